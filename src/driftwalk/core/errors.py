@@ -1,0 +1,62 @@
+"""The errors that driftwalk raises on purpose.
+
+Each is also a standard exception, so a caller may catch either. The message of an
+`InputError` is written for the person at the keyboard: what was wrong, where, what to do.
+The command line prints it on one line and exits with code 2.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class DriftwalkError(Exception):
+    """Base of every error that driftwalk raises on purpose."""
+
+
+class InputError(DriftwalkError, ValueError):
+    """Something the user gave cannot be used: a value, an option, an array."""
+
+
+class ConfigurationError(InputError):
+    """A study file or option is wrong: unknown key, value out of range, contradiction."""
+
+
+class FormatError(InputError):
+    """A file cannot be read as what it claims to be.
+
+    Parameters
+    ----------
+    message : str
+        What was wrong and what to do.
+    path : path-like, optional
+        The file.
+    line, column : int, optional
+        Position in the file, both counted from 1.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        path: str | Path | None = None,
+        line: int | None = None,
+        column: int | None = None,
+    ) -> None:
+        self.path = path
+        self.line = line
+        self.column = column
+        where = str(path) if path is not None else ""
+        if line is not None:
+            where += f", line {line}" if where else f"line {line}"
+        if column is not None:
+            where += f", column {column}"
+        super().__init__(f"{where}: {message}" if where else message)
+
+
+class RunDirectoryError(DriftwalkError, OSError):
+    """A run directory cannot be used: held by another process, of another study, not writable."""
+
+    def __str__(self) -> str:
+        """Return the message as it was given, without the errno prefix of `OSError`."""
+        return str(self.args[0]) if self.args else ""

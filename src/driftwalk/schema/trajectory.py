@@ -1,0 +1,180 @@
+"""The `trajectory` dataset: poses of one or more bodies over time.
+
+Dimensions ``(time, body)``; coordinates ``time`` [s] (strictly increasing) and ``body`` (names).
+Variables ``x``, ``y`` [m] and ``theta`` [rad, in (-pi, pi], NaN when unknown], float64. A missing
+sample is NaN in ``x`` and ``y``: gaps are real and are never filled. Bodies with clocks of their
+own share the union of their time stamps, each with NaN where it has no sample.
+
+What was known about the set-up stands in ``attrs``: ``kind`` = "trajectory", ``schema_version``,
+``source`` (file name), ``format`` (loader), ``sample_rate_Hz``, ``arena`` (JSON text, see
+`driftwalk.model.tank`), ``position_quantum_m`` (resolution of the file, 0 when unknown),
+``y_axis`` (what the loader did), ``counts`` (JSON text: what cleaning found).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SCHEMA_VERSION = 1
+VARIABLES: dict[str, dict[str, str]] = {
+    "x": {"units": "m", "long_name": "position x"},
+    "y": {"units": "m", "long_name": "position y"},
+    "theta": {"units": "rad", "long_name": "orientation"},
+}
+
+
+class Track(NamedTuple):
+    """The samples of one body that are present, shapes (n,), in time order."""
+
+    time: npt.NDArray[np.float64]
+    """Time [s]."""
+    x: npt.NDArray[np.float64]
+    """Position x [m]."""
+    y: npt.NDArray[np.float64]
+    """Position y [m]."""
+    theta: npt.NDArray[np.float64]
+    """Orientation [rad]; all NaN when the recording has none."""
+
+    @property
+    def has_orientation(self) -> bool:
+        """Whether any sample carries an orientation."""
+        return bool(np.isfinite(self.theta).any())
+
+
+def build_trajectory(
+    time: npt.ArrayLike,
+    x: npt.ArrayLike,
+    y: npt.ArrayLike,
+    theta: npt.ArrayLike | None = None,
+    *,
+    body: list[str] | None = None,
+    attrs: dict[str, Any] | None = None,
+) -> xr.Dataset:
+    """Build a `trajectory` dataset.
+
+    Parameters
+    ----------
+    time : array_like, shape (n,)
+        Time stamps [s], strictly increasing.
+    x, y : array_like, shape (n,) or (n, bodies)
+        Positions [m], NaN where a sample is missing.
+    theta : array_like, optional
+        Orientations [rad], same shape; wrapped into (-pi, pi].
+    body : list of str, optional
+        Names of the bodies; default ``"0"``, ``"1"``, ...
+    attrs : dict, optional
+        Attributes to add.
+
+    Returns
+    -------
+    xarray.Dataset
+        The checked dataset.
+
+    Raises
+    ------
+    InputError
+        When shapes disagree or times do not increase.
+
+    Examples
+    --------
+    >>> build_trajectory([0.0, 0.1], [0.0, 0.01], [0.0, 0.0]).sizes["time"]
+    2
+    """
+    import xarray as xr
+
+    time_s = np.asarray(time, dtype=np.float64)
+    x_m, y_m = (_columns(values) for values in (x, y))
+    theta_rad = np.full_like(x_m, np.nan) if theta is None else wrap_angle(_columns(theta))
+    if not x_m.shape == y_m.shape == theta_rad.shape or x_m.shape[0] != time_s.size:
+        raise InputError(
+            f"x {x_m.shape}, y {y_m.shape}, theta {theta_rad.shape} and time {time_s.shape} "
+            "do not have the same number of samples"
+        )
+    names = body if body is not None else [str(index) for index in range(x_m.shape[1])]
+    dataset = xr.Dataset(
+        {
+            name: (("time", "body"), values, VARIABLES[name])
+            for name, values in (("x", x_m), ("y", y_m), ("theta", theta_rad))
+        },
+        coords={
+            "time": ("time", time_s, {"units": "s", "long_name": "time"}),
+            "body": ("body", np.asarray(names, dtype=object), {"long_name": "body"}),
+        },
+        attrs={"kind": "trajectory", "schema_version": SCHEMA_VERSION, **(attrs or {})},
+    )
+    return check_trajectory(dataset)
+
+
+def wrap_angle(theta: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Wrap angles [rad] into (-pi, pi]."""
+    wrapped: npt.NDArray[np.float64] = np.pi - np.mod(np.pi - theta, 2.0 * np.pi)
+    return wrapped
+
+
+def check_trajectory(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the dataset if it is a valid `trajectory`, else raise `InputError`."""
+    for name in VARIABLES:
+        if name not in dataset or dataset[name].dims != ("time", "body"):
+            raise InputError(
+                f"not a trajectory dataset: variable '{name}' with dimensions (time, body) is missing"
+            )
+    time = dataset["time"].values
+    if time.size and not np.isfinite(time).all():
+        raise InputError("not a trajectory dataset: a time stamp is not a finite number")
+    if (np.diff(time) <= 0).any():
+        at = int(np.flatnonzero(np.diff(time) <= 0)[0])
+        raise InputError(
+            f"time does not increase at sample {at + 1}: {time[at]} s is followed by "
+            f"{time[at + 1]} s; sort the recording first"
+        )
+    return dataset
+
+
+def body_names(dataset: xr.Dataset) -> list[str]:
+    """Return the names of the bodies, in order."""
+    return [str(name) for name in dataset["body"].values]
+
+
+def body_track(dataset: xr.Dataset, body: str | None = None) -> Track:
+    """Return the present samples of one body.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A `trajectory`.
+    body : str, optional
+        Name of the body; may be left out when there is only one.
+
+    Raises
+    ------
+    InputError
+        When the body is not named and there are several, or there is none of that name.
+    """
+    names = body_names(dataset)
+    if body is None:
+        if len(names) != 1:
+            raise InputError(
+                f"the recording has {len(names)} bodies ({', '.join(names[:8])}"
+                f"{', …' if len(names) > 8 else ''}): name one with --body"
+            )
+        body = names[0]
+    if body not in names:
+        raise InputError(f"no body '{body}' in the recording; it has {', '.join(names)}")
+    index = names.index(body)
+    x, y, theta = (dataset[name].values[:, index] for name in VARIABLES)
+    present = np.isfinite(x) & np.isfinite(y)
+    time = dataset["time"].values
+    return Track(time[present], x[present], y[present], theta[present])
+
+
+def _columns(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    array = np.asarray(values, dtype=np.float64)
+    return array[:, None] if array.ndim == 1 else array

@@ -1,0 +1,3 @@
+"""Stage of driftwalk (being built)."""
+
+__all__: list[str] = []
