@@ -1,0 +1,196 @@
+"""Numbers with units: ``"0.55mN"`` read as 0.00055 N. Plain Python, no numpy.
+
+A quantity is a number followed by a unit: base symbols with SI prefixes, joined by a space, ``*``
+or ``/``, with exponents as ``m2``, ``m^2``, ``m**2`` or ``m²``. A number without a unit is in the
+unit that is asked for, which in driftwalk is always SI.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from fractions import Fraction
+from typing import Final, NamedTuple
+
+from driftwalk.core.errors import ConfigurationError
+
+Dimension = tuple[int, int, int, int]
+
+
+class _Unit(NamedTuple):
+    scale: Fraction
+    """Factor to SI."""
+    dimension: Dimension
+    """Exponents of metre, kilogram, second, radian."""
+
+
+_NONE: Final[Dimension] = (0, 0, 0, 0)
+# Symbols that take SI prefixes. The gram is here, and not the kilogram, because "kg" is k + g.
+_PREFIXABLE: Final[dict[str, _Unit]] = {
+    "m": _Unit(Fraction(1), (1, 0, 0, 0)),
+    "g": _Unit(Fraction(1, 1000), (0, 1, 0, 0)),
+    "s": _Unit(Fraction(1), (0, 0, 1, 0)),
+    "rad": _Unit(Fraction(1), (0, 0, 0, 1)),
+    "Hz": _Unit(Fraction(1), (0, 0, -1, 0)),
+    "N": _Unit(Fraction(1), (1, 1, -2, 0)),
+    "Pa": _Unit(Fraction(1), (-1, 1, -2, 0)),
+    "J": _Unit(Fraction(1), (2, 1, -2, 0)),
+}
+_DEGREE: Final = Fraction(math.pi) / 180
+_FIXED: Final[dict[str, _Unit]] = {
+    "1": _Unit(Fraction(1), _NONE),
+    "min": _Unit(Fraction(60), (0, 0, 1, 0)),
+    "h": _Unit(Fraction(3600), (0, 0, 1, 0)),
+    "deg": _Unit(_DEGREE, (0, 0, 0, 1)),
+    "°": _Unit(_DEGREE, (0, 0, 0, 1)),
+}
+# Both code points of mu are in use: the micro sign of keyboards and the Greek letter.
+_PREFIXES: Final[dict[str, Fraction]] = {
+    symbol: Fraction(10) ** power
+    for symbol, power in (
+        *(("G", 9), ("M", 6), ("k", 3), ("h", 2), ("d", -1), ("c", -2)),
+        *(("m", -3), ("u", -6), ("µ", -6), ("μ", -6), ("n", -9), ("p", -12)),
+    )
+}
+_NUMBER: Final = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
+_FACTOR: Final = re.compile(
+    r"\s*([*·/]?)\s*([A-Za-zµμ]+|°|1)\s*(?:(?:\^|\*\*)?(-?\d+)|([²³]))?", re.ASCII
+)
+_SUPERSCRIPTS: Final = {"²": 2, "³": 3}
+
+
+def parse_quantity(text: str | float, unit: str) -> float:
+    """Read a number with an optional unit, and return it in the unit asked for.
+
+    Parameters
+    ----------
+    text : str or float
+        Such as ``"0.55mN"``, ``"16 ms"``, ``"30cm"``, ``"0.5deg"``, ``"1.2 g/cm3"``; a bare number
+        (or a string that holds one) is taken to be in `unit` already.
+    unit : str
+        The unit of the result: ``"m"``, ``"N"``, ``"kg/m3"``, ``"Pa s"``, ..., or ``"1"`` for a
+        number without a dimension.
+
+    Returns
+    -------
+    float
+        The value in `unit`, finite.
+
+    Raises
+    ------
+    ConfigurationError
+        When the text is not a number, the unit is unknown or measures something else, or the value
+        is not finite. Pixels are not a unit: how many metres one is belongs to the recording.
+
+    Examples
+    --------
+    >>> parse_quantity("0.55mN", "N")
+    0.00055
+    """
+    if isinstance(text, bool) or not isinstance(text, (str, int, float)):
+        raise ConfigurationError(f"expected {_expected(unit)}, got {text!r}")
+    value = _parse_text(text, unit) if isinstance(text, str) else _to_float(text)
+    if not math.isfinite(value):
+        raise ConfigurationError(f"expected {_expected(unit)}, got {text!r}, which is not finite")
+    return value
+
+
+def _to_float(number: float | Fraction) -> float:
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf
+
+
+def _parse_text(text: str, unit: str) -> float:
+    match = _NUMBER.fullmatch(text)
+    if match is None or match[2].startswith(","):
+        hint = "; use a decimal point" if re.search(r"\d,\d", text) else ""
+        raise ConfigurationError(f"expected {_expected(unit)}, got '{text}'{hint}")
+    number, symbol = float(match[1]), match[2]
+    if not symbol:
+        return number
+    given, wanted = _parse_unit(symbol, text, unit), _parse_unit(unit, text, unit)
+    if given.dimension != wanted.dimension:
+        raise ConfigurationError(
+            f"expected {_expected(unit)}, got '{text}': '{symbol}' measures something else"
+        )
+    if not math.isfinite(number):
+        return number
+    # Exact fractions, rounded once: 0.55 mN is the float that 0.00055 N is.
+    return _to_float(Fraction(repr(number)) * given.scale / wanted.scale)
+
+
+def _parse_unit(symbol: str, text: str, unit: str) -> _Unit:
+    """Return the scale and dimension of a product of units."""
+    scale, dimension = Fraction(1), _NONE
+    position = 0
+    while position < len(symbol):
+        match = _FACTOR.match(symbol, position)
+        if match is None or (position == 0 and match[1]):
+            raise ConfigurationError(
+                f"expected {_expected(unit)}, got '{text}': cannot read the unit '{symbol}'"
+            )
+        # A slash divides by the factor after it alone, as in "kg/m s" written by hand.
+        sign = -1 if match[1] == "/" else 1
+        power = sign * int(match[3] or _SUPERSCRIPTS.get(match[4] or "", 1))
+        if abs(power) > 9:
+            raise ConfigurationError(
+                f"expected {_expected(unit)}, got '{text}': the exponent {power} is out of range"
+            )
+        factor = _lookup(match[2], text, unit)
+        scale *= factor.scale**power
+        dimension = _add(dimension, factor.dimension, power)
+        position = match.end()
+    return _Unit(scale, dimension)
+
+
+def _add(left: Dimension, right: Dimension, power: int) -> Dimension:
+    metre, kilogram, second, radian = (a + power * b for a, b in zip(left, right, strict=True))
+    return metre, kilogram, second, radian
+
+
+def _lookup(symbol: str, text: str, unit: str) -> _Unit:
+    """Return one unit; an exact symbol comes before a prefix, so that "min" is a minute."""
+    if symbol in _FIXED:
+        return _FIXED[symbol]
+    if symbol in _PREFIXABLE:
+        return _PREFIXABLE[symbol]
+    prefix, base = symbol[:1], symbol[1:]
+    if prefix in _PREFIXES and base in _PREFIXABLE:
+        return _Unit(_PREFIXES[prefix] * _PREFIXABLE[base].scale, _PREFIXABLE[base].dimension)
+    if symbol.lower() in ("px", "pixel", "pixels"):
+        raise ConfigurationError(
+            f"expected {_expected(unit)}, got '{text}': a pixel is not a unit of length; "
+            "say how many metres it is (metres_per_pixel, --metres-per-pixel)"
+        )
+    raise ConfigurationError(
+        f"expected {_expected(unit)}, got '{text}': unknown unit '{symbol}'{_suggestion(symbol)}"
+    )
+
+
+def _suggestion(symbol: str) -> str:
+    words = {"sec": "s", "ms": "ms", "minutes": "min", "degrees": "deg", "newton": "N", "hr": "h"}
+    known = {**{name.lower(): name for name in (*_PREFIXABLE, *_FIXED)}, **words}
+    found = known.get(symbol.lower()) or known.get(symbol.lower().rstrip("s"))
+    return f"; did you mean '{found}'?" if found else ""
+
+
+_EXAMPLES: Final = {
+    "m": "3cm",
+    "s": "16ms",
+    "N": "0.55mN",
+    "kg": "11.6g",
+    "rad": "0.5deg",
+    "Hz": "10Hz",
+    "m/s": "1cm/s",
+    "kg/m3": "1g/cm3",
+    "Pa s": "0.89mPa s",
+}
+
+
+def _expected(unit: str) -> str:
+    if unit == "1":
+        return "a number"
+    example = f" such as '{_EXAMPLES[unit]}'" if unit in _EXAMPLES else ""
+    return f"a number in {unit} or a quantity{example}"
