@@ -1,0 +1,111 @@
+"""Values and labels in the units that a reader of a figure expects (cm, mm, mN, degrees)."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# (unit in the dataset, unit in the figure) -> factor
+FACTORS: dict[tuple[str, str], float] = {
+    ("m", "cm"): 1e2,
+    ("m", "mm"): 1e3,
+    ("m s-1", "cm/s"): 1e2,
+    ("m s-1", "mm/s"): 1e3,
+    ("N", "mN"): 1e3,
+    ("rad", "°"): 180.0 / math.pi,
+    ("s", "s"): 1.0,
+    ("s", "min"): 1.0 / 60.0,
+    ("1", "%"): 1e2,
+}
+MN_PER_N = FACTORS["N", "mN"]
+
+
+def in_unit(variable: xr.DataArray, unit: str, *, stored: str) -> npt.NDArray[np.float64]:
+    """Return the values of a variable in `unit`.
+
+    Parameters
+    ----------
+    variable : xarray.DataArray
+        Its ``units`` attribute, when it has one, says what it is stored in.
+    unit : str
+        Unit of the figure, such as ``"cm"``.
+    stored : str
+        Unit that a variable without a ``units`` attribute has by its schema.
+
+    Raises
+    ------
+    InputError
+        When there is no way from the variable's unit to `unit`.
+    """
+    have = str(variable.attrs.get("units", stored))
+    if (have, unit) not in FACTORS:
+        raise InputError(
+            f"'{variable.name}' is in '{have}', expected '{stored}': convert it and set its "
+            "attribute 'units'"
+        )
+    return np.asarray(variable.values, dtype=np.float64) * FACTORS[have, unit]
+
+
+def label_of(variable: xr.DataArray, unit: str, *, name: str) -> str:
+    """Return "long_name (unit)"; `name` stands in for a missing ``long_name``."""
+    return f"{variable.attrs.get('long_name', name)} ({unit})"
+
+
+def force_label(calibration: xr.Dataset) -> str:
+    """Return the label of an axis of σ_F [mN], with the interval that gives it a meaning.
+
+    Only σ_F² times the interval at which the force is drawn anew is identifiable, so σ_F is never
+    shown without it.
+    """
+    return r"stochastic force $\sigma_F$ (mN)," + f"\n{force_interval_text(calibration)}"
+
+
+def force_interval_text(calibration: xr.Dataset) -> str:
+    """Return "drawn anew every 16 ms" for the force interval of the calibration."""
+    interval_s = required_attribute(calibration, "force_interval_s")
+    return f"drawn anew every {1e3 * float(interval_s):.4g} ms"
+
+
+DRAG_LABEL = r"drag coefficient $C_d$"
+LENGTH_LABEL = "step length (mm)"
+# The paper says step angle for what the field calls turning angle.
+ANGLE_LABEL = "turning (step) angle (°)"
+
+
+def required_attribute(dataset: xr.Dataset, name: str) -> Any:
+    """Return an attribute of the dataset, or raise `InputError` naming it."""
+    if name not in dataset.attrs:
+        raise InputError(f"the calibration has no attribute '{name}': it is not complete")
+    return dataset.attrs[name]
+
+
+def require_variables(dataset: xr.Dataset, *names: str) -> None:
+    """Raise `InputError` naming the variables that the dataset lacks."""
+    missing = [name for name in names if name not in dataset.variables]
+    if missing:
+        raise InputError(f"the calibration lacks {', '.join(missing)}: nothing to draw")
+
+
+def interval_of(calibration: xr.Dataset, name: str) -> tuple[float, float] | None:
+    """Return an interval [low, high] stored as an attribute, None when absent or not finite."""
+    stored = calibration.attrs.get(name)
+    if stored is None:
+        return None
+    ends = np.asarray(json.loads(stored) if isinstance(stored, str) else stored, dtype=np.float64)
+    if ends.shape != (2,) or not np.isfinite(ends).all():
+        return None
+    return float(ends[0]), float(ends[1])
+
+
+def number_attribute(dataset: xr.Dataset, name: str) -> float:
+    """Return a numeric attribute, NaN when it is absent."""
+    return float(dataset.attrs.get(name, math.nan))

@@ -1,0 +1,169 @@
+"""What all figures share: sizes, colours, the print style, and axes that need no display.
+
+Figures are made from `matplotlib.figure.Figure` with the Agg canvas, never through pyplot, so
+that drawing opens no window, holds no global list of figures, and leaves the reader's own style
+alone. A plotting function given an ``ax`` draws with whatever style that figure has; only the
+writers of files apply `print_style`.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colorbar import Colorbar
+    from matplotlib.colors import Colormap
+    from matplotlib.figure import Figure
+
+SINGLE_COLUMN_MM = 90.0
+DOUBLE_COLUMN_MM = 180.0
+MM_PER_INCH = 25.4
+
+# Perceptually uniform, readable in grey and with every common colour vision deficiency.
+SCORE_COLORMAP = "viridis"
+TIME_COLORMAP = "viridis"
+# From light to dark, so that a bin with nothing in it (white) is not mistaken for a large value.
+DENSITY_COLORMAP = "magma_r"
+
+INK = "#1a1a1a"
+MUTED = "#6b6b6b"
+PALE = "#e6e6e6"
+# Okabe and Ito's palette for colour-blind readers.
+BLUE = "#0072B2"
+ORANGE = "#D55E00"
+
+STYLE: dict[str, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 8.0,
+    "axes.titlesize": 8.0,
+    "axes.labelsize": 8.0,
+    "axes.linewidth": 0.6,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "axes.titlepad": 4.0,
+    "axes.labelpad": 3.0,
+    "text.color": INK,
+    "xtick.labelsize": 7.0,
+    "ytick.labelsize": 7.0,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.major.size": 2.5,
+    "ytick.major.size": 2.5,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "legend.fontsize": 7.0,
+    "legend.frameon": False,
+    "legend.handlelength": 1.6,
+    "legend.columnspacing": 1.2,
+    "lines.linewidth": 1.0,
+    "hatch.linewidth": 0.5,
+    "figure.titlesize": 8.0,
+    "figure.constrained_layout.h_pad": 0.03,
+    "figure.constrained_layout.w_pad": 0.03,
+    "savefig.dpi": 300.0,
+    # The same data give the same file: ids in an SVG are drawn from this salt, and text is
+    # stored as outlines so that a reader's fonts do not matter.
+    "svg.hashsalt": "driftwalk",
+    "svg.fonttype": "path",
+}
+
+# matplotlib's parameters are one global table: two threads must not swap them at a time.
+_STYLE_LOCK = threading.Lock()
+
+
+@contextmanager
+def print_style() -> Iterator[None]:
+    """Apply the print style to what is drawn inside, and restore the old one after.
+
+    The base is matplotlib's default and not the reader's own settings, so that the files of a run
+    look alike on every machine.
+    """
+    import matplotlib
+
+    with _STYLE_LOCK, matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        parameters: Any = matplotlib.rcParams
+        parameters.update(STYLE)
+        yield
+
+
+def new_figure(*, width_mm: float, height_mm: float) -> Figure:
+    """Return an empty figure of that size [mm] with the Agg canvas and constrained layout."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width_mm / MM_PER_INCH, height_mm / MM_PER_INCH), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def axes_or_new(
+    ax: Axes | None, *, width_mm: float = SINGLE_COLUMN_MM, height_mm: float = 75.0
+) -> Axes:
+    """Return `ax`, or the only axes of a new figure of that size [mm] when it is None."""
+    if ax is not None:
+        return ax
+    return new_figure(width_mm=width_mm, height_mm=height_mm).add_subplot()
+
+
+def axes_row_or_new(
+    axes: Any,
+    *,
+    count: int,
+    width_mm: float = DOUBLE_COLUMN_MM,
+    height_mm: float = 62.0,
+    **options: Any,
+) -> list[Axes]:
+    """Return `axes` as a list of `count` axes, or those of a new figure with one row of them.
+
+    Raises
+    ------
+    InputError
+        When `axes` does not hold exactly `count` axes.
+    """
+    import numpy as np
+
+    from driftwalk.core.errors import InputError
+
+    if axes is None:
+        figure = new_figure(width_mm=width_mm, height_mm=height_mm)
+        axes = figure.subplots(1, count, squeeze=False, **options)
+    row: list[Axes] = list(np.ravel(np.asarray(axes, dtype=object)))
+    if len(row) != count:
+        raise InputError(f"got {len(row)} axes, expected {count}: pass them as axes=[...]")
+    return row
+
+
+def speed_colormap() -> Colormap:
+    """Return one hue from light to middle: dark arrows stay readable, and blank differs from 0."""
+    import numpy as np
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap(colormaps["Blues"](np.linspace(0.06, 0.68, 256)), name="light_blues")
+
+
+def add_colorbar(mappable: ScalarMappable, axes: Axes | list[Axes], label: str) -> Colorbar:
+    """Add a slim colour bar to the right of the axes and return it."""
+    first = axes[0] if isinstance(axes, list) else axes
+    bar = first.figure.colorbar(mappable, ax=axes, label=label, pad=0.02, aspect=22, fraction=0.06)
+    bar.outline.set_linewidth(0.6)
+    if bar.solids is not None:
+        bar.solids.set_rasterized(True)
+    return bar
+
+
+def add_footer(figure: Figure, text: str) -> None:
+    """Write a small remark at the lower edge of the figure."""
+    figure.supxlabel(text, x=0.995, ha="right", fontsize=6.0, color=MUTED)
+
+
+def letter_panels(axes: list[Axes], titles: list[str]) -> None:
+    """Title panels "(a) …", "(b) …" at their left edge."""
+    for index, (ax, title) in enumerate(zip(axes, titles, strict=True)):
+        ax.set_title(f"({chr(ord('a') + index)}) {title}", loc="left")
