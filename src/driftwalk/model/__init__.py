@@ -1,3 +1,36 @@
-"""Stage of driftwalk (being built)."""
+"""What is simulated and how: frozen parameters with units, read from and written to TOML."""
 
-__all__: list[str] = []
+from driftwalk.model.block import Block
+from driftwalk.model.calibration import Calibration
+from driftwalk.model.flow import Flow
+from driftwalk.model.forces import Forces
+from driftwalk.model.observation import Observation
+from driftwalk.model.recording import Columns, Recording
+from driftwalk.model.simulation import Pose, Simulation
+from driftwalk.model.steps import Steps
+from driftwalk.model.study import Study, apply_overrides, load_study, parse_study
+from driftwalk.model.tank import FieldOfView, Tank
+from driftwalk.model.template import parameter_table, study_template
+from driftwalk.model.water import Water
+
+__all__ = [
+    "Block",
+    "Calibration",
+    "Columns",
+    "FieldOfView",
+    "Flow",
+    "Forces",
+    "Observation",
+    "Pose",
+    "Recording",
+    "Simulation",
+    "Steps",
+    "Study",
+    "Tank",
+    "Water",
+    "apply_overrides",
+    "load_study",
+    "parameter_table",
+    "parse_study",
+    "study_template",
+]

@@ -1,0 +1,77 @@
+"""The floating block: a square prism."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Field, model_validator
+
+from driftwalk.core.errors import ConfigurationError
+from driftwalk.model.section import Quantity, Section
+
+
+class Block(Section):
+    """A square prism of side a and mass m that floats upright.
+
+    Examples
+    --------
+    >>> Block().inertia_kg_m2
+    1.74e-06
+    """
+
+    section_name: ClassVar[str] = "block"
+
+    side_m: Annotated[float, Quantity("m", gt=0, le=10)] = Field(
+        default=0.03, description="Side a of the square, seen from above."
+    )
+    mass_kg: Annotated[float, Quantity("kg", gt=0, le=1e4)] = Field(
+        default=0.0116, description="Mass m, with everything that the block carries."
+    )
+    depth: Literal["immersed", "archimedes"] | None = Field(
+        default=None,
+        description=(
+            'Wetted depth d of a side face: "immersed" is d = a (the default), "archimedes" is the '
+            "depth at which the block floats, d = m / (density a^2). The drag depends on the "
+            "product of drag_coefficient and depth alone, so the two are always stated together."
+        ),
+    )
+    depth_m: Annotated[float | None, Quantity("m", gt=0, le=10)] = Field(
+        default=None,
+        description="Wetted depth d as a length, in place of `depth`.",
+        examples=[0.0129],
+    )
+    strips_per_face: Annotated[int, Quantity("1", ge=1, le=64, whole=True)] = Field(
+        default=8, description="Vertical strips into which each side face is cut for the drag."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_depth(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        word, number = data.get("depth"), data.get("depth_m")
+        if word is None and number is None:
+            return {**data, "depth": "immersed"}
+        if word is not None and number is not None:
+            raise ConfigurationError(
+                f"depth = {word!r} and depth_m = {number} both given: keep one"
+            )
+        return data
+
+    @classmethod
+    def replaced_by(cls, keys: set[str]) -> set[str]:
+        """Return the other way of giving the depth, when one is set."""
+        return {"depth", "depth_m"} - keys if keys & {"depth", "depth_m"} else set()
+
+    @property
+    def inertia_kg_m2(self) -> float:
+        """Moment of inertia about the vertical, I = m a² / 6 [kg m²]."""
+        return self.mass_kg * self.side_m**2 / 6.0
+
+    def wetted_depth_m(self, density_kg_m3: float) -> float:
+        """Return the wetted depth d of a side face [m] in water of the density given [kg/m³]."""
+        if self.depth_m is not None:
+            return self.depth_m
+        if self.depth == "archimedes":
+            return self.mass_kg / (density_kg_m3 * self.side_m**2)
+        return self.side_m

@@ -1,0 +1,36 @@
+"""How the flow field is taken from a recording."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
+
+from driftwalk.model.section import Quantity, Section
+
+
+class Flow(Section):
+    """How the flow field is taken from a recording (Eq. 4 of the paper)."""
+
+    section_name: ClassVar[str] = "flow"
+
+    cells: Annotated[int, Quantity("1", ge=2, le=2000, whole=True)] = Field(
+        default=50, description="Cells across the longer side of the tank."
+    )
+    cell_size_m: Annotated[float | None, Quantity("m", gt=0, le=10)] = Field(
+        default=None, description="Side of a cell, in place of `cells`.", examples=[0.006]
+    )
+    smoothing_window_s: Annotated[float, Quantity("s", gt=0, le=1e3)] = Field(
+        default=0.7,
+        description="Window of the local quadratic fit that gives velocity and acceleration.",
+    )
+    flow_drag_coefficient: Annotated[float, Quantity("1", gt=0, le=100)] = Field(
+        default=1.05, description="Drag coefficient C_x of the inertia correction (Eq. 4)."
+    )
+    min_count: Annotated[int, Quantity("1", ge=1, le=1_000_000, whole=True)] = Field(
+        default=1, description="Samples that a cell needs to count as measured."
+    )
+    inertia: Literal["corrected", "none"] = Field(
+        default="corrected",
+        description='"corrected" adds the inertia term of Eq. 4; "none" leaves it out.',
+    )

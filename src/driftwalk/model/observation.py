@@ -1,0 +1,52 @@
+"""What the camera does to the poses."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
+
+from driftwalk.model.section import Quantity, Section
+from driftwalk.model.tank import FieldOfView
+
+
+class Observation(Section):
+    """How a pose becomes a sample: noise, resolution of the file, missed samples."""
+
+    section_name: ClassVar[str] = "observation"
+
+    position_noise_m: Annotated[
+        float | Literal["estimate"], Quantity("m", ge=0, le=1, words=("estimate",))
+    ] = Field(
+        default="estimate",
+        description=(
+            'Standard deviation of the position noise of the tracker, per axis; "estimate" takes '
+            "it from the recording, and none where there is no recording."
+        ),
+    )
+    orientation_noise_rad: Annotated[
+        float | Literal["estimate"], Quantity("rad", ge=0, le=3.2, words=("estimate",))
+    ] = Field(
+        default="estimate", description="Standard deviation of the orientation noise, likewise."
+    )
+    position_quantum_m: Annotated[
+        float | Literal["recording"], Quantity("m", ge=0, le=1, words=("recording",))
+    ] = Field(
+        default="recording",
+        description=(
+            "Resolution to which simulated positions are rounded, 0 for none; "
+            '"recording" takes that of the recorded file.'
+        ),
+    )
+    gaps: Literal["recording", "none"] = Field(
+        default="recording",
+        description='Missed samples: "recording" removes the samples that the recording lacks.',
+    )
+    field_of_view: FieldOfView | None = Field(
+        default=None,
+        description=(
+            "What the camera sees, when that is less than the tank: the keys of [tank]'s form, and "
+            "center_m; samples outside are missing."
+        ),
+        examples=['{ shape = "rectangle", width_m = 0.25, height_m = 0.2 }'],
+    )

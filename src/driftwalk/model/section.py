@@ -1,0 +1,195 @@
+"""What every section of a study has in common: declared quantities and readable errors.
+
+A field is declared once: type, unit, range, default and meaning stand together, and the same
+declaration checks the value, writes the commented template and makes the reference page.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, ClassVar, get_args
+
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
+from pydantic_core import CoreSchema, ErrorDetails, core_schema
+
+from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.units import parse_quantity
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Declares a number of a study: its unit, its range, and the words it may be instead.
+
+    Parameters
+    ----------
+    unit : str
+        SI unit of the stored value, ``"1"`` for none. Text such as ``"0.55mN"`` is read.
+    ge, gt, le, lt : float, optional
+        Bounds: at least, more than, at most, less than.
+    words : tuple of str
+        Words that may stand for a number (``"auto"``, ``"estimate"``).
+    whole : bool
+        Whether only whole numbers are accepted.
+    """
+
+    unit: str
+    ge: float | None = None
+    gt: float | None = None
+    le: float | None = None
+    lt: float | None = None
+    words: tuple[str, ...] = ()
+    whole: bool = False
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Put `check` in front of the type's own validation."""
+        return core_schema.no_info_before_validator_function(self.check, handler(source))
+
+    def check(self, value: Any) -> Any:
+        """Return the value in the declared unit, or a word as it is.
+
+        Raises
+        ------
+        ConfigurationError
+            When it is neither, or out of range.
+        """
+        if value is None or (isinstance(value, str) and value in self.words):
+            return value
+        if self.words and isinstance(value, str) and value[:1].isalpha():
+            raise ConfigurationError(
+                f"expected a number{self._in_unit()} or {quoted(self.words)}, got '{value}'"
+                f"{did_you_mean(value, self.words)}"
+            )
+        if self.whole:
+            number: float = self._whole(value)
+        else:
+            number = parse_quantity(value, self.unit)
+        for bound, holds, text in (
+            (self.ge, number >= (self.ge or 0.0), "at least"),
+            (self.gt, number > (self.gt or 0.0), "more than"),
+            (self.le, number <= (self.le or 0.0), "at most"),
+            (self.lt, number < (self.lt or 0.0), "less than"),
+        ):
+            if bound is not None and not holds:
+                unit = f" {self.unit}" if self.unit != "1" else ""
+                raise ConfigurationError(f"must be {text} {bound:g}{unit}, got {value}")
+        return number
+
+    def range_text(self) -> str:
+        """Return the range in words, empty when there is none."""
+        parts = [
+            f"{sign} {bound:.15g}"
+            for sign, bound in ((">=", self.ge), (">", self.gt), ("<=", self.le), ("<", self.lt))
+            # The largest integer of a file format says nothing to a reader.
+            if bound is not None and bound < 1e18
+        ]
+        return ", ".join(parts)
+
+    def _in_unit(self) -> str:
+        return f" in {self.unit}" if self.unit != "1" else ""
+
+    def _whole(self, value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise ConfigurationError(f"expected a whole number, got {value!r}")
+        return value
+
+
+class Section(BaseModel):
+    """Base of every section: frozen, no unknown keys, errors that name section and key."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
+
+    section_name: ClassVar[str] = ""
+    """Name of the section in a study file, empty for the study itself."""
+
+    def __init__(self, /, **data: Any) -> None:
+        try:
+            super().__init__(**data)
+        except ValidationError as error:
+            raise _SectionError(_describe(type(self), error)) from None
+
+    @classmethod
+    def replaced_by(cls, keys: set[str]) -> set[str]:  # noqa: ARG003
+        """Return the keys that lose their meaning when the keys given are set."""
+        return set()
+
+
+class _SectionError(ConfigurationError):
+    """An error whose message names its section already."""
+
+
+def quoted(words: Iterable[str]) -> str:
+    """Return words in quotes, joined for a sentence."""
+    return " or ".join(f'"{word}"' for word in words)
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Return "; did you mean '…'?" for the closest known word, or nothing.
+
+    A name that lacks only its unit ("diameter" for "diameter_m") counts as close.
+    """
+    names = list(known)
+    found = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
+    found = found or [name for name in names if name.startswith(f"{word}_")]
+    return f"; did you mean '{found[0]}'?" if found else ""
+
+
+def quantity_of(section: type[Section], key: str) -> Quantity | None:
+    """Return the declared quantity of a field, None for a field that is not a number."""
+    metadata = section.model_fields[key].metadata
+    return next((item for item in metadata if isinstance(item, Quantity)), None)
+
+
+def words_of(section: type[Section], key: str) -> tuple[str, ...]:
+    """Return the words that a field accepts, empty when it accepts any or none."""
+    annotation = section.model_fields[key].annotation
+    arguments = (annotation, *get_args(annotation))
+    words = [word for item in arguments for word in get_args(item) if isinstance(word, str)]
+    words += [item for item in get_args(annotation) if isinstance(item, str)]
+    return tuple(dict.fromkeys(words))
+
+
+def _describe(section: type[Section], error: ValidationError) -> str:
+    """Return one sentence for the first problem, and how many more there are."""
+    problems = error.errors(include_url=False)
+    sentence = _sentence(section, problems[0])
+    more = len({problem["loc"][:1] for problem in problems}) - 1
+    if more > 0:
+        sentence += f" (and {more} more problem{'s' if more > 1 else ''})"
+    return sentence
+
+
+def _sentence(section: type[Section], problem: ErrorDetails) -> str:
+    cause = problem.get("ctx", {}).get("error")
+    if isinstance(cause, _SectionError):
+        return str(cause)
+    location, value, kind = problem["loc"], problem.get("input"), problem["type"]
+    name = section.section_name
+    if not location:
+        return f"[{name}] {cause}" if name else str(cause or problem["msg"])
+    key = str(location[0])
+    if kind == "extra_forbidden":
+        return _unknown_key(section, key)
+    if not name and kind in ("model_type", "model_attributes_type", "dict_type"):
+        return f"[{key}] must be a section of keys, got {value!r}"
+    where = f"[{name}] {key}" if name else key
+    if cause is not None:
+        return f"{where}: {cause}"
+    if kind == "missing":
+        return f"{where} is missing"
+    if kind == "literal_error":
+        words = words_of(section, key)
+        hint = did_you_mean(str(value), words)
+        return f"{where} must be {quoted(words)}, got {value!r}{hint}"
+    message = problem["msg"].replace("Input should be", "must be")
+    return f"{where} {message}, got {value!r}"
+
+
+def _unknown_key(section: type[Section], key: str) -> str:
+    hint = did_you_mean(key, section.model_fields)
+    if section.section_name:
+        return f"[{section.section_name}] unknown key '{key}'{hint}"
+    return f"unknown section or key '{key}'{hint}"

@@ -1,0 +1,104 @@
+"""How a simulation is run: time step, length, sampling, start, seed."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Field, field_validator
+
+from driftwalk.core.errors import ConfigurationError
+from driftwalk.model.section import Quantity, Section
+
+LONGEST_AUTOMATIC_STEP_S = 0.010
+
+
+class Pose(Section):
+    """A pose: position [m] and orientation [rad] in the frame of the tank's centre."""
+
+    section_name: ClassVar[str] = "simulation.start"
+
+    x_m: Annotated[float, Quantity("m")] = Field(default=0.0, description="Position x.")
+    y_m: Annotated[float, Quantity("m")] = Field(default=0.0, description="Position y.")
+    theta_rad: Annotated[float, Quantity("rad")] = Field(
+        default=0.0, description="Orientation, counter-clockwise from x."
+    )
+
+
+class Simulation(Section):
+    """How a simulation is run: time step, length, sampling, start, seed."""
+
+    section_name: ClassVar[str] = "simulation"
+
+    time_step_s: Annotated[
+        float | Literal["auto"], Quantity("s", gt=0, le=0.1, words=("auto",))
+    ] = Field(
+        default="auto",
+        description=(
+            'Time step of the integrator; "auto" is the largest whole divisor of force_interval_s '
+            "not above 10 ms. A step that does not divide the interval is an error."
+        ),
+    )
+    duration_s: Annotated[float, Quantity("s", gt=0, le=1e7)] = Field(
+        default=1800.0, description="Length of a simulated trajectory."
+    )
+    sample_rate_Hz: Annotated[float, Quantity("Hz", gt=0, le=1e5)] = Field(
+        default=10.0,
+        description="Sampling of a simulation that has no recording's time stamps to follow.",
+    )
+    replicates: Annotated[int, Quantity("1", ge=1, le=10_000_000, whole=True)] = Field(
+        default=1, description="Trajectories with the same parameters and different random numbers."
+    )
+    seed: Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)] = Field(
+        default=1, description="Seed of the random numbers; the same seed gives the same bits."
+    )
+    start: Literal["random"] | Pose = Field(
+        default="random",
+        description=(
+            'First pose: "random", anywhere in the tank, or a pose such as '
+            "{ x_m = 0.0, y_m = 0.0, theta_rad = 0.0 }. The block starts at rest."
+        ),
+    )
+
+    @field_validator("start", mode="before")
+    @classmethod
+    def _pose_or_word(cls, start: Any) -> Any:
+        if isinstance(start, str) and start != "random":
+            raise ConfigurationError(f'expected "random" or a pose, got {start!r}')
+        return Pose(**start) if isinstance(start, dict) else start
+
+
+def resolve_time_step(time_step_s: float | Literal["auto"], *, force_interval_s: float) -> float:
+    """Return the integrator's time step [s].
+
+    Parameters
+    ----------
+    time_step_s : float or "auto"
+        A step that divides the force interval, or "auto": the largest whole divisor of the
+        interval that is not above 10 ms (16 ms gives 8 ms).
+    force_interval_s : float
+        How long one draw of the stochastic force lasts [s].
+
+    Raises
+    ------
+    ConfigurationError
+        When a step that was named does not divide the interval.
+
+    Examples
+    --------
+    >>> resolve_time_step("auto", force_interval_s=0.016)
+    0.008
+    """
+    if time_step_s == "auto":
+        # The margin keeps an interval such as 0.03, which is not a binary fraction, at three steps.
+        parts = max(1, math.ceil(force_interval_s / LONGEST_AUTOMATIC_STEP_S - 1e-9))
+        return force_interval_s / parts
+    ratio = force_interval_s / time_step_s
+    parts = round(ratio)
+    if parts < 1 or abs(ratio - parts) > 1e-6 * ratio:
+        raise ConfigurationError(
+            f"time_step_s = {time_step_s:g} does not divide force_interval_s = "
+            f"{force_interval_s:g}: {ratio:.6g} steps in an interval; use a whole divisor or "
+            '"auto" (--time-step auto)'
+        )
+    return force_interval_s / parts

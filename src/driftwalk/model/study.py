@@ -1,0 +1,220 @@
+"""The study: every parameter of a piece of work, in one frozen object and one TOML file."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import Field, model_validator
+
+from driftwalk.core.errors import ConfigurationError
+from driftwalk.model.block import Block
+from driftwalk.model.calibration import Calibration
+from driftwalk.model.flow import Flow
+from driftwalk.model.forces import Forces
+from driftwalk.model.observation import Observation
+from driftwalk.model.recording import Recording
+from driftwalk.model.section import Section, did_you_mean
+from driftwalk.model.simulation import Pose, Simulation, resolve_time_step
+from driftwalk.model.steps import Steps
+from driftwalk.model.tank import Tank
+from driftwalk.model.water import Water
+
+
+class Study(Section):
+    """Everything that a simulation or calibration needs to know besides the recording itself.
+
+    A study is frozen, refuses unknown keys and contradictions, and survives a round trip through
+    its TOML file. Sections may be given as objects or as dictionaries.
+
+    Raises
+    ------
+    ConfigurationError
+        When a key is unknown, a value out of range, or two values contradict each other.
+
+    Examples
+    --------
+    >>> Study(forces={"force_interval_s": "16ms"}).time_step_s
+    0.008
+    """
+
+    block: Block = Field(default_factory=Block, description="The floating block.")
+    tank: Tank = Field(default_factory=Tank, description="The tank and its wall.")
+    water: Water = Field(default_factory=Water, description="The liquid.")
+    forces: Forces = Field(default_factory=Forces, description="Drag and stochastic force.")
+    simulation: Simulation = Field(
+        default_factory=Simulation, description="How a simulation is run."
+    )
+    observation: Observation = Field(
+        default_factory=Observation, description="What the camera does to the poses."
+    )
+    recording: Recording = Field(
+        default_factory=Recording, description="How the recording is read."
+    )
+    flow: Flow = Field(
+        default_factory=Flow, description="How the flow field is taken from the recording."
+    )
+    steps: Steps = Field(default_factory=Steps, description="How steps are formed.")
+    calibration: Calibration = Field(
+        default_factory=Calibration, description="What a calibration searches."
+    )
+
+    @model_validator(mode="after")
+    def _time_step_divides(self) -> Self:
+        _ = self.time_step_s
+        return self
+
+    @model_validator(mode="after")
+    def _block_fits(self) -> Self:
+        side, tank = self.block.side_m, self.tank
+        # In a round tank the corners decide; between straight walls a block may lie along them.
+        needed = side * math.sqrt(2.0) if tank.shape == "circle" else side
+        if needed >= tank.narrowest_m:
+            raise ConfigurationError(
+                f"the block does not fit into the tank: [block] side_m = {side:g} (diagonal "
+                f"{side * math.sqrt(2.0):.3g} m), [tank] is a {tank.describe()}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _start_inside(self) -> Self:
+        start = self.simulation.start
+        if isinstance(start, Pose) and not all(
+            self.tank.contains(x, y) for x, y in block_corners(start, side_m=self.block.side_m)
+        ):
+            raise ConfigurationError(
+                f"[simulation] start at ({start.x_m:g}, {start.y_m:g}) m puts a corner of the "
+                f"block (side_m = {self.block.side_m:g}) outside [tank], a {self.tank.describe()}"
+            )
+        return self
+
+    @property
+    def time_step_s(self) -> float:
+        """Time step of the integrator [s], "auto" resolved; it divides the force interval."""
+        return resolve_time_step(
+            self.simulation.time_step_s, force_interval_s=self.forces.force_interval_s
+        )
+
+    @property
+    def wetted_depth_m(self) -> float:
+        """Wetted depth d of a side face [m]."""
+        return self.block.wetted_depth_m(self.water.density_kg_m3)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the study as plain dictionaries, without the keys that are not set."""
+        return self.model_dump(mode="python", exclude_none=True)
+
+    def to_toml(self) -> str:
+        """Return the study as the text of a study file; `load_study` reads the same study back."""
+        from driftwalk.model.template import write_toml
+
+        return write_toml(self)
+
+
+def block_corners(pose: Pose, *, side_m: float) -> list[tuple[float, float]]:
+    """Return the four corners of a square block [m] at a pose."""
+    reach = side_m / math.sqrt(2.0)
+    angles = (pose.theta_rad + math.pi * (0.25 + 0.5 * quarter) for quarter in range(4))
+    return [
+        (pose.x_m + reach * math.cos(angle), pose.y_m + reach * math.sin(angle)) for angle in angles
+    ]
+
+
+def load_study(path: str | Path) -> Study:
+    """Read a study file.
+
+    Parameters
+    ----------
+    path : path-like
+        A TOML file. Keys that it lacks have their defaults; a number may be text with a unit
+        (``force_std_N = "0.55mN"``).
+
+    Raises
+    ------
+    ConfigurationError
+        When the file is not TOML, names an unknown key, or holds a wrong value; the message names
+        file, section and key.
+    OSError
+        When the file cannot be read.
+
+    Examples
+    --------
+    >>> load_study("study.toml").tank.diameter_m  # doctest: +SKIP
+    0.3
+    """
+    try:
+        # A byte order mark, as some editors write, is not part of TOML.
+        text = Path(path).read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ConfigurationError(f"{path}: not a text file in UTF-8 ({error.reason})") from error
+    return parse_study(text, source=str(path))
+
+
+def parse_study(text: str, *, source: str = "study") -> Study:
+    """Return the study that the text of a study file holds.
+
+    Parameters
+    ----------
+    text : str
+        TOML.
+    source : str
+        What to call the text in an error message.
+
+    Raises
+    ------
+    ConfigurationError
+        See `load_study`.
+    """
+    try:
+        return Study(**tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigurationError(f"{source}: not a TOML file: {error}") from error
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{source}: {error}") from error
+
+
+def apply_overrides(study: Study, overrides: Mapping[str, Any]) -> Study:
+    """Return a study in which some parameters have other values.
+
+    Parameters
+    ----------
+    study : Study
+        The study to start from; it stays as it is.
+    overrides : mapping
+        From ``"section.key"`` to the value; None returns the key to its default. Keys that replace
+        each other do: ``"block.depth_m"`` drops ``depth``, ``"tank.diameter_m"`` makes a circle.
+
+    Raises
+    ------
+    ConfigurationError
+        When there is no such parameter, or the result contradicts itself.
+
+    Examples
+    --------
+    >>> apply_overrides(Study(), {"tank.diameter_m": "50cm"}).tank.diameter_m
+    0.5
+    """
+    values = study.to_dict()
+    changes: dict[str, dict[str, Any]] = {}
+    for name, value in overrides.items():
+        section, _, key = name.partition(".")
+        changes.setdefault(_known_section(section, name), {})[key] = value
+    for section, changed in changes.items():
+        kind = type(getattr(study, section))
+        kept = values[section]
+        for key in kind.replaced_by(set(changed)) | set(changed):
+            kept.pop(key, None)
+        kept.update({key: value for key, value in changed.items() if value is not None})
+    return Study(**values)
+
+
+def _known_section(section: str, name: str) -> str:
+    if section not in Study.model_fields or "." not in name:
+        raise ConfigurationError(
+            f"no parameter '{name}'; expected 'section.key' such as 'tank.diameter_m'"
+            f"{did_you_mean(section, Study.model_fields)}"
+        )
+    return section

@@ -1,0 +1,128 @@
+"""Study files as text: a plain one, the commented template, and the table of the reference page."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections.abc import Iterator
+from typing import Any
+
+from driftwalk.model.section import Quantity, Section, quantity_of, quoted, words_of
+from driftwalk.model.study import Study
+
+_WIDTH = 96
+_HEAD = """\
+# Study file of driftwalk. Every parameter is here with its default; a line that starts with
+# "# key =" is a parameter that is not set. SI units; a number may also be text with a unit, such
+# as "0.55mN", "16ms" or "30cm". A key that you leave out has its default; an unknown key is an
+# error.
+"""
+
+
+def write_toml(study: Study) -> str:
+    """Return a study as TOML without comments."""
+    parts = []
+    for name in Study.model_fields:
+        section = getattr(study, name)
+        lines = [f"{key} = {_toml(value)}" for key, value in _set_values(section)]
+        parts.append("\n".join([f"[{name}]", *lines]))
+    return "\n\n".join(parts) + "\n"
+
+
+def study_template(study: Study | None = None) -> str:
+    """Return a study file in which every parameter stands with its unit, range and meaning.
+
+    Parameters
+    ----------
+    study : Study, optional
+        The values to write; the defaults when left out.
+
+    Examples
+    --------
+    >>> study_template().splitlines()[5]
+    '# The floating block.'
+    """
+    chosen = study if study is not None else Study()
+    parts = [_HEAD]
+    for name, field in Study.model_fields.items():
+        lines = [*_comment(field.description or ""), f"[{name}]"]
+        section = getattr(chosen, name)
+        for key in type(section).model_fields:
+            lines += _commented_parameter(section, key)
+        parts.append("\n".join(lines) + "\n")
+    return "\n".join(parts)
+
+
+def parameter_table(name: str) -> str:
+    """Return the parameters of one section as a Markdown table.
+
+    Parameters
+    ----------
+    name : str
+        Name of the section.
+    """
+    section = getattr(Study(), name)
+    rows = ["| key | default | values | meaning |", "|---|---|---|---|"]
+    for key, field in type(section).model_fields.items():
+        value = getattr(section, key)
+        default = f"`{_toml(value)}`" if value is not None else "not set"
+        accepted = _accepted(type(section), key).replace("|", "\\|")
+        rows.append(f"| `{key}` | {default} | {accepted} | {field.description} |")
+    return "\n".join(rows)
+
+
+def _commented_parameter(section: Section, key: str) -> Iterator[str]:
+    kind = type(section)
+    value = getattr(section, key)
+    accepted = _accepted(kind, key)
+    description = kind.model_fields[key].description or ""
+    yield ""
+    yield from _comment(f"{description} [{accepted}]" if accepted else description)
+    yield f"{key} = {_toml(value)}" if value is not None else f"# {key} = {_example(kind, key)}"
+
+
+def _example(kind: type[Section], key: str) -> str:
+    """Return a value to stand in the place of one that is not set."""
+    example = (kind.model_fields[key].examples or [""])[0]
+    return example if isinstance(example, str) and example[:1] in "{[" else _toml(example)
+
+
+def _accepted(kind: type[Section], key: str) -> str:
+    """Return unit, range and words of a parameter, in short."""
+    quantity = quantity_of(kind, key)
+    words = words_of(kind, key)
+    parts = [_number_text(quantity)] if quantity is not None else []
+    if words:
+        parts.append(quoted(words))
+    return ", or ".join(parts)
+
+
+def _number_text(quantity: Quantity) -> str:
+    name = "whole number" if quantity.whole else quantity.unit if quantity.unit != "1" else "number"
+    limits = quantity.range_text()
+    return f"{name}, {limits}" if limits else name
+
+
+def _comment(text: str) -> list[str]:
+    return textwrap.wrap(
+        text, _WIDTH, initial_indent="# ", subsequent_indent="# ", break_long_words=False
+    )
+
+
+def _set_values(section: Section) -> Iterator[tuple[str, Any]]:
+    for key in type(section).model_fields:
+        value = getattr(section, key)
+        if value is not None:
+            yield key, value
+
+
+def _toml(value: Any) -> str:
+    """Return a value as TOML; its strings are JSON's, but for the delete character."""
+    if isinstance(value, Section):
+        inner = ", ".join(f"{key} = {_toml(item)}" for key, item in _set_values(value))
+        return f"{{ {inner} }}" if inner else "{}"
+    if isinstance(value, (tuple, list)):
+        return "[" + ", ".join(_toml(item) for item in value) + "]"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(value)
