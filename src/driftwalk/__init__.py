@@ -9,8 +9,8 @@ from typing import Any
 
 __version__ = "0.1.0"
 
-# Which stage a public name lives in; the stage's own `__all__` is the authority, and a test
-# compares the two.
+# The stages whose public names are also names of the package. A stage's `__all__` is the only list
+# of its names. A name that is a stage is the stage: the function is `driftwalk.compare.compare`.
 _STAGES = ("record", "flow", "model", "simulate", "compare", "calibrate", "datasets", "report")
 
 
@@ -24,7 +24,8 @@ def __getattr__(name: str) -> Any:
         for stage in _STAGES:
             module = importlib.import_module(f"driftwalk.{stage}")
             if name in module.__all__:
-                return getattr(module, name)
+                globals()[name] = getattr(module, name)
+                return globals()[name]
     raise AttributeError(f"module 'driftwalk' has no attribute '{name}'")
 
 

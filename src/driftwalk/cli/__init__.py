@@ -1,3 +1,3 @@
-"""Stage of driftwalk (being built)."""
+"""The command line: one file per command, each of which parses, calls a stage, and writes."""
 
 __all__: list[str] = []

@@ -1,0 +1,102 @@
+"""How an error reaches the user: one line on stderr and an exit code, no traceback.
+
+``DRIFTWALK_DEBUG=1`` in the environment shows the traceback instead. An error that driftwalk does
+not know is a fault of driftwalk, and always shows its traceback.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import sys
+
+import typer
+
+from driftwalk.core.errors import DriftwalkError
+
+EXIT_USER_ERROR = 2
+EXIT_INTERRUPTED = 130
+EXIT_BROKEN_PIPE = 141
+
+
+class PastTyper(Exception):
+    """Carries its cause, an interrupt or a broken pipe, past typer, which would swallow it."""
+
+
+def exit_code_of(error: BaseException) -> int:
+    """Report an error on one line of stderr and return the exit code.
+
+    Parameters
+    ----------
+    error : BaseException
+        What a command ended with.
+
+    Returns
+    -------
+    int
+        2 for a mistake in the input, the options or the files; 130 for an interrupt; 141 for
+        a reader of the output that has gone, which is silent.
+
+    Raises
+    ------
+    BaseException
+        The error itself, when it is none of these or ``DRIFTWALK_DEBUG`` is set.
+    """
+    if isinstance(error, PastTyper) and error.__cause__ is not None:
+        error = error.__cause__
+    if isinstance(error, BrokenPipeError):
+        _silence_stdout()
+        return EXIT_BROKEN_PIPE
+    if os.environ.get("DRIFTWALK_DEBUG", "0") not in ("", "0"):
+        raise error
+    if isinstance(error, (KeyboardInterrupt, typer.Abort)):
+        _print_line("interrupted")
+        return EXIT_INTERRUPTED
+    line = one_line(error)
+    if line is None:
+        raise error
+    _print_line(f"error: {line}")
+    return EXIT_USER_ERROR
+
+
+def one_line(error: BaseException) -> str | None:
+    """Return the message of an error that is the user's to mend, on one line; else None."""
+    if isinstance(error, DriftwalkError):
+        return _joined(str(error))
+    if hasattr(error, "format_message"):  # what typer raises for a mistake in the options
+        return _usage_message(error)
+    if isinstance(error, OSError):
+        return _joined(_operating_system_message(error))
+    return None
+
+
+def _usage_message(error: BaseException) -> str:
+    message = _joined(error.format_message()) if hasattr(error, "format_message") else str(error)
+    context = getattr(error, "ctx", None)
+    if context is None:
+        return message
+    return f"{message.rstrip('.')} (see '{context.command_path} --help')"
+
+
+def _operating_system_message(error: OSError) -> str:
+    reason = error.strerror or str(error) or type(error).__name__
+    if error.errno == errno.ENOENT:
+        reason = "no such file or directory"
+    elif error.errno == errno.ENOSPC:
+        reason = "no space left on the disk"
+    return f"{error.filename}: {reason}" if error.filename is not None else reason
+
+
+def _joined(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _silence_stdout() -> None:
+    """Keep the interpreter from complaining when it flushes a pipe that nobody reads."""
+    with contextlib.suppress(OSError), open(os.devnull, "w") as nowhere:  # noqa: PTH123
+        os.dup2(nowhere.fileno(), sys.stdout.fileno())
+
+
+def _print_line(text: str) -> None:
+    print(f"driftwalk: {text}", file=sys.stderr, flush=True)

@@ -1,0 +1,153 @@
+"""The entry point `driftwalk` and the table of its commands.
+
+A command's module is imported when the command is used, so that ``driftwalk --help`` and a typing
+mistake answer at once.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any, Final, NamedTuple
+
+import typer
+from typer.core import TyperGroup
+from typer.main import get_command as to_click_command
+
+from driftwalk.cli.errors import PastTyper, exit_code_of
+
+
+class Command(NamedTuple):
+    """One command: where it is, and its line in the list of commands."""
+
+    module: str
+    attribute: str
+    help: str
+
+
+COMMANDS: Final[dict[str, Command]] = {
+    "study": Command("study", "study_app", "Write and check study files."),
+    "info": Command("info", "info", "Say what a recording holds and how it was understood."),
+    "convert": Command("convert", "convert", "Turn a recording into a trajectory file."),
+    "flow": Command("flow", "flow", "Take the flow field from a recording."),
+    "simulate": Command("simulate", "simulate", "Simulate the motion of the block."),
+    "compare": Command("compare", "compare", "Measure how far apart two motions are."),
+    "calibrate": Command(
+        "calibrate", "calibrate", "Find the drag coefficient and the stochastic force."
+    ),
+    "demo": Command("demo", "demo", "Calibrate a bundled recording, from file to report."),
+}
+
+
+class LazyGroup(TyperGroup):
+    """A group whose commands are stand-ins from `COMMANDS`, imported when they are run."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        for name in COMMANDS:
+            self.add_command(_one_command_app(name, _stand_in), name)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the command to run, imported."""
+        name, _, rest = super().resolve_command(ctx, args)
+        return name, (None if name is None else load_command(name)), rest
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; what typer would swallow goes past it to `main`."""
+        try:
+            return super().invoke(ctx)
+        except (KeyboardInterrupt, BrokenPipeError) as error:
+            raise PastTyper from error
+
+
+def load_command(name: str) -> Any:
+    """Import a command and return it in the form that the group runs."""
+    import importlib
+
+    entry = COMMANDS[name]
+    module = importlib.import_module(f"driftwalk.cli.{entry.module}")
+    target = getattr(module, entry.attribute)
+    if isinstance(target, typer.Typer):
+        return to_click_command(target)
+    return _one_command_app(name, target)
+
+
+def _stand_in() -> None:
+    """Stand for a command in the list of commands."""
+
+
+def _one_command_app(name: str, function: Callable[..., Any]) -> Any:
+    app = typer.Typer(add_completion=False)
+    short = COMMANDS[name].help
+    text = short if function is _stand_in else None
+    app.command(name, help=text, short_help=short)(function)
+    return to_click_command(app)
+
+
+app = typer.Typer(
+    cls=LazyGroup, add_completion=True, context_settings={"help_option_names": ["-h", "--help"]}
+)
+
+
+def _print_version(value: bool) -> None:
+    if value:
+        from driftwalk import __version__
+
+        typer.echo(f"driftwalk {__version__}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def driftwalk(
+    ctx: typer.Context,
+    version: Annotated[  # noqa: ARG001
+        bool,
+        typer.Option(
+            "--version", is_eager=True, callback=_print_version, help="Print the version."
+        ),
+    ] = False,
+) -> None:
+    """Calibrated stochastic motion models of floating, drifting and stirred robots.
+
+    Numbers are SI; 0.55mN, 16ms and 30cm are read too.
+    """
+    if ctx.invoked_subcommand is None:
+        typer.echo(ctx.get_help())
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        The words after ``driftwalk``; those of the process when left out.
+
+    Returns
+    -------
+    int
+        0 done, 2 a mistake of the user or of a file (one line on stderr), 130 interrupted.
+
+    Examples
+    --------
+    >>> main(["--version"])
+    driftwalk 0.1.0
+    0
+    """
+    command = to_click_command(app)
+    try:
+        code = command.main(
+            args=list(sys.argv[1:] if arguments is None else arguments),
+            prog_name="driftwalk",
+            standalone_mode=False,
+        )
+        # Output that still sits in a buffer may fail only now: a full disk, a closed pipe.
+        sys.stdout.flush()
+    except (Exception, KeyboardInterrupt) as error:
+        return exit_code_of(error)
+    return code if isinstance(code, int) else 0
+
+
+def run() -> None:
+    """Run the command line and leave the process; the entry point of the installed script."""
+    sys.exit(main())

@@ -1,0 +1,222 @@
+"""Options that several commands share, each declared once, and the study that they make.
+
+A command takes the annotated types it needs::
+
+    def simulate(study: StudyFile = None, force_std: ForceStd = None, json: Json = False) -> None:
+        parameters = resolve_study(study, study_overrides(force_std=force_std))
+
+An option that is not given is None and leaves the study file's value as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+
+from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.units import parse_quantity
+
+if TYPE_CHECKING:
+    from driftwalk.model import Study
+
+PANEL: Final = "Parameters (over the study file)"
+
+
+def quantity_parser(unit: str, *words: str) -> Callable[[str], Any]:
+    """Return a function that reads a quantity such as ``0.55mN``, or one of the words.
+
+    Parameters
+    ----------
+    unit : str
+        Unit of the result.
+    *words : str
+        Words that may stand for a number.
+    """
+
+    def parse(text: Any) -> Any:
+        # Typer may hand a value back that is parsed already.
+        if not isinstance(text, str) or text in words:
+            return text
+        try:
+            return parse_quantity(text, unit)
+        except ConfigurationError as error:
+            or_words = f" (or {', '.join(words)})" if words else ""
+            raise typer.BadParameter(f"{error}{or_words}") from error
+
+    return parse
+
+
+def quantity_option(name: str, unit: str, help: str, *words: str, metavar: str = "") -> Any:
+    """Return the declaration of an option that takes a quantity."""
+    choices = "|".join((*words, unit if unit != "1" else "number"))
+    return typer.Option(
+        name,
+        parser=quantity_parser(unit, *words),
+        metavar=metavar or f"<{choices}>",
+        help=help,
+        rich_help_panel=PANEL,
+        show_default=False,
+    )
+
+
+StudyFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--study",
+        metavar="FILE",
+        help="Study file with the parameters (see: driftwalk study new).",
+        show_default=False,
+    ),
+]
+FlowFile = Annotated[
+    Path | None,
+    typer.Option("--flow", metavar="FILE", help="Flow field to use.", show_default=False),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
+
+TankDiameter = Annotated[
+    float | None, quantity_option("--tank-diameter", "m", "Diameter of a circular tank.")
+]
+Side = Annotated[float | None, quantity_option("--side", "m", "Side of the block.")]
+Mass = Annotated[float | None, quantity_option("--mass", "kg", "Mass of the block.")]
+Depth = Annotated[
+    Any, quantity_option("--depth", "m", "Wetted depth of a side face.", "immersed", "archimedes")
+]
+DragCoefficient = Annotated[
+    float | None, quantity_option("--drag-coefficient", "1", "Drag coefficient C_d.")
+]
+ForceStd = Annotated[
+    float | None,
+    quantity_option("--force-std", "N", "Standard deviation of the stochastic force."),
+]
+ForceInterval = Annotated[
+    float | None,
+    quantity_option("--force-interval", "s", "How long one draw of the stochastic force lasts."),
+]
+WallFriction = Annotated[
+    float | None, quantity_option("--wall-friction", "1", "Coulomb friction of the wall.")
+]
+WallRestitution = Annotated[
+    float | None, quantity_option("--wall-restitution", "1", "Restitution of the wall, 0 to 1.")
+]
+TimeStep = Annotated[
+    Any, quantity_option("--time-step", "s", "Time step; divides the force interval.", "auto")
+]
+Duration = Annotated[
+    float | None, quantity_option("--duration", "s", "Length of a simulated trajectory.")
+]
+SampleRate = Annotated[
+    float | None, quantity_option("--sample-rate", "Hz", "Samples per second of a simulation.")
+]
+StepInterval = Annotated[
+    Any, quantity_option("--step-interval", "s", "Time between the positions of a step.", "auto")
+]
+PositionNoise = Annotated[
+    Any, quantity_option("--position-noise", "m", "Position noise of the tracker.", "estimate")
+]
+OrientationNoise = Annotated[
+    Any,
+    quantity_option("--orientation-noise", "rad", "Orientation noise of the tracker.", "estimate"),
+]
+Seed = Annotated[
+    int | None,
+    typer.Option(
+        "--seed",
+        min=0,
+        help="Seed of the random numbers.",
+        rich_help_panel=PANEL,
+        show_default=False,
+    ),
+]
+Replicates = Annotated[
+    int | None,
+    typer.Option(
+        "--replicates",
+        min=1,
+        help="Simulations with the same parameters.",
+        rich_help_panel=PANEL,
+        show_default=False,
+    ),
+]
+
+STUDY_KEYS: Final[dict[str, str]] = {
+    "tank_diameter": "tank.diameter_m",
+    "wall_friction": "tank.wall_friction",
+    "wall_restitution": "tank.wall_restitution",
+    "side": "block.side_m",
+    "mass": "block.mass_kg",
+    "depth": "block.depth",
+    "drag_coefficient": "forces.drag_coefficient",
+    "force_std": "forces.force_std_N",
+    "force_interval": "forces.force_interval_s",
+    "time_step": "simulation.time_step_s",
+    "duration": "simulation.duration_s",
+    "sample_rate": "simulation.sample_rate_Hz",
+    "seed": "simulation.seed",
+    "replicates": "simulation.replicates",
+    "step_interval": "steps.step_interval_s",
+    "position_noise": "observation.position_noise_m",
+    "orientation_noise": "observation.orientation_noise_rad",
+}
+"""From an option's name to the key of the study that it sets."""
+
+
+def study_overrides(**options: Any) -> dict[str, Any]:
+    """Return the keys of the study that the options given set; an option that is None sets none.
+
+    Parameters
+    ----------
+    **options
+        Values by the names in `STUDY_KEYS`.
+
+    Examples
+    --------
+    >>> study_overrides(tank_diameter=0.5, seed=None)
+    {'tank.diameter_m': 0.5}
+    """
+    overrides = {STUDY_KEYS[name]: value for name, value in options.items() if value is not None}
+    depth = overrides.get("block.depth")
+    if depth is not None and not isinstance(depth, str):
+        overrides["block.depth_m"] = overrides.pop("block.depth")
+    return overrides
+
+
+def resolve_study(study_path: Path | None, overrides: Mapping[str, Any]) -> Study:
+    """Return the study of a file, or the default one, with the options of the command line over it.
+
+    Parameters
+    ----------
+    study_path : Path or None
+        A study file.
+    overrides : mapping
+        From ``"section.key"`` to the value, as `study_overrides` makes it.
+
+    Raises
+    ------
+    ConfigurationError
+        When the file is wrong, or an option contradicts it; the message names both.
+
+    Examples
+    --------
+    >>> resolve_study(None, {"forces.force_std_N": 1e-3}).forces.force_std_N
+    0.001
+    """
+    from driftwalk.model import Study, apply_overrides, load_study
+
+    study = load_study(study_path) if study_path is not None else Study()
+    try:
+        return apply_overrides(study, overrides)
+    except ConfigurationError as error:
+        given = [option_name(key) for key in overrides]
+        base = f"{study_path}" if study_path is not None else "the default study"
+        raise ConfigurationError(f"{', '.join(given)} over {base}: {error}") from error
+
+
+def option_name(key: str) -> str:
+    """Return the option that sets a key of the study, the key itself where there is none."""
+    key = "block.depth" if key == "block.depth_m" else key
+    names = [name for name, known in STUDY_KEYS.items() if known == key]
+    return f"--{names[0].replace('_', '-')}" if names else key

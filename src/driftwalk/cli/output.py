@@ -1,0 +1,99 @@
+"""What a command prints on stdout: JSON for programs, a table for people."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import PurePath
+from typing import Any
+
+
+def print_json(values: Mapping[str, Any]) -> None:
+    """Print one JSON object on stdout.
+
+    Parameters
+    ----------
+    values : mapping
+        Keys with units in their names; numbers, text, lists, mappings, numpy scalars and arrays.
+        The order of the keys is kept; a number that is not finite becomes null, which JSON lacks.
+
+    Examples
+    --------
+    >>> print_json({"ks_distance": float("nan")})
+    {
+      "ks_distance": null
+    }
+    """
+    print(to_json(values))
+
+
+def to_json(values: Mapping[str, Any]) -> str:
+    """Return the text that `print_json` prints."""
+    return json.dumps(plain(values), indent=2, allow_nan=False, ensure_ascii=True)
+
+
+def plain(value: Any) -> Any:
+    """Return a value in JSON's own types: numpy to Python, a path to text, NaN to None.
+
+    Raises
+    ------
+    TypeError
+        When a value has no such form.
+    """
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if value is None or isinstance(value, (str, bool, int)):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, PurePath):
+        return str(value)
+    raise TypeError(f"cannot write {type(value).__name__} as JSON")
+
+
+def print_table(
+    rows: Sequence[Sequence[Any]], *, columns: Sequence[str] | None = None, title: str | None = None
+) -> None:
+    """Print a table on stdout: aligned on a terminal, and the same text through a pipe.
+
+    Parameters
+    ----------
+    rows : sequence of sequences
+        The cells; a float is shown with six significant digits, None as an empty cell.
+    columns : sequence of str, optional
+        Heads of the columns, with units.
+    title : str, optional
+        A line above the table.
+
+    Examples
+    --------
+    >>> print_table([["samples", 18001], ["duration [s]", 1800.0]])
+    samples       18001
+    duration [s]  1800
+    """
+    lines = [list(columns)] if columns is not None else []
+    lines += [[_cell(value) for value in row] for row in rows]
+    if title is not None:
+        print(title)
+    count = max((len(line) for line in lines), default=0)
+    widths = [max(len(line[i]) for line in lines if i < len(line)) for i in range(count)]
+    for line in lines:
+        cells = [cell.ljust(width) for cell, width in zip(line, widths, strict=False)]
+        print("  ".join(cells).rstrip())
+
+
+def print_note(text: str) -> None:
+    """Print a remark or warning on stderr, where it does not disturb the output."""
+    print(f"driftwalk: {' '.join(text.split())}", file=sys.stderr)
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return ""
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

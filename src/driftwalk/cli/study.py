@@ -1,0 +1,59 @@
+"""`driftwalk study`: write and check study files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from driftwalk.cli.options import Json
+from driftwalk.cli.output import print_json, print_note
+from driftwalk.core.errors import InputError
+
+study_app = typer.Typer(name="study", add_completion=False, help="Write and check study files.")
+
+
+@study_app.callback(invoke_without_command=True)
+def study(ctx: typer.Context) -> None:
+    """Write and check study files: every parameter of a piece of work in one TOML file."""
+    if ctx.invoked_subcommand is None:
+        typer.echo(ctx.get_help())
+
+
+@study_app.command()
+def new(
+    path: Annotated[
+        Path, typer.Argument(metavar="FILE", help="File to write; - is stdout.")
+    ] = Path("study.toml"),
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that exists.")] = False,
+) -> None:
+    """Write a study file in which every parameter stands with its unit, default and meaning."""
+    from driftwalk.model import study_template
+
+    if str(path) == "-":
+        typer.echo(study_template(), nl=False)
+        return
+    try:
+        with path.open("w" if force else "x", encoding="utf-8") as file:
+            file.write(study_template())
+    except FileExistsError as error:
+        raise InputError(
+            f"{path} exists; name another file or give --force to replace it"
+        ) from error
+    print_note(f"wrote {path}")
+
+
+@study_app.command()
+def check(
+    path: Annotated[Path, typer.Argument(metavar="FILE", help="Study file.")], json: Json = False
+) -> None:
+    """Read a study file and print all parameters that follow from it."""
+    from driftwalk.model import load_study
+
+    study = load_study(path)
+    if json:
+        resolved = {"time_step_s": study.time_step_s, "wetted_depth_m": study.wetted_depth_m}
+        print_json({**study.to_dict(), "resolved": resolved})
+    else:
+        typer.echo(study.to_toml(), nl=False)
