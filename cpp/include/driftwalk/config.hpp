@@ -17,6 +17,11 @@
   }                                                                                                \
   }
 
+// DRIFTWALK_PER_ISA(simulate_kernel_) is simulate_kernel_avx2 in the AVX2 build of a file.
+#define DRIFTWALK_JOIN_(a, b) a##b
+#define DRIFTWALK_JOIN(a, b) DRIFTWALK_JOIN_(a, b)
+#define DRIFTWALK_PER_ISA(name) DRIFTWALK_JOIN(name, DRIFTWALK_ISA)
+
 // Host and device: empty for C++, both qualifiers under CUDA.
 #if defined(__CUDACC__)
 #define DRIFTWALK_HD __host__ __device__

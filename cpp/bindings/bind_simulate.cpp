@@ -1,0 +1,306 @@
+// Bindings of the simulation core: arrays in, arrays out, the GIL released around the work.
+#include "driftwalk/dispatch.hpp"
+#include "driftwalk/math/elementary.hpp"
+#include "driftwalk/random/normal.hpp"
+#include "driftwalk/random/philox.hpp"
+#include "driftwalk/simulate/run.hpp"
+#include "driftwalk/simulate/simulate.hpp"
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include <optional>
+#include <stdexcept>
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace {
+
+template <class T, int Dimensions>
+using In = nb::ndarray<const T, nb::ndim<Dimensions>, nb::c_contig, nb::device::cpu>;
+template <class T>
+using Out = nb::ndarray<nb::numpy, T>;
+
+template <class T>
+Out<T> hand_out(std::vector<T>&& values, std::vector<std::size_t> shape) {
+  auto* const owned = new std::vector<T>(std::move(values));
+  nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+  return Out<T>(owned->data(), shape.size(), shape.data(), owner);
+}
+
+// A model with everything it points to, prepared for both number types.
+class Model {
+public:
+  Model(driftwalk::BatchModel model, In<double, 2> edges, In<double, 3> u, In<double, 3> v,
+        In<double, 1> frame_time, In<double, 1> sample_time)
+      : samples_(model.samples = static_cast<std::int64_t>(sample_time.size())) {
+    model.edges = edges.data();
+    model.edge_count = static_cast<int>(edges.shape(0));
+    model.flow_u = u.data();
+    model.flow_v = v.data();
+    model.frames = static_cast<int>(u.shape(0));
+    model.rows = static_cast<int>(u.shape(1));
+    model.columns = static_cast<int>(u.shape(2));
+    model.frame_time = frame_time.data();
+    model.sample_time = sample_time.data();
+    single_.emplace(model);
+    twice_.emplace(model);
+  }
+
+  std::int64_t samples() const { return samples_; }
+  const driftwalk::PreparedRun<float>& single() const { return *single_; }
+  const driftwalk::PreparedRun<double>& twice() const { return *twice_; }
+
+private:
+  std::int64_t samples_;
+  std::optional<driftwalk::PreparedRun<float>> single_;
+  std::optional<driftwalk::PreparedRun<double>> twice_;
+};
+
+// Worlds as the columns of one array (worlds, 8): x, y, theta, vx, vy, omega, drag coefficient,
+// force std; and their random keys.
+class Worlds {
+public:
+  Worlds(const In<double, 2>& table, const In<std::uint64_t, 1>& key)
+      : count_(table.shape(0)), columns_(table.size()) {
+    if (table.shape(1) != 8 || key.size() != count_) {
+      throw std::invalid_argument("worlds must have shape (n, 8) and key shape (n,)");
+    }
+    for (std::size_t row = 0; row < count_; ++row) {
+      for (std::size_t column = 0; column < 8; ++column) {
+        columns_[column * count_ + row] = table(row, column);
+      }
+    }
+    key_.assign(key.data(), key.data() + count_);
+  }
+
+  std::size_t count() const { return count_; }
+  driftwalk::BatchWorlds view() const {
+    const auto column = [&](std::size_t k) { return columns_.data() + k * count_; };
+    driftwalk::BatchWorlds view;
+    view.count = static_cast<std::int64_t>(count_);
+    view.x = column(0);
+    view.y = column(1);
+    view.theta = column(2);
+    view.vx = column(3);
+    view.vy = column(4);
+    view.omega = column(5);
+    view.drag_coefficient = column(6);
+    view.force_std = column(7);
+    view.key = key_.data();
+    return view;
+  }
+
+private:
+  std::size_t count_;
+  std::vector<double> columns_;
+  std::vector<std::uint64_t> key_;
+};
+
+template <class T>
+nb::tuple simulate_as(const driftwalk::PreparedRun<T>& run, const Worlds& worlds,
+                      std::int64_t samples, int threads) {
+  const std::size_t count = worlds.count(), n = static_cast<std::size_t>(samples);
+  std::vector<T> x(count * n), y(count * n), theta(count * n);
+  std::vector<std::uint32_t> status(count);
+  {
+    nb::gil_scoped_release release;
+    driftwalk::simulate_batch(run, worlds.view(), threads,
+                              {x.data(), y.data(), theta.data(), status.data()});
+  }
+  return nb::make_tuple(hand_out(std::move(x), {count, n}), hand_out(std::move(y), {count, n}),
+                        hand_out(std::move(theta), {count, n}),
+                        hand_out(std::move(status), {count}));
+}
+
+nb::tuple simulate(const Model& model, In<double, 2> table, In<std::uint64_t, 1> key, int threads,
+                   const std::string& precision) {
+  const Worlds worlds(table, key);
+  if (precision == "double") {
+    return simulate_as(model.twice(), worlds, model.samples(), threads);
+  }
+  return simulate_as(model.single(), worlds, model.samples(), threads);
+}
+
+nb::dict score(const Model& model, In<double, 2> table, In<std::uint64_t, 1> key,
+               In<std::int32_t, 1> left, In<double, 1> weight, In<std::int32_t, 1> triple,
+               std::optional<In<double, 2>> reference, int bins, double length_limit,
+               std::int64_t excerpt, bool keep_steps, int threads) {
+  const Worlds worlds(table, key);
+  const std::size_t count = worlds.count();
+  driftwalk::Scoring scoring;
+  scoring.plan = {left.data(), weight.data(), triple.data(),
+                  static_cast<std::int64_t>(left.size()), static_cast<std::int64_t>(triple.size())};
+  scoring.length_bins = scoring.angle_bins = bins;
+  scoring.length_limit = length_limit;
+  scoring.excerpt = std::min(excerpt, model.samples());
+  std::optional<driftwalk::KsReference> prepared;
+  if (reference) {
+    std::vector<double> length(reference->shape(0)), angle(length.size());
+    for (std::size_t k = 0; k < length.size(); ++k) {
+      length[k] = (*reference)(k, 0);
+      angle[k] = (*reference)(k, 1);
+    }
+    prepared.emplace(length.data(), angle.data(), static_cast<std::int64_t>(length.size()));
+    scoring.reference = &*prepared;
+  }
+  const std::size_t cells = static_cast<std::size_t>(bins) * static_cast<std::size_t>(bins);
+  const std::size_t kept = static_cast<std::size_t>(scoring.excerpt);
+  const std::size_t scored = reference ? count : 0;
+  const std::size_t pairs = triple.size(), stored = keep_steps ? count * pairs : 0;
+  std::vector<double> distance(scored), place_length(scored), place_angle(scored);
+  std::vector<std::int32_t> quadrant(scored);
+  std::vector<std::int64_t> pair_count(count);
+  std::vector<std::uint32_t> status(count);
+  std::vector<float> density(count * cells), excerpt_x(count * kept), excerpt_y(count * kept);
+  std::vector<float> length(stored), angle(stored);
+  const auto wanted = [](auto& values) { return values.empty() ? nullptr : values.data(); };
+  {
+    nb::gil_scoped_release release;
+    driftwalk::score_batch(model.single(), worlds.view(), scoring, threads,
+                           {wanted(distance), wanted(place_length), wanted(place_angle),
+                            wanted(quadrant), pair_count.data(), status.data(), wanted(density),
+                            wanted(excerpt_x), wanted(excerpt_y), wanted(length), wanted(angle)});
+  }
+  const std::size_t rows = static_cast<std::size_t>(bins);
+  nb::dict out;
+  out["pairs"] = hand_out(std::move(pair_count), {count});
+  out["status"] = hand_out(std::move(status), {count});
+  if (reference) {
+    out["ks_distance"] = hand_out(std::move(distance), {count});
+    out["ks_step_length"] = hand_out(std::move(place_length), {count});
+    out["ks_turning_angle"] = hand_out(std::move(place_angle), {count});
+    out["ks_quadrant"] = hand_out(std::move(quadrant), {count});
+  }
+  if (bins > 0) {
+    out["step_density"] = hand_out(std::move(density), {count, rows, rows});
+  }
+  if (kept > 0) {
+    out["excerpt_x"] = hand_out(std::move(excerpt_x), {count, kept});
+    out["excerpt_y"] = hand_out(std::move(excerpt_y), {count, kept});
+  }
+  if (keep_steps) {
+    out["step_length"] = hand_out(std::move(length), {count, pairs});
+    out["turning_angle"] = hand_out(std::move(angle), {count, pairs});
+  }
+  return out;
+}
+
+driftwalk::StepTable step_table(const In<float, 2>& length, const In<float, 2>& angle,
+                                const In<std::int64_t, 1>& count) {
+  if (length.shape(0) != angle.shape(0) || length.shape(1) != angle.shape(1) ||
+      count.size() != length.shape(0)) {
+    throw std::invalid_argument("step lengths, turning angles and counts do not match");
+  }
+  return {length.data(), angle.data(), count.data(), static_cast<std::int64_t>(length.shape(0)),
+          static_cast<std::int64_t>(length.shape(1))};
+}
+
+Out<double> ks_matrix(In<float, 2> a_length, In<float, 2> a_angle, In<std::int64_t, 1> a_count,
+                      In<float, 2> b_length, In<float, 2> b_angle, In<std::int64_t, 1> b_count,
+                      int threads) {
+  const driftwalk::StepTable a = step_table(a_length, a_angle, a_count);
+  const driftwalk::StepTable b = step_table(b_length, b_angle, b_count);
+  std::vector<double> out(static_cast<std::size_t>(a.rows * b.rows));
+  {
+    nb::gil_scoped_release release;
+    driftwalk::ks_matrix(a, b, threads, out.data());
+  }
+  return hand_out(std::move(out),
+                  {static_cast<std::size_t>(a.rows), static_cast<std::size_t>(b.rows)});
+}
+
+// Drag force [N] and torque [N m] on a block of the model, in double precision.
+std::tuple<double, double, double> drag(const Model& model, double drag_coefficient, double x,
+                                        double y, double theta, double vx, double vy,
+                                        double omega) {
+  const driftwalk::Prepared<double>& run = model.twice().view();
+  driftwalk::Axes<double> axes;
+  driftwalk::sincos(theta, axes.sine, axes.cosine);
+  const driftwalk::BlockShape<double> block{run.half_side, run.strip_width, run.strips};
+  const driftwalk::DragSums<double> sums = driftwalk::drag_sums(
+      block, run.flow, x, y, axes, driftwalk::Motion<double>{vx, vy, omega});
+  const double scale = run.drag_scale * drag_coefficient;
+  return {sums.force_x * scale, sums.force_y * scale, sums.torque * scale};
+}
+
+std::vector<std::uint32_t> philox(std::uint64_t key, const std::vector<std::uint32_t>& counter) {
+  if (counter.size() != 4) {
+    throw std::invalid_argument("a counter has four words");
+  }
+  const driftwalk::Philox<std::uint32_t> stream{static_cast<std::uint32_t>(key),
+                                                static_cast<std::uint32_t>(key >> 32)};
+  std::vector<std::uint32_t> out(4);
+  stream(counter[0], counter[1], counter[2], counter[3], out.data());
+  return out;
+}
+
+}  // namespace
+
+void register_simulate(nb::module_& module);
+void register_simulate(nb::module_& module) {
+  using driftwalk::BatchModel;
+  nb::class_<Model>(module, "Model")
+      .def(
+          "__init__",
+          [](Model* self, double side, double mass, double inertia, double depth, int strips,
+             double water_density, double radius, In<double, 2> edges, double restitution,
+             double friction, double bounce_speed, In<double, 3> u, In<double, 3> v,
+             In<double, 1> frame_time, double origin_x, double origin_y, double spacing_x,
+             double spacing_y, double time_step, int steps_per_interval, In<double, 1> sample_time,
+             double position_noise, double orientation_noise, double position_quantum) {
+            BatchModel model;
+            model.side = side;
+            model.mass = mass;
+            model.inertia = inertia;
+            model.depth = depth;
+            model.strips = strips;
+            model.water_density = water_density;
+            model.radius = radius;
+            model.restitution = restitution;
+            model.friction = friction;
+            model.bounce_speed = bounce_speed;
+            model.origin_x = origin_x;
+            model.origin_y = origin_y;
+            model.spacing_x = spacing_x;
+            model.spacing_y = spacing_y;
+            model.time_step = time_step;
+            model.steps_per_interval = steps_per_interval;
+            model.position_noise = position_noise;
+            model.orientation_noise = orientation_noise;
+            model.position_quantum = position_quantum;
+            new (self) Model(model, edges, u, v, frame_time, sample_time);
+          },
+          nb::kw_only(), "side"_a, "mass"_a, "inertia"_a, "depth"_a, "strips"_a, "water_density"_a,
+          "radius"_a, "edges"_a, "restitution"_a, "friction"_a, "bounce_speed"_a, "u"_a, "v"_a,
+          "frame_time"_a, "origin_x"_a, "origin_y"_a, "spacing_x"_a, "spacing_y"_a, "time_step"_a,
+          "steps_per_interval"_a, "sample_time"_a, "position_noise"_a, "orientation_noise"_a,
+          "position_quantum"_a)
+      .def_prop_ro("samples", &Model::samples);
+  module.def("simulate", &simulate, "model"_a, "worlds"_a, "key"_a, nb::kw_only(), "threads"_a,
+             "precision"_a);
+  module.def("score", &score, "model"_a, "worlds"_a, "key"_a, nb::kw_only(), "left"_a, "weight"_a,
+             "triple"_a, "reference"_a.none(), "bins"_a, "length_limit"_a, "excerpt"_a,
+             "keep_steps"_a, "threads"_a);
+  module.def("ks_matrix", &ks_matrix, "a_length"_a, "a_angle"_a, "a_count"_a, "b_length"_a,
+             "b_angle"_a, "b_count"_a, nb::kw_only(), "threads"_a);
+  module.def("drag", &drag, "model"_a, nb::kw_only(), "drag_coefficient"_a, "x"_a, "y"_a, "theta"_a,
+             "vx"_a, "vy"_a, "omega"_a);
+  module.def("philox", &philox, "key"_a, "counter"_a);
+  module.def("instruction_set",
+             [] { return std::string(driftwalk::name(driftwalk::chosen_instruction_set())); });
+  module.def("available_instruction_sets", [] {
+    std::vector<std::string> names;
+    for (const auto set : {driftwalk::InstructionSet::baseline, driftwalk::InstructionSet::avx2,
+                           driftwalk::InstructionSet::avx512}) {
+      if (driftwalk::is_available(set)) {
+        names.emplace_back(driftwalk::name(set));
+      }
+    }
+    return names;
+  });
+}

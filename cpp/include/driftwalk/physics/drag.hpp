@@ -1,0 +1,91 @@
+// Drag on a square block in a flow, from N vertical strips on each of its four side faces.
+//
+//     F_k = 1/2 rho C_d (a/N) d max(0, -n.w_k) w_k,   w_k = u(x_k) - v_k,   windward strips only
+//
+// In the frame of a face (normal n, tangent t, strip offsets o_k along t) with s_k = max(0, -n.w_k)
+// the sums over a face need nine operations a strip:
+//     n.F = -K sum s^2,   t.F = K (t.sum(s u) - (t.v + omega h) sum s),
+//     torque = h t.F + K sum o_k s_k^2,   sum o_k s_k^2 = w ((N+1)/2 sum s^2 - M),
+// M the sum of the running sums of s^2, w = a/N, h = a/2.
+#pragma once
+
+#include "driftwalk/flow/bilinear.hpp"
+
+DRIFTWALK_LANES_BEGIN
+
+template <class Real>
+struct Pose {
+  Real x, y, theta;  // [m, m, rad]
+};
+template <class Real>
+struct Motion {
+  Real vx, vy, omega;  // [m/s, m/s, rad/s]
+};
+
+// The block's axes: cosine and sine of its orientation.
+template <class Real>
+struct Axes {
+  Real cosine, sine;
+};
+
+template <class T>
+struct BlockShape {
+  T half_side;      // h = a/2 [m]
+  T strip_width;    // a/N [m]
+  int strips;       // N
+};
+
+// Everything divided by K = 1/2 rho C_d (a/N) d.
+template <class Real>
+struct DragSums {
+  Real force_x, force_y;  // [m^2/s^2]
+  Real torque;            // [m^3/s^2]
+  Real conductance;       // sum of s over all strips [m/s]: how strongly drag damps motion
+};
+
+template <class Real, class T>
+inline DragSums<Real> drag_sums(const BlockShape<T>& block, const FlowView<T>& flow, Real x, Real y,
+                                const Axes<Real>& axes, const Motion<Real>& motion) {
+  const T h = block.half_side;
+  const T w = block.strip_width;
+  const int strips = block.strips;
+  const T first_offset = w * T(0.5) - h;
+  DragSums<Real> sums{Real(T(0)), Real(T(0)), Real(T(0)), Real(T(0))};
+  const Real centre_x = (x - flow.origin_x) * flow.per_spacing_x;
+  const Real centre_y = (y - flow.origin_y) * flow.per_spacing_y;
+  Real nx = axes.cosine, ny = axes.sine;
+  for (int face = 0; face < 4; ++face) {
+    const Real tx = -ny, ty = nx;
+    FlowCursor<Real> cursor(flow, centre_x + (nx * h + tx * first_offset) * flow.per_spacing_x,
+                            centre_y + (ny * h + ty * first_offset) * flow.per_spacing_y,
+                            tx * (w * flow.per_spacing_x), ty * (w * flow.per_spacing_y));
+    const Real raw_nx = nx * flow.unit, raw_ny = ny * flow.unit;
+    const Real spin_step = motion.omega * w;
+    Real closing = (nx * motion.vx + ny * motion.vy) - motion.omega * first_offset;
+    Real squares{T(0)}, running{T(0)}, sum_u{T(0)}, sum_v{T(0)}, sum_s{T(0)};
+    for (int k = 0; k < strips; ++k) {
+      Real u, v;
+      cursor.read(u, v);
+      const Real s = max(closing - (raw_nx * u + raw_ny * v), Real(T(0)));
+      squares = squares + s * s;
+      running = running + squares;
+      sum_u = sum_u + s * u;
+      sum_v = sum_v + s * v;
+      sum_s = sum_s + s;
+      cursor.advance();
+      closing = closing - spin_step;
+    }
+    const Real slip = (tx * motion.vx + ty * motion.vy) + motion.omega * h;
+    const Real tangential = (tx * sum_u + ty * sum_v) * flow.unit - slip * sum_s;
+    sums.force_x = sums.force_x + (tx * tangential - nx * squares);
+    sums.force_y = sums.force_y + (ty * tangential - ny * squares);
+    const Real lever = squares * (T(0.5) * T(strips + 1)) - running;
+    sums.torque = sums.torque + (tangential * h + lever * w);
+    sums.conductance = sums.conductance + sum_s;
+    nx = tx;
+    ny = ty;
+  }
+  return sums;
+}
+
+DRIFTWALK_LANES_END

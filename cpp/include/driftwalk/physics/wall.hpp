@@ -1,0 +1,212 @@
+// Impulses between the corners of a block and the wall of a convex arena.
+//
+// Two corners can touch a circle, or one straight edge, at a time: the deepest, and the one that
+// flips the smaller body-frame component of the normal. Their normal impulses are solved together
+// (a flat face bounces without spinning up), with restitution e above the bounce speed and none
+// below; Coulomb friction follows, then a second pass without restitution. Every impulse either
+// reflects a closing speed with e <= 1 or opposes a sliding speed without reversing it, so the
+// kinetic energy never grows. Penetration is removed by moving the block, velocities unchanged.
+//
+// Impulses are per unit mass; `per_inertia` is mass / moment of inertia [1/m^2].
+#pragma once
+
+#include "driftwalk/math/elementary.hpp"
+#include "driftwalk/physics/drag.hpp"
+#include "driftwalk/simulate/prepared.hpp"
+
+DRIFTWALK_LANES_BEGIN
+
+template <class T>
+using WallEdge = PreparedEdge<T>;
+
+template <class T>
+struct WallView {
+  T radius;                // of a circle [m]; 0 for a polygon
+  const WallEdge<T>* edges;  // of a polygon
+  int edge_count;
+  T restitution;
+  T friction;
+  T bounce_speed;  // no bounce below it [m/s]
+};
+
+template <class Real>
+struct Contact {
+  Real rx, ry;     // corner from the centre of mass [m]
+  Real nx, ny;     // outward normal there
+  Real depth;      // penetration [m], negative when clear
+};
+
+// How easily an impulse at the corner changes the speed there: 1 / (1 + lever^2 m/I).
+template <class Real>
+struct Response {
+  Real normal, tangent;
+};
+
+template <class Real>
+inline Real closing_speed(const Contact<Real>& c, const Motion<Real>& m) {
+  return (m.vx - m.omega * c.ry) * c.nx + (m.vy + m.omega * c.rx) * c.ny;
+}
+template <class Real>
+inline Real normal_lever(const Contact<Real>& c) {
+  return c.rx * c.ny - c.ry * c.nx;
+}
+template <class Real>
+inline Real tangent_lever(const Contact<Real>& c) {
+  return c.rx * c.nx + c.ry * c.ny;
+}
+
+// Apply the inward normal impulse `push` and the tangential impulse `drag` (along (-ny, nx)).
+template <class Real>
+inline void apply_impulse(const Contact<Real>& c, Real push, Real drag, Real per_inertia,
+                          Motion<Real>& m) {
+  m.vx = m.vx - push * c.nx - drag * c.ny;
+  m.vy = m.vy - push * c.ny + drag * c.nx;
+  m.omega = m.omega + (drag * tangent_lever(c) - push * normal_lever(c)) * per_inertia;
+}
+
+template <class Real>
+inline Response<Real> response(const Contact<Real>& c, Real per_inertia) {
+  using T = typename Numbers<Real>::Scalar;
+  const Real one{T(1)}, n = normal_lever(c), t = tangent_lever(c);
+  return {one / (one + n * n * per_inertia), one / (one + t * t * per_inertia)};
+}
+
+// Coulomb friction that belongs to the normal impulse `push`.
+template <class Real, class T>
+inline void apply_friction(const Contact<Real>& c, const Response<Real>& r, Real push, T friction,
+                           Real per_inertia, Motion<Real>& m) {
+  const Real sliding = (m.vy + m.omega * c.rx) * c.nx - (m.vx - m.omega * c.ry) * c.ny;
+  const Real stop = -sliding * r.tangent;
+  const Real limit = push * friction;
+  apply_impulse(c, Real(T(0)), max(min(stop, limit), -limit), per_inertia, m);
+}
+
+template <class Real, class T>
+inline void resolve_contacts(const Contact<Real>& a, const Contact<Real>& b, const WallView<T>& wall,
+                             Real per_inertia, Motion<Real>& m) {
+  const Real zero{T(0)}, one{T(1)};
+  const Real speed_a = closing_speed(a, m), speed_b = closing_speed(b, m);
+  const auto hit_a = (a.depth > zero) & (speed_a > zero);
+  const auto hit_b = (b.depth > zero) & (speed_b > zero);
+  const Real bounce{wall.bounce_speed}, restitution{wall.restitution};
+  const Real want_a = select(hit_a, speed_a * (one + select(speed_a > bounce, restitution, zero)), zero);
+  const Real want_b = select(hit_b, speed_b * (one + select(speed_b > bounce, restitution, zero)), zero);
+  const Real lever_a = normal_lever(a), lever_b = normal_lever(b);
+  const Real aa = one + lever_a * lever_a * per_inertia;
+  const Real bb = one + lever_b * lever_b * per_inertia;
+  const Real ab = (a.nx * b.nx + a.ny * b.ny) + lever_a * lever_b * per_inertia;
+  const Real scale = one / (aa * bb - ab * ab);
+  const Real joint_a = (bb * want_a - ab * want_b) * scale;
+  const Real joint_b = (aa * want_b - ab * want_a) * scale;
+  const Response<Real> response_a = response(a, per_inertia);
+  const Response<Real> response_b = response(b, per_inertia);
+  const auto joint = hit_a & hit_b & (joint_a > zero) & (joint_b > zero);
+  // With one corner only, or where both together would pull: the faster corner alone.
+  const auto a_alone = want_a * bb >= want_b * aa;
+  const Real push_a = select(joint, joint_a, select(a_alone, want_a * response_a.normal, zero));
+  const Real push_b = select(joint, joint_b, select(a_alone, zero, want_b * response_b.normal));
+  apply_impulse(a, push_a, zero, per_inertia, m);
+  apply_impulse(b, push_b, zero, per_inertia, m);
+  apply_friction(a, response_a, push_a, wall.friction, per_inertia, m);
+  apply_friction(b, response_b, push_b, wall.friction, per_inertia, m);
+  // What the first pass left closing is stopped, without restitution.
+  for (int corner = 0; corner < 2; ++corner) {
+    const Contact<Real>& c = corner == 0 ? a : b;
+    const Response<Real>& r = corner == 0 ? response_a : response_b;
+    const Real left = select(c.depth > zero, max(closing_speed(c, m), zero), zero);
+    const Real push = left * r.normal;
+    apply_impulse(c, push, zero, per_inertia, m);
+    apply_friction(c, r, push, wall.friction, per_inertia, m);
+  }
+}
+
+// The two corners that can touch, given the direction (nx, ny) of the wall seen from the centre.
+template <class Real, class T>
+inline void leading_corners(Real nx, Real ny, T h, const Axes<Real>& axes, Contact<Real>& first,
+                            Contact<Real>& second) {
+  const Real p1 = nx * axes.cosine + ny * axes.sine;
+  const Real p2 = ny * axes.cosine - nx * axes.sine;
+  const Real s1 = copy_sign(Real(h), p1), s2 = copy_sign(Real(h), p2);
+  const auto flip_first = abs(p1) < abs(p2);
+  const Real f1 = select(flip_first, -s1, s1), f2 = select(flip_first, s2, -s2);
+  first.rx = s1 * axes.cosine - s2 * axes.sine;
+  first.ry = s1 * axes.sine + s2 * axes.cosine;
+  second.rx = f1 * axes.cosine - f2 * axes.sine;
+  second.ry = f1 * axes.sine + f2 * axes.cosine;
+}
+
+template <class Real, class T>
+inline void measure_circle(Contact<Real>& c, T radius, Real x, Real y) {
+  const Real px = x + c.rx, py = y + c.ry;
+  const Real distance = sqrt(px * px + py * py);
+  const Real per_distance = Real(T(1)) / max(distance, Real(T(1e-9)));
+  c.nx = px * per_distance;
+  c.ny = py * per_distance;
+  c.depth = distance - radius;
+}
+
+template <class Real, class T>
+inline void measure_edge(Contact<Real>& c, const WallEdge<T>& edge, Real x, Real y) {
+  c.nx = Real(edge.normal_x);
+  c.ny = Real(edge.normal_y);
+  c.depth = ((x + c.rx) * edge.normal_x + (y + c.ry) * edge.normal_y) - edge.distance;
+}
+
+template <class Real, class T>
+inline void push_out(const Contact<Real>& c, Pose<Real>& pose) {
+  const Real shift = max(c.depth, Real(T(0)));
+  pose.x = pose.x - c.nx * shift;
+  pose.y = pose.y - c.ny * shift;
+}
+
+// Returns where a wall touched the block.
+template <class Real, class T>
+inline auto meet_wall(const WallView<T>& wall, T h, Real per_inertia, Pose<Real>& pose,
+                      Motion<Real>& motion) -> typename Numbers<Real>::Bool {
+  const Real zero{T(0)};
+  Contact<Real> first, second;
+  Axes<Real> axes;
+  const T reach = h * T(1.41421356237309515);
+  if (wall.radius > T(0)) {
+    const T inner = max(wall.radius - reach, T(0));
+    const Real squared = pose.x * pose.x + pose.y * pose.y;
+    const auto near = squared > Real(inner * inner);
+    if (!any(near)) {
+      return near;
+    }
+    sincos(bounded_angle(pose.theta), axes.sine, axes.cosine);
+    leading_corners(pose.x, pose.y, h, axes, first, second);
+    measure_circle(first, wall.radius, pose.x, pose.y);
+    const auto touched = first.depth > zero;
+    if (!any(touched)) {
+      return touched;
+    }
+    measure_circle(second, wall.radius, pose.x, pose.y);
+    resolve_contacts(first, second, wall, per_inertia, motion);
+    push_out<Real, T>(first, pose);
+    measure_circle(second, wall.radius, pose.x, pose.y);
+    push_out<Real, T>(second, pose);
+    return touched;
+  }
+  auto touched = zero > zero;
+  for (int e = 0; e < wall.edge_count; ++e) {
+    const WallEdge<T>& edge = wall.edges[e];
+    const Real along = pose.x * edge.normal_x + pose.y * edge.normal_y;
+    if (!any(along > Real(edge.distance - reach))) {
+      continue;
+    }
+    sincos(bounded_angle(pose.theta), axes.sine, axes.cosine);
+    leading_corners(Real(edge.normal_x), Real(edge.normal_y), h, axes, first, second);
+    measure_edge(first, edge, pose.x, pose.y);
+    if (!any(first.depth > zero)) {
+      continue;
+    }
+    measure_edge(second, edge, pose.x, pose.y);
+    touched = touched | (first.depth > zero);
+    resolve_contacts(first, second, wall, per_inertia, motion);
+    push_out<Real, T>(first, pose);
+  }
+  return touched;
+}
+
+DRIFTWALK_LANES_END

@@ -1,0 +1,36 @@
+// Pairs of independent standard normal numbers from two random words (Box-Muller).
+//
+// The uniform that goes under the logarithm has 24 bits, so |normal| <= 5.77; the tail beyond has
+// probability 8e-9.
+#pragma once
+
+#include "driftwalk/math/elementary.hpp"
+
+DRIFTWALK_LANES_BEGIN
+
+template <int N>
+inline void normal_pair(UIntPack<N> word0, UIntPack<N> word1, FloatPack<N>& first,
+                        FloatPack<N>& second) {
+  using Real = FloatPack<N>;
+  const Real uniform = (to_real(Real(), as_signed(word0 >> 8)) + 1.0f) * 0x1p-24f;
+  const Real radius = sqrt(log(uniform) * -2.0f);
+  // The angle in quarter turns: quadrant in the two top bits, the rest centred on zero.
+  const IntPack<N> quadrant = as_signed(word1 >> 30);
+  const Real rest = to_real(Real(), as_signed((word1 >> 8) & 0x3fffffu)) * 0x1p-22f - 0.5f;
+  Real sine, cosine;
+  sincos_reduced(rest * 1.57079633f, sine, cosine);
+  rotate_quadrant(quadrant, sine, cosine);
+  first = radius * cosine;
+  second = radius * sine;
+}
+
+DRIFTWALK_HD inline void normal_pair(UInt32 word0, UInt32 word1, double& first, double& second) {
+  const double uniform = (double(word0 >> 8) + 1.0) * 0x1p-24;
+  const double radius = __builtin_sqrt(-2.0 * __builtin_log(uniform));
+  const double quarter =
+      double(word1 >> 30) + double((word1 >> 8) & 0x3fffffu) * 0x1p-22 - 0.5;
+  first = radius * __builtin_cos(quarter * (pi_value / 2));
+  second = radius * __builtin_sin(quarter * (pi_value / 2));
+}
+
+DRIFTWALK_LANES_END

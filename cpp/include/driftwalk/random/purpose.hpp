@@ -1,0 +1,15 @@
+// What each stream of random numbers is for. The number is part of a random number's address:
+// changing one changes every result, so new purposes are added at the end and none is reused.
+#pragma once
+
+#include <cstdint>
+
+namespace driftwalk {
+
+enum class Purpose : std::uint32_t {
+  force = 1,        // stochastic force, one draw per force interval
+  observation = 2,  // camera noise, one draw per sample
+  start = 3,        // start pose
+};
+
+}  // namespace driftwalk

@@ -1,0 +1,89 @@
+// A batch made ready for the kernels: constants and tables in the kernels' number type.
+#pragma once
+
+#include "driftwalk/simulate/batch.hpp"
+
+#include <cstdint>
+
+namespace driftwalk {
+
+// An edge of a polygonal arena.
+template <class T>
+struct PreparedEdge {
+  T normal_x, normal_y;  // outward unit normal
+  T distance;            // of the edge from the origin along the normal [m]
+};
+
+// Numbers in one node's record of the flow table: (u, u above, v, v above).
+inline constexpr int flow_record = 4;
+
+// The flow table's numbers: 16-bit integers for the float kernels, doubles for the reference.
+template <class T>
+struct FlowNumber {
+  using type = T;
+};
+template <>
+struct FlowNumber<float> {
+  using type = std::int16_t;
+};
+
+template <class T>
+struct FlowView {
+  const typename FlowNumber<T>::type* table;  // [rows][1 << stride_bits][flow_record]
+  int stride_bits;
+  T unit;              // velocity of a looked-up number of 1 [m/s]
+  T origin_x;          // position of node (0, 0) [m]
+  T origin_y;
+  T per_spacing_x;     // 1 / node spacing [1/m]
+  T per_spacing_y;
+  T low_x, high_x;     // where a block's centre may be for every strip to be on the table [m]
+  T low_y, high_y;
+};
+
+// Everything a kernel reads, in its own number type. Plain pointers: the kernels are compiled once
+// per instruction set and must share no container code (see config.hpp).
+template <class T>
+struct Prepared {
+  // block and integrator
+  T half_side, strip_width;
+  int strips;
+  T dt, per_dt, per_inertia;
+  int steps_per_interval;
+  double drag_scale;          // 1/2 rho (a/N) d [kg/m^2]: K = drag_scale * C_d
+  double mass, inertia;
+  // wall
+  T radius, restitution, friction, bounce_speed;
+  const PreparedEdge<T>* edges;
+  int edge_count;
+  // flow: the first of `frames` tables, frame_size numbers each
+  FlowView<T> flow;
+  std::int64_t frame_size;
+  int frames;
+  const double* frame_time;
+  // sampling: sample k lies in step sample_step[k], at the fraction sample_weight[k] of it
+  std::int64_t samples;
+  const std::int64_t* sample_step;
+  const T* sample_weight;
+  // camera
+  T position_noise, orientation_noise, position_quantum;
+};
+
+// Where the samples of a run go: sample k of lane l stands at [l * lane_stride + k].
+template <class T>
+struct SampleSink {
+  T* x;
+  T* y;
+  T* theta;
+  std::int64_t lane_stride;
+  // Scratch for one frame of the flow table, used when there are several.
+  typename FlowNumber<T>::type* blended_flow;
+};
+
+// Runs worlds first .. first + count - 1 (count <= lanes) and writes their samples and status.
+using SimulateLanes = void (*)(const Prepared<float>&, const BatchWorlds&, std::int64_t first,
+                               int count, const SampleSink<float>&, std::uint32_t* status);
+
+void simulate_reference(const Prepared<double>&, const BatchWorlds&, std::int64_t world,
+                        const SampleSink<double>&, std::uint32_t* status);
+
+}  // namespace driftwalk

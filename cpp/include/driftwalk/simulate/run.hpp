@@ -1,0 +1,205 @@
+// The loop of a pack of worlds through a whole run: forces, steps, samples.
+#pragma once
+
+#include "driftwalk/physics/integrator.hpp"
+#include "driftwalk/random/normal.hpp"
+#include "driftwalk/random/philox.hpp"
+#include "driftwalk/simulate/prepared.hpp"
+
+DRIFTWALK_LANES_BEGIN
+
+template <class Real>
+inline void load_worlds(const BatchWorlds& worlds, std::int64_t first, int count,
+                        World<Real>& state, Real& drag_coefficient, Real& force_std,
+                        Philox<typename Numbers<Real>::UInt>& stream) {
+  constexpr int lanes = Numbers<Real>::lanes;
+  // Lanes beyond the last world repeat it; nothing of theirs is written.
+  double column[8][lanes];
+  UInt32 low[lanes], high[lanes];
+  for (int lane = 0; lane < lanes; ++lane) {
+    const std::int64_t world = first + (lane < count ? lane : count - 1);
+    const double values[8] = {worlds.x[world],  worlds.y[world],     worlds.theta[world],
+                              worlds.vx[world], worlds.vy[world],    worlds.omega[world],
+                              worlds.drag_coefficient[world], worlds.force_std[world]};
+    for (int k = 0; k < 8; ++k) {
+      column[k][lane] = values[k];
+    }
+    low[lane] = static_cast<UInt32>(worlds.key[world]);
+    high[lane] = static_cast<UInt32>(worlds.key[world] >> 32);
+  }
+  load_lanes(column[0], state.pose.x);
+  load_lanes(column[1], state.pose.y);
+  load_lanes(column[2], state.pose.theta);
+  load_lanes(column[3], state.motion.vx);
+  load_lanes(column[4], state.motion.vy);
+  load_lanes(column[5], state.motion.omega);
+  load_lanes(column[6], drag_coefficient);
+  load_lanes(column[7], force_std);
+  std::memcpy(&stream.key0, low, sizeof low);
+  std::memcpy(&stream.key1, high, sizeof high);
+  const Real zero{typename Numbers<Real>::Scalar(0)};
+  state.drag = {zero, zero, zero};
+}
+
+// Four standard normal numbers of a purpose at a position of its stream.
+template <class Real>
+inline void draw_normals(const Philox<typename Numbers<Real>::UInt>& stream, Purpose purpose,
+                         std::int64_t index, Real* out) {
+  using UInt = typename Numbers<Real>::UInt;
+  UInt words[4];
+  stream(UInt(static_cast<UInt32>(index)), UInt(static_cast<UInt32>(0)),
+         UInt(static_cast<UInt32>(index >> 32)), UInt(static_cast<UInt32>(purpose)), words);
+  normal_pair(words[0], words[1], out[0], out[1]);
+  normal_pair(words[2], words[3], out[2], out[3]);
+}
+
+template <class Real, class T>
+inline Real quantise(Real value, T quantum) {
+  const Real scaled = value / Real(quantum);
+  return to_real(value, truncate(scaled + copy_sign(Real(T(0.5)), scaled))) * quantum;
+}
+
+// The pose as the camera reports it, written to every lane's own column.
+template <class Real, class T>
+inline void write_sample(const Prepared<T>& run, const SampleSink<T>& sink, std::int64_t sample,
+                         int count, const Philox<typename Numbers<Real>::UInt>& stream, Real x,
+                         Real y, Real theta) {
+  if (run.position_noise > T(0) || run.orientation_noise > T(0)) {
+    Real noise[4];
+    draw_normals(stream, Purpose::observation, sample, noise);
+    x = x + noise[0] * run.position_noise;
+    y = y + noise[1] * run.position_noise;
+    theta = theta + noise[2] * run.orientation_noise;
+  }
+  if (run.position_quantum > T(0)) {
+    x = quantise(x, run.position_quantum);
+    y = quantise(y, run.position_quantum);
+  }
+  theta = wrap_angle(theta);
+  for (int lane = 0; lane < count; ++lane) {
+    const std::int64_t at = lane * sink.lane_stride + sample;
+    sink.x[at] = lane_of(x, lane);
+    sink.y[at] = lane_of(y, lane);
+    if (sink.theta != nullptr) {
+      sink.theta[at] = lane_of(theta, lane);
+    }
+  }
+}
+
+// The flow table at a time, blended linearly between the two frames around it.
+template <class T, class Node>
+inline const Node* flow_table_at(const Prepared<T>& run, double time, Node* scratch) {
+  int frame = 0;
+  while (frame + 2 < run.frames && run.frame_time[frame + 1] <= time) {
+    ++frame;
+  }
+  const double span = run.frame_time[frame + 1] - run.frame_time[frame];
+  const double raw = (time - run.frame_time[frame]) / span;
+  const T weight = static_cast<T>(raw < 0 ? 0 : (raw > 1 ? 1 : raw));
+  const Node* before = run.flow.table + frame * run.frame_size;
+  const Node* after = before + run.frame_size;
+  for (std::int64_t k = 0; k < run.frame_size; ++k) {
+    const T low = static_cast<T>(before[k]);
+    scratch[k] = static_cast<Node>(low + (static_cast<T>(after[k]) - low) * weight);
+  }
+  return scratch;
+}
+
+// Path length of a world in the second half of its samples, before camera noise: a world at rest is
+// told by it, whatever the noise makes of its recorded steps.
+template <class Real>
+struct Motionless {
+  using T = typename Numbers<Real>::Scalar;
+  Real x, y, path;
+  std::int64_t from;
+  T threshold;
+
+  template <class Run>
+  explicit Motionless(const Run& run) : x(T(0)), y(T(0)), path(T(0)), from(run.samples / 2) {
+    constexpr double slowest = 1e-6;  // [m/s]
+    const std::int64_t steps = run.sample_step[run.samples - 1] - run.sample_step[from];
+    threshold = static_cast<T>(slowest * static_cast<double>(steps) * static_cast<double>(run.dt));
+  }
+
+  inline void add(std::int64_t sample, Real new_x, Real new_y) {
+    if (sample > from) {
+      path = path + abs(new_x - x) + abs(new_y - y);
+    }
+    x = new_x;
+    y = new_y;
+  }
+};
+
+template <class Real, class T>
+inline typename Numbers<Real>::Bool is_sound(const Prepared<T>& run, const World<Real>& w) {
+  const Real margin{run.half_side};
+  return (w.pose.x > Real(run.flow.low_x) - margin) & (w.pose.x < Real(run.flow.high_x) + margin) &
+         (w.pose.y > Real(run.flow.low_y) - margin) & (w.pose.y < Real(run.flow.high_y) + margin);
+}
+
+// The state at the end of a run says whether every number on the way was one: a NaN never heals.
+template <class Real, class T>
+inline void write_status(const Prepared<T>& run, const World<Real>& w, const Motionless<Real>& rest,
+                         int count, std::uint32_t* status) {
+  const Real total = w.pose.x + w.pose.y + w.pose.theta + w.motion.vx + w.motion.vy;
+  const auto finite = abs(total) < Real(T(1e30));
+  const auto inside = is_sound(run, w);
+  for (int lane = 0; lane < count; ++lane) {
+    status[lane] = (lane_of(finite, lane) ? 0u : status_non_finite) |
+                   (lane_of(inside, lane) ? 0u : status_escaped) |
+                   (lane_of(rest.path, lane) < rest.threshold ? status_no_motion : 0u);
+  }
+}
+
+template <class Real, class T>
+inline void run_worlds(const Prepared<T>& run, const BatchWorlds& worlds, std::int64_t first,
+                       int count, const SampleSink<T>& sink, std::uint32_t* status) {
+  using UInt = typename Numbers<Real>::UInt;
+  const BlockShape<T> block{run.half_side, run.strip_width, run.strips};
+  const StepConstants<T> step{run.dt, run.per_dt, run.per_inertia};
+  const WallView<T> wall{run.radius,      run.edges,    run.edge_count,
+                         run.restitution, run.friction, run.bounce_speed};
+  FlowView<T> flow = run.flow;
+  World<Real> world;
+  Real drag_coefficient, force_std;
+  Philox<UInt> stream;
+  load_worlds(worlds, first, count, world, drag_coefficient, force_std, stream);
+  const WorldConstants<Real> constants{drag_coefficient * static_cast<T>(run.drag_scale / run.mass),
+                                       drag_coefficient *
+                                           static_cast<T>(run.drag_scale / run.inertia)};
+  const Real noise_scale = force_std * static_cast<T>(1.0 / run.mass);
+  meet_wall(wall, block.half_side, Real(step.per_inertia), world.pose, world.motion);
+
+  Motionless<Real> rest(run);
+  Real normals[4];
+  std::int64_t step_index = 0, sample = 0;
+  for (std::int64_t interval = 0; sample < run.samples; ++interval) {
+    // One Philox block serves two force intervals.
+    const int half = static_cast<int>(interval & 1) * 2;
+    if (half == 0) {
+      draw_normals(stream, Purpose::force, interval >> 1, normals);
+    }
+    const Real noise_x = normals[half] * noise_scale;
+    const Real noise_y = normals[half + 1] * noise_scale;
+    for (int sub = 0; sub < run.steps_per_interval && sample < run.samples; ++sub, ++step_index) {
+      if (run.frames > 1) {
+        const double middle = (static_cast<double>(step_index) + 0.5) * static_cast<double>(run.dt);
+        flow.table = flow_table_at(run, middle, sink.blended_flow);
+      }
+      const Pose<Real> before = world.pose;
+      Real turned;
+      step_world(block, flow, wall, step, constants, noise_x, noise_y, world, turned);
+      for (; sample < run.samples && run.sample_step[sample] == step_index; ++sample) {
+        const T weight = run.sample_weight[sample];
+        const Real x = before.x + (world.pose.x - before.x) * weight;
+        const Real y = before.y + (world.pose.y - before.y) * weight;
+        rest.add(sample, x, y);
+        write_sample(run, sink, sample, count, stream, x, y,
+                     wrap_angle(before.theta + turned * weight));
+      }
+    }
+  }
+  write_status(run, world, rest, count, status);
+}
+
+DRIFTWALK_LANES_END

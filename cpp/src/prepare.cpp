@@ -1,0 +1,163 @@
+#include "driftwalk/simulate/prepare.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <type_traits>
+
+namespace driftwalk {
+
+namespace {
+// Half extents of the arena about the origin: where a block's centre can be.
+void arena_extent(const BatchModel& model, double& low_x, double& high_x, double& low_y,
+                  double& high_y) {
+  if (model.radius > 0) {
+    low_x = low_y = -model.radius;
+    high_x = high_y = model.radius;
+    return;
+  }
+  // The corners of a convex polygon are where neighbouring edges meet.
+  low_x = low_y = HUGE_VAL;
+  high_x = high_y = -HUGE_VAL;
+  for (int e = 0; e < model.edge_count; ++e) {
+    const double* a = model.edges + 3 * e;
+    const double* b = model.edges + 3 * ((e + 1) % model.edge_count);
+    const double determinant = a[0] * b[1] - a[1] * b[0];
+    const double x = (a[2] * b[1] - b[2] * a[1]) / determinant;
+    const double y = (a[0] * b[2] - b[0] * a[2]) / determinant;
+    low_x = std::min(low_x, x);
+    high_x = std::max(high_x, x);
+    low_y = std::min(low_y, y);
+    high_y = std::max(high_y, y);
+  }
+}
+
+int padding(double reach, double spacing) { return static_cast<int>(std::ceil(reach / spacing)) + 1; }
+}  // namespace
+
+template <class T>
+PreparedRun<T>::PreparedRun(const BatchModel& model) {
+  view_.half_side = static_cast<T>(model.side / 2);
+  view_.strip_width = static_cast<T>(model.side / model.strips);
+  view_.strips = model.strips;
+  view_.dt = static_cast<T>(model.time_step);
+  view_.per_dt = static_cast<T>(1.0 / model.time_step);
+  view_.per_inertia = static_cast<T>(model.mass / model.inertia);
+  view_.steps_per_interval = model.steps_per_interval;
+  view_.drag_scale = 0.5 * model.water_density * (model.side / model.strips) * model.depth;
+  view_.mass = model.mass;
+  view_.inertia = model.inertia;
+  view_.position_noise = static_cast<T>(model.position_noise);
+  view_.orientation_noise = static_cast<T>(model.orientation_noise);
+  view_.position_quantum = static_cast<T>(model.position_quantum);
+  prepare_wall(model);
+  prepare_flow(model);
+  prepare_samples(model);
+}
+
+template <class T>
+void PreparedRun<T>::prepare_wall(const BatchModel& model) {
+  view_.radius = static_cast<T>(model.radius);
+  view_.restitution = static_cast<T>(model.restitution);
+  view_.friction = static_cast<T>(model.friction);
+  view_.bounce_speed = static_cast<T>(model.bounce_speed);
+  edges_.resize(static_cast<std::size_t>(model.edge_count));
+  for (std::size_t e = 0; e < edges_.size(); ++e) {
+    edges_[e] = {static_cast<T>(model.edges[3 * e]), static_cast<T>(model.edges[3 * e + 1]),
+                 static_cast<T>(model.edges[3 * e + 2])};
+  }
+  view_.edges = edges_.data();
+  view_.edge_count = model.edge_count;
+}
+
+// One record per node; beyond the grid the nearest node's value goes on. Velocities are rounded to
+// max|u| / 32767 in both tables, so that the reference sees the flow that the kernels see.
+template <class T>
+void PreparedRun<T>::prepare_flow(const BatchModel& model) {
+  using Node = typename FlowNumber<T>::type;
+  constexpr bool quantised = std::is_integral_v<Node>;
+  FlowView<T>& flow = view_.flow;
+  double low_x, high_x, low_y, high_y;
+  arena_extent(model, low_x, high_x, low_y, high_y);
+  // The farthest strip centre from a block's centre lies within its half diagonal.
+  const double reach = model.side * 0.5 * std::sqrt(2.0);
+  const double right = model.origin_x + (model.columns - 1) * model.spacing_x;
+  const double top = model.origin_y + (model.rows - 1) * model.spacing_y;
+  const int left_pad = padding(std::max(model.origin_x - low_x, 0.0) + reach, model.spacing_x);
+  const int right_pad = padding(std::max(high_x - right, 0.0) + reach, model.spacing_x);
+  const int bottom_pad = padding(std::max(model.origin_y - low_y, 0.0) + reach, model.spacing_y);
+  const int top_pad = padding(std::max(high_y - top, 0.0) + reach, model.spacing_y);
+  const int rows = model.rows + bottom_pad + top_pad;
+  flow.stride_bits = static_cast<int>(
+      std::bit_width(static_cast<unsigned>(model.columns + left_pad + right_pad - 1)));
+  const int columns = 1 << flow.stride_bits;
+
+  const std::int64_t nodes = std::int64_t(model.frames) * model.rows * model.columns;
+  double largest = 0;
+  for (std::int64_t k = 0; k < nodes; ++k) {
+    largest = std::max({largest, std::abs(model.flow_u[k]), std::abs(model.flow_v[k])});
+  }
+  const double step = largest > 0 ? largest / 32767 : 1;
+  // The float kernel's four weights sum to 32767.
+  flow.unit = quantised ? static_cast<T>(step / 32767) : T(1);
+  flow.origin_x = static_cast<T>(model.origin_x - left_pad * model.spacing_x);
+  flow.origin_y = static_cast<T>(model.origin_y - bottom_pad * model.spacing_y);
+  flow.per_spacing_x = static_cast<T>(1.0 / model.spacing_x);
+  flow.per_spacing_y = static_cast<T>(1.0 / model.spacing_y);
+  flow.low_x = static_cast<T>(low_x);
+  flow.high_x = static_cast<T>(high_x);
+  flow.low_y = static_cast<T>(low_y);
+  flow.high_y = static_cast<T>(high_y);
+
+  view_.frames = model.frames;
+  view_.frame_size = std::int64_t(rows) * columns * flow_record;
+  // One more record: the last node's load reaches one beyond it.
+  table_.resize(static_cast<std::size_t>(view_.frame_size * model.frames + flow_record));
+  const auto node = [&](const double* values, int frame, int row, int column) {
+    row = std::clamp(row - bottom_pad, 0, model.rows - 1);
+    column = std::clamp(column - left_pad, 0, model.columns - 1);
+    const double rounded =
+        std::round(values[(std::int64_t(frame) * model.rows + row) * model.columns + column] / step);
+    return static_cast<Node>(quantised ? rounded : rounded * step);
+  };
+  Node* out = table_.data();
+  for (int frame = 0; frame < model.frames; ++frame) {
+    for (int row = 0; row < rows; ++row) {
+      for (int column = 0; column < columns; ++column, out += flow_record) {
+        out[0] = node(model.flow_u, frame, row, column);
+        out[1] = node(model.flow_u, frame, row + 1, column);
+        out[2] = node(model.flow_v, frame, row, column);
+        out[3] = node(model.flow_v, frame, row + 1, column);
+      }
+    }
+  }
+  flow.table = table_.data();
+  if (model.frames > 1) {
+    frame_time_.assign(model.frame_time, model.frame_time + model.frames);
+  }
+  view_.frame_time = frame_time_.data();
+}
+
+template <class T>
+void PreparedRun<T>::prepare_samples(const BatchModel& model) {
+  const std::size_t count = static_cast<std::size_t>(model.samples);
+  sample_step_.resize(count);
+  sample_weight_.resize(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const double steps = model.sample_time[k] / model.time_step;
+    // A sample on a step's end belongs to that step, whichever way the division rounded.
+    const double nearest = std::round(steps);
+    const double exact = std::abs(steps - nearest) < 1e-9 * (1.0 + steps) ? nearest : steps;
+    const double index = std::max(std::ceil(exact) - 1.0, 0.0);
+    sample_step_[k] = static_cast<std::int64_t>(index);
+    sample_weight_[k] = static_cast<T>(exact - index);
+  }
+  view_.samples = model.samples;
+  view_.sample_step = sample_step_.data();
+  view_.sample_weight = sample_weight_.data();
+}
+
+template class PreparedRun<float>;
+template class PreparedRun<double>;
+
+}  // namespace driftwalk

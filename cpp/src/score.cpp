@@ -1,0 +1,136 @@
+// Worlds are scored as they finish: their trajectories live in a thread's scratch and go no further.
+#include "driftwalk/math/elementary.hpp"
+#include "driftwalk/simulate/lanes.hpp"
+#include "driftwalk/simulate/simulate.hpp"
+#include "driftwalk/simulate/threads.hpp"
+#include "driftwalk/stats/steps.hpp"
+
+namespace driftwalk {
+
+namespace {
+
+void bin_steps(const Scoring& scoring, const double* length, const double* angle,
+               std::int64_t pairs, float* density) {
+  const std::int64_t cells = std::int64_t(scoring.length_bins) * scoring.angle_bins;
+  std::fill(density, density + cells, 0.0f);
+  for (std::int64_t k = 0; k < pairs; ++k) {
+    const double across = length[k] / scoring.length_limit * scoring.length_bins;
+    const double around = (angle[k] + pi_value) / (2 * pi_value) * scoring.angle_bins;
+    const int row = static_cast<int>(std::min(across, scoring.length_bins - 1.0));
+    const int column = static_cast<int>(std::clamp(around, 0.0, scoring.angle_bins - 1.0));
+    density[row * scoring.angle_bins + column] += 1.0f;
+  }
+  for (std::int64_t k = 0; k < cells && pairs > 0; ++k) {
+    density[k] /= static_cast<float>(pairs);
+  }
+}
+
+// One thread's scratch and what it does with a pack of worlds.
+class Scorer {
+public:
+  Scorer(const PreparedRun<float>& run, const BatchWorlds& worlds, const Scoring& scoring,
+         const Scores& out)
+      : run_(run), worlds_(worlds), scoring_(scoring), out_(out), kernel_(chosen_kernel()),
+        // A whole number of cache lines plus one, so that lanes do not share cache sets.
+        stride_((run.view().samples / 16 + 2) * 16),
+        x_(static_cast<std::size_t>(stride_ * kernel_.lanes)), y_(x_.size()),
+        blended_(static_cast<std::size_t>(run.blended_flow_size())),
+        length_(static_cast<std::size_t>(scoring.plan.pairs)), angle_(length_.size()) {}
+
+  void operator()(std::int64_t pack) {
+    const std::int64_t first = pack * kernel_.lanes;
+    const int count = static_cast<int>(std::min<std::int64_t>(kernel_.lanes, worlds_.count - first));
+    const SampleSink<float> sink{x_.data(), y_.data(), nullptr, stride_, blended_.data()};
+    kernel_.run(run_.view(), worlds_, first, count, sink, out_.status + first);
+    for (int lane = 0; lane < count; ++lane) {
+      score(first + lane, x_.data() + lane * stride_, y_.data() + lane * stride_);
+    }
+  }
+
+private:
+  void score(std::int64_t world, const float* x, const float* y) {
+    const std::int64_t pairs =
+        apply_step_plan(scoring_.plan, x, y, length_.data(), angle_.data(), nullptr);
+    out_.pairs[world] = pairs;
+    if (out_.density != nullptr) {
+      const std::int64_t cells = std::int64_t(scoring_.length_bins) * scoring_.angle_bins;
+      bin_steps(scoring_, length_.data(), angle_.data(), pairs, out_.density + world * cells);
+    }
+    if (out_.excerpt_x != nullptr) {
+      std::copy(x, x + scoring_.excerpt, out_.excerpt_x + world * scoring_.excerpt);
+      std::copy(y, y + scoring_.excerpt, out_.excerpt_y + world * scoring_.excerpt);
+    }
+    if (out_.length != nullptr) {
+      const std::int64_t at = world * scoring_.plan.pairs;
+      std::copy_n(length_.data(), pairs, out_.length + at);
+      std::copy_n(angle_.data(), pairs, out_.angle + at);
+    }
+    if (out_.distance != nullptr) {
+      write_distance(world, pairs);
+    }
+  }
+
+  // A world without motion, or without steps, is as far from the recording as can be.
+  void write_distance(std::int64_t world, std::int64_t pairs) {
+    KsPlace place;
+    double distance = 1;
+    if (pairs > 0 && out_.status[world] == status_ok) {
+      const KsResult result =
+          ks_two_sample(*scoring_.reference, length_.data(), angle_.data(), pairs, workspace_);
+      distance = result.distance();
+      place = result.place();
+    }
+    out_.distance[world] = distance;
+    out_.place_length[world] = place.x;
+    out_.place_angle[world] = place.y;
+    out_.place_quadrant[world] = place.quadrant;
+  }
+
+  const PreparedRun<float>& run_;
+  const BatchWorlds& worlds_;
+  const Scoring& scoring_;
+  const Scores& out_;
+  SimulateKernel kernel_;
+  std::int64_t stride_;
+  std::vector<float> x_, y_;
+  std::vector<std::int16_t> blended_;
+  std::vector<double> length_, angle_;
+  KsWorkspace workspace_;
+};
+
+void widen(const StepTable& table, std::int64_t row, std::vector<double>& length,
+           std::vector<double>& angle) {
+  const std::int64_t at = row * table.stride, count = table.count[row];
+  length.assign(table.length + at, table.length + at + count);
+  angle.assign(table.angle + at, table.angle + at + count);
+}
+
+}  // namespace
+
+void score_batch(const PreparedRun<float>& run, const BatchWorlds& worlds, const Scoring& scoring,
+                 int threads, const Scores& out) {
+  const int lanes = chosen_kernel().lanes;
+  run_tasks((worlds.count + lanes - 1) / lanes, threads,
+            [&] { return Scorer(run, worlds, scoring, out); });
+}
+
+void ks_matrix(const StepTable& references, const StepTable& samples, int threads, double* out) {
+  run_tasks(references.rows, threads, [&] {
+    return [&, length = std::vector<double>(), angle = std::vector<double>(),
+            workspace = KsWorkspace()](std::int64_t row) mutable {
+      widen(references, row, length, angle);
+      const KsReference reference(length.data(), angle.data(), references.count[row]);
+      for (std::int64_t column = 0; column < samples.rows; ++column) {
+        widen(samples, column, length, angle);
+        out[row * samples.rows + column] =
+            samples.count[column] == 0 || references.count[row] == 0
+                ? 1.0
+                : ks_two_sample(reference, length.data(), angle.data(), samples.count[column],
+                                workspace)
+                      .distance();
+      }
+    };
+  });
+}
+
+}  // namespace driftwalk

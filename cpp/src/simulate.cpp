@@ -1,0 +1,57 @@
+#include "driftwalk/simulate/simulate.hpp"
+
+#include "driftwalk/dispatch.hpp"
+#include "driftwalk/simulate/lanes.hpp"
+#include "driftwalk/simulate/threads.hpp"
+
+namespace driftwalk {
+
+SimulateKernel chosen_kernel() {
+#if defined(DRIFTWALK_X86_LANES)
+  switch (chosen_instruction_set()) {
+  case InstructionSet::avx512:
+    return simulate_kernel_avx512();
+  case InstructionSet::avx2:
+    return simulate_kernel_avx2();
+  case InstructionSet::baseline:
+    break;
+  }
+#endif
+  return simulate_kernel_baseline();
+}
+
+void simulate_batch(const PreparedRun<float>& run, const BatchWorlds& worlds, int threads,
+                    const Trajectories<float>& out) {
+  const SimulateKernel kernel = chosen_kernel();
+  const std::int64_t samples = run.view().samples;
+  const std::int64_t packs = (worlds.count + kernel.lanes - 1) / kernel.lanes;
+  run_tasks(packs, threads, [&] {
+    return [&, blended = std::vector<std::int16_t>(
+                   static_cast<std::size_t>(run.blended_flow_size()))](std::int64_t pack) mutable {
+      const std::int64_t first = pack * kernel.lanes;
+      const int count = static_cast<int>(std::min<std::int64_t>(kernel.lanes, worlds.count - first));
+      const std::int64_t at = first * samples;
+      const SampleSink<float> sink{out.x + at, out.y + at,
+                                   out.theta == nullptr ? nullptr : out.theta + at, samples,
+                                   blended.data()};
+      kernel.run(run.view(), worlds, first, count, sink, out.status + first);
+    };
+  });
+}
+
+void simulate_batch(const PreparedRun<double>& run, const BatchWorlds& worlds, int threads,
+                    const Trajectories<double>& out) {
+  const std::int64_t samples = run.view().samples;
+  run_tasks(worlds.count, threads, [&] {
+    return [&, blended = std::vector<double>(static_cast<std::size_t>(run.blended_flow_size()))](
+               std::int64_t world) mutable {
+      const std::int64_t at = world * samples;
+      const SampleSink<double> sink{out.x + at, out.y + at,
+                                    out.theta == nullptr ? nullptr : out.theta + at, samples,
+                                    blended.data()};
+      simulate_reference(run.view(), worlds, world, sink, out.status + world);
+    };
+  });
+}
+
+}  // namespace driftwalk
