@@ -89,6 +89,12 @@ def draw_arena(ax: Axes, arena: Mapping[str, Any]) -> Patch | None:
 
 
 def label_position(ax: Axes) -> None:
-    """Label axes that show positions in the tank."""
+    """Label axes that show positions in the tank, both with the same ticks."""
+    from matplotlib.ticker import MaxNLocator
+
+    # A fixed number of ticks: one that follows the size of the axes makes the layout, which
+    # depends on the width of the labels, need several passes.
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(MaxNLocator(nbins=7, steps=[1, 2, 5, 10]))
     ax.set_xlabel("x (cm)")
     ax.set_ylabel("y (cm)")

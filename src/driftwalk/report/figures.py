@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from driftwalk.core.errors import InputError
 from driftwalk.report.plot_density_panels import plot_density_panels, shared_setting_text
 from driftwalk.report.plot_flow import COMPONENTS, SPEED_LABEL, plot_flow, velocity_of
-from driftwalk.report.plot_ks_map import plot_ks_map, plot_refined_map
+from driftwalk.report.plot_ks_map import LEGEND_ORDER, plot_ks_map, plot_refined_map
 from driftwalk.report.plot_steps import plot_steps
 from driftwalk.report.plot_trajectory import plot_trajectory
 from driftwalk.report.plot_validation import plot_validation
@@ -113,7 +113,7 @@ def flow_figure(flow: xr.Dataset) -> Figure:
     """Return Fig. 2: the block's velocity beside the water's, or the water's alone."""
     has_block = all(name in flow for name in COMPONENTS["block"])
     if not has_block:
-        figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=76.0)
+        figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=76.0, layout="compressed")
         plot_flow(flow, figure.add_subplot())
         return figure
     import numpy as np
@@ -122,7 +122,7 @@ def flow_figure(flow: xr.Dataset) -> Figure:
         float(np.nanmax(np.hypot(*velocity_of(flow, field)[:2]), initial=0.0)) / 100.0
         for field in ("block", "water")
     )
-    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=93.0)
+    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=92.0, layout="compressed")
     row = list(figure.subplots(1, 2, sharex=True, sharey=True))
     plot_flow(flow, row[0], field="block", speed_limit=top, colorbar="none")
     plot_flow(flow, row[1], field="water", speed_limit=top, colorbar="none")
@@ -141,7 +141,7 @@ def flow_figure(flow: xr.Dataset) -> Figure:
 
 def trajectory_figure(trajectory: xr.Dataset, *, body: str | None = None) -> Figure:
     """Return Fig. 5a: the first minute of the path."""
-    figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=76.0)
+    figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=80.0, layout="compressed")
     ax = figure.add_subplot()
     time = body_track(trajectory, body).time
     if time.size and time[-1] - time[0] > EXCERPT_S:
@@ -178,7 +178,13 @@ def ks_map_figure(calibration: xr.Dataset) -> Figure:
     plot_refined_map(calibration, row[1])
     letter_panels(row, ["whole box", "near the optimum (lines: fitted surface)"])
     handles, labels = row[0].get_legend_handles_labels()
-    figure.legend(handles[::-1], labels[::-1], loc="outside upper center", ncols=6)
+    order = sorted(range(len(labels)), key=lambda index: LEGEND_ORDER.index(labels[index]))
+    figure.legend(
+        [handles[index] for index in order],
+        [labels[index] for index in order],
+        loc="outside upper center",
+        ncols=6,
+    )
     return figure
 
 

@@ -60,7 +60,7 @@ def plot_density_panels(
     calibration : xarray.Dataset
         What `driftwalk.calibrate.calibrate` returns.
     axes : sequence of 4 matplotlib.axes.Axes, optional
-        Where to draw; a new figure with one row when left out.
+        Where to draw, in one row or two; a new figure with one row when left out.
     parameter : {"drag_coefficient", "force_std"}
         The parameter that differs between the panels.
     low, high : float, optional
@@ -100,9 +100,10 @@ def plot_density_panels(
         ax.set_ylim(*limits[1])
         ax.xaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10]))
         ax.set_xlabel(LENGTH_LABEL)
+        ax.set_ylabel(ANGLE_LABEL)
+        ax.label_outer()
     for ax, setting in zip(row[1:], settings, strict=True):
         _mark_cause(ax, setting)
-    row[0].set_ylabel(ANGLE_LABEL)
     letter_panels(row, ["recording", *(_title(setting, parameter) for setting in settings)])
     if colorbar == "beside":
         add_colorbar(mesh, row, DENSITY_LABEL)

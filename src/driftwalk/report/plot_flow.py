@@ -76,7 +76,7 @@ def plot_flow(
     """
     u, v, flag = velocity_of(flow, field)
     x, y = (in_unit(flow[axis], "cm", stored="m") for axis in ("x", "y"))
-    ax = axes_or_new(ax, height_mm=76.0)
+    ax = axes_or_new(ax, layout="compressed")
     speed = np.hypot(u, v)
     top = float(np.nanmax(speed, initial=0.0)) if speed_limit is None else 100.0 * speed_limit
     mesh = ax.pcolormesh(

@@ -30,9 +30,15 @@ Array = npt.NDArray[np.float64]
 CAUSES: dict[int, tuple[str, str]] = {
     1: ("no motion (D = 1)", "//////"),
     2: ("not finite", "xxxxxx"),
-    4: ("too few steps", "......"),
+    4: ("too few steps", "------"),
 }
 UNKNOWN_CAUSE = ("not computed", "\\\\\\\\\\\\")
+OPTIMUM_LABEL, REGION_LABEL = "optimum and interval", "90 % region"
+LEGEND_ORDER = [
+    OPTIMUM_LABEL,
+    REGION_LABEL,
+    *(name for name, _ in (*CAUSES.values(), UNKNOWN_CAUSE)),
+]
 
 
 def plot_ks_map(
@@ -75,7 +81,7 @@ def plot_ks_map(
     drag, force = axes_of(calibration, prefix="")
     dims = ("force_std", "drag_coefficient")
     score = 1.0 - calibration["ks_distance"].transpose(*dims).values
-    status = calibration["status"].transpose(*dims).values
+    status = _status(calibration, "status", dims)
     ax = axes_or_new(ax)
     mesh = _score_mesh(ax, drag, force, score, bottom=0.0, top=1.0)
     _hatch_causes(ax, drag, force, status, np.isfinite(score))
@@ -133,6 +139,8 @@ def plot_refined_map(
         floor = 1.0 - number_attribute(calibration, "noise_floor")
         high = np.nanmax([high, floor])
         mesh.set_clim(low, high + 0.06 * (high - low))
+    status = _status(calibration, "refined_status", dims)
+    _hatch_causes(ax, drag, force, status, np.isfinite(score))
     lines = None
     if min(surface.shape) >= 2 and np.isfinite(surface).any():
         lines = ax.contour(drag, force, surface, levels=6, colors="white", linewidths=0.6)
@@ -189,7 +197,7 @@ def draw_optimum(ax: Axes, calibration: xr.Dataset, *, color: str = "white") -> 
     outline = [Stroke(linewidth=2.2, foreground=INK if color == "white" else "white"), Normal()]
     ax.errorbar(
         [drag], [force], xerr=bars[0], yerr=bars[1], fmt="o", ms=3.5, color=color, elinewidth=1.0,
-        capsize=0.0, zorder=6, label="optimum and interval", path_effects=outline,
+        capsize=0.0, zorder=6, label=OPTIMUM_LABEL, path_effects=outline,
     )  # fmt: skip
 
 
@@ -204,7 +212,7 @@ def _draw_region(ax: Axes, calibration: xr.Dataset) -> None:
     ax.add_patch(
         Polygon(
             outline, closed=True, facecolor="none", edgecolor=INK, linewidth=0.9, zorder=5,
-            label="90 % region", path_effects=[Stroke(linewidth=2.0, foreground="white"), Normal()],
+            label=REGION_LABEL, path_effects=[Stroke(linewidth=2.0, foreground="white"), Normal()],
         )
     )  # fmt: skip
 
@@ -223,6 +231,14 @@ def region_of(calibration: xr.Dataset) -> Array | None:
     return vertices if len(vertices) >= 3 else None
 
 
+def _status(calibration: xr.Dataset, name: str, dims: tuple[str, str]) -> npt.NDArray[np.int64]:
+    """Return the status bits as whole numbers, 0 throughout when the map has none."""
+    if name not in calibration:
+        return np.zeros([calibration.sizes[dim] for dim in dims], dtype=np.int64)
+    stored = calibration[name].transpose(*dims).values
+    return np.asarray(np.nan_to_num(stored), dtype=np.int64)
+
+
 def _score_mesh(
     ax: Axes, drag: Array, force: Array, score: Array, *, bottom: float | None, top: float | None
 ) -> QuadMesh:
@@ -238,7 +254,7 @@ def _hatch_causes(
     ax: Axes,
     drag: Array,
     force: Array,
-    status: npt.NDArray[np.integer],
+    status: npt.NDArray[np.int64],
     known: npt.NDArray[np.bool_],
 ) -> None:
     """Cover every cell that has a cause, or no distance, by a hatched rectangle."""
@@ -271,5 +287,5 @@ def _finish(ax: Axes, calibration: xr.Dataset, mesh: QuadMesh, colorbar: str) ->
     bar = add_colorbar(mesh, ax, "score 1 − D")
     if np.isfinite(floor):
         bar.ax.axhline(1.0 - floor, color=INK, lw=1.4)
-        bar.set_label(f"score 1 − D   (line: noise floor, D = {floor:.2g})")
+        bar.set_label("score 1 − D (line: noise floor)")
     return bar

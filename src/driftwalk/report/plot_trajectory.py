@@ -72,7 +72,7 @@ def plot_trajectory(
     from matplotlib.collections import LineCollection
 
     track = _excerpt(body_track(trajectory, body), start, stop)
-    ax = axes_or_new(ax, height_mm=76.0)
+    ax = axes_or_new(ax, layout="compressed")
     points = CM_PER_M * np.column_stack([track.x, track.y])
     joined = joined_neighbours(track.time)
     segments = np.stack([points[:-1][joined], points[1:][joined]], axis=1)

@@ -19,7 +19,7 @@ from driftwalk.report.labels import (
     required_attribute,
 )
 from driftwalk.report.plot_density_panels import Parameter
-from driftwalk.report.plot_ks_map import draw_optimum, region_of
+from driftwalk.report.plot_ks_map import REGION_LABEL, draw_optimum, region_of
 from driftwalk.report.style import BLUE, INK, MUTED, ORANGE, PALE, axes_or_new, axes_row_or_new
 
 if TYPE_CHECKING:
@@ -174,7 +174,7 @@ def plot_bootstrap(calibration: xr.Dataset, ax: Axes | None = None) -> Axes:
     if region is not None:
         ax.add_patch(
             Polygon(
-                region, closed=True, facecolor="none", edgecolor=INK, lw=0.8, label="90 % region"
+                region, closed=True, facecolor="none", edgecolor=INK, lw=0.8, label=REGION_LABEL
             )
         )
     draw_optimum(ax, calibration, color=ORANGE)

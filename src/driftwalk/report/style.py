@@ -11,7 +11,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -92,23 +92,30 @@ def print_style() -> Iterator[None]:
         yield
 
 
-def new_figure(*, width_mm: float, height_mm: float) -> Figure:
-    """Return an empty figure of that size [mm] with the Agg canvas and constrained layout."""
+Layout = Literal["constrained", "compressed"]
+
+
+def new_figure(*, width_mm: float, height_mm: float, layout: Layout = "constrained") -> Figure:
+    """Return an empty figure of that size [mm] with the Agg canvas.
+
+    `layout` is matplotlib's: "compressed" is the one for axes of equal aspect.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width_mm / MM_PER_INCH, height_mm / MM_PER_INCH), layout="constrained")
+    figure = Figure(figsize=(width_mm / MM_PER_INCH, height_mm / MM_PER_INCH), layout=layout)
     FigureCanvasAgg(figure)
     return figure
 
 
 def axes_or_new(
-    ax: Axes | None, *, width_mm: float = SINGLE_COLUMN_MM, height_mm: float = 75.0
+    ax: Axes | None, *, height_mm: float = 75.0, layout: Layout = "constrained"
 ) -> Axes:
-    """Return `ax`, or the only axes of a new figure of that size [mm] when it is None."""
+    """Return `ax`, or when it is None the only axes of a new figure one column wide."""
     if ax is not None:
         return ax
-    return new_figure(width_mm=width_mm, height_mm=height_mm).add_subplot()
+    figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=height_mm, layout=layout)
+    return figure.add_subplot()
 
 
 def axes_row_or_new(
