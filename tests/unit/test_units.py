@@ -94,7 +94,7 @@ def test_minute_is_not_a_milli_inch_and_a_metre_is_not_a_milli() -> None:
 
 
 def test_a_number_without_dimension_takes_no_unit() -> None:
-    with pytest.raises(ConfigurationError, match="expected a number, got '0.5m'"):
+    with pytest.raises(ConfigurationError, match=r"expected a number, got '0\.5m'"):
         parse_quantity("0.5m", "1")
 
 

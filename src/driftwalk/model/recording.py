@@ -2,25 +2,40 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.model.section import Quantity, Section
 
 
+def _number_to_text(column: Any) -> Any:
+    is_number = isinstance(column, int) and not isinstance(column, bool)
+    return str(column) if is_number else column
+
+
+Column = Annotated[str | None, BeforeValidator(_number_to_text)]
+
+
 class Columns(Section):
-    """Columns of a table, each by its name in the header or its number, counted from 1."""
+    """Columns of a table, each by its name in the header or its number, counted from 1.
+
+    A unit may follow the column after a colon: ``x = "pos_x:mm"``.
+    """
 
     section_name: ClassVar[str] = "recording.columns"
 
-    time: str | int | None = Field(default=None, description="Column of the time.")
-    frame: str | int | None = Field(default=None, description="Column of the frame number.")
-    x: str | int | None = Field(default=None, description="Column of x.")
-    y: str | int | None = Field(default=None, description="Column of y.")
-    theta: str | int | None = Field(default=None, description="Column of the orientation.")
-    body: str | int | None = Field(default=None, description="Column of the body's name.")
+    t: Column = Field(default=None, description="Column of the time.")
+    frame: Column = Field(default=None, description="Column of the frame number.")
+    x: Column = Field(default=None, description="Column of x.")
+    y: Column = Field(default=None, description="Column of y.")
+    theta: Column = Field(default=None, description="Column of the orientation.")
+    body: Column = Field(default=None, description="Column of the body's name.")
+
+    def to_dict(self) -> dict[str, str]:
+        """Return the columns that are set, from quantity to column."""
+        return self.model_dump(exclude_none=True)
 
 
 class Recording(Section):
@@ -50,18 +65,42 @@ class Recording(Section):
         description="Size of a pixel in m, where the file is in pixels.",
         examples=[0.0005],
     )
-    length_unit: Literal["auto", "m", "cm", "mm", "px"] = Field(
-        default="auto", description='Unit of the positions; "auto" is what the format says.'
-    )
-    angle_unit: Literal["auto", "rad", "deg"] = Field(
-        default="auto", description='Unit of the orientation; "auto" is what the format says.'
+    length_unit: Literal["auto", "m", "cm", "mm", "um", "km", "px"] = Field(
+        default="auto", description='Unit of the positions; "auto" is what the file says.'
     )
     y_axis: Literal["auto", "up", "down"] = Field(
         default="auto",
-        description='Sense of the file\'s y axis; "auto" is down for pixels and up otherwise.',
+        description='Sense of the file\'s y axis; "auto" is that of the format, down for pixels.',
     )
-    time_order: Literal["strict", "sort"] = Field(
-        default="strict", description='Times that go back: "strict" is an error, "sort" sorts them.'
+    columns: Columns | None = Field(
+        default=None,
+        description=(
+            "Columns of a table (t, frame, x, y, theta, body), each by its name in the header or "
+            'its number from 1; a unit may follow, as in "angle:deg".'
+        ),
+        examples=['{ t = "time", x = 2, y = 3 }'],
+    )
+    delimiter: str | None = Field(
+        default=None,
+        description="Character between the fields of a table; recognised when not given.",
+        examples=[";"],
+    )
+    x_file: str | None = Field(
+        default=None,
+        description="File of the x matrix, where each coordinate has a file of its own.",
+        examples=["x.csv"],
+    )
+    y_file: str | None = Field(
+        default=None, description="File of the y matrix, likewise.", examples=["y.csv"]
+    )
+    theta_file: str | None = Field(
+        default=None, description="File of the orientation matrix.", examples=["theta.csv"]
+    )
+    keypoint: str | None = Field(
+        default=None, description="Which keypoint of a pose file is the body.", examples=["centre"]
+    )
+    sort: Literal["error", "sort"] = Field(
+        default="error", description='Times that go back: "error" refuses them, "sort" sorts them.'
     )
     max_speed_m_s: Annotated[float | None, Quantity("m/s", gt=0, le=1e4)] = Field(
         default=None,
@@ -75,11 +114,6 @@ class Recording(Section):
             "finds the smallest outline of [tank]'s shape that holds the positions, "
             '"file" is what the file says.'
         ),
-    )
-    columns: Columns | None = Field(
-        default=None,
-        description="Columns of a table, each by its name in the header or its number from 1.",
-        examples=['{ time = "t", x = 2, y = 3 }'],
     )
 
     @model_validator(mode="after")

@@ -1,0 +1,162 @@
+"""Who may import whom, and what is imported only inside functions."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+SOURCE = Path(__file__).resolve().parents[2] / "src" / "driftwalk"
+
+GROUND = frozenset({"core", "_core", "schema"})
+# The table of the architecture page: for each folder, the others that it may import.
+MAY_IMPORT: dict[str, frozenset[str]] = {
+    "core": frozenset({"_core"}),
+    "schema": frozenset({"core", "_core"}),
+    "record": GROUND,
+    "flow": GROUND,
+    "model": GROUND,
+    "compare": GROUND,
+    "sweep": GROUND,
+    "simulate": GROUND | {"model"},
+    "calibrate": GROUND | {"simulate", "compare", "flow", "model", "sweep"},
+    "assemble": GROUND | {"simulate", "compare", "flow", "model", "sweep"},
+    "datasets": GROUND | {"record", "flow", "model", "compare", "sweep", "simulate"},
+    "testing": GROUND | {"record", "flow", "model", "compare", "sweep", "simulate"},
+    "report": GROUND,
+    "viewer": GROUND,
+    "cli": GROUND
+    | {"record", "flow", "model", "compare", "sweep", "simulate", "calibrate", "assemble"}
+    | {"datasets", "testing", "report", "viewer"},
+}
+HEAVY = frozenset({"xarray", "scipy", "pandas", "cv2", "matplotlib", "dask", "optuna", "h5netcdf"})
+# `driftwalk.core` and `driftwalk.schema` are used by module; a stage by the names in its `__all__`.
+BY_MODULE = GROUND
+
+
+class Import(NamedTuple):
+    file: Path
+    line: int
+    module: str
+    names: tuple[str, ...]
+    at_module_level: bool
+    for_types_only: bool
+
+    @property
+    def folder(self) -> str:
+        parts = self.file.relative_to(SOURCE).parts
+        return parts[0] if len(parts) > 1 else ""
+
+    def __str__(self) -> str:
+        return f"{self.file.relative_to(SOURCE)}:{self.line} imports {self.module}"
+
+
+def imports_of(file: Path) -> Iterator[Import]:
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    yield from walk(file, tree.body, at_module_level=True, for_types_only=False)
+
+
+def walk(
+    file: Path, body: list[ast.stmt], *, at_module_level: bool, for_types_only: bool
+) -> Iterator[Import]:
+    for node in body:
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield Import(file, node.lineno, alias.name, (), at_module_level, for_types_only)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{file}:{node.lineno}: a relative import"
+            names = tuple(alias.name for alias in node.names)
+            module = node.module or ""
+            yield Import(file, node.lineno, module, names, at_module_level, for_types_only)
+        else:
+            inside = at_module_level and not isinstance(
+                node, (ast.FunctionDef, ast.AsyncFunctionDef)
+            )
+            typing_only = for_types_only or (
+                isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
+            )
+            for name in ("body", "orelse", "finalbody"):
+                inner = getattr(node, name, [])
+                if isinstance(inner, list):
+                    statements = [item for item in inner if isinstance(item, ast.stmt)]
+                    yield from walk(
+                        file, statements, at_module_level=inside, for_types_only=typing_only
+                    )
+            for handler in getattr(node, "handlers", []):
+                yield from walk(
+                    file, handler.body, at_module_level=inside, for_types_only=typing_only
+                )
+
+
+ALL_IMPORTS = [found for file in sorted(SOURCE.rglob("*.py")) for found in imports_of(file)]
+
+
+def stages_imported(found: Import) -> set[str]:
+    """Return the folders of driftwalk that an import statement reaches."""
+    if found.module == "driftwalk":
+        return {name for name in found.names if name != "__version__"}
+    if found.module.startswith("driftwalk."):
+        return {found.module.split(".")[1]}
+    return set()
+
+
+def test_every_folder_has_a_rank() -> None:
+    folders = {path.name for path in SOURCE.iterdir() if path.is_dir()} - {"__pycache__"}
+    assert folders <= MAY_IMPORT.keys(), folders - MAY_IMPORT.keys()
+
+
+def test_walk_finds_imports() -> None:
+    """The walk itself can fail: a known import inside a function, and one for types only."""
+    found = [entry for entry in ALL_IMPORTS if entry.file == SOURCE / "schema" / "trajectory.py"]
+    assert any(e.module == "xarray" and e.for_types_only for e in found)
+    assert any(e.module == "xarray" and not e.at_module_level for e in found)
+    assert any(e.module == "driftwalk.core.errors" and e.at_module_level for e in found)
+
+
+@pytest.mark.parametrize("folder", sorted(MAY_IMPORT))
+def test_folder_imports_only_from_lower_ranks(folder: str) -> None:
+    allowed = MAY_IMPORT[folder] | {folder}
+    wrong = [
+        str(found)
+        for found in ALL_IMPORTS
+        if found.folder == folder and not stages_imported(found) <= allowed
+    ]
+    assert not wrong
+
+
+def test_command_line_uses_public_names() -> None:
+    wrong = []
+    for found in ALL_IMPORTS:
+        stages = stages_imported(found) - BY_MODULE - {"cli"}
+        if found.folder != "cli" or not stages or found.for_types_only:
+            continue
+        if found.module.count(".") > 1 or any(name.startswith("_") for name in found.names):
+            wrong.append(str(found))
+    assert not wrong
+
+
+def test_heavy_packages_are_imported_inside_functions() -> None:
+    wrong = [
+        str(found)
+        for found in ALL_IMPORTS
+        if found.module.split(".")[0] in HEAVY
+        and found.at_module_level
+        and not found.for_types_only
+    ]
+    assert not wrong
+
+
+def test_stages_do_not_import_the_command_line_or_each_other_in_a_ring() -> None:
+    """The table itself has no ring: every folder's imports can be put in order."""
+    ordered: list[str] = ["_core"]
+    remaining = dict(MAY_IMPORT)
+    while remaining:
+        ready = [name for name, needs in remaining.items() if needs <= set(ordered)]
+        assert ready, f"a ring among {sorted(remaining)}"
+        for name in ready:
+            ordered.append(name)
+            del remaining[name]
+    assert "cli" not in frozenset().union(*MAY_IMPORT.values())
