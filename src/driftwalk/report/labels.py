@@ -19,12 +19,8 @@ FACTORS: dict[tuple[str, str], float] = {
     ("m", "cm"): 1e2,
     ("m", "mm"): 1e3,
     ("m s-1", "cm/s"): 1e2,
-    ("m s-1", "mm/s"): 1e3,
     ("N", "mN"): 1e3,
     ("rad", "°"): 180.0 / math.pi,
-    ("s", "s"): 1.0,
-    ("s", "min"): 1.0 / 60.0,
-    ("1", "%"): 1e2,
 }
 MN_PER_N = FACTORS["N", "mN"]
 
@@ -53,11 +49,6 @@ def in_unit(variable: xr.DataArray, unit: str, *, stored: str) -> npt.NDArray[np
             "attribute 'units'"
         )
     return np.asarray(variable.values, dtype=np.float64) * FACTORS[have, unit]
-
-
-def label_of(variable: xr.DataArray, unit: str, *, name: str) -> str:
-    """Return "long_name (unit)"; `name` stands in for a missing ``long_name``."""
-    return f"{variable.attrs.get('long_name', name)} ({unit})"
 
 
 def force_label(calibration: xr.Dataset) -> str:
