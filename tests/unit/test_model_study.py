@@ -8,7 +8,14 @@ from pathlib import Path
 import pytest
 
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.model import Study, apply_overrides, load_study, parse_study, study_template
+from driftwalk.model import (
+    Study,
+    apply_overrides,
+    load_study,
+    parameter_table,
+    parse_study,
+    study_template,
+)
 from driftwalk.model.section import Section, quantity_of
 
 
@@ -246,3 +253,19 @@ def test_overrides_replace_what_contradicts_them() -> None:
 def test_override_of_nothing_is_refused(name: str) -> None:
     with pytest.raises(ConfigurationError, match=r"no parameter|unknown key"):
         apply_overrides(Study(), {name: 1})
+
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "study-file.md"
+
+
+@pytest.mark.parametrize("name", list(Study.model_fields))
+def test_reference_page_has_the_table_of_the_declarations(name: str) -> None:
+    table = parameter_table(name)
+    assert f"## [{name}]\n\n{Study.model_fields[name].description}\n\n{table}\n" in PAGE.read_text(
+        encoding="utf-8"
+    ), f"paste the output of driftwalk.model.parameter_table({name!r}) under [{name}]"
+
+
+def test_example_of_the_reference_page_is_a_study() -> None:
+    example = PAGE.read_text(encoding="utf-8").partition("```toml\n")[2].partition("```")[0]
+    assert parse_study(example).recording.arena == "fit"
