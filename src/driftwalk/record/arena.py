@@ -1,0 +1,209 @@
+"""The arena of a recording: what the user states or asks to fit, and the shift to its centre."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.record.circle import fit_circle, tank_radius_bound
+from driftwalk.record.raw import Array
+
+INSIDE = 0.999
+"""Share of the samples that must lie within an arena for its centre to be the file's origin."""
+
+
+@dataclass(frozen=True)
+class PlacedArena:
+    """An arena, and where its centre lies in the file's frame."""
+
+    arena: dict[str, Any]
+    """As it goes into the dataset, centre at the origin."""
+    origin: tuple[float, float]
+    """What is subtracted from the positions [m]."""
+    found: dict[str, Any] = field(default_factory=dict)
+    """How the centre and the size were found."""
+    notes: list[str] = field(default_factory=list)
+
+
+def place_arena(text: str, x: Array, y: Array, *, block_side: float | None = None) -> PlacedArena:
+    """Read ``--arena`` and place it over the positions.
+
+    Parameters
+    ----------
+    text : str
+        ``circle:D``, ``rect:WxH`` (sizes as ``0.3`` in metres or ``30cm``; ``@X,Y`` may follow
+        with the centre in metres), ``polygon:FILE`` (CSV of vertices x_m, y_m) or ``fit``. Centre
+        and vertices are in the file's frame, in metres with y up.
+    x, y : array, shape (n,)
+        Positions of all bodies [m], NaN left out.
+    block_side : float, optional
+        Side of a square block [m]; with ``fit`` it turns the circle of the centres into a lower
+        bound of the tank's radius.
+
+    Notes
+    -----
+    Without ``@X,Y`` the centre is the file's origin if 99.9 % of the positions lie inside the arena
+    there, else it is fitted to the positions; which of the two is reported.
+
+    Raises
+    ------
+    InputError
+        When the text cannot be read, or the centre cannot be fitted.
+    """
+    known = np.isfinite(x) & np.isfinite(y)
+    x, y = x[known], y[known]
+    kind, _, rest = text.partition(":")
+    size, _, center = rest.partition("@")
+    if kind == "fit" and not rest:
+        return _fitted(x, y, block_side=block_side)
+    if kind == "circle" and size:
+        return _circle(_length(size, text), x, y, center=_center(center, text))
+    if kind in ("rect", "rectangle") and size.count("x") == 1:
+        width, height = (_length(part, text) for part in size.split("x"))
+        return _rectangle(width, height, x, y, center=_center(center, text))
+    if kind == "polygon" and rest:
+        return _polygon(Path(rest))
+    raise InputError(f"--arena is circle:D, rect:WxH, polygon:FILE or fit; got '{text}'")
+
+
+def _length(text: str, whole: str) -> float:
+    from driftwalk.core.units import parse_quantity
+
+    try:
+        value = parse_quantity(text, "m")
+    except ValueError as error:
+        raise InputError(f"--arena {whole}: '{text}' is not a length ({error})") from error
+    if not (np.isfinite(value) and value > 0):
+        raise InputError(f"--arena {whole}: a size must be above zero")
+    return value
+
+
+def _center(text: str, whole: str) -> tuple[float, float] | None:
+    if not text:
+        return None
+    try:
+        x, y = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise InputError(f"--arena {whole}: '@{text}' is not a centre @X,Y in metres") from error
+    return x, y
+
+
+def _fitted(x: Array, y: Array, *, block_side: float | None) -> PlacedArena:
+    fit = fit_circle(x, y)
+    radius = fit.radius if block_side is None else tank_radius_bound(fit.radius, block_side)
+    found = {
+        "by": "fit",
+        "radius_of_centers_m": fit.radius,
+        "center_m": [fit.center_x, fit.center_y],
+        "sectors_visited_share": fit.coverage,
+        "residual_m": fit.residual,
+        "samples_outside": fit.outside,
+        "radius_is": "of the centres" if block_side is None else "lower bound of the tank",
+    }
+    if block_side is None:
+        notes = [
+            f"the fitted circle (radius {fit.radius:.4g} m) is that of the body's centre, which "
+            "never reaches the rim: the tank is larger; state it with --arena circle:D if you "
+            "know it"
+        ]
+    else:
+        notes = [
+            f"centres reach {fit.radius:.4g} m, so the tank's radius is at least {radius:.4g} m, "
+            "and this if a face of the block lay against the wall"
+        ]
+    if fit.coverage < 0.5:
+        notes.append(
+            f"the body came near the rim in {fit.coverage:.0%} of the directions only: "
+            "the fitted circle is uncertain"
+        )
+    arena = {"shape": "circle", "diameter_m": 2.0 * radius, "center_m": [0.0, 0.0]}
+    return PlacedArena(arena, (fit.center_x, fit.center_y), found, notes)
+
+
+def _circle(
+    diameter: float, x: Array, y: Array, *, center: tuple[float, float] | None
+) -> PlacedArena:
+    found: dict[str, Any] = {"by": "given"}
+    radius = 0.5 * diameter
+    if center is None and _inside(np.hypot(x, y) <= radius):
+        center, found = (0.0, 0.0), {"by": "origin of the file"}
+    elif center is None:
+        fit = fit_circle(x, y)
+        center = (fit.center_x, fit.center_y)
+        found = {
+            "by": "fit",
+            "radius_of_centers_m": fit.radius,
+            "sectors_visited_share": fit.coverage,
+        }
+    found["center_m"] = list(center)
+    outside = int((np.hypot(x - center[0], y - center[1]) > radius).sum())
+    arena = {"shape": "circle", "diameter_m": diameter, "center_m": [0.0, 0.0]}
+    return PlacedArena(arena, center, {**found, "samples_outside": outside}, _outside(outside, x))
+
+
+def _rectangle(
+    width: float, height: float, x: Array, y: Array, *, center: tuple[float, float] | None
+) -> PlacedArena:
+    found: dict[str, Any] = {"by": "given"}
+    if center is None and _inside((np.abs(x) <= width / 2) & (np.abs(y) <= height / 2)):
+        center, found = (0.0, 0.0), {"by": "origin of the file"}
+    elif center is None:
+        if not x.size:
+            raise InputError("the arena's centre cannot be fitted: the recording has no positions")
+        # The middle between the outermost positions, a few tracking errors aside.
+        middle = [float(np.percentile(v, [0.05, 99.95]).mean()) for v in (x, y)]
+        center, found = (middle[0], middle[1]), {"by": "fit"}
+    found["center_m"] = list(center)
+    inside = (np.abs(x - center[0]) <= width / 2) & (np.abs(y - center[1]) <= height / 2)
+    outside = int((~inside).sum())
+    arena = {"shape": "rectangle", "width_m": width, "height_m": height, "center_m": [0.0, 0.0]}
+    return PlacedArena(arena, center, {**found, "samples_outside": outside}, _outside(outside, x))
+
+
+def _inside(inside: np.ndarray[Any, np.dtype[np.bool_]]) -> bool:
+    return bool(inside.size) and float(inside.mean()) >= INSIDE
+
+
+def _outside(outside: int, x: Array) -> list[str]:
+    if outside <= 0.001 * x.size:
+        return []
+    return [
+        f"{outside} of {x.size} positions lie outside the arena: its size, or the scale, is wrong"
+    ]
+
+
+def _polygon(path: Path) -> PlacedArena:
+    from driftwalk.record.head import read_header
+    from driftwalk.record.text import TableLayout, read_table
+
+    names, delimiter, skip, has_header = read_header(path)
+    if len(names) != 2 or (has_header and names != ["x_m", "y_m"]):
+        raise FormatError("a polygon has two columns, x_m and y_m", path=path, line=1)
+    table = read_table(path, TableLayout(delimiter, ["x_m", "y_m"], skip, (0, 1)))
+    vertices = np.column_stack([table.numbers[0], table.numbers[1]])
+    if (vertices[0] == vertices[-1]).all():
+        vertices = vertices[:-1]
+    if vertices.shape[0] < 3 or not np.isfinite(vertices).all():
+        raise FormatError("a polygon needs at least three vertices", path=path)
+    following = np.roll(vertices, -1, axis=0)
+    cross = vertices[:, 0] * following[:, 1] - following[:, 0] * vertices[:, 1]
+    if cross.sum() == 0.0:
+        raise FormatError("the polygon has no area", path=path)
+    center = ((vertices + following) * cross[:, None]).sum(axis=0) / (3.0 * cross.sum())
+    arena = {"shape": "polygon", "vertices_m": (vertices - center).tolist()}
+    x, y = center.tolist()
+    return PlacedArena(arena, (x, y), {"by": "given", "center_m": [x, y]})
+
+
+def arena_attributes(placed: PlacedArena) -> dict[str, str]:
+    """Return the attributes that a trajectory carries about its arena."""
+    return {
+        "arena": json.dumps(placed.arena),
+        "origin_shift_m": json.dumps(list(placed.origin)),
+        "arena_found": json.dumps(placed.found),
+    }

@@ -1,0 +1,144 @@
+"""The circle that a body's centre stays in, found robustly, and what it says about the tank."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+from driftwalk.record.raw import Array
+
+DIRECTIONS = 72
+SECTORS = 36
+TRIMMED_SHARE = 2e-4
+"""Share of the samples, in every direction, that may lie outside: tracking errors."""
+RIM = 0.85
+"""A sector counts as visited when a sample lies beyond this share of the radius."""
+
+
+class CircleFit(NamedTuple):
+    """The circle of a body's centres."""
+
+    center_x: float
+    """Centre x [m]."""
+    center_y: float
+    """Centre y [m]."""
+    radius: float
+    """Radius [m] that the centres reach; the tank's own radius is larger."""
+    coverage: float
+    """Share of 36 sectors in which the body came near the rim (beyond 0.85 of the radius)."""
+    residual: float
+    """Median distance [m] of the outline in 72 directions from the circle."""
+    outside: int
+    """Samples more than 2 % of the radius outside: tracking errors, or not a circle."""
+
+
+def fit_circle(x: npt.ArrayLike, y: npt.ArrayLike) -> CircleFit:
+    """Fit the circle that the samples fill, whatever errors lie outside it.
+
+    The extent of the samples in direction phi is ``h(phi) = c . u(phi) + r`` for a disc of centre
+    c and radius r: linear in the three unknowns. It is taken in 72 directions, each time leaving
+    out the 0.02 % (at least 3) outermost samples, and fitted by least absolute deviations, so that
+    directions that the body never visited count little. Gross errors are removed first.
+
+    This is the circle of the *centres*. The robot's centre never reaches the rim: see
+    `tank_radius_bound`.
+
+    Parameters
+    ----------
+    x, y : array_like, shape (n,)
+        Positions [m]; NaN is left out.
+
+    Returns
+    -------
+    CircleFit
+
+    Raises
+    ------
+    InputError
+        With fewer than 20 positions, or positions that all coincide.
+
+    Examples
+    --------
+    >>> angle = np.linspace(0.0, 6.28, 500)
+    >>> round(fit_circle(np.cos(angle) + 3.0, np.sin(angle)).radius, 2)
+    1.0
+    """
+    points = np.column_stack([np.asarray(x, np.float64).ravel(), np.asarray(y, np.float64).ravel()])
+    points = points[np.isfinite(points).all(axis=1)]
+    if points.shape[0] < 20:
+        raise InputError(f"a circle needs at least 20 positions, got {points.shape[0]}")
+    points = _without_gross_errors(points)
+    if np.ptp(points, axis=0).max() == 0.0:
+        raise InputError("a circle cannot be fitted: the body never moves")
+    angle = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    design = np.column_stack([np.cos(angle), np.sin(angle), np.ones(DIRECTIONS)])
+    extent = _extents(points, design[:, :2])
+    center_x, center_y, radius = _least_absolute(design, extent).tolist()
+    if radius <= 0.0:
+        raise InputError("a circle cannot be fitted: the positions do not fill one")
+    distance = np.hypot(points[:, 0] - center_x, points[:, 1] - center_y)
+    bearing = np.arctan2(points[:, 1] - center_y, points[:, 0] - center_x)
+    sector = ((bearing + np.pi) / (2.0 * np.pi) * SECTORS).astype(int) % SECTORS
+    visited = np.unique(sector[distance > RIM * radius]).size
+    residual = np.abs(extent - design @ np.array([center_x, center_y, radius]))
+    return CircleFit(
+        center_x,
+        center_y,
+        radius,
+        coverage=visited / SECTORS,
+        residual=float(np.median(residual)),
+        outside=int((distance > 1.02 * radius).sum()),
+    )
+
+
+def tank_radius_bound(centers_radius: float, block_side: float) -> float:
+    """Return the smallest radius of a round tank in which a square block's centre reaches so far.
+
+    The centre is farthest out when a face lies against the wall with both corners: then
+    ``R = sqrt((r + a/2)^2 + (a/2)^2)``. Turned any other way the block needs a larger tank, so this
+    is a lower bound, and the radius itself if the block did lie flat against the wall.
+
+    Parameters
+    ----------
+    centers_radius : float
+        Radius r of the circle of the centres [m], as from `fit_circle`.
+    block_side : float
+        Side a of the block [m].
+
+    Examples
+    --------
+    >>> round(tank_radius_bound(0.13425, 0.03), 4)
+    0.15
+    """
+    half = 0.5 * block_side
+    return math.hypot(centers_radius + half, half)
+
+
+def _without_gross_errors(points: Array) -> Array:
+    """Drop samples farther than twice the 99 % distance from the median point."""
+    distance = np.hypot(*(points - np.median(points, axis=0)).T)
+    kept: Array = points[distance <= 2.0 * np.percentile(distance, 99.0)]
+    return kept
+
+
+def _extents(points: Array, directions: Array) -> Array:
+    """Return the extent of the samples along each direction, its outermost few left out."""
+    last = points.shape[0] - 1 - max(3, int(TRIMMED_SHARE * points.shape[0]))
+    return np.array([np.partition(points @ direction, last)[last] for direction in directions])
+
+
+def _least_absolute(design: Array, values: Array) -> Array:
+    """Solve the linear problem in the sense of least absolute deviations, by reweighting."""
+    scale = float(np.ptp(values)) or 1.0
+    weights: Array = np.ones(values.size)
+    solution: Array = np.zeros(design.shape[1])
+    for _ in range(100):
+        root = np.sqrt(weights)
+        fitted = np.linalg.lstsq(design * root[:, None], values * root, rcond=None)[0]
+        solution = np.asarray(fitted, dtype=np.float64)
+        weights = 1.0 / np.maximum(np.abs(values - design @ solution), 1e-6 * scale)
+    return solution

@@ -1,0 +1,166 @@
+"""Duplicate and unsorted times, jumps and gaps: found, handled and counted."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+from driftwalk.record.raw import RawBody
+
+
+@dataclass
+class Counts:
+    """What cleaning found in one body."""
+
+    rows: int = 0
+    """Rows of the body in the file."""
+    without_time: int = 0
+    """Rows without a time, dropped."""
+    unsorted: int = 0
+    """Times that went backwards, sorted because that was asked for."""
+    duplicates_dropped: int = 0
+    """Rows whose time a later row repeats, dropped: the last is kept."""
+    outside_window: int = 0
+    """Rows before ``--from`` or after ``--to``, dropped."""
+    jumps_removed: int = 0
+    """Samples beyond ``--max-speed``, turned into gaps."""
+    missing: int = 0
+    """Rows without a position, before jumps were removed."""
+    samples: int = 0
+    """Samples with a position at the end."""
+
+    def as_dict(self) -> dict[str, int]:
+        """Return the counts as a plain dictionary."""
+        return asdict(self)
+
+
+def clean_body(
+    body: RawBody,
+    *,
+    sort: str = "error",
+    start: float | None = None,
+    stop: float | None = None,
+    max_speed: float | None = None,
+) -> tuple[RawBody, Counts]:
+    """Return the body with strictly increasing times, and what was done to it.
+
+    Parameters
+    ----------
+    body : RawBody
+        In SI units. Arrays without a fault are used as they are, not copied.
+    sort : {"error", "sort"}
+        What to do when times go backwards.
+    start, stop : float, optional
+        First and last time to keep [s].
+    max_speed : float, optional
+        A sample that could be reached from the last good one only faster than this [m/s] becomes
+        a gap.
+
+    Raises
+    ------
+    InputError
+        When times go backwards and `sort` is ``"error"``.
+    """
+    if sort not in ("error", "sort"):
+        raise InputError(f"sort is 'error' or 'sort', got '{sort}'")
+    counts = Counts(rows=body.clock.size)
+    known = np.isfinite(body.clock)
+    if not known.all():
+        counts.without_time = int((~known).sum())
+        body = _take(body, known)
+    body = _in_order(body, counts, sort=sort)
+    repeated = body.clock[1:] == body.clock[:-1]
+    if repeated.any():
+        counts.duplicates_dropped = int(repeated.sum())
+        body = _take(body, np.append(~repeated, True))
+    if start is not None or stop is not None:
+        inside = np.ones(body.clock.size, dtype=bool)
+        inside &= body.clock >= (-np.inf if start is None else start)
+        inside &= body.clock <= (np.inf if stop is None else stop)
+        counts.outside_window = int((~inside).sum())
+        body = _take(body, inside)
+    counts.missing = _blank_missing(body)
+    if max_speed is not None:
+        if not max_speed > 0:
+            raise InputError(f"--max-speed must be above zero, got {max_speed} m/s")
+        jumps = find_jumps(body, max_speed)
+        counts.jumps_removed = int(jumps.size)
+        body = _without(body, jumps)
+    counts.samples = int(np.isfinite(body.x).sum())
+    return body, counts
+
+
+def _take(body: RawBody, rows: npt.NDArray[np.bool_] | npt.NDArray[np.int64]) -> RawBody:
+    theta = None if body.theta is None else body.theta[rows]
+    return RawBody(body.name, body.clock[rows], body.x[rows], body.y[rows], theta)
+
+
+def _in_order(body: RawBody, counts: Counts, *, sort: str) -> RawBody:
+    backwards = np.flatnonzero(body.clock[1:] < body.clock[:-1])
+    if not backwards.size:
+        return body
+    if sort == "error":
+        at = int(backwards[0])
+        raise InputError(
+            f"time goes backwards in row {at + 2} of body '{body.name}': {body.clock[at]:.6g} s is "
+            f"followed by {body.clock[at + 1]:.6g} s ({backwards.size} such rows); add --sort to "
+            "sort them"
+        )
+    counts.unsorted = int(backwards.size)
+    return _take(body, np.argsort(body.clock, kind="stable"))
+
+
+def _blank_missing(body: RawBody) -> int:
+    """Make half a position no position; return the number of rows without one."""
+    lost = ~(np.isfinite(body.x) & np.isfinite(body.y))
+    count = int(lost.sum())
+    if count:
+        body.x[lost] = np.nan
+        body.y[lost] = np.nan
+    return count
+
+
+def _without(body: RawBody, rows: npt.NDArray[np.int64]) -> RawBody:
+    if not rows.size:
+        return body
+    x, y = body.x.copy(), body.y.copy()
+    x[rows] = y[rows] = np.nan
+    return RawBody(body.name, body.clock, x, y, body.theta)
+
+
+def find_jumps(body: RawBody, max_speed: float) -> npt.NDArray[np.int64]:
+    """Return the indices of samples that the body cannot have reached at `max_speed` [m/s].
+
+    Each sample is compared with the last accepted one, so an excursion to another body is removed
+    whole until it is within reach again. The first accepted sample is the first from which the
+    next can be reached.
+
+    Examples
+    --------
+    >>> time = np.arange(5.0)
+    >>> find_jumps(RawBody("0", time, np.array([0.0, 1, 90, 3, 4]), time * 0), 2.0).tolist()
+    [2]
+    """
+    present = np.flatnonzero(np.isfinite(body.x))
+    t, x, y = body.clock[present], body.x[present], body.y[present]
+    if t.size < 2:
+        return np.zeros(0, dtype=np.int64)
+    fast = np.hypot(np.diff(x), np.diff(y)) > max_speed * np.diff(t)
+    suspects = np.flatnonzero(fast)
+    slow = np.flatnonzero(~fast)
+    first = int(slow[0]) if slow.size else 0
+    removed = list(range(first))
+    last = first
+    while (place := int(np.searchsorted(suspects, last))) < suspects.size:
+        good = int(suspects[place])
+        at = good + 1
+        while at < t.size and np.hypot(x[at] - x[good], y[at] - y[good]) > max_speed * (
+            t[at] - t[good]
+        ):
+            removed.append(at)
+            at += 1
+        last = at
+    return present[np.array(removed, dtype=np.int64)]

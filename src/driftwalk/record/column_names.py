@@ -1,0 +1,254 @@
+"""What a column's name says: which quantity, of which body, in which unit."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from driftwalk.core.errors import InputError
+
+_ROOTS: dict[str, str] = {
+    **dict.fromkeys(("t", "time", "timestamp", "seconds"), "t"),
+    **dict.fromkeys(
+        ("frame", "frames", "framenumber", "frameno", "frameid", "frameindex"), "frame"
+    ),
+    **dict.fromkeys(("x", "posx", "xpos", "cx", "xc"), "x"),
+    **dict.fromkeys(("y", "posy", "ypos", "cy", "yc"), "y"),
+    **dict.fromkeys(("theta", "heading", "orientation", "angle", "yaw"), "theta"),
+    **dict.fromkeys(
+        ("body", "id", "track", "trackid", "robot", "robotid", "individual", "animal", "name"),
+        "body",
+    ),
+}
+_UNITS: dict[str, str] = {
+    **{unit: unit for unit in ("m", "cm", "mm", "um", "km", "s", "ms", "us", "ns", "min", "px")},
+    **{"µm": "um", "μm": "um", "µs": "us", "μs": "us", "metres": "m", "meters": "m"},
+    **dict.fromkeys(("pix", "pixel", "pixels"), "px"),
+    **dict.fromkeys(("sec", "secs", "second", "seconds"), "s"),
+    **dict.fromkeys(("msec", "milliseconds"), "ms"),
+    **dict.fromkeys(("rad", "radian", "radians"), "rad"),
+    **dict.fromkeys(("deg", "degree", "degrees", "°"), "deg"),
+}
+_ALLOWED: dict[str, frozenset[str]] = {
+    "t": frozenset({"s", "ms", "us", "ns", "min"}),
+    "frame": frozenset(),
+    "x": frozenset({"m", "cm", "mm", "um", "km", "px"}),
+    "y": frozenset({"m", "cm", "mm", "um", "km", "px"}),
+    "theta": frozenset({"rad", "deg"}),
+    "body": frozenset(),
+}
+# Words that stand beside x or y without naming a body. They hint at an image, so a length beside
+# them is not taken for metres.
+_IMAGE_WORDS = frozenset({"pos", "position", "center", "centre", "centroid", "image", "coord"})
+_FRAME_WORDS = frozenset({"number", "no", "index", "stamp", "col", "num"})
+_BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
+
+
+@dataclass(frozen=True)
+class ColumnMeaning:
+    """What a column holds."""
+
+    quantity: str
+    """``"t"``, ``"frame"``, ``"x"``, ``"y"``, ``"theta"`` or ``"body"``."""
+    unit: str = ""
+    """Unit in the name, ``""`` when there is none."""
+    body: str = ""
+    """Name of the body in the name, ``""`` when there is none."""
+    bare: bool = True
+    """Whether the name is the quantity's plain symbol, without a word that hints at an image."""
+
+
+def column_meaning(name: str) -> ColumnMeaning | None:
+    """Return what a column of that name holds, or None when the name says nothing known.
+
+    Examples
+    --------
+    >>> column_meaning("x_mm")
+    ColumnMeaning(quantity='x', unit='mm', body='', bare=True)
+    >>> column_meaning("robot2 theta (deg)").body
+    'robot2'
+    """
+    text, unit = _split_brackets(name.strip().strip("\"'").strip().lstrip("#%").strip())
+    if unit is None:
+        return None
+    tokens = [token for token in re.split(r"[\s_.\-/]+", text) if token]
+    if not unit and len(tokens) > 1 and tokens[-1].lower() in _UNITS:
+        unit = _UNITS[tokens.pop().lower()]
+    found = [(index, *_root(token)) for index, token in enumerate(tokens)]
+    found = [entry for entry in found if entry[1]]
+    if len(found) == 2 and found[0][1] == "body" and found[1][1] in ("x", "y", "theta"):
+        found = found[1:]  # "robot x", "id_1_x": the body's own name, then the quantity
+    elif len(found) == 2 and found[0][1] == found[1][1] == "body":
+        found = found[:1]  # "track id"
+    elif len(found) == 2 and found[0][1] == "frame" and found[1][1] == "body":
+        found = found[:1]  # "frame id"
+    if len(found) != 1:
+        return None
+    index, quantity, number = found[0]
+    rest = [token for position, token in enumerate(tokens) if position != index]
+    words = _IMAGE_WORDS | _FRAME_WORDS
+    if quantity in ("t", "frame", "body") and any(
+        token.lower() not in words | {"id"} for token in rest
+    ):
+        return None
+    if unit and unit not in _ALLOWED[quantity]:
+        return None
+    image = {token.lower() for token in rest} & _IMAGE_WORDS
+    names = [token for token in rest if token.lower() not in words]
+    return ColumnMeaning(
+        quantity=quantity,
+        unit=unit or ("s" if tokens[index].lower() == "seconds" else ""),
+        body="_".join([*names, number] if number else names)
+        if quantity in ("x", "y", "theta")
+        else "",
+        bare=not image and tokens[index].lower().rstrip("0123456789") in ("x", "y", "theta", "t"),
+    )
+
+
+def _split_brackets(name: str) -> tuple[str, str | None]:
+    """Split ``"x (mm)"`` into name and unit; the unit is None when it is not one that is known."""
+    match = _BRACKETS.match(name)
+    if match is None:
+        return name, ""
+    return match.group(1), _UNITS.get(match.group(2).strip().lower())
+
+
+def _root(token: str) -> tuple[str, str]:
+    """Return (quantity, number of the body) of one word, ("", "") when it is none."""
+    match = re.fullmatch(r"(.*?)(\d*)", token.lower())
+    stem, number = match.groups() if match else (token.lower(), "")
+    quantity = _ROOTS.get(stem, "")
+    if number and quantity not in ("x", "y", "theta"):
+        return "", ""
+    return quantity, number
+
+
+@dataclass
+class ColumnMap:
+    """Which column (from 0) holds what."""
+
+    clock: int | None = None
+    """Times or frame numbers; None: the row number is the frame number."""
+    clock_unit: str = "frame"
+    bodies: dict[str, dict[str, int]] = field(default_factory=dict)
+    """Body to quantity (x, y, theta) to column."""
+    body_column: int | None = None
+    length_unit: str = ""
+    angle_unit: str = ""
+    bare: bool = True
+
+
+def map_columns(names: list[str], chosen: dict[str, str], *, use_frames: bool) -> ColumnMap:
+    """Find the columns of a table by their names and by what the user says.
+
+    Parameters
+    ----------
+    names : list of str
+        Names of the columns; ``""`` where there is none.
+    chosen : dict
+        Quantity to the name or the number (from 1) of its column, ``":unit"`` may follow.
+    use_frames : bool
+        Whether a frame rate was given, so that frame numbers are the clock where there are any.
+
+    Raises
+    ------
+    InputError
+        When a column is missing, named twice, or does not exist.
+    """
+    meanings = {
+        index: meaning for index, name in enumerate(names) if (meaning := column_meaning(name))
+    }
+    for quantity, reference in chosen.items():
+        index, unit = _find(reference, names, quantity)
+        if unit and unit not in _ALLOWED[quantity]:
+            raise InputError(
+                f"--columns {quantity}={reference}: '{unit}' is not a unit of {quantity}"
+            )
+        known = meanings.get(index)
+        meanings = {
+            other: meaning
+            for other, meaning in meanings.items()
+            if meaning.quantity != quantity and other != index
+        }
+        inferred = known.unit if known and known.quantity == quantity else ""
+        meanings[index] = ColumnMeaning(quantity, unit or inferred, "", bool(known and known.bare))
+    return _collect(meanings, names, use_frames=use_frames)
+
+
+def _find(reference: str, names: list[str], quantity: str) -> tuple[int, str]:
+    if quantity not in _ALLOWED:
+        raise InputError(
+            f"--columns {quantity}={reference}: unknown quantity; name {', '.join(_ALLOWED)}"
+        )
+    for text, unit in ((reference, ""), reference.rpartition(":")[::2]):
+        if text in names:
+            return names.index(text), _UNITS.get(unit.lower(), unit)
+        if text.isdecimal() and 1 <= int(text) <= len(names):
+            return int(text) - 1, _UNITS.get(unit.lower(), unit)
+    shown = ", ".join(repr(name) for name in names[:12]) + (", …" if len(names) > 12 else "")
+    raise InputError(
+        f"--columns {quantity}={reference}: no such column; the file has {len(names)}: {shown}"
+    )
+
+
+def _collect(
+    meanings: dict[int, ColumnMeaning], names: list[str], *, use_frames: bool
+) -> ColumnMap:
+    """Turn what each column means into one map, and refuse what is ambiguous."""
+    single: dict[str, int] = {}
+    result = ColumnMap()
+    for index, meaning in sorted(meanings.items()):
+        if meaning.quantity in ("x", "y", "theta"):
+            place = result.bodies.setdefault(meaning.body, {})
+        else:
+            place = single
+        if meaning.quantity in place:
+            raise InputError(
+                f"columns '{names[place[meaning.quantity]]}' and '{names[index]}' could both be "
+                f"{meaning.quantity}: name one with --columns {meaning.quantity}=NAME"
+            )
+        place[meaning.quantity] = index
+    _require_positions(result, names)
+    result.body_column = single.get("body")
+    wanted = [meaning for meaning in meanings.values() if meaning.quantity in ("x", "y")]
+    result.length_unit = _agreed([meaning.unit for meaning in wanted], "positions")
+    angles = [meaning.unit for meaning in meanings.values() if meaning.quantity == "theta"]
+    result.angle_unit = _agreed(angles, "angles") if angles else ""
+    result.bare = all(meaning.bare for meaning in wanted)
+    if "frame" in single and ("t" not in single or use_frames):
+        result.clock = single["frame"]
+    elif "t" in single:
+        result.clock = single["t"]
+        result.clock_unit = meanings[result.clock].unit or "s"
+    return result
+
+
+def _require_positions(result: ColumnMap, names: list[str]) -> None:
+    bodies = {
+        body: columns for body, columns in result.bodies.items() if {"x", "y"} <= set(columns)
+    }
+    if not bodies:
+        shown = ", ".join(repr(name) for name in names[:12]) + (", …" if len(names) > 12 else "")
+        raise InputError(
+            f"no columns of x and y among {shown}: name them with --columns x=NAME,y=NAME "
+            "(or their numbers, from 1)"
+        )
+    if len(bodies) == 1:
+        # "x1, y1, heading": an orientation without the body's number belongs to the only body.
+        only = next(iter(bodies.values()))
+        loose = [
+            columns["theta"]
+            for body, columns in result.bodies.items()
+            if body not in bodies and "theta" in columns
+        ]
+        if "theta" not in only and len(loose) == 1:
+            only["theta"] = loose[0]
+    result.bodies = bodies
+
+
+def _agreed(units: list[str], what: str) -> str:
+    distinct = sorted(set(units))
+    if len(distinct) > 1:
+        shown = ", ".join(unit or "none" for unit in distinct)
+        raise InputError(f"the columns of {what} name different units ({shown}): name them alike")
+    return distinct[0] if distinct else ""

@@ -1,0 +1,146 @@
+"""From the numbers of a file to SI: clock, scale, the direction of y. The only place for units."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from driftwalk.core.errors import InputError
+from driftwalk.record.quantum import detect_quantum
+from driftwalk.record.raw import (
+    ANGLE_UNITS,
+    CLOCK_UNITS,
+    LENGTH_UNITS,
+    Array,
+    RawBody,
+    RawRecording,
+    ReadOptions,
+)
+
+EPOCH_S = 1e8
+"""A clock beyond three years counts from 1970 and is set to start at zero."""
+
+
+def convert_units(
+    raw: RawRecording, options: ReadOptions, *, y_axis: str | None = None
+) -> tuple[list[RawBody], dict[str, object]]:
+    """Return the bodies in s, m and rad with y up, and the attributes that say what was done.
+
+    The positions of `raw` are scaled in place, so that a large recording is held once.
+
+    Parameters
+    ----------
+    raw : RawRecording
+        What a loader returned.
+    options : ReadOptions
+        Frame rate, scale and unit.
+    y_axis : {"up", "down"}, optional
+        Direction of y in the file, for positions and angles; None: as the format has it.
+
+    Raises
+    ------
+    InputError
+        When scale or frame rate are neither in the file nor given (the message names the option),
+        or are given though the file holds them.
+    """
+    if y_axis not in (None, "up", "down"):
+        raise InputError(f"--y-axis is 'up' or 'down', got '{y_axis}'")
+    scale, in_pixels = _length_scale(raw, options)
+    ticks, rate = _ticks(raw, options)
+    flip, flip_theta = _flips(raw, y_axis=y_axis, in_pixels=in_pixels)
+    quantum = max(detect_quantum(values) for body in raw.bodies[:4] for values in (body.x, body.y))
+    attrs: dict[str, object] = dict(raw.attrs)
+    attrs["y_axis"] = _describe_flips(raw, flip, flip_theta)
+    attrs.setdefault("position_quantum_m", quantum * scale)
+    if rate is not None:
+        attrs["sample_rate_Hz"] = rate
+    if in_pixels:
+        attrs["metres_per_pixel"] = scale
+    clocks = _convert_clocks(raw, ticks, attrs)
+    turn = ANGLE_UNITS[raw.angle_unit] * (-1.0 if flip_theta else 1.0)
+    bodies = []
+    for body in raw.bodies:
+        np.multiply(body.x, scale, out=body.x)
+        np.multiply(body.y, -scale if flip else scale, out=body.y)
+        if body.theta is not None and turn != 1.0:
+            np.multiply(body.theta, turn, out=body.theta)
+        bodies.append(RawBody(body.name, clocks[id(body.clock)], body.x, body.y, body.theta))
+    return bodies, attrs
+
+
+def _length_scale(raw: RawRecording, options: ReadOptions) -> tuple[float, bool]:
+    """Return (metres per unit of the file, whether that unit is the pixel)."""
+    unit = options.length_unit
+    if unit is not None and unit not in (*LENGTH_UNITS, "px"):
+        raise InputError(f"--length-unit is one of {', '.join(LENGTH_UNITS)}, px; got '{unit}'")
+    if unit is not None and raw.length_unit not in ("", "px", unit):
+        raise InputError(
+            f"--length-unit {unit} contradicts the file, whose positions are in {raw.length_unit}"
+        )
+    unit = unit or raw.length_unit
+    if not unit and options.metres_per_pixel is not None:
+        unit = "px"
+    if not unit and raw.bare_length_is_si:
+        unit = "m"
+    if unit == "px":
+        if options.metres_per_pixel is None:
+            raise InputError("the positions are in pixels: give the scale with --metres-per-pixel")
+        return _positive(options.metres_per_pixel, "--metres-per-pixel"), True
+    if not unit:
+        raise InputError(
+            "the file does not say the unit of its positions: give --metres-per-pixel for pixels, "
+            "or --length-unit m, cm or mm"
+        )
+    if options.metres_per_pixel is not None:
+        raise InputError(
+            f"--metres-per-pixel is for positions in pixels, and these are in {unit}: leave it out"
+        )
+    return LENGTH_UNITS[unit], False
+
+
+def _ticks(raw: RawRecording, options: ReadOptions) -> tuple[float, float | None]:
+    """Return (units of the clock per second, frame rate if the clock counts frames)."""
+    if raw.clock_unit != "frame":
+        if options.frame_rate_hz is not None:
+            raise InputError("the file has a clock of its own: leave --frame-rate out")
+        return CLOCK_UNITS[raw.clock_unit], None
+    rate = options.frame_rate_hz if options.frame_rate_hz is not None else raw.frame_rate_hz
+    if rate is None:
+        raise InputError("the file counts frames: give their rate in Hz with --frame-rate")
+    return _positive(rate, "--frame-rate"), rate
+
+
+def _positive(value: float, option: str) -> float:
+    if not (np.isfinite(value) and value > 0):
+        raise InputError(f"{option} must be a number above zero, got {value}")
+    return float(value)
+
+
+def _flips(raw: RawRecording, *, y_axis: str | None, in_pixels: bool) -> tuple[bool, bool]:
+    """Return whether y and whether theta change their sign."""
+    positions = y_axis or raw.y_axis or ("down" if in_pixels else "up")
+    angles = y_axis or raw.theta_axis or positions
+    return positions == "down", angles == "down"
+
+
+def _describe_flips(raw: RawRecording, flip: bool, flip_theta: bool) -> str:
+    has_theta = any(body.theta is not None for body in raw.bodies)
+    if not flip and not (flip_theta and has_theta):
+        return "up in the file: kept"
+    if not has_theta or flip == flip_theta:
+        return (
+            "down in the file: y and theta negated" if has_theta else "down in the file: y negated"
+        )
+    kept, negated = ("theta", "y") if flip else ("y", "theta")
+    return f"{kept} kept, {negated} negated (measured in the image)"
+
+
+def _convert_clocks(raw: RawRecording, ticks: float, attrs: dict[str, object]) -> dict[int, Array]:
+    """Return each distinct clock array in seconds; bodies that shared one still do."""
+    arrays = {id(body.clock): body.clock for body in raw.bodies}
+    starts = [float(np.nanmin(c)) for c in arrays.values() if np.isfinite(c).any()]
+    origin = min(starts, default=0.0)
+    if raw.clock_unit == "frame" or origin / ticks < EPOCH_S:
+        origin = 0.0
+    else:
+        attrs["time_origin_unix_s"] = origin / ticks
+    return {key: (clock - origin) / ticks for key, clock in arrays.items()}

@@ -1,0 +1,86 @@
+"""What the first lines of a text file tell: delimiter, header, number of columns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from driftwalk.core.errors import FormatError
+from driftwalk.record.bad_row import MISSING, is_number, split_fields
+from driftwalk.record.text import read_head
+
+
+def first_lines(head: bytes, count: int = 5) -> list[str]:
+    """Return the first whole lines of a file's start; bytes that are not UTF-8 are replaced.
+
+    Nothing is returned when the bytes cannot be text.
+    """
+    if b"\0" in head:
+        return []
+    lines = head.split(b"\n")
+    return [line.decode("utf-8", "replace").rstrip("\r") for line in lines[:count] if line.strip()]
+
+
+def detect_delimiter(lines: list[str]) -> str:
+    """Return the character that separates the fields of the first lines; a blank when none does.
+
+    A tab or semicolon wins over a comma, since a comma may also be a decimal sign; blanks come
+    last, since they stand in names.
+    """
+    for delimiter in "\t;,":
+        if lines and all(delimiter in line for line in lines[:2]):
+            return delimiter
+    return next((delimiter for delimiter in "\t;," if lines and delimiter in lines[0]), " ")
+
+
+def is_numeric_row(fields: list[str]) -> bool:
+    """Whether a row is data: each field is a number or missing, and one at least is a number."""
+    known = [field for field in fields if field not in MISSING]
+    return bool(known) and all(is_number(field) for field in known)
+
+
+def read_header(path: Path, *, delimiter: str | None = None) -> tuple[list[str], str, int, bool]:
+    """Return (names of the columns, delimiter, lines before the data, whether there is a header).
+
+    Lines that start with ``#`` before the header are comments; a header may start with ``#`` or
+    ``%`` itself when it is the last of them and has as many fields as the data.
+
+    Raises
+    ------
+    FormatError
+        When the file is empty or its first lines are not UTF-8 text.
+    """
+    head = read_head(path)
+    if b"\0" in head:
+        raise FormatError("is not a text file", path=path)
+    raw = head.split(b"\n")
+    at = next((i for i, line in enumerate(raw) if line.strip() and not line.startswith(b"#")), None)
+    if at is None:
+        raise FormatError("the file is empty", path=path)
+    lines = [_strict(line, path, number) for number, line in enumerate(raw[: at + 2], start=1)]
+    separator = delimiter or detect_delimiter(lines[at : at + 2])
+    fields = _without_trailing(split_fields(lines[at], separator))
+    if not is_numeric_row(fields):
+        return fields, separator, at + 1, True
+    previous = [line for line in lines[:at] if line.strip()]
+    if previous:
+        commented = _without_trailing(split_fields(previous[-1].lstrip("# "), separator))
+        if len(commented) == len(fields) > 1:
+            return commented, separator, at, True
+    return [""] * len(fields), separator, at, False
+
+
+def _strict(line: bytes, path: Path, number: int) -> str:
+    try:
+        return line.decode("utf-8").rstrip("\r")
+    except UnicodeDecodeError as error:
+        raise FormatError(
+            f"is not UTF-8 text (byte 0x{line[error.start]:02x}): save the file as UTF-8",
+            path=path,
+            line=number,
+            column=error.start + 1,
+        ) from error
+
+
+def _without_trailing(fields: list[str]) -> list[str]:
+    """Drop one empty field that a delimiter at the end of a line leaves."""
+    return fields[:-1] if len(fields) > 1 and not fields[-1] else fields

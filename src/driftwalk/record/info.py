@@ -1,0 +1,176 @@
+"""Describe a recording: bodies, clock, gaps, extent, speed, noise."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from driftwalk.core.errors import InputError
+from driftwalk.record.circle import fit_circle
+from driftwalk.record.noise import estimate_tracking_noise
+from driftwalk.record.raw import Array
+from driftwalk.schema import Track, body_names, body_track, check_trajectory
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+GAP = 1.5
+"""An interval beyond this many usual ones is a gap."""
+TOLERANCE = 0.05
+"""Share by which an interval may differ from the usual one and still count as even."""
+
+
+def describe(trajectory: xr.Dataset) -> dict[str, Any]:
+    """Describe every body of a recording.
+
+    Parameters
+    ----------
+    trajectory : xarray.Dataset
+        A `trajectory`, as from `load`.
+
+    Returns
+    -------
+    dict
+        JSON-ready, with units in the keys: ``source``, ``format``, ``y_axis``, ``arena``,
+        ``position_quantum_m``, ``counts``, ``warnings``, and ``bodies``: name to samples, missing
+        rows, duration_s, rate_Hz, jitter, gaps, extent, the circle of the centres, speed and the
+        estimated tracking noise. A number that cannot be had is None.
+
+    Examples
+    --------
+    >>> from driftwalk.schema import build_trajectory
+    >>> describe(build_trajectory([0.0, 0.1], [0.0, 0.01], [0.0, 0.0]))["bodies"]["0"]["samples"]
+    2
+    """
+    check_trajectory(trajectory)
+    attrs = trajectory.attrs
+    counts = _json_attribute(attrs, "counts", {})
+    warnings = counts.pop("warnings", [])
+    return {
+        "source": attrs.get("source"),
+        "format": attrs.get("format"),
+        "y_axis": attrs.get("y_axis"),
+        "arena": _json_attribute(attrs, "arena", None),
+        "arena_found": _json_attribute(attrs, "arena_found", None),
+        "origin_shift_m": _json_attribute(attrs, "origin_shift_m", None),
+        "position_quantum_m": _number(float(attrs.get("position_quantum_m", math.nan))),
+        "metres_per_pixel": _number(float(attrs.get("metres_per_pixel", math.nan))),
+        "counts": counts,
+        "warnings": warnings,
+        "bodies": {name: _describe_body(trajectory, name) for name in body_names(trajectory)},
+    }
+
+
+def _json_attribute(attrs: dict[Any, Any], name: str, default: Any) -> Any:
+    text = attrs.get(name)
+    if text is None:
+        return default
+    try:
+        return json.loads(text)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"the attribute '{name}' of the dataset is not JSON: {error}") from error
+
+
+def _describe_body(trajectory: xr.Dataset, name: str) -> dict[str, Any]:
+    track = body_track(trajectory, name)
+    noise = estimate_tracking_noise(track)
+    described: dict[str, Any] = {
+        "samples": int(track.time.size),
+        "has_orientation": track.has_orientation,
+        **_clock(track),
+        **_extent(track),
+        **_speed(track),
+        **noise._asdict(),
+    }
+    described["circle_of_centers"] = _circle(track)
+    return {
+        key: _number(value) if isinstance(value, float) else value
+        for key, value in described.items()
+    }
+
+
+def _number(value: float) -> float | None:
+    """Return the number, None when it is not finite: JSON has no NaN."""
+    return value if math.isfinite(value) else None
+
+
+def _clock(track: Track) -> dict[str, Any]:
+    if track.time.size < 2:
+        start = float(track.time[0]) if track.time.size else math.nan
+        return {"start_s": start, "stop_s": start, "duration_s": 0.0, "rate_Hz": math.nan}
+    interval = np.diff(track.time)
+    usual = float(np.median(interval))
+    gaps = interval > GAP * usual
+    low, high = np.percentile(interval, [5.0, 95.0]).tolist()
+    duration = float(track.time[-1] - track.time[0])
+    return {
+        "start_s": float(track.time[0]),
+        "stop_s": float(track.time[-1]),
+        "duration_s": duration,
+        "rate_Hz": 1.0 / usual,
+        "interval_median_s": usual,
+        "interval_5_percent_s": low,
+        "interval_95_percent_s": high,
+        "uneven_intervals_share": float((np.abs(interval - usual) > TOLERANCE * usual).mean()),
+        "gaps": int(gaps.sum()),
+        "longest_gap_s": float(interval[gaps].max()) if gaps.any() else 0.0,
+        "gap_time_share": float((interval[gaps] - usual).sum()) / duration,
+    }
+
+
+def _extent(track: Track) -> dict[str, Any]:
+    if not track.time.size:
+        return {}
+    return {
+        f"{axis}_{side}_m": float(getattr(np, side)(getattr(track, axis)))
+        for axis in ("x", "y")
+        for side in ("min", "max")
+    }
+
+
+def _circle(track: Track) -> dict[str, Any] | None:
+    """Return the circle of the centres, None when there is none to fit."""
+    try:
+        fit = fit_circle(track.x, track.y)
+    except InputError:
+        return None
+    return {
+        "center_m": [fit.center_x, fit.center_y],
+        "radius_m": fit.radius,
+        "sectors_visited_share": fit.coverage,
+        "residual_m": fit.residual,
+        "samples_outside": fit.outside,
+    }
+
+
+def _speed(track: Track) -> dict[str, Any]:
+    """Return quantiles of the speed between neighbours that no gap separates."""
+    if track.time.size < 2:
+        return {}
+    interval = np.diff(track.time)
+    near = interval <= GAP * np.median(interval)
+    speed = np.hypot(np.diff(track.x), np.diff(track.y))[near] / interval[near]
+    described = {
+        "speed_mean_m_s": float(speed.mean()),
+        "speed_median_m_s": float(np.median(speed)),
+        "speed_99_percent_m_s": float(np.percentile(speed, 99.0)),
+        "speed_max_m_s": float(speed.max()),
+    }
+    if track.has_orientation:
+        described |= _turn_rate(track.theta, interval, near)
+    return described
+
+
+def _turn_rate(theta: Array, interval: Array, near: np.ndarray[Any, Any]) -> dict[str, float]:
+    turned = np.diff(theta)
+    turned = (turned + np.pi) % (2.0 * np.pi) - np.pi
+    rate = (turned[near] / interval[near])[np.isfinite(turned[near])]
+    if not rate.size:
+        return {}
+    return {
+        "turn_rate_mean_rad_s": float(rate.mean()),
+        "turn_rate_std_rad_s": float(rate.std()),
+    }

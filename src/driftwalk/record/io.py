@@ -1,0 +1,253 @@
+"""Load a recording: read, convert to SI, clean, place in its arena."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.record.arena import PlacedArena, arena_attributes, place_arena
+from driftwalk.record.clean import Counts, clean_body
+from driftwalk.record.convert_units import convert_units
+from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
+from driftwalk.record.registry import find_loader
+from driftwalk.record.warn import plausibility_warnings
+from driftwalk.schema import build_trajectory
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def load(
+    path: str | PathLike[str],
+    *,
+    format: str | None = None,
+    body: str | None = None,
+    start: float | None = None,
+    stop: float | None = None,
+    arena: str | None = None,
+    block_side: float | None = None,
+    frame_rate: float | None = None,
+    metres_per_pixel: float | None = None,
+    length_unit: str | None = None,
+    y_axis: str | None = None,
+    max_speed: float | None = None,
+    sort: str = "error",
+    columns: Mapping[str, str] | None = None,
+    delimiter: str | None = None,
+    x: str | PathLike[str] | None = None,
+    y: str | PathLike[str] | None = None,
+    theta: str | PathLike[str] | None = None,
+    keypoint: str | None = None,
+) -> xr.Dataset:
+    """Load a recording as a `trajectory` dataset in SI units, y up.
+
+    The format is recognised by content. Scale, frame rate and arena are never guessed: what the
+    file does not hold has to be given, and the error names the option.
+
+    Parameters
+    ----------
+    path : path-like
+        File (may be gzip-compressed text), or a folder of SwisTrack tracks or matrices.
+    format : str, optional
+        Name of the format, see `readable_formats`.
+    body : str, optional
+        Name of the one body to keep; None or ``"all"`` keeps all.
+    start, stop : float, optional
+        First and last time to keep [s], on the file's clock.
+    arena : str, optional
+        ``circle:D``, ``rect:WxH``, ``polygon:FILE`` or ``fit``; see `driftwalk.record.arena`.
+        Positions are shifted so that its centre is the origin.
+    block_side : float, optional
+        Side of a square block [m]; makes ``arena="fit"`` give a bound of the tank, not of the
+        centres.
+    frame_rate : float, optional
+        Frames per second [Hz] of a recording that counts frames.
+    metres_per_pixel : float, optional
+        Scale of a recording in pixels [m].
+    length_unit : {"m", "cm", "mm", "um", "px"}, optional
+        Unit of positions in a file that does not say.
+    y_axis : {"up", "down"}, optional
+        Direction of y in the file; None: down for pixels (y and theta are negated), else up.
+    max_speed : float, optional
+        Samples that could only be reached faster than this [m/s] become gaps.
+    sort : {"error", "sort"}
+        What to do when times go backwards.
+    columns : mapping, optional
+        For a plain table: t, frame, x, y, theta, body to the name or number (from 1) of the
+        column; ``":unit"`` may follow, such as ``{"x": "2:mm"}``.
+    delimiter : str, optional
+        Character between fields of a plain table.
+    x, y, theta : path-like, optional
+        One matrix per coordinate: a row per frame, a column per body.
+    keypoint : str, optional
+        Which keypoint of a pose file is the body.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions (time, body); what cleaning found stands in ``attrs["counts"]`` as JSON.
+
+    Raises
+    ------
+    FormatError
+        When the file cannot be read; with line and column.
+    InputError
+        When an option is missing, wrong, or contradicts the file.
+
+    Examples
+    --------
+    >>> from importlib.resources import files
+    >>> recording = files("driftwalk.datasets") / "tank30_ode_a" / "recording.csv"
+    >>> load(str(recording), arena="circle:0.3").sizes["time"]
+    18001
+    """
+    source = Path(path)
+    options = ReadOptions(
+        columns=dict(columns or {}),
+        delimiter=delimiter,
+        frame_rate_hz=frame_rate,
+        metres_per_pixel=metres_per_pixel,
+        length_unit=length_unit,
+        x=None if x is None else Path(x),
+        y=None if y is None else Path(y),
+        theta=None if theta is None else Path(theta),
+        keypoint=keypoint,
+    )
+    loader = find_loader(source, format=format or ("matrices" if options.y is not None else None))
+    raw = loader.read(source, options)
+    raw.bodies = _select(raw.bodies, body)
+    try:
+        bodies, attrs = convert_units(raw, options, y_axis=y_axis)
+        cleaned, counts = _clean(bodies, sort=sort, start=start, stop=stop, max_speed=max_speed)
+        del bodies
+        attrs |= {"source": source.name, "format": loader.name}
+        return _assemble(cleaned, counts, attrs, raw, arena=arena, block_side=block_side)
+    except FormatError:
+        raise
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from error
+
+
+def readable_formats() -> dict[str, str]:
+    """Return every readable format and its description.
+
+    Examples
+    --------
+    >>> readable_formats()["driftwalk"]
+    "driftwalk's own NetCDF"
+    """
+    from driftwalk.record.registry import loaders
+
+    return {name: loader.description for name, loader in loaders().items()}
+
+
+def _select(bodies: list[RawBody], wanted: str | None) -> list[RawBody]:
+    if wanted is None or wanted == "all":
+        return bodies
+    chosen = [body for body in bodies if body.name == wanted]
+    if not chosen:
+        names = [body.name for body in bodies]
+        shown = ", ".join(names[:20]) + (", …" if len(names) > 20 else "")
+        raise InputError(f"--body '{wanted}': no such body in the recording; it has {shown}")
+    return chosen
+
+
+def _clean(
+    bodies: list[RawBody],
+    *,
+    sort: str,
+    start: float | None,
+    stop: float | None,
+    max_speed: float | None,
+) -> tuple[list[RawBody], dict[str, Counts]]:
+    """Clean each body; the uncleaned one is let go as soon as its successor is there."""
+    cleaned: list[RawBody] = []
+    counts: dict[str, Counts] = {}
+    while bodies:
+        body, found = clean_body(
+            bodies.pop(0), sort=sort, start=start, stop=stop, max_speed=max_speed
+        )
+        cleaned.append(body)
+        counts[body.name] = found
+    if not any(body.clock.size for body in cleaned):
+        if start is not None or stop is not None:
+            raise InputError("no sample lies between --from and --to")
+        raise InputError("the recording has no row with a time")
+    return cleaned, counts
+
+
+def _assemble(
+    bodies: list[RawBody],
+    counts: dict[str, Counts],
+    attrs: dict[str, Any],
+    raw: RawRecording,
+    *,
+    arena: str | None,
+    block_side: float | None,
+) -> xr.Dataset:
+    """Place the bodies in their arena and on one clock, and write down what was done."""
+    notes = list(raw.notes)
+    if arena is not None:
+        placed = _place(arena, bodies, block_side=block_side)
+        _shift(bodies, placed)
+        attrs |= arena_attributes(placed)
+        notes += placed.notes
+    totals = {
+        key: sum(getattr(found, key) for found in counts.values()) for key in Counts().as_dict()
+    }
+    time, x, y, theta = _one_clock(bodies)
+    if "sample_rate_Hz" not in attrs and time.size > 1:
+        attrs["sample_rate_Hz"] = _usual_rate(bodies)
+    notes += plausibility_warnings(bodies)
+    attrs["counts"] = json.dumps(
+        {
+            "rows_in_file": raw.rows,
+            **totals,
+            "per_body": {name: found.as_dict() for name, found in counts.items()},
+            "warnings": notes,
+        }
+    )
+    return build_trajectory(time, x, y, theta, body=[body.name for body in bodies], attrs=attrs)
+
+
+def _place(arena: str, bodies: list[RawBody], *, block_side: float | None) -> PlacedArena:
+    if len(bodies) == 1:
+        return place_arena(arena, bodies[0].x, bodies[0].y, block_side=block_side)
+    x, y = (np.concatenate([getattr(body, axis) for body in bodies]) for axis in ("x", "y"))
+    return place_arena(arena, x, y, block_side=block_side)
+
+
+def _shift(bodies: list[RawBody], placed: PlacedArena) -> None:
+    if placed.origin != (0.0, 0.0):
+        for body in bodies:
+            body.x -= placed.origin[0]
+            body.y -= placed.origin[1]
+
+
+def _one_clock(bodies: list[RawBody]) -> tuple[Array, Array, Array, Array | None]:
+    """Return the union of the clocks and the bodies' columns on it."""
+    has_theta = any(body.theta is not None for body in bodies)
+    if len(bodies) == 1:
+        body = bodies[0]
+        return body.clock, body.x, body.y, body.theta
+    clocks = {id(body.clock): body.clock for body in bodies}
+    time = np.unique(np.concatenate(list(clocks.values())))
+    columns = [np.full((time.size, len(bodies)), np.nan) for _ in range(3 if has_theta else 2)]
+    for index, body in enumerate(bodies):
+        at = np.searchsorted(time, body.clock)
+        columns[0][at, index] = body.x
+        columns[1][at, index] = body.y
+        if body.theta is not None:
+            columns[2][at, index] = body.theta
+    return time, columns[0], columns[1], columns[2] if has_theta else None
+
+
+def _usual_rate(bodies: list[RawBody]) -> float:
+    intervals = [float(np.median(np.diff(body.clock))) for body in bodies if body.clock.size > 1]
+    return 1.0 / float(np.median(intervals)) if intervals else 0.0

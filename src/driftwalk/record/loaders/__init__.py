@@ -1,0 +1,1 @@
+"""One file per format. A file that defines ``LOADER`` is a format; see `record.registry`."""

@@ -1,0 +1,107 @@
+"""Plain tables: CSV, TSV, semicolons or blanks, with or without header, columns named or mapped."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.record.column_names import ColumnMap, map_columns
+from driftwalk.record.head import first_lines, read_header
+from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
+from driftwalk.record.stacked import split_bodies
+from driftwalk.record.text import Table, TableLayout, read_table
+
+
+class PlainLoader:
+    """A table with one row per sample; bodies side by side, stacked, or one alone."""
+
+    name = "csv"
+    description = (
+        "plain CSV, TSV or blank-separated table, columns recognised or named by --columns"
+    )
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Accept any text, so weakly that every other format wins."""
+        lines = first_lines(head, 2)
+        return 0.1 if lines and not lines[0].lstrip().startswith(("[", "{", "$", "<")) else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read the table as its header and ``--columns`` describe it."""
+        names, delimiter, skip, has_header = read_header(path, delimiter=options.delimiter)
+        if not has_header and not options.columns:
+            raise FormatError(
+                f"the file has {len(names)} columns and no header: name them with --columns, "
+                "such as --columns t=1,x=2,y=3",
+                path=path,
+            )
+        try:
+            columns = map_columns(
+                names, options.columns, use_frames=options.frame_rate_hz is not None
+            )
+        except InputError as error:
+            raise FormatError(str(error), path=path, line=skip if has_header else None) from error
+        labels = [name or str(index) for index, name in enumerate(names, start=1)]
+        table = read_table(path, _layout(columns, labels, delimiter=delimiter, skip=skip))
+        clock: Array = (
+            np.arange(table.rows, dtype=np.float64)
+            if columns.clock is None
+            else table.numbers[columns.clock]
+        )
+        return RawRecording(
+            bodies=_bodies(table, columns, clock, path=path),
+            clock_unit=columns.clock_unit,
+            length_unit=columns.length_unit,
+            angle_unit=columns.angle_unit or "rad",
+            # Bare `x, y` beside a time in seconds is SI; beside frame numbers it may be pixels.
+            bare_length_is_si=columns.bare and columns.clock_unit != "frame",
+            rows=table.rows,
+        )
+
+
+def _layout(columns: ColumnMap, names: list[str], *, delimiter: str, skip: int) -> TableLayout:
+    used = {index for places in columns.bodies.values() for index in places.values()}
+    if columns.clock is not None:
+        used.add(columns.clock)
+    texts = () if columns.body_column is None else (columns.body_column,)
+    return TableLayout(
+        delimiter=delimiter,
+        names=names,
+        skip_lines=skip,
+        numbers=tuple(sorted(used - set(texts))),
+        texts=texts,
+    )
+
+
+def _bodies(table: Table, columns: ColumnMap, clock: Array, *, path: Path) -> list[RawBody]:
+    values = table.numbers
+    if columns.body_column is None:
+        return [
+            RawBody(
+                name or "0",
+                clock,
+                values[places["x"]],
+                values[places["y"]],
+                values[places["theta"]] if "theta" in places else None,
+            )
+            for name, places in columns.bodies.items()
+        ]
+    if len(columns.bodies) > 1:
+        raise FormatError(
+            "has several columns of x and also a column that names the body: choose one layout "
+            "with --columns",
+            path=path,
+        )
+    places = next(iter(columns.bodies.values()))
+    return split_bodies(
+        table.codes[columns.body_column],
+        table.labels[columns.body_column],
+        clock=clock,
+        x=values[places["x"]],
+        y=values[places["y"]],
+        theta=values[places["theta"]] if "theta" in places else None,
+    )
+
+
+LOADER = PlainLoader()

@@ -1,0 +1,208 @@
+"""Estimate the camera's noise from the recording itself."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.record.raw import Array
+from driftwalk.schema import Track
+
+ORDER = 4
+"""Order of the differences: a path that is a cubic over five samples leaves nothing."""
+LAGS = 6
+TRIM = 5.0
+"""Windows beyond this many robust standard deviations (glitches, wall hits) are left out."""
+BLOCK = 500
+"""Windows in a block; blocks are left out in turn for the standard error."""
+MAX_BLOCKS = 100
+MIN_WINDOWS = 50
+
+
+class NoiseEstimate(NamedTuple):
+    """White tracking noise of a recording, and the unrest of the path it was told apart from."""
+
+    position_noise_m: float
+    """Standard deviation of the position, per axis [m]; NaN with too few samples."""
+    orientation_noise_rad: float
+    """Standard deviation of the orientation [rad]; NaN without orientations."""
+    position_noise_standard_error_m: float
+    """Standard error of `position_noise_m` [m], from leaving out blocks in turn."""
+    orientation_noise_standard_error_rad: float
+    """Standard error of `orientation_noise_rad` [rad]."""
+    acceleration_intensity_m2_s3: float
+    """Intensity q of the path's white acceleration, per axis [m^2/s^3]."""
+    windows: int
+    """Windows of five samples that were used."""
+
+
+def estimate_tracking_noise(track: Track) -> NoiseEstimate:
+    """Tell white camera noise apart from the body's own unrest.
+
+    A position is modelled as a smooth path, plus an integrated Wiener process (the body's velocity
+    under white accelerations of intensity q), plus white noise of variance r^2. In fourth
+    differences d the smooth path vanishes, and their autocovariances at lags 0 to 6 are linear in
+    the two unknowns::
+
+        E[d_n d_(n+l)] = r^2 sum_i w_i w'_i + q sum_ij w_i w'_j |t_i - t'_j|^3 / 12
+
+    On an even clock the first sum is the autocorrelation of (1, -4, 6, -4, 1), the second that of
+    twice differenced ``h^3 (2/3, 1/6, 0, ...)``. The weights w are those of divided differences at
+    the actual times, so an uneven clock needs no special case. The unknowns follow by least
+    squares with none below zero; x and y share them. A velocity that jumps (a hit at the wall) has
+    the covariance of the second term, so it does not pass for noise; outlying windows are left
+    out, and so are windows across a gap.
+
+    Noise that is not white (a slowly moving body in whole pixels) is underestimated.
+
+    Parameters
+    ----------
+    track : Track
+        One body.
+
+    Returns
+    -------
+    NoiseEstimate
+        Zero where the motion explains all there is.
+
+    Examples
+    --------
+    >>> time = np.arange(1000) * 0.1
+    >>> noise = np.random.default_rng(1).normal(0.0, 3e-4, (2, 1000))
+    >>> track = Track(time, 0.01 * time + noise[0], noise[1], np.full(1000, np.nan))
+    >>> round(estimate_tracking_noise(track).position_noise_m, 4)
+    0.0003
+    """
+    position = _estimate(track.time, [track.x, track.y])
+    turned = np.isfinite(track.theta)
+    orientation = _estimate(track.time[turned], [np.unwrap(track.theta[turned])])
+    return NoiseEstimate(
+        position_noise_m=position.noise,
+        orientation_noise_rad=orientation.noise,
+        position_noise_standard_error_m=position.standard_error,
+        orientation_noise_standard_error_rad=orientation.standard_error,
+        acceleration_intensity_m2_s3=position.intensity,
+        windows=position.windows,
+    )
+
+
+class _Estimate(NamedTuple):
+    noise: float
+    standard_error: float
+    intensity: float
+    windows: int
+
+
+_NOTHING = _Estimate(math.nan, math.nan, math.nan, 0)
+
+
+def _estimate(time: Array, series: list[Array]) -> _Estimate:
+    """Fit noise and intensity to the lag products of all blocks."""
+    starts = _window_starts(time)
+    if starts.size < MIN_WINDOWS:
+        return _NOTHING
+    blocks = np.array_split(starts, max(8, starts.size // BLOCK))
+    blocks = blocks[:: math.ceil(len(blocks) / MAX_BLOCKS)]
+    differences = [
+        [_weights(time, block)[1] * values[_members(block)] for values in series]
+        for block in blocks
+    ]
+    limits = [
+        TRIM * _robust_std(np.concatenate([block[axis].sum(axis=1) for block in differences]))
+        for axis in range(len(series))
+    ]
+    sums = np.zeros((len(blocks), LAGS + 1, 4))
+    for index, block in enumerate(blocks):
+        values = np.stack([part.sum(axis=1) for part in differences[index]])
+        good = np.array([np.abs(v) <= limit for v, limit in zip(values, limits, strict=True)])
+        sums[index] = _lag_sums(time, block, values, good)
+    noise, intensity = _solve(sums.sum(axis=0))
+    left_out = np.array([_solve(sums.sum(axis=0) - part)[0] for part in sums])
+    count = len(blocks)
+    variance = (count - 1) / count * float(((left_out - left_out.mean()) ** 2).sum())
+    noise = max(noise, 0.0)
+    # d(r) = d(r^2) / 2r; at r = 0 the error of r^2 itself bounds r.
+    error = math.sqrt(variance)
+    standard_error = (
+        min(error / (2.0 * math.sqrt(noise)), math.sqrt(error)) if noise else math.sqrt(error)
+    )
+    return _Estimate(math.sqrt(noise), standard_error, max(intensity, 0.0), sum(map(len, blocks)))
+
+
+def _window_starts(time: Array) -> npt.NDArray[np.int64]:
+    """Return the first sample of each window of five that no gap splits."""
+    if time.size <= ORDER:
+        return np.zeros(0, dtype=np.int64)
+    usual = float(np.median(np.diff(time)))
+    span = time[ORDER:] - time[:-ORDER]
+    return np.flatnonzero(span <= 1.5 * ORDER * usual)
+
+
+def _members(starts: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    return starts[:, None] + np.arange(ORDER + 1)
+
+
+def _weights(time: Array, starts: npt.NDArray[np.int64]) -> tuple[Array, Array]:
+    """Return the times of each window and the weights of its divided difference.
+
+    Scaled to the sum of squares of (1, -4, 6, -4, 1), which they are on an even clock.
+    """
+    times = time[_members(starts)]
+    apart = times[:, :, None] - times[:, None, :]
+    apart += np.eye(ORDER + 1)  # a sample's distance to itself is no factor
+    weights = 1.0 / apart.prod(axis=2)
+    weights *= np.sqrt(math.comb(2 * ORDER, ORDER) / (weights**2).sum(axis=1))[:, None]
+    return times, weights
+
+
+def _lag_sums(
+    time: Array, starts: npt.NDArray[np.int64], values: Array, good: npt.NDArray[np.bool_]
+) -> Array:
+    """Return for each lag the sums of (noise term, process term, product of differences, count)."""
+    times, weights = _weights(time, starts)
+    sums = np.zeros((LAGS + 1, 4))
+    for lag in range(LAGS + 1):
+        if starts.size <= lag:
+            break
+        first, second = slice(0, starts.size - lag), slice(lag, starts.size)
+        near = starts[second] - starts[first] == lag
+        noise = np.zeros(near.size)
+        for i in range(lag, ORDER + 1):
+            noise += weights[first][:, i] * weights[second][:, i - lag]
+        distance = np.abs(times[first][:, :, None] - times[second][:, None, :])
+        process = np.einsum("ni,nij,nj->n", weights[first], distance**3 / 12.0, weights[second])
+        both = near & good[:, first] & good[:, second]
+        product = values[:, first] * values[:, second]
+        count = both.sum(axis=0)
+        sums[lag] = (
+            (noise * count).sum(),
+            (process * count).sum(),
+            (product * both).sum(),
+            count.sum(),
+        )
+    return sums
+
+
+def _robust_std(values: Array) -> float:
+    """Return the standard deviation by the median absolute value; infinite when that is zero."""
+    spread = 1.4826 * float(np.median(np.abs(values)))
+    return spread if spread > 0.0 else math.inf
+
+
+def _solve(sums: Array) -> tuple[float, float]:
+    """Return (r^2, q) of the least-squares fit over lags, q not below zero."""
+    used = sums[:, 3] > 0
+    if used.sum() < 2:
+        return 0.0, 0.0
+    noise, process, product = (sums[used, column] / sums[used, 3] for column in range(3))
+    scale = math.sqrt(float((process**2).sum())) or 1.0
+    design = np.column_stack([noise, process / scale])
+    variance, intensity = np.linalg.lstsq(design, product, rcond=None)[0].tolist()
+    if intensity < 0.0:
+        return float(noise @ product / (noise @ noise)), 0.0
+    if variance < 0.0:
+        return variance, float(process @ product / (process @ process))
+    return variance, intensity / scale

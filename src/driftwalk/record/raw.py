@@ -1,0 +1,95 @@
+"""What a loader returns: the numbers of a file in the file's own units, and what they mean.
+
+Units, scale, clock and the direction of y are turned into SI in one place, `record.convert_units`;
+a loader only says what the file holds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+LENGTH_UNITS: dict[str, float] = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "km": 1e3}
+"""Metres per unit of length; pixels are ``"px"``, and ``""`` is a file that does not say."""
+
+CLOCK_UNITS: dict[str, float] = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1.0 / 60.0}
+"""Units of time per second; a clock that counts frames is ``"frame"``."""
+
+ANGLE_UNITS: dict[str, float] = {"rad": 1.0, "deg": float(np.pi / 180.0)}
+"""Radians per unit of angle."""
+
+
+@dataclass
+class RawBody:
+    """The samples of one body as the file has them, in the file's order."""
+
+    name: str
+    clock: Array
+    """Time stamps or frame numbers, shape (n,); bodies may share one array."""
+    x: Array
+    """Position x, shape (n,), NaN where the body was not detected."""
+    y: Array
+    """Position y, shape (n,)."""
+    theta: Array | None = None
+    """Orientation, shape (n,), wrapped or not; None when the file has none."""
+
+
+@dataclass
+class RawRecording:
+    """The bodies of a file and what the file says about its numbers."""
+
+    bodies: list[RawBody]
+    clock_unit: str = "frame"
+    """A key of `CLOCK_UNITS`, or ``"frame"``."""
+    length_unit: str = ""
+    """A key of `LENGTH_UNITS`, ``"px"``, or ``""`` when the file does not say."""
+    angle_unit: str = "rad"
+    """A key of `ANGLE_UNITS`."""
+    bare_length_is_si: bool = False
+    """Whether a length without a unit is metres in this format."""
+    y_axis: str = ""
+    """Direction of y in the file, ``"up"`` or ``"down"``; ``""``: down in pixels, else up."""
+    theta_axis: str = ""
+    """Direction of y that the angles were measured in; ``""``: the same as `y_axis`."""
+    frame_rate_hz: float | None = None
+    """Frame rate when the file itself holds it."""
+    rows: int = 0
+    """Rows of data in the file."""
+    notes: list[str] = field(default_factory=list)
+    """Sentences for the person who loads the file."""
+    attrs: dict[str, Any] = field(default_factory=dict)
+    """Attributes to carry over into the dataset."""
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """What the person who loads a recording knows and the file may not say.
+
+    A loader reads what it needs and leaves the rest to the stages after it.
+    """
+
+    columns: dict[str, str] = field(default_factory=dict)
+    """Name or number (from 1) of the column of each of t, frame, x, y, theta, body; ``":unit"`` may
+    follow."""
+    delimiter: str | None = None
+    """Character between fields; None: recognised."""
+    frame_rate_hz: float | None = None
+    """Frames per second [Hz]."""
+    metres_per_pixel: float | None = None
+    """Scale of a recording in pixels [m]."""
+    length_unit: str | None = None
+    """Unit of positions in a file that does not say: ``"m"``, ``"cm"``, ``"mm"``, ``"um"``."""
+    x: Path | None = None
+    """File of the x matrix (one row a frame, one column a body)."""
+    y: Path | None = None
+    """File of the y matrix."""
+    theta: Path | None = None
+    """File of the orientation matrix."""
+    keypoint: str | None = None
+    """Which keypoint of a pose file is the body."""

@@ -1,0 +1,100 @@
+"""The readable formats: one file each in `record.loaders`, found by being there.
+
+A further format joins by one file that defines ``LOADER``, an object with the members of
+`Loader`. Nothing else has to be edited.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Protocol, runtime_checkable
+
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.record.raw import RawRecording, ReadOptions
+from driftwalk.record.text import read_head
+
+
+@runtime_checkable
+class Loader(Protocol):
+    """Reads one file format."""
+
+    @property
+    def name(self) -> str:
+        """Word for ``--format``."""
+
+    @property
+    def description(self) -> str:
+        """One line for the list of formats."""
+
+    def sniff(self, head: bytes, path: Path, /) -> float:
+        """Return how sure the loader is, 0 to 1, that the file is of its format.
+
+        `head` is the start of the file (64 KiB), uncompressed and without a byte order mark, empty
+        for a folder. It must not raise.
+        """
+
+    def read(self, path: Path, options: ReadOptions, /) -> RawRecording:
+        """Read the file, or raise `FormatError`."""
+
+
+@cache
+def loaders() -> dict[str, Loader]:
+    """Return every loader by its name.
+
+    Examples
+    --------
+    >>> "idtracker" in loaders()
+    True
+    """
+    import importlib
+    import pkgutil
+
+    from driftwalk.record import loaders as package
+
+    found: dict[str, Loader] = {}
+    for module in sorted(pkgutil.iter_modules(package.__path__), key=lambda entry: entry.name):
+        loader = importlib.import_module(f"{package.__name__}.{module.name}").LOADER
+        found[loader.name] = loader
+    return found
+
+
+def find_loader(path: Path, *, format: str | None = None) -> Loader:
+    """Return the loader of a file, by the name of its format or by its content.
+
+    Parameters
+    ----------
+    path : Path
+        File or folder.
+    format : str, optional
+        Name of the format; None: the loader that is most sure.
+
+    Raises
+    ------
+    InputError
+        When there is no such format or file, or nothing recognises the content.
+    """
+    known = loaders()
+    if format is not None and format not in known:
+        raise InputError(f"unknown --format '{format}'; readable: {', '.join(known)}")
+    if not path.exists():
+        raise FormatError("there is no such file", path=path)
+    if format is not None:
+        return known[format]
+    head = b"" if path.is_dir() else read_head(path)
+    if not head.strip() and not path.is_dir():
+        raise FormatError("the file is empty", path=path)
+    _refuse_utf16(head, path)
+    confidence = {name: loader.sniff(head, path) for name, loader in known.items()}
+    best = max(confidence, key=lambda name: confidence[name])
+    if confidence[best] <= 0.0:
+        raise FormatError(
+            f"the format is not recognised; name it with --format (readable: {', '.join(known)})",
+            path=path,
+        )
+    return known[best]
+
+
+def _refuse_utf16(head: bytes, path: Path) -> None:
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise FormatError("is UTF-16 text: save the file as UTF-8", path=path)

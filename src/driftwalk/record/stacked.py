@@ -1,0 +1,52 @@
+"""Split rows of several bodies, stacked one below the other, into bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.record.raw import Array, RawBody
+
+
+def split_bodies(
+    codes: npt.NDArray[np.int32],
+    labels: Sequence[str],
+    *,
+    clock: Array,
+    x: Array,
+    y: Array,
+    theta: Array | None = None,
+) -> list[RawBody]:
+    """Return one body per label, each with its rows in the file's order.
+
+    Parameters
+    ----------
+    codes : array of int32, shape (n,)
+        Index of each row's body in `labels`.
+    labels : sequence of str
+        Names of the bodies.
+    clock, x, y, theta : array, shape (n,)
+        The rows.
+    """
+    if len(labels) == 1:
+        return [RawBody(labels[0], clock, x, y, theta)]
+    order = np.argsort(codes, kind="stable")
+    ends = np.cumsum(np.bincount(codes, minlength=len(labels)))[:-1]
+    rows = np.split(order, ends)
+    return [
+        RawBody(name, clock[at], x[at], y[at], None if theta is None else theta[at])
+        for name, at in zip(labels, rows, strict=True)
+        if at.size
+    ]
+
+
+def order_in_frame(frame: npt.ArrayLike) -> npt.NDArray[np.int32]:
+    """Return, for rows in the order of their frames, the place of each row within its frame."""
+    values = np.asarray(frame)
+    if not values.size:
+        return np.zeros(0, dtype=np.int32)
+    starts = np.flatnonzero(np.concatenate(([True], values[1:] != values[:-1])))
+    lengths = np.diff(np.append(starts, values.size))
+    return (np.arange(values.size) - np.repeat(starts, lengths)).astype(np.int32)

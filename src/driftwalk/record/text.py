@@ -1,0 +1,222 @@
+"""Tables of numbers in text files: strict, exact, and in bounded memory.
+
+The file is read in blocks of a few megabytes. In each block the fields of every line are counted
+first, so that a short or long row cannot slip through, then pandas' C parser reads the numbers
+(correctly rounded). Only when a block fails is it read again line by line, to say which line and
+column is wrong.
+"""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import FormatError
+from driftwalk.record.bad_row import MISSING, check_lines
+from driftwalk.record.raw import Array
+
+BLOCK_BYTES = 8 << 20
+GZIP_MAGIC = b"\x1f\x8b"
+BOM = b"\xef\xbb\xbf"
+HEAD_BYTES = 1 << 16
+
+
+@dataclass(frozen=True)
+class TableLayout:
+    """Where the numbers stand in a text file."""
+
+    delimiter: str
+    """One character, or ``" "`` for any run of blanks."""
+    names: list[str]
+    """Names of all columns, in order (for error messages)."""
+    skip_lines: int = 0
+    """Lines before the first row of data."""
+    numbers: tuple[int, ...] = ()
+    """Columns (from 0) to read as numbers."""
+    texts: tuple[int, ...] = ()
+    """Columns (from 0) to read as text."""
+
+
+@dataclass
+class Table:
+    """Columns of a text file."""
+
+    rows: int
+    numbers: dict[int, Array]
+    """Column (from 0) to its values."""
+    codes: dict[int, npt.NDArray[np.int32]] = field(default_factory=dict)
+    """Text column to the index of each row's value in `labels`."""
+    labels: dict[int, list[str]] = field(default_factory=dict)
+    """Text column to its distinct values, in order of appearance."""
+
+
+def open_binary(path: Path) -> IO[bytes]:
+    """Open a file for reading, through gzip when its content says so."""
+    try:
+        with path.open("rb") as file:
+            compressed = file.read(2) == GZIP_MAGIC
+        return gzip.open(path, "rb") if compressed else path.open("rb")  # type: ignore[return-value]
+    except OSError as error:
+        raise FormatError(f"cannot be opened: {error.strerror or error}", path=path) from error
+
+
+def read_head(path: Path) -> bytes:
+    """Return the first 64 KiB of a file, uncompressed and without a byte order mark."""
+    with open_binary(path) as file:
+        try:
+            head = file.read(HEAD_BYTES)
+        except (OSError, EOFError) as error:
+            raise FormatError(f"is a damaged gzip file: {error}", path=path) from error
+    return head.removeprefix(BOM)
+
+
+def read_table(path: Path, layout: TableLayout) -> Table:
+    """Read the numbered and the text columns of a table.
+
+    Parameters
+    ----------
+    path : Path
+        Text file, may be gzip-compressed.
+    layout : TableLayout
+        Columns to read.
+
+    Returns
+    -------
+    Table
+        Values as float64, NaN where a field is empty or says so.
+
+    Raises
+    ------
+    FormatError
+        With line and column, when a row has another number of fields than the header or a field is
+        not a number.
+    """
+    chunks: dict[int, list[Array]] = {column: [] for column in layout.numbers}
+    codes: dict[int, list[npt.NDArray[np.int32]]] = {column: [] for column in layout.texts}
+    labels: dict[int, dict[str, int]] = {column: {} for column in layout.texts}
+    rows = 0
+    for line, block in _blocks(path, layout.skip_lines):
+        frame = _parse(block, layout, path=path, line=line)
+        rows += len(frame)
+        for column, parts in chunks.items():
+            parts.append(frame[column].to_numpy(dtype=np.float64))
+        for column, seen in labels.items():
+            codes[column].append(_encode(frame[column], seen))
+    if not rows:
+        raise FormatError("holds no rows of data", path=path)
+    # Column by column, so that no more than one column is ever held twice.
+    return Table(
+        rows=rows,
+        numbers={column: _join(chunks.pop(column)) for column in layout.numbers},
+        codes={column: np.concatenate(codes.pop(column)) for column in layout.texts},
+        labels={column: list(seen) for column, seen in labels.items()},
+    )
+
+
+def _join(parts: list[Array]) -> Array:
+    joined = np.concatenate(parts)
+    parts.clear()
+    return joined
+
+
+def _blocks(path: Path, skip_lines: int) -> Iterator[tuple[int, bytes]]:
+    """Yield (number of the first line, whole lines) until the file ends."""
+    line = 1 + skip_lines
+    with open_binary(path) as file:
+        try:
+            for _ in range(skip_lines):
+                file.readline()
+            if not skip_lines:
+                start = file.read(len(BOM))
+                rest = b"" if start == BOM else start
+            else:
+                rest = b""
+            while block := file.read(BLOCK_BYTES):
+                whole, newline, tail = (rest + block).rpartition(b"\n")
+                rest = tail
+                if newline:
+                    yield line, whole + newline
+                    line += whole.count(b"\n") + 1
+            if rest.strip():
+                yield line, rest + b"\n"
+        except (OSError, EOFError) as error:
+            raise FormatError(f"cannot be read to its end: {error}", path=path) from error
+
+
+def _parse(block: bytes, layout: TableLayout, *, path: Path, line: int) -> Any:
+    """Return the block as a data frame, or raise a `FormatError` that says where it is wrong."""
+    import io
+
+    import pandas as pd
+
+    fields = _field_counts(block, layout.delimiter)
+    expected = len(layout.names)
+    whole = fields[fields > 0]
+    width = expected
+    if (whole != expected).any():
+        check_lines(block, layout, path=path, line=line)
+        width = max(expected, int(whole.max(initial=0)))
+    # The stubs of pandas cannot follow options in a dictionary.
+    exact: Any = {} if _pandas_is_exact(pd.__version__) else {"float_precision": "round_trip"}
+    try:
+        frame = pd.read_csv(
+            io.BytesIO(block),
+            header=None,
+            names=list(range(width)),
+            usecols=sorted({*layout.numbers, *layout.texts}),
+            dtype=dict.fromkeys(layout.texts, str),
+            sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
+            na_values=list(MISSING),
+            keep_default_na=False,
+            index_col=False,
+            skipinitialspace=True,
+            low_memory=False,
+            engine="c",
+            **exact,
+        )
+    except (ValueError, UnicodeDecodeError) as error:
+        check_lines(block, layout, path=path, line=line)
+        raise FormatError(f"cannot be read as a table: {error}", path=path, line=line) from error
+    if any(frame[column].dtype.kind not in "iuf" for column in layout.numbers):
+        check_lines(block, layout, path=path, line=line)
+        raise FormatError("has a column that is not numbers", path=path, line=line)
+    if b'"' in block and len(frame) != whole.size:
+        raise FormatError("has a quotation mark that is not closed", path=path, line=line)
+    return frame
+
+
+def _pandas_is_exact(version: str) -> bool:
+    """Whether pandas' default parsing of floats is correctly rounded (from 3.1 on)."""
+    major, minor = (int(part) for part in version.split(".")[:2])
+    return (major, minor) >= (3, 1)
+
+
+def _field_counts(block: bytes, delimiter: str) -> npt.NDArray[np.int64]:
+    """Count the fields of each line of a block; 0 for a blank line."""
+    characters = np.frombuffer(block, dtype=np.uint8)
+    ends = np.flatnonzero(characters == ord("\n"))
+    blank = np.isin(characters, np.frombuffer(b" \t\r\n", dtype=np.uint8))
+    if delimiter == " ":
+        first = np.concatenate(([True], blank[:-1])) & ~blank
+        return np.diff(np.searchsorted(np.flatnonzero(first), ends), prepend=0)
+    separators = np.flatnonzero(characters == ord(delimiter))
+    fields = np.diff(np.searchsorted(separators, ends), prepend=0) + 1
+    # A line of blanks alone holds no field, though a blank may be the delimiter itself.
+    inked = np.diff(np.searchsorted(np.flatnonzero(~blank), ends), prepend=0)
+    fields[inked == 0] = 0
+    return fields
+
+
+def _encode(values: Any, seen: dict[str, int]) -> npt.NDArray[np.int32]:
+    """Turn the texts of a column into numbers, adding new ones to `seen`."""
+    import pandas as pd
+
+    local, found = pd.factorize(values.fillna("").astype(str))
+    index = np.array([seen.setdefault(str(text), len(seen)) for text in found], dtype=np.int32)
+    return index[local]

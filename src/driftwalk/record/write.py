@@ -1,0 +1,108 @@
+"""Write a trajectory: driftwalk's NetCDF, or plain CSV."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from driftwalk.core.errors import InputError
+from driftwalk.schema import body_names, check_trajectory
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+ROWS_AT_ONCE = 200_000
+CSV_COLUMNS = ["t_s", "x_m", "y_m", "theta_rad", "body"]
+
+
+def save_trajectory(
+    dataset: xr.Dataset, path: str | PathLike[str], *, existing: str = "error"
+) -> Path:
+    """Write a trajectory as NetCDF (``.nc``) or plain CSV (``.csv``), by the name's ending.
+
+    CSV has the columns t_s, x_m, y_m, theta_rad and body. Numbers have as many digits as it takes
+    to read the same float64 back. Rows are the present samples, and one row with empty positions
+    for a time at which no body is present; the arena and the other attributes are lost, so NetCDF
+    is the format to keep.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A `trajectory`.
+    path : path-like
+        Where to write. The file appears whole or not at all.
+    existing : {"error", "replace"}
+        What to do when the file is there already.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        When the file exists, its folder does not, or its ending is neither ``.nc`` nor ``.csv``.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from driftwalk.schema import build_trajectory
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_trajectory(build_trajectory([0.0], [0.1], [0.2]), f"{folder}/a.csv").name
+    'a.csv'
+    """
+    check_trajectory(dataset)
+    if existing not in ("error", "replace"):
+        raise InputError(f"existing is 'error' or 'replace', got '{existing}'")
+    target = Path(path)
+    writers: dict[str, Callable[[xr.Dataset, Path], None]] = {
+        ".nc": _write_netcdf,
+        ".csv": _write_csv,
+    }
+    writer = writers.get(target.suffix.lower())
+    if writer is None:
+        raise InputError(f"{target}: write to a file that ends in .nc or .csv")
+    if not target.parent.is_dir():
+        raise InputError(f"{target}: the folder {target.parent} does not exist")
+    if target.exists() and existing == "error":
+        raise InputError(f"{target} exists already: name another file, or add --overwrite")
+    partial = target.with_name(f".{target.name}.{os.getpid()}.partial")
+    try:
+        writer(dataset, partial)
+        partial.replace(target)
+    except OSError as error:
+        raise InputError(f"{target} cannot be written: {error.strerror or error}") from error
+    finally:
+        partial.unlink(missing_ok=True)
+    return target
+
+
+def _write_netcdf(dataset: xr.Dataset, path: Path) -> None:
+    encoding = {name: {"zlib": True, "complevel": 4} for name in ("x", "y", "theta")}
+    dataset.to_netcdf(path, engine="h5netcdf", encoding=encoding)
+
+
+def _write_csv(dataset: xr.Dataset, path: Path) -> None:
+    """Write block by block, so that the text never stands in memory as a whole."""
+    import pandas as pd
+
+    time = dataset["time"].values
+    names = np.array(body_names(dataset), dtype=object)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        pd.DataFrame(columns=CSV_COLUMNS).to_csv(file, index=False)
+        for first in range(0, time.size, ROWS_AT_ONCE):
+            block = slice(first, first + ROWS_AT_ONCE)
+            x, y, theta = (dataset[name].values[block] for name in ("x", "y", "theta"))
+            present = np.isfinite(x) & np.isfinite(y)
+            present[:, 0] |= ~present.any(axis=1)
+            row, body = np.nonzero(present)
+            values = [time[block][row], x[row, body], y[row, body], theta[row, body], names[body]]
+            pd.DataFrame(dict(zip(CSV_COLUMNS, values, strict=True))).to_csv(
+                file, index=False, header=False
+            )
