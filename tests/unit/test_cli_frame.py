@@ -22,6 +22,7 @@ from driftwalk.cli import main as cli_main
 from driftwalk.cli import options
 from driftwalk.cli.main import COMMANDS, Command, main
 from driftwalk.cli.options import (
+    CALIBRATION_KEYS,
     STUDY_KEYS,
     DragCoefficient,
     ForceStd,
@@ -250,11 +251,12 @@ def test_wrong_option_is_named(
 
 
 def test_every_option_sets_a_parameter_that_exists() -> None:
-    for name, key in STUDY_KEYS.items():
+    for name, key in (*STUDY_KEYS.items(), *CALIBRATION_KEYS.items()):
         section, _, field = key.partition(".")
         assert field in type(getattr(Study(), section)).model_fields, key
         assert option_name(key) == f"--{name.replace('_', '-')}"
     assert option_name("block.depth_m") == "--depth"
+    assert study_overrides(keys=CALIBRATION_KEYS, seed=3) == {"calibration.seed": 3}
 
 
 def test_study_new_writes_the_template_once(

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import inspect
 import tomllib
 from pathlib import Path
 
 import pytest
 
+import driftwalk
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.model import (
     Study,
+    Tank,
     apply_overrides,
     load_study,
     parameter_table,
@@ -17,6 +20,7 @@ from driftwalk.model import (
     study_template,
 )
 from driftwalk.model.section import Section, quantity_of
+from driftwalk.record import load
 
 
 def test_defaults_are_the_papers_block_and_tank() -> None:
@@ -269,3 +273,48 @@ def test_reference_page_has_the_table_of_the_declarations(name: str) -> None:
 def test_example_of_the_reference_page_is_a_study() -> None:
     example = PAGE.read_text(encoding="utf-8").partition("```toml\n")[2].partition("```")[0]
     assert parse_study(example).recording.arena == "fit"
+
+
+def test_load_options_are_arguments_of_load() -> None:
+    study = Study(
+        recording={
+            "format": "table",
+            "start_s": 1,
+            "stop_s": 2,
+            "frame_rate_Hz": 25,
+            "metres_per_pixel": "0.5mm",
+            "length_unit": "px",
+            "y_axis": "down",
+            "columns": {"x": 2, "y": "pos_y:mm"},
+            "sort": "sort",
+            "x_file": "x.csv",
+            "arena_center_m": [0.1, -0.2],
+        }
+    )
+    options = study.load_options()
+    assert options["columns"] == {"x": "2", "y": "pos_y:mm"}
+    assert options["metres_per_pixel"] == 0.0005
+    assert options["arena"] == "circle:0.3@0.1,-0.2"
+    assert options.keys() <= inspect.signature(load).parameters.keys()
+    assert Study().load_options() == {"sort": "error", "arena": "circle:0.3"}
+
+
+@pytest.mark.parametrize(
+    ("values", "arena"),
+    [
+        ({"recording": {"arena": "fit"}}, "fit"),
+        ({"recording": {"arena": "file"}}, None),
+        ({"tank": {"shape": "rectangle", "width_m": 0.4, "height_m": 0.3}}, "rect:0.4x0.3"),
+        ({"tank": {"shape": "polygon", "vertices_m": [[0, 0], [1, 0], [0, 1]]}}, None),
+    ],
+)
+def test_arena_of_the_recording(values: dict[str, dict[str, object]], arena: str | None) -> None:
+    assert Study(**values).load_options().get("arena") == arena
+
+
+def test_study_reads_the_bundled_recording() -> None:
+    """The bundled recording is simulated; its study is the default one."""
+    path = Path(driftwalk.__file__).parent / "datasets" / "tank30_ode_a" / "recording.csv"
+    trajectory = load(path, **Study().load_options())
+    assert trajectory.sizes["time"] == 18001
+    assert Tank.from_arena(trajectory.attrs["arena"]) == Tank()

@@ -163,21 +163,32 @@ STUDY_KEYS: Final[dict[str, str]] = {
 }
 """From an option's name to the key of the study that it sets."""
 
+CALIBRATION_KEYS: Final[dict[str, str]] = {
+    **STUDY_KEYS,
+    "seed": "calibration.seed",
+    "replicates": "calibration.replicates",
+    "bootstrap": "calibration.bootstrap",
+    "confidence": "calibration.confidence",
+}
+"""The same for a calibration, where seed and replicates are those of its simulations."""
 
-def study_overrides(**options: Any) -> dict[str, Any]:
+
+def study_overrides(*, keys: Mapping[str, str] = STUDY_KEYS, **options: Any) -> dict[str, Any]:
     """Return the keys of the study that the options given set; an option that is None sets none.
 
     Parameters
     ----------
+    keys : mapping
+        `STUDY_KEYS`, or `CALIBRATION_KEYS`.
     **options
-        Values by the names in `STUDY_KEYS`.
+        Values by the names in `keys`.
 
     Examples
     --------
     >>> study_overrides(tank_diameter=0.5, seed=None)
     {'tank.diameter_m': 0.5}
     """
-    overrides = {STUDY_KEYS[name]: value for name, value in options.items() if value is not None}
+    overrides = {keys[name]: value for name, value in options.items() if value is not None}
     depth = overrides.get("block.depth")
     if depth is not None and not isinstance(depth, str):
         overrides["block.depth_m"] = overrides.pop("block.depth")
@@ -218,5 +229,6 @@ def resolve_study(study_path: Path | None, overrides: Mapping[str, Any]) -> Stud
 def option_name(key: str) -> str:
     """Return the option that sets a key of the study, the key itself where there is none."""
     key = "block.depth" if key == "block.depth_m" else key
-    names = [name for name, known in STUDY_KEYS.items() if known == key]
+    declared = (*STUDY_KEYS.items(), *CALIBRATION_KEYS.items())
+    names = [name for name, known in declared if known == key]
     return f"--{names[0].replace('_', '-')}" if names else key

@@ -15,7 +15,7 @@ class Block(Section):
 
     Examples
     --------
-    >>> Block().inertia_kg_m2
+    >>> round(Block().inertia_kg_m2, 12)
     1.74e-06
     """
 

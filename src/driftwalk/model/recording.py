@@ -110,11 +110,41 @@ class Recording(Section):
     arena: Literal["tank", "fit", "file"] = Field(
         default="tank",
         description=(
-            'Where the tank lies in the file\'s frame: "tank" has its centre at the origin, "fit" '
-            "finds the smallest outline of [tank]'s shape that holds the positions, "
-            '"file" is what the file says.'
+            'What holds the positions: "tank" is [tank], its centre at the file\'s origin where '
+            'that agrees with the positions and fitted to them otherwise; "fit" is a circle fitted '
+            'to the positions; "file" is what the file says, if anything.'
         ),
     )
+    arena_center_m: tuple[float, float] | None = Field(
+        default=None,
+        description="Centre [x, y] of the tank in the file's frame in m, y up, where it is known.",
+        examples=["[0.42, -0.31]"],
+    )
+
+    def load_options(self) -> dict[str, Any]:
+        """Return the keyword arguments of `driftwalk.record.load` but for the arena.
+
+        What is not set is left out, so that the loader's own default holds.
+        """
+        named = {
+            "format": self.format if self.format != "auto" else None,
+            "body": self.body,
+            "start": self.start_s,
+            "stop": self.stop_s,
+            "frame_rate": self.frame_rate_Hz,
+            "metres_per_pixel": self.metres_per_pixel,
+            "length_unit": self.length_unit if self.length_unit != "auto" else None,
+            "y_axis": self.y_axis if self.y_axis != "auto" else None,
+            "max_speed": self.max_speed_m_s,
+            "sort": self.sort,
+            "columns": self.columns.to_dict() if self.columns is not None else None,
+            "delimiter": self.delimiter,
+            "x": self.x_file,
+            "y": self.y_file,
+            "theta": self.theta_file,
+            "keypoint": self.keypoint,
+        }
+        return {name: value for name, value in named.items() if value is not None}
 
     @model_validator(mode="after")
     def _some_time(self) -> Self:
