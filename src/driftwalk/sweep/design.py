@@ -1,0 +1,159 @@
+"""Which settings a sweep visits, in which order, and how they are cut into work units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class WorkUnit:
+    """A run of consecutive settings that is computed and stored at once.
+
+    Attributes
+    ----------
+    start, stop : int
+        The settings ``start <= i < stop`` of the design.
+    settings : dict of str to numpy.ndarray
+        The values of every axis, each of shape (stop - start,).
+    """
+
+    start: int
+    stop: int
+    settings: dict[str, npt.NDArray[Any]]
+
+    @property
+    def id(self) -> str:
+        """Name of the unit: it depends on which settings it holds and on nothing else."""
+        return f"{self.start:08d}-{self.stop:08d}"
+
+    @property
+    def size(self) -> int:
+        """Number of settings."""
+        return self.stop - self.start
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """A grid of settings: every combination of the values of its axes, the last axis fastest.
+
+    Attributes
+    ----------
+    axes : dict of str to numpy.ndarray
+        The values of each axis, in the order of the dimensions.
+    """
+
+    axes: dict[str, npt.NDArray[Any]]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values of each axis."""
+        return tuple(values.size for values in self.axes.values())
+
+    @property
+    def size(self) -> int:
+        """Number of settings."""
+        return math.prod(self.shape)
+
+    def settings(self, start: int = 0, stop: int | None = None) -> dict[str, npt.NDArray[Any]]:
+        """Return the values of every axis for the settings ``start <= i < stop``.
+
+        Returns
+        -------
+        dict of str to numpy.ndarray
+            Shape (stop - start,) each.
+        """
+        indices = np.unravel_index(np.arange(self.size)[start:stop], self.shape)
+        pairs = zip(self.axes.items(), indices, strict=True)
+        return {name: values[index] for (name, values), index in pairs}
+
+    def units(self, size: int) -> list[WorkUnit]:
+        """Cut the settings into work units of `size` settings; the last may be shorter.
+
+        Raises
+        ------
+        InputError
+            When `size` is below 1.
+        """
+        if size < 1:
+            raise InputError(f"size of a work unit: expected at least 1 setting, got {size}")
+        starts = range(0, self.size, size)
+        stops = [min(start + size, self.size) for start in starts]
+        return [
+            WorkUnit(start, stop, self.settings(start, stop))
+            for start, stop in zip(starts, stops, strict=True)
+        ]
+
+    def unstack(self, arrays: Mapping[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
+        """Turn the leading dimension of arrays, the settings, into one dimension per axis.
+
+        Parameters
+        ----------
+        arrays : mapping of str to numpy.ndarray
+            Shape (settings, ...) each, as `run_sweep` returns them.
+
+        Returns
+        -------
+        dict of str to numpy.ndarray
+            Shape ``(*self.shape, ...)`` each.
+
+        Raises
+        ------
+        InputError
+            When an array has another number of settings.
+        """
+        for name, array in arrays.items():
+            if array.shape[:1] != (self.size,):
+                raise InputError(
+                    f"array '{name}': expected {self.size} settings, got shape {array.shape}"
+                )
+        return {name: array.reshape(self.shape + array.shape[1:]) for name, array in arrays.items()}
+
+    def describe(self) -> dict[str, Any]:
+        """Return the axes as plain lists, for a specification."""
+        return {name: values.tolist() for name, values in self.axes.items()}
+
+
+def grid(**axes: npt.ArrayLike) -> Design:
+    """Return the design of every combination of the given values, the last axis fastest.
+
+    Parameters
+    ----------
+    **axes : array_like, one-dimensional
+        Name and values of each axis; numbers, finite. The order of the arguments is the order of
+        the dimensions.
+
+    Raises
+    ------
+    InputError
+        When an axis is empty, not one-dimensional, no numbers or not finite.
+
+    Examples
+    --------
+    >>> grid(drag_coefficient=[0.5, 1.0], replicate=range(3)).settings()["replicate"]
+    array([0, 1, 2, 0, 1, 2])
+    """
+    if not axes:
+        raise InputError("a design needs at least one axis, got none")
+    return Design({name: _axis(name, values) for name, values in axes.items()})
+
+
+def _axis(name: str, values: npt.ArrayLike) -> npt.NDArray[Any]:
+    array = np.array(values)
+    if array.ndim != 1 or array.size == 0:
+        raise InputError(
+            f"axis '{name}': expected a list of one or more numbers, got shape {array.shape}"
+        )
+    if array.dtype.kind not in "iuf":
+        raise InputError(f"axis '{name}': expected numbers, got {array.dtype}")
+    if not np.isfinite(array).all():
+        raise InputError(f"axis '{name}': expected finite numbers, got {array.tolist()}")
+    array.setflags(write=False)
+    return array
