@@ -1,17 +1,44 @@
 """driftwalk: calibrated stochastic motion models of floating, drifting and stirred robots.
 
-Every public name is resolved on first use, so `import driftwalk` loads nothing heavy.
+Every public name is resolved on first use, so `import driftwalk` loads nothing heavy. A stage that
+is named like its main function is called as that function: `driftwalk.simulate(study, flow)`.
 """
 
 from __future__ import annotations
 
+import sys
+from types import ModuleType
 from typing import Any
 
 __version__ = "0.1.0"
 
-# The stages whose public names are also names of the package. A stage's `__all__` is the only list
-# of its names. A name that is a stage is the stage: the function is `driftwalk.compare.compare`.
+# The stages whose public names are also names of the package; a stage's `__all__` is the only list
+# of its names.
 _STAGES = ("record", "flow", "model", "simulate", "compare", "calibrate", "datasets", "report")
+
+
+class _Stage(ModuleType):
+    """A stage that holds a function of its own name, and is called as that function."""
+
+    def __call__(self, *arguments: Any, **options: Any) -> Any:
+        """Call the function that the stage is named after."""
+        return getattr(self, self.__name__.rpartition(".")[2])(*arguments, **options)
+
+
+class _Package(ModuleType):
+    """The package: makes a stage callable at the moment at which the import system adds it.
+
+    Without this, `driftwalk.compare` would be the function or the stage, depending on what was
+    imported before.
+    """
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if isinstance(value, ModuleType) and name in getattr(value, "__all__", ()):
+            value.__class__ = _Stage
+        super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
 
 
 def __getattr__(name: str) -> Any:

@@ -11,13 +11,12 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 import pytest
 import typer
 
-import driftwalk
+from driftwalk import __version__
 from driftwalk.cli import main as cli_main
 from driftwalk.cli import options
 from driftwalk.cli.main import COMMANDS, Command, main
@@ -64,7 +63,7 @@ def one_error_line(capsys: pytest.CaptureFixture[str]) -> str:
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--version"]) == 0
-    assert capsys.readouterr().out == f"driftwalk {driftwalk.__version__}\n"
+    assert capsys.readouterr().out == f"driftwalk {__version__}\n"
 
 
 @pytest.mark.parametrize("arguments", [[], ["--help"], ["-h"]])
@@ -352,13 +351,3 @@ def test_progress_on_a_terminal_is_a_bar() -> None:
 )
 def test_duration_text(seconds: float, text: str) -> None:
     assert duration_text(seconds) == text
-
-
-def test_public_names_resolve_to_the_stages() -> None:
-    listed: dict[str, Any] = {name: getattr(driftwalk, name) for name in dir(driftwalk)}
-    assert listed["Study"] is Study
-    assert listed["model"].__name__ == "driftwalk.model"
-    for stage in (value for value in listed.values() if isinstance(value, ModuleType)):
-        assert all(hasattr(stage, name) for name in stage.__all__), stage.__name__
-    with pytest.raises(AttributeError, match="no attribute 'studdy'"):
-        _ = driftwalk.studdy
