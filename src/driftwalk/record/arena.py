@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -102,7 +103,7 @@ def _fitted(x: Array, y: Array, *, block_side: float | None) -> PlacedArena:
         "center_m": [fit.center_x, fit.center_y],
         "sectors_visited_share": fit.coverage,
         "residual_m": fit.residual,
-        "samples_outside": fit.outside,
+        "samples_astray": fit.astray,
         "radius_is": "of the centres" if block_side is None else "lower bound of the tank",
     }
     if block_side is None:
@@ -200,10 +201,21 @@ def _polygon(path: Path) -> PlacedArena:
     return PlacedArena(arena, (x, y), {"by": "given", "center_m": [x, y]})
 
 
-def arena_attributes(placed: PlacedArena) -> dict[str, str]:
-    """Return the attributes that a trajectory carries about its arena."""
+def arena_attributes(
+    placed: PlacedArena, *, shifted_before: Sequence[float] = (0.0, 0.0)
+) -> dict[str, str]:
+    """Return the attributes that a trajectory carries about its arena.
+
+    Parameters
+    ----------
+    placed : PlacedArena
+        The arena.
+    shifted_before : sequence of float
+        What an earlier conversion subtracted from the positions [m].
+    """
+    shift = [old + new for old, new in zip(shifted_before, placed.origin, strict=True)]
     return {
         "arena": json.dumps(placed.arena),
-        "origin_shift_m": json.dumps(list(placed.origin)),
+        "origin_shift_m": json.dumps(shift),
         "arena_found": json.dumps(placed.found),
     }

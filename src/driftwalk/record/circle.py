@@ -15,6 +15,11 @@ DIRECTIONS = 72
 SECTORS = 36
 TRIMMED_SHARE = 2e-4
 """Share of the samples, in every direction, that may lie outside: tracking errors."""
+STRAY = 1.15
+"""Samples beyond this many radii of a first fit are tracking errors, if they are few."""
+STRAY_SHARE = 0.01
+OUTER = 0.9
+"""Share of the directions in which the fitted circle encloses the samples."""
 RIM = 0.85
 """A sector counts as visited when a sample lies beyond this share of the radius."""
 
@@ -32,7 +37,7 @@ class CircleFit(NamedTuple):
     """Share of 36 sectors in which the body came near the rim (beyond 0.85 of the radius)."""
     residual: float
     """Median distance [m] of the outline in 72 directions from the circle."""
-    outside: int
+    astray: int
     """Samples more than 2 % of the radius outside: tracking errors, or not a circle."""
 
 
@@ -41,8 +46,10 @@ def fit_circle(x: npt.ArrayLike, y: npt.ArrayLike) -> CircleFit:
 
     The extent of the samples in direction phi is ``h(phi) = c . u(phi) + r`` for a disc of centre
     c and radius r: linear in the three unknowns. It is taken in 72 directions, each time leaving
-    out the 0.02 % (at least 3) outermost samples, and fitted by least absolute deviations, so that
-    directions that the body never visited count little. Gross errors are removed first.
+    out the 0.02 % (at least 3) outermost samples. A first fit by least absolute deviations, which
+    no tracking error moves, tells samples astray (beyond 1.15 radii, if they are fewer than 1 %);
+    the second fit, without them, is the 0.9 quantile regression over the directions, since a
+    direction in which the body stayed away from the rim says nothing about the rim.
 
     This is the circle of the *centres*. The robot's centre never reaches the rim: see
     `tank_radius_bound`.
@@ -71,13 +78,18 @@ def fit_circle(x: npt.ArrayLike, y: npt.ArrayLike) -> CircleFit:
     points = points[np.isfinite(points).all(axis=1)]
     if points.shape[0] < 20:
         raise InputError(f"a circle needs at least 20 positions, got {points.shape[0]}")
+    total = points.shape[0]
     points = _without_gross_errors(points)
     if np.ptp(points, axis=0).max() == 0.0:
         raise InputError("a circle cannot be fitted: the body never moves")
     angle = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     design = np.column_stack([np.cos(angle), np.sin(angle), np.ones(DIRECTIONS)])
+    center_x, center_y, radius = _quantile_fit(design, _extents(points, design[:, :2]), 0.5)
+    astray = np.hypot(points[:, 0] - center_x, points[:, 1] - center_y) > STRAY * radius
+    if astray.mean() < STRAY_SHARE:
+        points = points[~astray]
     extent = _extents(points, design[:, :2])
-    center_x, center_y, radius = _least_absolute(design, extent).tolist()
+    center_x, center_y, radius = _quantile_fit(design, extent, OUTER)
     if radius <= 0.0:
         raise InputError("a circle cannot be fitted: the positions do not fill one")
     distance = np.hypot(points[:, 0] - center_x, points[:, 1] - center_y)
@@ -91,7 +103,7 @@ def fit_circle(x: npt.ArrayLike, y: npt.ArrayLike) -> CircleFit:
         radius,
         coverage=visited / SECTORS,
         residual=float(np.median(residual)),
-        outside=int((distance > 1.02 * radius).sum()),
+        astray=total - int((distance <= 1.02 * radius).sum()),
     )
 
 
@@ -131,8 +143,8 @@ def _extents(points: Array, directions: Array) -> Array:
     return np.array([np.partition(points @ direction, last)[last] for direction in directions])
 
 
-def _least_absolute(design: Array, values: Array) -> Array:
-    """Solve the linear problem in the sense of least absolute deviations, by reweighting."""
+def _quantile_fit(design: Array, values: Array, share: float) -> tuple[float, float, float]:
+    """Return the three unknowns with `share` of the values below the fit, by reweighting."""
     scale = float(np.ptp(values)) or 1.0
     weights: Array = np.ones(values.size)
     solution: Array = np.zeros(design.shape[1])
@@ -140,5 +152,7 @@ def _least_absolute(design: Array, values: Array) -> Array:
         root = np.sqrt(weights)
         fitted = np.linalg.lstsq(design * root[:, None], values * root, rcond=None)[0]
         solution = np.asarray(fitted, dtype=np.float64)
-        weights = 1.0 / np.maximum(np.abs(values - design @ solution), 1e-6 * scale)
-    return solution
+        error = values - design @ solution
+        weights = np.where(error > 0, share, 1.0 - share) / np.maximum(np.abs(error), 1e-6 * scale)
+    x, y, radius = solution.tolist()
+    return x, y, radius

@@ -25,7 +25,7 @@ def convert_units(
 ) -> tuple[list[RawBody], dict[str, object]]:
     """Return the bodies in s, m and rad with y up, and the attributes that say what was done.
 
-    The positions of `raw` are scaled in place, so that a large recording is held once.
+    The arrays of `raw` are converted in place, so that a large recording is held once.
 
     Parameters
     ----------
@@ -143,4 +143,7 @@ def _convert_clocks(raw: RawRecording, ticks: float, attrs: dict[str, object]) -
         origin = 0.0
     else:
         attrs["time_origin_unix_s"] = origin / ticks
-    return {key: (clock - origin) / ticks for key, clock in arrays.items()}
+    for clock in arrays.values():
+        np.subtract(clock, origin, out=clock)
+        np.divide(clock, ticks, out=clock)
+    return arrays

@@ -142,7 +142,7 @@ def _circle(track: Track) -> dict[str, Any] | None:
         "radius_m": fit.radius,
         "sectors_visited_share": fit.coverage,
         "residual_m": fit.residual,
-        "samples_outside": fit.outside,
+        "samples_astray": fit.astray,
     }
 
 

@@ -196,7 +196,8 @@ def _assemble(
     if arena is not None:
         placed = _place(arena, bodies, block_side=block_side)
         _shift(bodies, placed)
-        attrs |= arena_attributes(placed)
+        before = json.loads(attrs.get("origin_shift_m", "[0.0, 0.0]"))
+        attrs |= arena_attributes(placed, shifted_before=before)
         notes += placed.notes
     totals = {
         key: sum(getattr(found, key) for found in counts.values()) for key in Counts().as_dict()

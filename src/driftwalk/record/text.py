@@ -21,7 +21,7 @@ from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import MISSING, check_lines
 from driftwalk.record.raw import Array
 
-BLOCK_BYTES = 8 << 20
+BLOCK_BYTES = 4 << 20
 GZIP_MAGIC = b"\x1f\x8b"
 BOM = b"\xef\xbb\xbf"
 HEAD_BYTES = 1 << 16
@@ -201,15 +201,17 @@ def _field_counts(block: bytes, delimiter: str) -> npt.NDArray[np.int64]:
     """Count the fields of each line of a block; 0 for a blank line."""
     characters = np.frombuffer(block, dtype=np.uint8)
     ends = np.flatnonzero(characters == ord("\n"))
-    blank = np.isin(characters, np.frombuffer(b" \t\r\n", dtype=np.uint8))
     if delimiter == " ":
+        blank = np.isin(characters, np.frombuffer(b" \t\r\n", dtype=np.uint8))
         first = np.concatenate(([True], blank[:-1])) & ~blank
         return np.diff(np.searchsorted(np.flatnonzero(first), ends), prepend=0)
-    separators = np.flatnonzero(characters == ord(delimiter))
-    fields = np.diff(np.searchsorted(separators, ends), prepend=0) + 1
-    # A line of blanks alone holds no field, though a blank may be the delimiter itself.
-    inked = np.diff(np.searchsorted(np.flatnonzero(~blank), ends), prepend=0)
-    fields[inked == 0] = 0
+    starts = np.concatenate(([0], ends[:-1] + 1))
+    separators = characters == ord(delimiter)
+    fields = np.add.reduceat(separators, starts, dtype=np.int64) + 1
+    # A line of blanks alone holds no field; it may hold delimiters when these are tabs.
+    for line in np.flatnonzero((fields == 1) | (ends - starts < 2 * fields)):
+        if not block[starts[line] : ends[line]].strip():
+            fields[line] = 0
     return fields
 
 

@@ -115,7 +115,10 @@ def build_trajectory(
 
 def wrap_angle(theta: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """Wrap angles [rad] into (-pi, pi]."""
-    wrapped: npt.NDArray[np.float64] = np.pi - np.mod(np.pi - theta, 2.0 * np.pi)
+    wrapped: npt.NDArray[np.float64] = np.pi - theta
+    # In place: a long recording is not to be held four times.
+    np.mod(wrapped, 2.0 * np.pi, out=wrapped)
+    np.subtract(np.pi, wrapped, out=wrapped)
     return wrapped
 
 

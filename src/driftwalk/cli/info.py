@@ -1,0 +1,151 @@
+"""`driftwalk info`: what a recording holds, and how it was understood."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from driftwalk.cli.options import Json, Side, TankDiameter
+from driftwalk.cli.output import print_json, print_note, print_table
+from driftwalk.cli.recording_options import (
+    RecordingFile,
+    RecordingOptions,
+    with_recording_options,
+)
+
+SIDE_BY_SIDE = 5
+"""Bodies shown as columns; more are shown as rows, with fewer numbers."""
+
+_ROWS: list[tuple[str, str, float]] = [
+    ("samples", "samples", 1),
+    ("orientation", "has_orientation", 1),
+    ("duration [s]", "duration_s", 1),
+    ("from [s]", "start_s", 1),
+    ("to [s]", "stop_s", 1),
+    ("rate [Hz]", "rate_Hz", 1),
+    ("interval, 5 % [ms]", "interval_5_percent_s", 1e3),
+    ("interval, median [ms]", "interval_median_s", 1e3),
+    ("interval, 95 % [ms]", "interval_95_percent_s", 1e3),
+    ("uneven intervals [%]", "uneven_intervals_share", 100),
+    ("gaps", "gaps", 1),
+    ("longest gap [s]", "longest_gap_s", 1),
+    ("time in gaps [%]", "gap_time_share", 100),
+    ("x from [cm]", "x_min_m", 100),
+    ("x to [cm]", "x_max_m", 100),
+    ("y from [cm]", "y_min_m", 100),
+    ("y to [cm]", "y_max_m", 100),
+    ("speed, mean [cm/s]", "speed_mean_m_s", 100),
+    ("speed, 99 % [cm/s]", "speed_99_percent_m_s", 100),
+    ("speed, largest [cm/s]", "speed_max_m_s", 100),
+    ("turn rate, mean [rad/s]", "turn_rate_mean_rad_s", 1),
+    ("position noise [mm]", "position_noise_m", 1e3),
+    ("  standard error [mm]", "position_noise_standard_error_m", 1e3),
+    ("orientation noise [deg]", "orientation_noise_rad", 57.29577951308232),
+    ("  standard error [deg]", "orientation_noise_standard_error_rad", 57.29577951308232),
+]
+_CIRCLE_ROWS: list[tuple[str, str, float]] = [
+    ("circle of centres: radius [cm]", "radius_m", 100),
+    ("  rim visited [%]", "sectors_visited_share", 100),
+]
+_BRIEF = ["samples", "duration_s", "rate_Hz", "gaps", "speed_mean_m_s", "position_noise_m"]
+_COUNTS = {
+    "rows": "rows of these bodies",
+    "missing": "without a position",
+    "without_time": "without a time, dropped",
+    "duplicates_dropped": "same time again, earlier dropped",
+    "unsorted": "times out of order, sorted",
+    "outside_window": "outside --from and --to",
+    "jumps_removed": "jumps made gaps",
+    "samples": "samples left",
+}
+
+
+@with_recording_options
+def info(
+    recording: RecordingFile,
+    how: RecordingOptions,
+    tank_diameter: TankDiameter = None,
+    side: Side = None,
+    json: Json = False,
+) -> None:
+    """Say what a recording holds and how it was understood.
+
+    Bodies, clock and its jitter, gaps, extent, the circle that the centres stay in, speed, and the
+    tracking noise estimated from the recording itself.
+    """
+    from driftwalk.record import describe
+
+    described = describe(how.load(recording, tank_diameter=tank_diameter, side=side))
+    if json:
+        print_json(described)
+        return
+    _print_file(described)
+    print()
+    _print_bodies(described["bodies"])
+    print()
+    _print_counts(described["counts"])
+    for warning in described["warnings"]:
+        print_note(f"warning: {warning}")
+
+
+def _print_file(described: dict[str, Any]) -> None:
+    rows: list[list[Any]] = [
+        ["file", described["source"]],
+        ["format", described["format"]],
+        ["y axis", described["y_axis"]],
+        ["bodies", len(described["bodies"])],
+        ["arena", _arena_text(described)],
+        ["resolution [mm]", _scaled(described["position_quantum_m"] or None, 1e3)],
+    ]
+    if described["metres_per_pixel"] is not None:
+        rows.append(["scale [mm/pixel]", described["metres_per_pixel"] * 1e3])
+    print_table(rows)
+
+
+def _arena_text(described: dict[str, Any]) -> str:
+    arena = described["arena"]
+    if arena is None:
+        return "not stated (--arena)"
+    sizes = {
+        "circle": lambda: f"circle, diameter {arena['diameter_m'] * 100:.4g} cm",
+        "rectangle": lambda: (
+            f"rectangle, {arena['width_m'] * 100:.4g} x {arena['height_m'] * 100:.4g} cm"
+        ),
+        "polygon": lambda: f"polygon with {len(arena['vertices_m'])} vertices",
+    }
+    found = described["arena_found"] or {}
+    center = found.get("center_m")
+    where = "" if center is None else f"; centre at x {center[0]:.4g} m, y {center[1]:.4g} m"
+    return sizes[arena["shape"]]() + where + (f" ({found['by']})" if "by" in found else "")
+
+
+def _scaled(value: Any, factor: float) -> Any:
+    if value is None or isinstance(value, bool):
+        return {None: "-", True: "yes", False: "no"}[value]
+    return value if factor == 1 else value * factor
+
+
+def _print_bodies(bodies: dict[str, dict[str, Any]]) -> None:
+    if len(bodies) > SIDE_BY_SIDE:
+        chosen = [row for row in _ROWS if row[1] in _BRIEF]
+        lines = [
+            [name, *(_scaled(body.get(key), factor) for _, key, factor in chosen)]
+            for name, body in bodies.items()
+        ]
+        print_table(lines, columns=["body", *(label for label, _, _ in chosen)])
+        return
+    rows = [
+        [label, *(_scaled(body.get(key), factor) for body in bodies.values())]
+        for label, key, factor in _ROWS
+    ]
+    rows += [
+        [label, *(_scaled((b["circle_of_centers"] or {}).get(key), f) for b in bodies.values())]
+        for label, key, f in _CIRCLE_ROWS
+    ]
+    print_table(rows, columns=["body", *bodies])
+
+
+def _print_counts(counts: dict[str, Any]) -> None:
+    """Print what reading and cleaning met, for all bodies together."""
+    rows = [["rows in the file", counts["rows_in_file"]]] if "rows_in_file" in counts else []
+    rows += [[label, counts[key]] for key, label in _COUNTS.items() if key in counts]
+    print_table(rows)
