@@ -1,0 +1,48 @@
+// The sweep of the KS statistic: plain data passed to the kernels of the instruction sets.
+//
+// Positions. Every pooled point has a position 0 .. n-1 in the order of x and one in the order of y.
+// Points with equal x are ordered by descending y, points with equal y by descending position in
+// x (see ks_geometry). Then "before it in both orders" is exactly "smaller in both coordinates",
+// ties or not, and the sweep only counts along a permutation.
+#pragma once
+
+#include <cstdint>
+
+namespace driftwalk {
+
+// Weights of a point that shares a coordinate with another, in the order of x.
+struct KsTied {
+  std::int64_t column;      // weight of {x = X, y < Y}
+  std::int64_t row;         // weight of {y = Y, x < X}
+  std::int64_t equal;       // weight of {x = X, y = Y}, the origin among them
+  std::int64_t left;        // weight of {x < X}
+  std::int64_t left_closed; // weight of {x <= X}
+  std::int64_t below;       // weight of {y < Y}
+  std::int64_t below_closed;
+};
+
+struct KsSweep {
+  std::int64_t n;                 // points of both samples
+  const std::int32_t* y_position; // (n) by position in x
+  const std::uint8_t* second;     // (n) by position in x: 1 for a point of sample 2
+  std::int64_t weight[2];         // of a point of sample 1 (positive) and of sample 2 (negative)
+  std::int64_t total;             // sum of the positive weights
+  const KsTied* tied;             // (n), or null when no two points share a coordinate
+  bool limits;                    // count both open and closed quadrants
+  void* scratch;                  // ks_scratch_bytes(n), aligned to 64
+};
+
+// The largest |weight| found with an origin of one sample, and where: position in x and quadrant.
+struct KsBest {
+  std::int64_t value;
+  std::int64_t position; // -1 when the value is zero
+  std::int32_t quadrant;
+};
+
+std::int64_t ks_scratch_bytes(std::int64_t n);
+
+void ks_sweep_baseline(const KsSweep& sweep, KsBest best[2]);
+void ks_sweep_avx2(const KsSweep& sweep, KsBest best[2]);
+void ks_sweep_avx512(const KsSweep& sweep, KsBest best[2]);
+
+} // namespace driftwalk

@@ -1,0 +1,170 @@
+// The KS statistic behind its public header: prepares the points and runs the sweep of the chosen
+// instruction set.
+#include "driftwalk/dispatch.hpp"
+#include "driftwalk/stats/ks2d.hpp"
+#include "driftwalk/stats/ks2d_order.hpp"
+#include "driftwalk/stats/ks2d_permutation.hpp"
+#include "driftwalk/stats/ks2d_sweep.hpp"
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace driftwalk {
+namespace {
+
+void sweep_with(InstructionSet set, const KsSweep& sweep, KsBest best[2]) {
+#if defined(DRIFTWALK_X86_LANES)
+  if (set == InstructionSet::avx512) {
+    return ks_sweep_avx512(sweep, best);
+  }
+  if (set == InstructionSet::avx2) {
+    return ks_sweep_avx2(sweep, best);
+  }
+#endif
+  (void)set;
+  ks_sweep_baseline(sweep, best);
+}
+
+constexpr std::int64_t alignment = 64;
+
+} // namespace
+
+std::int64_t ks_scratch_bytes(std::int64_t n) {
+  // Per point: two orders of five keys and four counters, a label, a block, a row; at most 4, 4, 1,
+  // 4 and 16 bytes each. The rest is padding and the arrays of one block and of one per block.
+  return 96 * n + 128 * 1024;
+}
+
+struct KsReference::Data {
+  KsSortedSample sorted;
+  std::vector<double> x;
+  std::vector<double> y;
+};
+
+struct KsWorkspace::Data {
+  KsSortScratch sort;
+  KsSortedSample sorted;
+  KsGeometry geometry;
+  KsTiedWeights tied;
+  std::vector<unsigned char> scratch;
+
+  // Run the sweep over the geometry with the given labels (by position in x).
+  void sweep(const std::uint8_t* second, std::int64_t n1, std::int64_t n2, KsTies ties,
+             InstructionSet set, KsBest best[2]) {
+    const std::int64_t common = std::gcd(n1, n2);
+    KsSweep job{};
+    job.n = geometry.n;
+    job.y_position = geometry.y_position.data();
+    job.second = second;
+    job.weight[0] = n2 / common;
+    job.weight[1] = -(n1 / common);
+    job.total = n1 * job.weight[0];
+    job.limits = ties == KsTies::limits;
+    if (geometry.tied) {
+      ks_tied_weights(geometry, second, job.weight, tied);
+      job.tied = tied.tied.data();
+    }
+    ks_grow(scratch, ks_scratch_bytes(geometry.n) + alignment);
+    const std::uintptr_t begin = reinterpret_cast<std::uintptr_t>(scratch.data());
+    job.scratch = scratch.data() + (alignment - begin % alignment) % alignment;
+    sweep_with(set, job, best);
+    best[0].value *= common;
+    best[1].value *= common;
+  }
+};
+
+double KsResult::distance1() const {
+  return n1 > 0 && n2 > 0 ? double(d1) / (double(n1) * double(n2))
+                          : std::numeric_limits<double>::quiet_NaN();
+}
+double KsResult::distance2() const {
+  return n1 > 0 && n2 > 0 ? double(d2) / (double(n1) * double(n2))
+                          : std::numeric_limits<double>::quiet_NaN();
+}
+double KsResult::distance() const {
+  return n1 > 0 && n2 > 0 ? double(d1 + d2) / (2.0 * double(n1) * double(n2))
+                          : std::numeric_limits<double>::quiet_NaN();
+}
+const KsPlace& KsResult::place() const { return d1 >= d2 ? place1 : place2; }
+
+std::int64_t first_not_finite(const double* x, const double* y, std::int64_t n) {
+  for (std::int64_t i = 0; i < n; ++i) {
+    if (!std::isfinite(x[i]) || !std::isfinite(y[i])) {
+      return i;
+    }
+  }
+  return -1;
+}
+
+KsReference::KsReference(const double* x, const double* y, std::int64_t n)
+    : data_(std::make_unique<Data>()) {
+  KsSortScratch scratch;
+  ks_sort(x, y, n, scratch, data_->sorted);
+  data_->x.assign(x, x + n);
+  data_->y.assign(y, y + n);
+}
+KsReference::~KsReference() = default;
+KsReference::KsReference(KsReference&&) noexcept = default;
+KsReference& KsReference::operator=(KsReference&&) noexcept = default;
+std::int64_t KsReference::size() const { return data_->sorted.n; }
+
+KsWorkspace::KsWorkspace() : data_(std::make_unique<Data>()) {}
+KsWorkspace::~KsWorkspace() = default;
+KsWorkspace::KsWorkspace(KsWorkspace&&) noexcept = default;
+KsWorkspace& KsWorkspace::operator=(KsWorkspace&&) noexcept = default;
+
+KsResult ks_two_sample(const KsReference& reference, const double* x2, const double* y2,
+                       std::int64_t n2, KsWorkspace& workspace, KsTies ties) {
+  const KsReference::Data& first = reference.data();
+  KsWorkspace::Data& work = workspace.data();
+  KsResult result;
+  result.n1 = first.sorted.n;
+  result.n2 = n2;
+  if (result.n1 == 0 || n2 == 0) {
+    return result;
+  }
+  ks_sort(x2, y2, n2, work.sort, work.sorted);
+  ks_geometry(first.sorted, work.sorted, work.geometry);
+  KsBest best[2];
+  work.sweep(work.geometry.second.data(), result.n1, n2, ties, chosen_instruction_set(), best);
+  result.d1 = best[0].value;
+  result.d2 = best[1].value;
+  if (best[0].position >= 0) {
+    const std::int32_t i = work.geometry.point[best[0].position];
+    result.place1 = {first.x[i], first.y[i], best[0].quadrant, i};
+  }
+  if (best[1].position >= 0) {
+    const std::int64_t i = work.geometry.point[best[1].position] - result.n1;
+    result.place2 = {x2[i], y2[i], best[1].quadrant, i};
+  }
+  return result;
+}
+
+void ks_permutations(const double* x, const double* y, std::int64_t n1, std::int64_t n2,
+                     const std::int32_t* block_of, std::int64_t blocks, const std::uint8_t* labels,
+                     std::int64_t permutations, KsTies ties, std::int64_t* statistic) {
+  const KsReference reference(x, y, n1);
+  KsWorkspace workspace;
+  KsWorkspace::Data& work = workspace.data();
+  ks_sort(x + n1, y + n1, n2, work.sort, work.sorted);
+  ks_geometry(reference.data().sorted, work.sorted, work.geometry);
+  const std::int64_t n = n1 + n2;
+  std::vector<std::int32_t> block_by_x(static_cast<std::size_t>(n));
+  for (std::int64_t k = 0; k < n; ++k) {
+    block_by_x[k] = block_of[work.geometry.point[k]];
+  }
+  const InstructionSet set = chosen_instruction_set();
+  std::vector<std::uint8_t> second(static_cast<std::size_t>(n));
+  for (std::int64_t p = 0; p < permutations; ++p) {
+    const std::uint8_t* const label = labels + p * blocks;
+    for (std::int64_t k = 0; k < n; ++k) {
+      second[k] = label[block_by_x[k]];
+    }
+    KsBest best[2];
+    work.sweep(second.data(), n1, n2, ties, set, best);
+    statistic[p] = best[0].value + best[1].value;
+  }
+}
+
+} // namespace driftwalk

@@ -1,0 +1,34 @@
+// The sweep of the KS statistic, compiled once per instruction set.
+#include "driftwalk/stats/ks2d_kernel.hpp"
+
+DRIFTWALK_LANES_BEGIN
+
+namespace {
+// Blocks of 128 while a position fits 16 bits; beyond that the cost of a point grows with the size
+// of a block plus the number of blocks over its size, so the block grows with the sample.
+template <class Weight>
+void sweep_with(const KsSweep& sweep, KsBest best[2]) {
+  if (sweep.n <= 65536) {
+    KsSweeper<std::int16_t, Weight, 7>(sweep).run(best);
+  } else if (sweep.n <= 1 << 20) {
+    KsSweeper<std::int32_t, Weight, 8>(sweep).run(best);
+  } else {
+    KsSweeper<std::int32_t, Weight, 11>(sweep).run(best);
+  }
+}
+
+void sweep_any(const KsSweep& sweep, KsBest best[2]) {
+  // A quadrant is a sum of at most four terms, none beyond the total.
+  if (sweep.total <= std::numeric_limits<std::int32_t>::max() / 4) {
+    sweep_with<std::int32_t>(sweep, best);
+  } else {
+    sweep_with<std::int64_t>(sweep, best);
+  }
+}
+} // namespace
+
+DRIFTWALK_LANES_END
+
+void driftwalk::DRIFTWALK_PER_ISA(ks_sweep_)(const KsSweep& sweep, KsBest best[2]) {
+  sweep_any(sweep, best);
+}
