@@ -61,7 +61,7 @@ struct KsWorkspace::Data {
     job.weight[1] = -(n1 / common);
     job.total = n1 * job.weight[0];
     job.limits = ties == KsTies::limits;
-    if (geometry.tied) {
+    if (geometry.tied > 0) {
       ks_tied_weights(geometry, second, job.weight, tied);
       job.tied = tied.tied.data();
     }
@@ -126,6 +126,7 @@ KsResult ks_two_sample(const KsReference& reference, const double* x2, const dou
   }
   ks_sort(x2, y2, n2, work.sort, work.sorted);
   ks_geometry(first.sorted, work.sorted, work.geometry);
+  result.tied = work.geometry.tied;
   KsBest best[2];
   work.sweep(work.geometry.second.data(), result.n1, n2, ties, chosen_instruction_set(), best);
   result.d1 = best[0].value;
@@ -137,6 +138,35 @@ KsResult ks_two_sample(const KsReference& reference, const double* x2, const dou
   if (best[1].position >= 0) {
     const std::int64_t i = work.geometry.point[best[1].position] - result.n1;
     result.place2 = {x2[i], y2[i], best[1].quadrant, i};
+  }
+  return result;
+}
+
+KsPeacock ks_peacock(const KsReference& reference, const double* x2, const double* y2,
+                     std::int64_t n2, KsWorkspace& workspace) {
+  const KsReference::Data& first = reference.data();
+  KsWorkspace::Data& work = workspace.data();
+  const std::int64_t n1 = first.sorted.n;
+  KsPeacock result;
+  if (n1 == 0 || n2 == 0) {
+    return result;
+  }
+  ks_sort(x2, y2, n2, work.sort, work.sorted);
+  ks_geometry(first.sorted, work.sorted, work.geometry);
+  const std::int64_t weight[2] = {n2, -n1};
+  const KsCut cut = ks_largest_cut(work.geometry, weight);
+  result.d = cut.value;
+  if (cut.position >= 0) {
+    const auto coordinate = [n1](const std::vector<double>& a, const double* b, std::int64_t i) {
+      return i < n1 ? a[i] : b[i - n1];
+    };
+    const KsGeometry& g = work.geometry;
+    std::int64_t upper = 0; // the point that sits at the cut's position in y
+    while (g.y_position[upper] != cut.y_position) {
+      ++upper;
+    }
+    result.place = {coordinate(first.x, x2, g.point[cut.position]),
+                    coordinate(first.y, y2, g.point[upper]), cut.quadrant, -1};
   }
   return result;
 }

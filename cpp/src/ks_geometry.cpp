@@ -48,6 +48,17 @@ void run_starts(const std::vector<std::uint8_t>& starts, const std::int32_t* poi
   }
 }
 
+std::int64_t count_tied(const KsGeometry& g) {
+  const auto alone = [n = g.n](const std::vector<std::uint8_t>& starts, std::int64_t k) {
+    return starts[k] != 0 && (k + 1 == n || starts[k + 1] != 0);
+  };
+  std::int64_t tied = 0;
+  for (std::int64_t k = 0; k < g.n; ++k) {
+    tied += !alone(g.x_starts, k) || !alone(g.y_starts, g.y_position[k]);
+  }
+  return tied;
+}
+
 // Equal x by descending y, then equal y by descending position in x.
 void order_ties(KsGeometry& g) {
   ks_grow(g.start_of, g.n);
@@ -95,9 +106,10 @@ void ks_geometry(const KsSortedSample& first, const KsSortedSample& second, KsGe
           x_runs += key != previous;
           previous = key;
         });
-  g.tied = x_runs != g.n || y_runs != g.n;
-  if (g.tied) {
+  g.tied = 0;
+  if (x_runs != g.n || y_runs != g.n) {
     order_ties(g);
+    g.tied = count_tied(g);
   }
   for (std::int64_t k = 0; k < g.n; ++k) {
     g.second[k] = g.point[k] >= first.n;

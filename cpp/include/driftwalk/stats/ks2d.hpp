@@ -34,6 +34,7 @@ struct KsResult {
   std::int64_t d2 = 0; // D2 n1 n2
   std::int64_t n1 = 0;
   std::int64_t n2 = 0;
+  std::int64_t tied = 0; // points of both samples that share a coordinate with another
   KsPlace place1; // where D1 sits: its origin is a point of sample 1
   KsPlace place2; // where D2 sits: its origin is a point of sample 2
 
@@ -81,5 +82,14 @@ private:
 // The statistic between the reference (sample 1) and the points (x2, y2) (sample 2).
 KsResult ks_two_sample(const KsReference& reference, const double* x2, const double* y2,
                        std::int64_t n2, KsWorkspace& workspace, KsTies ties = KsTies::strict);
+
+// Peacock's statistic: the largest difference over every cut of the plane, not only over cuts at a
+// point. A cut at (X, Y) parts {x <= X} from {x > X} and {y <= Y} from {y > Y}.
+struct KsPeacock {
+  std::int64_t d = 0; // D n1 n2
+  KsPlace place;      // of the cut; it belongs to no sample, so the index stays -1
+};
+KsPeacock ks_peacock(const KsReference& reference, const double* x2, const double* y2,
+                     std::int64_t n2, KsWorkspace& workspace);
 
 } // namespace driftwalk
