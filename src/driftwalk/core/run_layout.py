@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 
-from driftwalk.core.atomic import remove_partials, storage_error, write_atomic
+from driftwalk.core.atomic import remove_partials, write_atomic
 from driftwalk.core.errors import DriftwalkError, RunDirectoryError
 from driftwalk.core.provenance import MANIFEST_KIND, read_manifest, utc_now
 from driftwalk.core.shards import make_folder, remove_shards
@@ -96,8 +96,9 @@ def lock_folder(path: Path) -> BaseFileLock:
             "directory"
         ) from None
     except (OSError, NotImplementedError) as error:
-        raise storage_error(error, path / LOCK_FILE) or RunDirectoryError(
-            f"cannot lock {path}: {error}; choose a directory on another file system"
+        reason = getattr(error, "strerror", None) or error
+        raise RunDirectoryError(
+            f"cannot lock the directory {path} for writing: {reason}; choose another directory"
         ) from error
     return lock
 
