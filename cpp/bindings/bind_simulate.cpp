@@ -8,6 +8,7 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
@@ -129,7 +130,7 @@ nb::tuple simulate(const Model& model, In<double, 2> table, In<std::uint64_t, 1>
 nb::dict score(const Model& model, In<double, 2> table, In<std::uint64_t, 1> key,
                In<std::int32_t, 1> left, In<double, 1> weight, In<std::int32_t, 1> triple,
                std::optional<In<double, 2>> reference, int bins, double length_limit,
-               std::int64_t excerpt, bool keep_steps, int threads) {
+               double angle_limit, std::int64_t excerpt, bool keep_steps, int threads) {
   const Worlds worlds(table, key);
   const std::size_t count = worlds.count();
   driftwalk::Scoring scoring;
@@ -137,6 +138,7 @@ nb::dict score(const Model& model, In<double, 2> table, In<std::uint64_t, 1> key
                   static_cast<std::int64_t>(left.size()), static_cast<std::int64_t>(triple.size())};
   scoring.length_bins = scoring.angle_bins = bins;
   scoring.length_limit = length_limit;
+  scoring.angle_limit = angle_limit;
   scoring.excerpt = std::min(excerpt, model.samples());
   std::optional<driftwalk::KsReference> prepared;
   if (reference) {
@@ -284,7 +286,7 @@ void register_simulate(nb::module_& module) {
   module.def("simulate", &simulate, "model"_a, "worlds"_a, "key"_a, nb::kw_only(), "threads"_a,
              "precision"_a);
   module.def("score", &score, "model"_a, "worlds"_a, "key"_a, nb::kw_only(), "left"_a, "weight"_a,
-             "triple"_a, "reference"_a.none(), "bins"_a, "length_limit"_a, "excerpt"_a,
+             "triple"_a, "reference"_a.none(), "bins"_a, "length_limit"_a, "angle_limit"_a, "excerpt"_a,
              "keep_steps"_a, "threads"_a);
   module.def("ks_matrix", &ks_matrix, "a_length"_a, "a_angle"_a, "a_count"_a, "b_length"_a,
              "b_angle"_a, "b_count"_a, nb::kw_only(), "threads"_a);

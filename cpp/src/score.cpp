@@ -1,5 +1,4 @@
 // Worlds are scored as they finish: their trajectories live in a thread's scratch and go no further.
-#include "driftwalk/math/elementary.hpp"
 #include "driftwalk/simulate/lanes.hpp"
 #include "driftwalk/simulate/simulate.hpp"
 #include "driftwalk/simulate/threads.hpp"
@@ -15,7 +14,8 @@ void bin_steps(const Scoring& scoring, const double* length, const double* angle
   std::fill(density, density + cells, 0.0f);
   for (std::int64_t k = 0; k < pairs; ++k) {
     const double across = length[k] / scoring.length_limit * scoring.length_bins;
-    const double around = (angle[k] + pi_value) / (2 * pi_value) * scoring.angle_bins;
+    const double around =
+        (angle[k] / scoring.angle_limit + 1) * 0.5 * scoring.angle_bins;
     const int row = static_cast<int>(std::min(across, scoring.length_bins - 1.0));
     const int column = static_cast<int>(std::clamp(around, 0.0, scoring.angle_bins - 1.0));
     density[row * scoring.angle_bins + column] += 1.0f;

@@ -1,3 +1,6 @@
-"""Stage of driftwalk (being built)."""
+"""What would this model do? Simulated trajectories of one block in a stirred tank."""
 
-__all__: list[str] = []
+from driftwalk.simulate.initial import Start, recorded_start
+from driftwalk.simulate.run import simulate, simulate_like
+
+__all__ = ["Start", "recorded_start", "simulate", "simulate_like"]

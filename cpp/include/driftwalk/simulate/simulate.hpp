@@ -27,7 +27,9 @@ struct Scoring {
   const KsReference* reference = nullptr;  // the recording's steps; null: no distance wanted
   // joint density of step length and turning angle, length_bins x angle_bins
   int length_bins = 0, angle_bins = 0;
-  double length_limit = 0;  // upper edge of the last length bin [m]; longer steps count there
+  // The bins cover [0, length_limit] [m] and [-angle_limit, angle_limit] [rad]; a step beyond
+  // counts in the last bin on its side.
+  double length_limit = 0, angle_limit = 0;
   std::int64_t excerpt = 0;  // samples kept from the start
 };
 

@@ -1,0 +1,140 @@
+"""The door to the native core: plain numbers and datasets in, a prepared model out."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk import _core
+from driftwalk.core.errors import InputError
+from driftwalk.schema import check_flow_field
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study, Tank
+
+Floats = npt.NDArray[np.float64]
+
+STATUS: Final[dict[str, int]] = {"non_finite": 1, "escaped": 2, "no_motion": 4}
+"""Bits of a world's status; 0 is sound."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """What the camera does to a pose: noise per axis [m], [rad], and the file's resolution [m]."""
+
+    position_noise: float = 0.0
+    orientation_noise: float = 0.0
+    position_quantum: float = 0.0
+
+
+def default_threads() -> int:
+    """Return how many threads to use: the processors that this process may run on."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def native_model(study: Study, flow: xr.Dataset, sample_time: Floats, camera: Camera) -> _core.Model:
+    """Return the native core's form of a model.
+
+    Parameters
+    ----------
+    study : Study
+        Block, tank, water and the two times; its drag coefficient and force_std belong to the
+        worlds and are not read.
+    flow : xarray.Dataset
+        A `flow_field`, steady or with a `time` dimension.
+    sample_time : ndarray, shape (n,)
+        Times of the samples from the start of the run [s], increasing, >= 0.
+    camera : Camera
+        Noise and resolution of the samples.
+
+    Raises
+    ------
+    InputError
+        When there is no sample, times do not increase, or the dataset is no flow field.
+    """
+    check_flow_field(flow)
+    if sample_time.size == 0 or sample_time[0] < 0 or (np.diff(sample_time) <= 0).any():
+        raise InputError("sampling times must be increasing, from 0 on, and at least one")
+    tank = study.tank
+    x, y = flow["x"].values, flow["y"].values
+    step = study.time_step_s
+    return _core.Model(
+        side=study.block.side_m,
+        mass=study.block.mass_kg,
+        inertia=study.block.inertia_kg_m2,
+        depth=study.wetted_depth_m,
+        strips=study.block.strips_per_face,
+        water_density=study.water.density_kg_m3,
+        radius=tank.radius_m or 0.0,
+        edges=wall_edges(tank),
+        restitution=tank.wall_restitution,
+        friction=tank.wall_friction,
+        bounce_speed=tank.bounce_speed_m_s,
+        u=_frames(flow, "u"),
+        v=_frames(flow, "v"),
+        frame_time=_frame_times(flow),
+        origin_x=float(x[0]),
+        origin_y=float(y[0]),
+        spacing_x=float((x[-1] - x[0]) / (x.size - 1)),
+        spacing_y=float((y[-1] - y[0]) / (y.size - 1)),
+        time_step=step,
+        steps_per_interval=round(study.forces.force_interval_s / step),
+        sample_time=np.ascontiguousarray(sample_time, dtype=np.float64),
+        position_noise=camera.position_noise,
+        orientation_noise=camera.orientation_noise,
+        position_quantum=camera.position_quantum,
+    )
+
+
+def wall_edges(tank: Tank) -> Floats:
+    """Return the edges of a polygonal tank: outward normal and distance from the origin [m].
+
+    Shape (edges, 3); empty for a circle.
+    """
+    corners = np.asarray(tank.corners_m, dtype=np.float64).reshape(-1, 2)
+    along = np.roll(corners, -1, axis=0) - corners
+    # Counter-clockwise corners: the outside is to the right of each edge.
+    normal = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.column_stack([normal, np.sum(normal * corners, axis=1)])
+
+
+def world_table(
+    *,
+    x: npt.ArrayLike,
+    y: npt.ArrayLike,
+    theta: npt.ArrayLike,
+    vx: npt.ArrayLike = 0.0,
+    vy: npt.ArrayLike = 0.0,
+    omega: npt.ArrayLike = 0.0,
+    drag_coefficient: npt.ArrayLike,
+    force_std: npt.ArrayLike,
+) -> Floats:
+    """Return the worlds' start poses [m, rad], motions [m/s, rad/s] and parameters, shape (n, 8)."""
+    columns = np.broadcast_arrays(
+        *(
+            np.atleast_1d(np.asarray(values, dtype=np.float64))
+            for values in (x, y, theta, vx, vy, omega, drag_coefficient, force_std)
+        )
+    )
+    return np.ascontiguousarray(np.stack(columns, axis=1))
+
+
+def _frames(flow: xr.Dataset, name: str) -> Floats:
+    values = np.asarray(flow[name].values, dtype=np.float64)
+    return np.ascontiguousarray(values if values.ndim == 3 else values[None])
+
+
+def _frame_times(flow: xr.Dataset) -> Floats:
+    if "time" not in flow["u"].dims:
+        return np.zeros(1)
+    times = np.ascontiguousarray(flow["time"].values, dtype=np.float64)
+    if (np.diff(times) <= 0).any():
+        raise InputError("the times of the flow field do not increase")
+    return times

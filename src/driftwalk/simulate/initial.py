@@ -1,0 +1,118 @@
+"""Where and how a simulated block starts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk import _core
+from driftwalk.core.errors import InputError
+from driftwalk.core.smoothing import local_quadratic
+
+if TYPE_CHECKING:
+    from driftwalk.model import Study
+    from driftwalk.schema import Track
+
+START_PURPOSE = 3
+"""Purpose of the start pose's random numbers, see cpp/include/driftwalk/random/purpose.hpp."""
+
+
+class Start(NamedTuple):
+    """Pose and motion of a block at the start: numbers, or arrays with one entry per world."""
+
+    x: npt.ArrayLike
+    """Position x [m]."""
+    y: npt.ArrayLike
+    """Position y [m]."""
+    theta: npt.ArrayLike
+    """Orientation [rad]."""
+    vx: npt.ArrayLike = 0.0
+    """Velocity x [m/s]."""
+    vy: npt.ArrayLike = 0.0
+    """Velocity y [m/s]."""
+    omega: npt.ArrayLike = 0.0
+    """Angular velocity [rad/s]."""
+
+
+def random_start(study: Study, keys: npt.NDArray[np.uint64]) -> Start:
+    """Draw one start pose at rest per world: uniform over the poses that fit into the tank.
+
+    Rejection sampling from the tank's bounding box with the world's own random stream.
+
+    Raises
+    ------
+    InputError
+        When no pose that fits was found in 1000 draws.
+    """
+    poses = np.array([_draw_pose(study, int(key)) for key in keys])
+    return Start(poses[:, 0], poses[:, 1], poses[:, 2])
+
+
+def _draw_pose(study: Study, key: int) -> tuple[float, float, float]:
+    from driftwalk.model.simulation import Pose
+    from driftwalk.model.study import block_corners
+
+    tank, side = study.tank, study.block.side_m
+    corners = np.asarray(tank.corners_m or [(-tank.extent_m[0] / 2,) * 2, (tank.extent_m[0] / 2,) * 2])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    for draw in range(1000):
+        words = np.array(_core.philox(key, [0, draw, 0, START_PURPOSE]), dtype=np.float64)
+        across, up, turn = words[:3] * 2.0**-32
+        pose = Pose(
+            x_m=low[0] + across * (high[0] - low[0]),
+            y_m=low[1] + up * (high[1] - low[1]),
+            theta_rad=(2.0 * turn - 1.0) * np.pi,
+        )
+        if all(tank.contains(x, y) for x, y in block_corners(pose, side_m=side)):
+            return pose.x_m, pose.y_m, pose.theta_rad
+    raise InputError(
+        f"no start pose was found for a block of {side:g} m in a {tank.describe()}: "
+        "give one ([simulation] start) or a larger tank"
+    )
+
+
+def recorded_start(track: Track, *, window: float = 0.7) -> Start:
+    """Return the pose and smoothed motion at the first sample of a recording.
+
+    Parameters
+    ----------
+    track : Track
+        The recorded body.
+    window : float
+        Length of the local quadratic fit [s].
+
+    Returns
+    -------
+    Start
+        Smoothed where the first samples allow it, else the first sample at rest. Without
+        orientation in the recording theta is NaN: each world then draws its own.
+
+    Raises
+    ------
+    InputError
+        When the track has no sample.
+    """
+    if track.time.size == 0:
+        raise InputError("the recording has no sample to start from")
+    first = slice(0, min(track.time.size, 64))
+    time = track.time[first]
+    turn = np.unwrap(np.where(np.isfinite(track.theta[first]), track.theta[first], 0.0))
+    values = np.column_stack([track.x[first], track.y[first], turn])
+    position, velocity, _ = (fit[0] for fit in local_quadratic(time, values, window=window))
+    raw = values[0]
+    position = np.where(np.isfinite(position), position, raw)
+    velocity = np.where(np.isfinite(velocity), velocity, 0.0)
+    if not np.isfinite(track.theta[first]).all():
+        position[2], velocity[2] = np.nan, 0.0
+    return Start(*(float(value) for value in (*position, *velocity)))
+
+
+def world_orientations(theta: npt.ArrayLike, keys: npt.NDArray[np.uint64]) -> npt.NDArray[np.float64]:
+    """Return the start orientation of every world [rad]: the given one, or a random one for NaN."""
+    given = np.broadcast_to(np.asarray(theta, dtype=np.float64), keys.shape).copy()
+    for index in np.flatnonzero(np.isnan(given)):
+        word = _core.philox(int(keys[index]), [0, 0, 0, START_PURPOSE])[0]
+        given[index] = (word * 2.0**-31 - 1.0) * np.pi
+    return given

@@ -1,0 +1,256 @@
+"""The NumPy twin of the native core: the same model, written plainly, for reading and for tests.
+
+Same equations, same random numbers, float64, one strip, face and contact at a time, vectorised over
+worlds only. It is slow and is no product: results come from the native core, which is held against
+this page. The two agree to rounding as long as a path is not chaotic, and in distribution after.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+FORCE_PURPOSE = 1
+_MULTIPLIERS = (np.uint64(0xD2511F53), np.uint64(0xCD9E8D57))
+_WEYL = (np.uint64(0x9E3779B9), np.uint64(0xBB67AE85))
+_LOW = np.uint64(0xFFFFFFFF)
+
+
+@dataclass(frozen=True)
+class TwinModel:
+    """Everything the twin needs, SI units."""
+
+    side: float
+    mass: float
+    depth: float
+    strips: int
+    water_density: float
+    radius: float
+    restitution: float
+    friction: float
+    bounce_speed: float
+    time_step: float
+    steps_per_interval: int
+    flow_x: Floats
+    flow_y: Floats
+    flow_u: Floats
+    flow_v: Floats
+
+    @property
+    def inertia(self) -> float:
+        """Moment of inertia about the vertical [kg m^2]."""
+        return self.mass * self.side**2 / 6.0
+
+
+def philox(key: npt.NDArray[np.uint64], counter: tuple[int, int, int, int]) -> list[Floats]:
+    """Return the four words of Philox 4x32-10 for every key, as uint64 arrays below 2**32."""
+    c0, c1, c2, c3 = (np.full(key.shape, word, dtype=np.uint64) for word in counter)
+    k0, k1 = key & _LOW, key >> np.uint64(32)
+    for _ in range(10):
+        first, second = _MULTIPLIERS[0] * c0, _MULTIPLIERS[1] * c2
+        c0, c1, c2, c3 = (
+            (second >> np.uint64(32)) ^ c1 ^ k0,
+            second & _LOW,
+            (first >> np.uint64(32)) ^ c3 ^ k1,
+            first & _LOW,
+        )
+        k0, k1 = (k0 + _WEYL[0]) & _LOW, (k1 + _WEYL[1]) & _LOW
+    return [c0, c1, c2, c3]  # type: ignore[list-item]
+
+
+def normal_pair(word0: Floats, word1: Floats) -> tuple[Floats, Floats]:
+    """Return two standard normals per pair of words (Box-Muller, 24-bit uniforms)."""
+    first, second = word0.astype(np.uint64), word1.astype(np.uint64)
+    uniform = ((first >> np.uint64(8)).astype(np.float64) + 1.0) * 2.0**-24
+    quadrant = (second >> np.uint64(30)).astype(np.float64)
+    rest = ((second >> np.uint64(8)) & np.uint64(0x3FFFFF)).astype(np.float64) * 2.0**-22 - 0.5
+    radius = np.sqrt(-2.0 * np.log(uniform))
+    angle = (quadrant + rest) * (np.pi / 2.0)
+    return radius * np.cos(angle), radius * np.sin(angle)
+
+
+def force_normals(key: npt.NDArray[np.uint64], interval: int) -> tuple[Floats, Floats]:
+    """Return the two standard normals of a force interval; one Philox block serves two."""
+    words = philox(key, (interval >> 1 & 0xFFFFFFFF, 0, interval >> 33, FORCE_PURPOSE))
+    half = 2 * (interval & 1)
+    return normal_pair(words[half], words[half + 1])
+
+
+def flow_at(model: TwinModel, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Return the bilinear flow [m/s] at points [m], the edge's value beyond the grid."""
+    dx = (model.flow_x[-1] - model.flow_x[0]) / (model.flow_x.size - 1)
+    dy = (model.flow_y[-1] - model.flow_y[0]) / (model.flow_y.size - 1)
+    column = np.clip((x - model.flow_x[0]) / dx, 0, model.flow_x.size - 1)
+    row = np.clip((y - model.flow_y[0]) / dy, 0, model.flow_y.size - 1)
+    i = np.minimum(column.astype(int), model.flow_x.size - 2)
+    j = np.minimum(row.astype(int), model.flow_y.size - 2)
+    fx, fy = column - i, row - j
+    step = max(np.abs(model.flow_u).max(), np.abs(model.flow_v).max()) / 32767 or 1.0
+    parts = []
+    for values in (model.flow_u, model.flow_v):
+        nodes = np.round(values / step) * step
+        parts.append(
+            (nodes[j, i] * (1 - fx) + nodes[j, i + 1] * fx) * (1 - fy)
+            + (nodes[j + 1, i] * (1 - fx) + nodes[j + 1, i + 1] * fx) * fy
+        )
+    return parts[0], parts[1]
+
+
+def drag(
+    model: TwinModel, drag_coefficient: Floats, pose: Floats, motion: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return force x, y [N], torque [N m] and conductance [m/s], summed strip by strip (Eq. 2)."""
+    half, width = model.side / 2, model.side / model.strips
+    scale = 0.5 * model.water_density * drag_coefficient * width * model.depth
+    x, y, theta = pose
+    vx, vy, omega = motion
+    force_x, force_y, torque, conductance = (np.zeros_like(x) for _ in range(4))
+    for face in range(4):
+        angle = theta + face * np.pi / 2
+        normal_x, normal_y = np.cos(angle), np.sin(angle)
+        for strip in range(model.strips):
+            offset = (strip + 0.5) * width - half
+            arm_x = half * normal_x - offset * normal_y
+            arm_y = half * normal_y + offset * normal_x
+            u, v = flow_at(model, x + arm_x, y + arm_y)
+            relative_x = u - (vx - omega * arm_y)
+            relative_y = v - (vy + omega * arm_x)
+            facing = np.maximum(0.0, -(normal_x * relative_x + normal_y * relative_y))
+            strip_x, strip_y = scale * facing * relative_x, scale * facing * relative_y
+            force_x += strip_x
+            force_y += strip_y
+            torque += arm_x * strip_y - arm_y * strip_x
+            conductance += facing
+    return force_x, force_y, torque, conductance
+
+
+def simulate_reference(
+    model: TwinModel,
+    *,
+    drag_coefficient: Floats,
+    force_std: Floats,
+    key: npt.NDArray[np.uint64],
+    pose: Floats,
+    motion: Floats,
+    steps: int,
+) -> Floats:
+    """Return the poses after 0 .. steps time steps, shape (steps + 1, 3, worlds)."""
+    pose, motion = pose.astype(np.float64), motion.astype(np.float64)
+    before = np.zeros_like(motion)
+    per_mass = np.array([1 / model.mass, 1 / model.mass, 1 / model.inertia])[:, None]
+    dt = model.time_step
+    stiffness = 0.5 * model.water_density * drag_coefficient * model.side / model.strips
+    stiffness = stiffness * model.depth
+    spread = np.stack(
+        [np.ones_like(stiffness), np.ones_like(stiffness), np.full_like(stiffness, model.side**2 / 3)]
+    )
+    pose, motion, _ = meet_circle(model, pose, motion)
+    path = [pose]
+    noise = np.zeros_like(motion)
+    for step in range(steps):
+        if step % model.steps_per_interval == 0:
+            normals = force_normals(key, step // model.steps_per_interval)
+            noise = np.stack([normals[0], normals[1], np.zeros_like(normals[0])])
+            noise *= force_std / model.mass
+        ahead = motion + dt / 2 * (before + noise)
+        middle = pose + dt / 4 * (motion + ahead)
+        force_x, force_y, torque, conductance = drag(model, drag_coefficient, middle, ahead)
+        acceleration = np.stack([force_x, force_y, torque]) * per_mass
+        damping = 1 + dt / 2 * stiffness * spread * per_mass * conductance
+        mean = ahead + dt / 2 * (acceleration - before) / damping
+        after = 2 * mean - motion
+        before = (after - motion) / dt - noise
+        pose, motion = pose + dt * mean, after
+        pose, motion, touched = meet_circle(model, pose, motion)
+        before = np.where(touched, 0.0, before)
+        pose = np.stack([pose[0], pose[1], np.pi - np.mod(np.pi - pose[2], 2 * np.pi)])
+        path.append(pose)
+    return np.stack(path)
+
+
+def meet_circle(
+    model: TwinModel, pose: Floats, motion: Floats
+) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:
+    """Resolve the impacts on a circular wall, one world at a time; say which worlds touched it."""
+    pose, motion = pose.copy(), motion.copy()
+    touched = np.zeros(pose.shape[1], dtype=bool)
+    for world in range(pose.shape[1]):
+        corners = _corner_arms(model, pose[2, world])
+        distance = np.hypot(*(pose[:2, world, None] + corners))
+        order = np.argsort(-distance)
+        if not distance[order[0]] > model.radius:
+            continue
+        touched[world] = True
+        contacts = [_contact(model, pose[:2, world], corners[:, k]) for k in order[:2]]
+        motion[:, world] = _resolve(model, contacts, motion[:, world])
+        for _, arm in contacts:
+            normal, depth = _normal(model, pose[:2, world], arm)
+            pose[:2, world] -= normal * max(depth, 0.0)
+    return pose, motion, touched
+
+
+def _corner_arms(model: TwinModel, theta: float) -> Floats:
+    angles = theta + np.pi / 4 + np.arange(4) * np.pi / 2
+    return model.side / np.sqrt(2) * np.stack([np.cos(angles), np.sin(angles)])
+
+
+def _normal(model: TwinModel, centre: Floats, arm: Floats) -> tuple[Floats, float]:
+    corner = centre + arm
+    distance = float(np.hypot(*corner))
+    return corner / distance, distance - model.radius
+
+
+def _contact(model: TwinModel, centre: Floats, arm: Floats) -> tuple[Floats, Floats]:
+    normal, depth = _normal(model, centre, arm)
+    return np.array([*normal, depth]), arm
+
+
+def _jacobian(direction: Floats, arm: Floats) -> Floats:
+    return np.array([direction[0], direction[1], arm[0] * direction[1] - arm[1] * direction[0]])
+
+
+def _resolve(model: TwinModel, contacts: list[tuple[Floats, Floats]], motion: Floats) -> Floats:
+    inverse_mass = np.array([1.0, 1.0, model.mass / model.inertia])
+    normals = [_jacobian(contact[:2], arm) for contact, arm in contacts]
+    tangents = [_jacobian(np.array([-c[1], c[0]]), arm) for c, arm in contacts]
+    speeds = [float(row @ motion) for row in normals]
+    active = [c[2] > 0 and s > 0 for (c, _), s in zip(contacts, speeds, strict=True)]
+    wanted = np.array(
+        [
+            s * (1 + (model.restitution if s > model.bounce_speed else 0.0)) if on else 0.0
+            for s, on in zip(speeds, active, strict=True)
+        ]
+    )
+    pushes = _normal_impulses(np.array(normals), inverse_mass, wanted, all(active))
+    for row, push in zip(normals, pushes, strict=True):
+        motion = motion - inverse_mass * row * push
+    for row, push in zip(tangents, pushes, strict=True):
+        motion = _rub(model, row, inverse_mass, motion, push)
+    for (contact, _), row, tangent in zip(contacts, normals, tangents, strict=True):
+        left = max(float(row @ motion), 0.0) if contact[2] > 0 else 0.0
+        push = left / float(row @ (inverse_mass * row))
+        motion = motion - inverse_mass * row * push
+        motion = _rub(model, tangent, inverse_mass, motion, push)
+    return motion
+
+
+def _normal_impulses(rows: Floats, inverse_mass: Floats, wanted: Floats, joint: bool) -> Floats:
+    matrix = (rows * inverse_mass) @ rows.T
+    if joint:
+        both = np.linalg.solve(matrix, wanted)
+        if (both > 0).all():
+            return np.asarray(both)
+    alone = wanted / np.diag(matrix)
+    return np.where(np.arange(2) == int(alone[1] > alone[0]), alone, 0.0)
+
+
+def _rub(
+    model: TwinModel, row: Floats, inverse_mass: Floats, motion: Floats, push: float
+) -> Floats:
+    stop = -float(row @ motion) / float(row @ (inverse_mass * row))
+    limit = model.friction * push
+    return np.asarray(motion + inverse_mass * row * min(max(stop, -limit), limit))

@@ -1,0 +1,244 @@
+"""Simulated trajectories, as many replicates as asked for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk import _core
+from driftwalk.core.errors import InputError
+from driftwalk.core.seeds import world_keys
+from driftwalk.simulate.backend import (
+    STATUS,
+    Camera,
+    default_threads,
+    native_model,
+    world_table,
+)
+from driftwalk.simulate.initial import Start, random_start, recorded_start, world_orientations
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+Backend = Literal["cpu", "reference"]
+
+
+def simulate(
+    study: Study,
+    flow: xr.Dataset,
+    *,
+    sample_time: npt.ArrayLike | None = None,
+    start: Start | None = None,
+    replicates: int | None = None,
+    seed: int | None = None,
+    backend: Backend = "cpu",
+    threads: int | None = None,
+) -> xr.Dataset:
+    """Simulate one block in a stirred tank.
+
+    Drag on vertical strips of the four side faces (Eq. 2 of the paper, windward strips), a
+    stochastic force N(0, sigma_F^2 I) on the centre of mass drawn anew every force interval, and
+    impacts on the wall. Second order in time.
+
+    Parameters
+    ----------
+    study : Study
+        Block, tank, water, forces, simulation and observation. "estimate" and "recording" in the
+        observation mean no noise and no rounding here, since there is no recording.
+    flow : xarray.Dataset
+        The water's velocity, a `flow_field`.
+    sample_time : array_like, shape (n,), optional
+        Times of the samples [s], increasing, from 0 on; default: the study's rate and duration.
+    start : Start, optional
+        Pose and motion at time 0; default: what the study says.
+    replicates, seed : int, optional
+        Over the study's values.
+    backend : {"cpu", "reference"}
+        The batch kernels in single precision, or the same source in double precision.
+    threads : int, optional
+        Default: all processors. The result does not depend on it.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``x``, ``y`` [m], ``theta`` [rad] with dimensions (replicate, time, body) and ``status``
+        (replicate), bits with CF flag masks.
+
+    Raises
+    ------
+    InputError
+        When times do not increase or `flow` is no flow field.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> still = dw.uniform_flow(0.0, 0.0, extent=0.3)
+    >>> run = dw.simulate(dw.Study(), still, sample_time=[0.0, 0.1, 0.2], seed=1)
+    >>> run.sizes["time"]
+    3
+    """
+    settings = study.simulation
+    count = settings.replicates if replicates is None else replicates
+    if count < 1:
+        raise InputError(f"replicates must be at least 1, got {count}")
+    chosen = settings.seed if seed is None else seed
+    times = _default_times(study) if sample_time is None else np.asarray(sample_time, np.float64)
+    keys = world_keys(chosen, trial=0, replicate=np.arange(count))
+    begin = start if start is not None else _study_start(study, keys)
+    model = native_model(study, flow, times, plain_camera(study))
+    worlds = world_table(
+        **{**begin._asdict(), "theta": world_orientations(begin.theta, keys)},
+        drag_coefficient=np.full(count, study.forces.drag_coefficient),
+        force_std=study.forces.force_std_N,
+    )
+    x, y, theta, status = _core.simulate(
+        model,
+        worlds,
+        keys,
+        threads=threads or default_threads(),
+        precision="double" if backend == "reference" else "single",
+    )
+    hide_unseen(study, x, y, theta)
+    return _dataset(study, times, (x, y, theta), status, {"seed": chosen, "backend": backend})
+
+
+def simulate_like(
+    study: Study,
+    flow: xr.Dataset,
+    recording: xr.Dataset,
+    *,
+    body: str | None = None,
+    replicates: int | None = None,
+    seed: int | None = None,
+    threads: int | None = None,
+) -> xr.Dataset:
+    """Simulate what the camera would have recorded: start, time stamps and gaps of a recording.
+
+    Parameters
+    ----------
+    study, flow
+        As in `simulate`; noise that is to be estimated must be numbers by now.
+    recording : xarray.Dataset
+        A `trajectory`; its present samples give the time stamps, its first samples the start.
+    body : str, optional
+        The body to follow, where there are several.
+    replicates, seed, threads
+        As in `simulate`.
+
+    Returns
+    -------
+    xarray.Dataset
+        As of `simulate`; time 0 is the recording's first sample.
+
+    Raises
+    ------
+    InputError
+        When the body is not named and there are several.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> recording, flow = dw.tank30_recording(), dw.tank30_flow()
+    >>> run = dw.simulate_like(dw.Study(), flow, recording.isel(time=slice(0, 100)))
+    >>> run.sizes["time"]
+    100
+    """
+    from driftwalk.schema import body_track
+
+    track = body_track(recording, body)
+    begin = recorded_start(track)
+    times = track.time - track.time[0]
+    return simulate(
+        study,
+        flow,
+        sample_time=times,
+        start=begin,
+        replicates=replicates,
+        seed=seed,
+        threads=threads,
+    )
+
+
+def plain_camera(study: Study) -> Camera:
+    """Return the camera of a study in which "estimate" and "recording" stand for none."""
+    seen = study.observation
+    values = (seen.position_noise_m, seen.orientation_noise_rad, seen.position_quantum_m)
+    return Camera(*(0.0 if isinstance(value, str) else value for value in values))
+
+
+def hide_unseen(study: Study, x: Any, y: Any, theta: Any) -> None:
+    """Make the samples outside the field of view missing, in place."""
+    field = study.observation.field_of_view
+    if field is None:
+        return
+    if field.radius_m is not None:
+        seen = np.hypot(x - field.center_m[0], y - field.center_m[1]) <= field.radius_m
+    else:
+        corners = np.asarray(field.corners_m)
+        along = np.roll(corners, -1, axis=0) - corners
+        seen = np.ones(x.shape, dtype=bool)
+        for (cx, cy), (ax, ay) in zip(corners, along, strict=True):
+            side = ax * (y - field.center_m[1] - cy) - ay * (x - field.center_m[0] - cx)
+            seen &= side >= 0
+    for values in (x, y, theta):
+        values[~seen] = np.nan
+
+
+def _default_times(study: Study) -> npt.NDArray[np.float64]:
+    settings = study.simulation
+    samples = int(np.floor(settings.duration_s * settings.sample_rate_Hz + 1e-9)) + 1
+    return np.arange(samples) / settings.sample_rate_Hz
+
+
+def _study_start(study: Study, keys: npt.NDArray[np.uint64]) -> Start:
+    from driftwalk.model.simulation import Pose
+
+    start = study.simulation.start
+    if isinstance(start, Pose):
+        return Start(start.x_m, start.y_m, start.theta_rad)
+    return random_start(study, keys)
+
+
+def _dataset(
+    study: Study, times: Any, poses: tuple[Any, Any, Any], status: Any, attrs: dict[str, Any]
+) -> xr.Dataset:
+    import xarray as xr
+
+    from driftwalk.schema.trajectory import VARIABLES
+
+    dims = ("replicate", "time", "body")
+    forces = study.forces
+    data: dict[str, Any] = {
+        name: (dims, values[:, :, None], VARIABLES[name])
+        for name, values in zip(("x", "y", "theta"), poses, strict=True)
+    }
+    flags = {
+        "long_name": "what went wrong in a world",
+        "flag_masks": np.array(list(STATUS.values()), dtype=np.int32),
+        "flag_meanings": " ".join(STATUS),
+    }
+    data["status"] = ("replicate", status.astype(np.int32), flags)
+    return xr.Dataset(
+        data,
+        coords={
+            "time": ("time", times, {"units": "s", "long_name": "time"}),
+            "body": ("body", np.array(["block"], dtype=object), {"long_name": "body"}),
+            "replicate": np.arange(status.size),
+        },
+        attrs={
+            "kind": "simulation",
+            "schema_version": 1,
+            "arena": study.tank.to_arena_json(),
+            "drag_coefficient": forces.drag_coefficient,
+            "force_std_N": forces.force_std_N,
+            "force_interval_s": forces.force_interval_s,
+            "force_noise_intensity_N2_s": forces.force_noise_intensity_N2_s,
+            "time_step_s": study.time_step_s,
+            "study": study.to_toml(),
+            **attrs,
+        },
+    )
