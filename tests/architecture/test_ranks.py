@@ -22,7 +22,8 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "compare": GROUND,
     "sweep": GROUND,
     "simulate": GROUND | {"model"},
-    "calibrate": GROUND | {"simulate", "compare", "flow", "model", "sweep"},
+    # `record` for the tracking noise of a recording, which is what "estimate" stands for.
+    "calibrate": GROUND | {"record", "simulate", "compare", "flow", "model", "sweep"},
     "assemble": GROUND | {"simulate", "compare", "flow", "model", "sweep"},
     "datasets": GROUND | {"record", "flow", "model", "compare", "sweep", "simulate"},
     "testing": GROUND | {"record", "flow", "model", "compare", "sweep", "simulate"},
