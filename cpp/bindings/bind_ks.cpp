@@ -71,13 +71,14 @@ Result compare(const KsReference& reference, const Points& points, bool limits) 
   return {r.d1, r.d2, r.n1, r.n2, r.tied, place_of(r.place1), place_of(r.place2)};
 }
 
-std::tuple<std::int64_t, Place> peacock(const KsReference& reference, const Points& points) {
+// (D n1 n2, points that tie, place)
+std::tuple<std::int64_t, std::int64_t, Place> peacock(const KsReference& reference, const Points& points) {
   const nb::gil_scoped_release released;
   Scratch& own = scratch();
   own.columns.assign(points);
   const KsPeacock r = ks_peacock(reference, own.columns.x.data(), own.columns.y.data(),
                                  own.columns.size(), own.workspace);
-  return {r.d, place_of(r.place)};
+  return {r.d, r.tied, place_of(r.place)};
 }
 
 nb::ndarray<nb::numpy, std::int64_t, nb::ndim<1>>

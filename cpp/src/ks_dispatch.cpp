@@ -156,6 +156,7 @@ KsPeacock ks_peacock(const KsReference& reference, const double* x2, const doubl
   const std::int64_t weight[2] = {n2, -n1};
   const KsCut cut = ks_largest_cut(work.geometry, weight);
   result.d = cut.value;
+  result.tied = work.geometry.tied;
   if (cut.position >= 0) {
     const auto coordinate = [n1](const std::vector<double>& a, const double* b, std::int64_t i) {
       return i < n1 ? a[i] : b[i - n1];

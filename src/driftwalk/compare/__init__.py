@@ -1,3 +1,45 @@
-"""Stage of driftwalk (being built)."""
+"""How far apart are two motions? Steps, the two-sample 2-D KS distance, its significance.
 
-__all__: list[str] = []
+`compare` does it all for two trajectories; `steps` gives the steps of one; `ks_distance` is a
+general tool for any two sets of points in the plane.
+"""
+
+from driftwalk.compare.autocorrelation import autocorrelation_time
+from driftwalk.compare.density import joint_density, step_length_edges, turning_angle_edges
+from driftwalk.compare.ks import (
+    QUADRANTS,
+    KsComparison,
+    KsPlace,
+    KsReference,
+    ks_compare,
+    ks_distance,
+    ks_reference,
+)
+from driftwalk.compare.motion import compare
+from driftwalk.compare.plan import AppliedSteps, StepPlan, apply_steps, plan_steps
+from driftwalk.compare.significance import PermutationTest, block_permutation_test
+from driftwalk.compare.walk import steps
+from driftwalk.compare.warn import ComparisonWarning
+
+__all__ = [
+    "QUADRANTS",
+    "AppliedSteps",
+    "ComparisonWarning",
+    "KsComparison",
+    "KsPlace",
+    "KsReference",
+    "PermutationTest",
+    "StepPlan",
+    "apply_steps",
+    "autocorrelation_time",
+    "block_permutation_test",
+    "compare",
+    "joint_density",
+    "ks_compare",
+    "ks_distance",
+    "ks_reference",
+    "plan_steps",
+    "step_length_edges",
+    "steps",
+    "turning_angle_edges",
+]

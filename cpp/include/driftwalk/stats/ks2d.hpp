@@ -86,8 +86,9 @@ KsResult ks_two_sample(const KsReference& reference, const double* x2, const dou
 // Peacock's statistic: the largest difference over every cut of the plane, not only over cuts at a
 // point. A cut at (X, Y) parts {x <= X} from {x > X} and {y <= Y} from {y > Y}.
 struct KsPeacock {
-  std::int64_t d = 0; // D n1 n2
-  KsPlace place;      // of the cut; it belongs to no sample, so the index stays -1
+  std::int64_t d = 0;    // D n1 n2
+  std::int64_t tied = 0; // points of both samples that share a coordinate with another
+  KsPlace place;         // of the cut; it belongs to no sample, so the index stays -1
 };
 KsPeacock ks_peacock(const KsReference& reference, const double* x2, const double* y2,
                      std::int64_t n2, KsWorkspace& workspace);

@@ -1,0 +1,191 @@
+"""Compare two recorded or simulated motions by their steps."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from driftwalk.compare.density import joint_density, step_length_edges, turning_angle_edges
+from driftwalk.compare.ks import KsComparison, Points, Ties, ks_compare
+from driftwalk.compare.plan import usual_interval
+from driftwalk.compare.significance import PermutationTest, block_permutation_test
+from driftwalk.compare.walk import steps
+from driftwalk.core.errors import InputError
+from driftwalk.schema import body_track
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SCHEMA_VERSION = 1
+
+
+def compare(
+    trajectory_a: xr.Dataset,
+    trajectory_b: xr.Dataset,
+    *,
+    body_a: str | None = None,
+    body_b: str | None = None,
+    step_interval: float | None = None,
+    ties: Ties = "strict",
+    block_length: int | None = None,
+    permutations: int = 999,
+    seed: int = 1,
+) -> xr.Dataset:
+    """Compare the step lengths and turning angles of two motions.
+
+    Parameters
+    ----------
+    trajectory_a, trajectory_b : xarray.Dataset
+        Two `trajectory` datasets.
+    body_a, body_b : str, optional
+        Names of the bodies; may be left out where there is only one.
+    step_interval : float, optional
+        Time between the positions of a step [s], the same for both; default: the longer of the two
+        median sampling intervals.
+    ties : {"strict", "limits"}
+        As in `ks_distance`.
+    block_length, permutations, seed
+        As in `block_permutation_test`; ``permutations=0`` leaves the test out.
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind "comparison". Numbers: ``ks_distance`` (D), ``ks_distance_a``, ``ks_distance_b`` (D1,
+        D2), ``score`` (1 - D); where D sits: ``ks_step_length`` [m], ``ks_turning_angle`` [rad],
+        ``ks_quadrant`` (0 to 3, NaN and -1 when D is 0); ``tied_fraction``; of the test
+        ``p_value``, ``noise_floor``, ``block_length``, ``autocorrelation_time`` [steps] (NaN, or 0,
+        when it was not made). By ``motion`` ("a", "b"): ``pairs``, ``zero_length``, ``gaps``,
+        ``mean_step_length`` [m], ``median_step_length`` [m], ``std_turning_angle`` [rad], ``mode``,
+        ``step_density`` (density_step_length, density_turning_angle), fractions per bin with edges
+        ``step_length_edge`` [m], ``turning_angle_edge`` [rad]. ``attrs``: ``step_interval_s``,
+        ``permutations``, ``seed``, ``ties``, ``warnings`` (JSON list of sentences).
+
+    Raises
+    ------
+    InputError
+        When a body is not there or no steps can be formed.
+
+    Warns
+    -----
+    ComparisonWarning
+        For steps of zero length and tied points, see `steps` and `ks_distance`.
+
+    Examples
+    --------
+    >>> import driftwalk
+    >>> a, b = driftwalk.load("a.csv"), driftwalk.load("b.csv")  # doctest: +SKIP
+    >>> float(driftwalk.compare(a, b)["ks_distance"])  # doctest: +SKIP
+    0.021
+    """
+    trajectories = ((trajectory_a, body_a), (trajectory_b, body_b))
+    interval = step_interval
+    if interval is None:
+        interval = max(_sampling_interval(dataset, body) for dataset, body in trajectories)
+    walks = [steps(dataset, body=body, step_interval=interval) for dataset, body in trajectories]
+    points = [_points(walk) for walk in walks]
+    result = ks_compare(*points, ties=ties)
+    sentences = [
+        f"motion {name}: {sentence}"
+        for name, walk in zip("ab", walks, strict=True)
+        for sentence in json.loads(walk.attrs["warnings"])
+    ]
+    test = None
+    if permutations > 0:
+        try:
+            test = block_permutation_test(
+                *points, block_length=block_length, permutations=permutations, seed=seed, ties=ties
+            )
+        except InputError as error:
+            sentences.append(f"no significance test: {error}")
+    return _dataset(
+        walks,
+        result,
+        test,
+        attrs={
+            "step_interval_s": interval,
+            "permutations": permutations if test is not None else 0,
+            "seed": seed,
+            "ties": ties,
+            "warnings": json.dumps(sentences),
+        },
+    )
+
+
+def _sampling_interval(trajectory: xr.Dataset, body: str | None) -> float:
+    time = body_track(trajectory, body).time
+    if time.size < 3:
+        raise InputError(f"steps need at least three samples, got {time.size}")
+    return usual_interval(time)
+
+
+def _points(walk: xr.Dataset) -> Points:
+    return np.column_stack([walk["step_length"].values, walk["turning_angle"].values])
+
+
+def _numbers(result: KsComparison, test: PermutationTest | None) -> dict[str, Any]:
+    """Return the scalar variables."""
+    metre, radian = {"units": "m"}, {"units": "rad"}
+    one = {"units": "1"}
+    place = result.place
+    return {
+        "ks_distance": ((), result.distance, {**one, "long_name": "KS distance"}),
+        "ks_distance_a": ((), result.distance_a, {**one, "long_name": "origins in a"}),
+        "ks_distance_b": ((), result.distance_b, {**one, "long_name": "origins in b"}),
+        "score": ((), 1.0 - result.distance, {**one, "long_name": "1 - KS distance"}),
+        "ks_step_length": ((), place.x, metre),
+        "ks_turning_angle": ((), place.y, radian),
+        "ks_quadrant": ((), np.int8(place.quadrant), {"long_name": "quadrant of the maximum"}),
+        "tied_fraction": ((), result.tied_fraction, one),
+        "p_value": ((), test.p_value if test else np.nan, one),
+        "noise_floor": (
+            (),
+            test.noise_floor if test else np.nan,
+            {**one, "long_name": "median KS distance of the permutations"},
+        ),
+        "block_length": ((), test.block_length if test else 0, one),
+        "autocorrelation_time": ((), test.autocorrelation_time if test else np.nan, one),
+    }
+
+
+def _dataset(
+    walks: list[xr.Dataset],
+    result: KsComparison,
+    test: PermutationTest | None,
+    *,
+    attrs: dict[str, Any],
+) -> xr.Dataset:
+    import xarray as xr
+
+    lengths = [walk["step_length"].values for walk in walks]
+    angles = [walk["turning_angle"].values for walk in walks]
+    length_edge, angle_edge = step_length_edges(*lengths), turning_angle_edges()
+    density = [
+        joint_density(length, angle, step_length_edge=length_edge, turning_angle_edge=angle_edge)
+        for length, angle in zip(lengths, angles, strict=True)
+    ]
+    by_motion: dict[str, Any] = {
+        name: ("motion", [walk.attrs[name] for walk in walks])
+        for name in ("pairs", "zero_length", "gaps")
+    }
+    by_motion["mode"] = ("motion", np.array([walk.attrs["mode"] for walk in walks], dtype=object))
+    by_motion |= {
+        "mean_step_length": ("motion", [length.mean() for length in lengths], {"units": "m"}),
+        "median_step_length": ("motion", [np.median(length) for length in lengths], {"units": "m"}),
+        "std_turning_angle": ("motion", [angle.std() for angle in angles], {"units": "rad"}),
+        "step_density": (
+            ("motion", "density_step_length", "density_turning_angle"),
+            np.stack(density),
+            {"units": "1", "long_name": "fraction of steps"},
+        ),
+    }
+    return xr.Dataset(
+        {**_numbers(result, test), **by_motion},
+        coords={
+            "motion": ("motion", np.array(["a", "b"], dtype=object)),
+            "step_length_edge": ("step_length_edge", length_edge, {"units": "m"}),
+            "turning_angle_edge": ("turning_angle_edge", angle_edge, {"units": "rad"}),
+        },
+        attrs={"kind": "comparison", "schema_version": SCHEMA_VERSION, **attrs},
+    )

@@ -1,0 +1,251 @@
+"""Which samples of a recording form steps: decided once from the time stamps.
+
+The plan knows no positions. Built from a recording, it is applied to the recording and to every
+trajectory simulated at the same time stamps, so that both pass through the same function.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk import _core
+from driftwalk.core.errors import InputError
+
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int32]
+Mode = Literal["exact", "interpolated"]
+
+TOLERANCE = 0.05
+# More intervals than this out of tolerance, and steps are formed by interpolation.
+IRREGULAR_FRACTION = 0.05
+# Interpolation bridges neighbours at most this many step intervals apart.
+BRIDGED_INTERVALS = 1.5
+# Time stamps are decimal fractions in binary: what is equal on paper differs in the last bits.
+ROUNDING = 1e-9
+LARGEST_GRID = 50_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class StepPlan:
+    """How steps are formed from a series of positions.
+
+    Resampled point k is ``(1 - weight[k]) p[left[k]] + weight[k] p[left[k] + 1]`` (where the weight
+    is zero the right neighbour is not looked at); pair i is formed of the points ``triple[i]``,
+    ``triple[i] + 1`` and ``triple[i] + 2``.
+    """
+
+    left: Integers
+    """Sample to the left of each point, shape (points,)."""
+    weight: Floats
+    """Weight of the sample to the right, shape (points,)."""
+    triple: Integers
+    """First point of each pair, shape (pairs,)."""
+    time: Floats
+    """When the second step of each pair begins [s], shape (pairs,)."""
+    mode: Mode
+    """"exact": points are samples; "interpolated": points lie between samples."""
+    step_interval: float
+    """Time between the points of a step [s]."""
+    samples: int
+    """Samples of the series that the plan was made for."""
+    gaps: int
+    """Sampling intervals longer than 1.5 times the usual one."""
+    irregular: int
+    """Sampling intervals that leave the tolerance about the usual one."""
+
+    @property
+    def points(self) -> int:
+        """Number of resampled points."""
+        return int(self.left.size)
+
+    @property
+    def pairs(self) -> int:
+        """Number of (step length, turning angle) pairs."""
+        return int(self.triple.size)
+
+
+class AppliedSteps(NamedTuple):
+    """The pairs of one trajectory."""
+
+    step_length: Floats
+    """Length of the second step of each pair [m]."""
+    turning_angle: Floats
+    """Signed angle from the first step to the second [rad], in (-pi, pi]."""
+    pair: Integers
+    """Index in the plan of each pair."""
+    zero_length: int
+    """Pairs left out because a step has zero length, so there is no angle."""
+    missing: int
+    """Pairs left out because a position is not finite."""
+
+
+def plan_steps(
+    time: npt.ArrayLike, *, step_interval: float | None = None, tolerance: float = TOLERANCE
+) -> StepPlan:
+    """Decide from time stamps which positions form steps.
+
+    A pair is formed only from three points `step_interval` apart. Where the sampling is regular (at
+    most 5 % of the intervals leave the tolerance about the median), points are samples: every k-th
+    of each gap-free run of samples, beginning with its first, k being the whole number of sampling
+    intervals in the step interval (mode "exact"; steps do not overlap). Otherwise, or where the
+    step interval is no multiple of the sampling interval, points are interpolated linearly on the
+    grid first time stamp + j `step_interval`, between samples at most 1.5 `step_interval` apart
+    (mode "interpolated").
+
+    Parameters
+    ----------
+    time : array_like, shape (n,)
+        Time stamps of the samples that are present [s], increasing, n >= 3.
+    step_interval : float, optional
+        Time between the points of a step [s]; default: the median sampling interval.
+    tolerance : float
+        How far an interval may be from its nominal value, as a fraction of it.
+
+    Raises
+    ------
+    InputError
+        When times do not increase, there are fewer than three, the interval is not positive, or no
+        three points are `step_interval` apart.
+
+    Examples
+    --------
+    >>> plan_steps([0.0, 0.1, 0.2, 0.3, 0.5]).pairs
+    2
+    """
+    stamps = _checked_times(time)
+    intervals = np.diff(stamps)
+    sampling = usual_interval(stamps)
+    wanted = sampling if step_interval is None else float(step_interval)
+    if not (np.isfinite(wanted) and wanted > 0):
+        raise InputError(f"step_interval must be a positive time in s, got {step_interval!r}")
+    within = np.abs(intervals - sampling) <= tolerance * sampling * (1 + ROUNDING)
+    multiple = max(1, round(wanted / sampling))
+    divides = abs(multiple * sampling - wanted) <= tolerance * wanted * (1 + ROUNDING)
+    irregular = int((~within).sum())
+    if divides and irregular <= IRREGULAR_FRACTION * intervals.size:
+        mode: Mode = "exact"
+        left, triple = _decimate(stamps, within, multiple, wanted, tolerance)
+        weight = np.zeros(left.size)
+        point_time = stamps[left]
+    else:
+        mode = "interpolated"
+        left, weight, triple, point_time = _interpolate(stamps, wanted)
+    if triple.size == 0:
+        raise InputError(
+            f"no three positions are {wanted:.6g} s apart (usual sampling interval "
+            f"{sampling:.6g} s, {stamps.size} samples): choose another step_interval"
+        )
+    return StepPlan(
+        left=left.astype(np.int32),
+        weight=weight,
+        triple=triple.astype(np.int32),
+        time=point_time[triple + 1],
+        mode=mode,
+        step_interval=wanted,
+        samples=int(stamps.size),
+        gaps=int((intervals > BRIDGED_INTERVALS * sampling).sum()),
+        irregular=irregular,
+    )
+
+
+def apply_steps(plan: StepPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> AppliedSteps:
+    """Form the steps of a trajectory whose samples stand at the plan's time stamps.
+
+    Parameters
+    ----------
+    plan : StepPlan
+        From `plan_steps`.
+    x, y : array_like, shape (plan.samples,)
+        Positions [m], float32 or float64; a pair that needs a position that is not finite is left
+        out and counted.
+
+    Raises
+    ------
+    InputError
+        When the number of positions is not that of the plan.
+
+    Examples
+    --------
+    >>> plan = plan_steps([0.0, 0.1, 0.2])
+    >>> float(apply_steps(plan, [0.0, 1.0, 1.0], [0.0, 0.0, 2.0]).step_length[0])
+    2.0
+    """
+    x_m, y_m = np.asarray(x), np.asarray(y)
+    kind = np.float32 if x_m.dtype == y_m.dtype == np.float32 else np.float64
+    if x_m.shape != (plan.samples,) or y_m.shape != (plan.samples,):
+        raise InputError(
+            f"the step plan was made for {plan.samples} samples, got x {x_m.shape} and y "
+            f"{y_m.shape}"
+        )
+    return AppliedSteps(
+        *_core.apply_step_plan(
+            plan.left,
+            plan.weight,
+            plan.triple,
+            np.ascontiguousarray(x_m, dtype=kind),
+            np.ascontiguousarray(y_m, dtype=kind),
+        )
+    )
+
+
+def usual_interval(time: Floats) -> float:
+    """Return the median sampling interval [s], to nine digits: time stamps are decimal numbers."""
+    return float(f"{np.median(np.diff(time)):.9g}")
+
+
+def _checked_times(time: npt.ArrayLike) -> Floats:
+    stamps = np.asarray(time, dtype=np.float64)
+    if stamps.ndim != 1 or stamps.size < 3:
+        raise InputError(f"steps need at least three samples, got time stamps {stamps.shape}")
+    increases = np.diff(stamps) > 0
+    if not increases.all():
+        at = int(np.flatnonzero(~increases)[0])
+        raise InputError(
+            f"time does not increase at sample {at + 1}: {stamps[at]} s is followed by "
+            f"{stamps[at + 1]} s; sort the recording first"
+        )
+    if not np.isfinite(stamps[[0, -1]]).all():
+        raise InputError("the first or last time stamp is not a finite number")
+    return stamps
+
+
+def _decimate(
+    stamps: Floats, within: npt.NDArray[np.bool_], multiple: int, wanted: float, tolerance: float
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Return every `multiple`-th sample of each gap-free run, and where three of them follow."""
+    sample = np.arange(stamps.size)
+    run_start = np.maximum.accumulate(np.where(np.r_[True, ~within], sample, 0))
+    chosen = sample[(sample - run_start) % multiple == 0]
+    follows = np.diff(chosen) == multiple
+    follows &= run_start[chosen[1:]] == run_start[chosen[:-1]]
+    duration = np.diff(stamps[chosen])
+    follows &= np.abs(duration - wanted) <= tolerance * wanted * (1 + ROUNDING)
+    return chosen, np.flatnonzero(follows[:-1] & follows[1:])
+
+
+def _interpolate(
+    stamps: Floats, wanted: float
+) -> tuple[npt.NDArray[np.int64], Floats, npt.NDArray[np.int64], Floats]:
+    """Return the points of a regular grid that lie between near neighbours."""
+    steps = (stamps[-1] - stamps[0]) / wanted
+    if steps > LARGEST_GRID:
+        raise InputError(
+            f"a step_interval of {wanted:.6g} s divides the {stamps[-1] - stamps[0]:.6g} s of the "
+            f"recording into more than {LARGEST_GRID} steps: choose a longer one"
+        )
+    index = np.arange(int(np.floor(steps + ROUNDING)) + 1)
+    grid = stamps[0] + index * wanted
+    left = np.clip(np.searchsorted(stamps, grid, side="right") - 1, 0, stamps.size - 2)
+    width = stamps[left + 1] - stamps[left]
+    weight = (grid - stamps[left]) / width
+    on_right = weight > 1 - ROUNDING
+    left, weight = left + on_right, np.where(on_right, 0.0, weight)
+    weight[weight < ROUNDING] = 0.0
+    known = (weight == 0.0) | (width <= BRIDGED_INTERVALS * wanted * (1 + ROUNDING))
+    follows = np.diff(index[known]) == 1
+    triple = np.flatnonzero(follows[:-1] & follows[1:])
+    return left[known], weight[known], triple, grid[known]

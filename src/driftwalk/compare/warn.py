@@ -1,0 +1,7 @@
+"""The warnings of this stage."""
+
+from __future__ import annotations
+
+
+class ComparisonWarning(UserWarning):
+    """A comparison was made, but what it says is limited by the data."""

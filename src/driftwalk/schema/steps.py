@@ -1,0 +1,88 @@
+"""The `steps` dataset: a sampled path as steps of a correlated random walk.
+
+Dimension ``step``; coordinate ``time`` [s], the instant at which the step begins; variables
+``step_length`` [m] and ``turning_angle`` [rad, in (-pi, pi]], the signed angle from the step before
+to this one (the paper's step angle). What was counted on the way stands in ``attrs``.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SCHEMA_VERSION = 1
+VARIABLES: dict[str, dict[str, str]] = {
+    "step_length": {"units": "m", "long_name": "step length"},
+    "turning_angle": {"units": "rad", "long_name": "turning angle"},
+}
+
+
+def build_steps(
+    step_length: npt.ArrayLike,
+    turning_angle: npt.ArrayLike,
+    *,
+    time: npt.ArrayLike,
+    attrs: dict[str, Any] | None = None,
+) -> xr.Dataset:
+    """Build a `steps` dataset.
+
+    Parameters
+    ----------
+    step_length : array_like, shape (n,)
+        Step lengths [m], > 0.
+    turning_angle : array_like, shape (n,)
+        Turning angles [rad], in (-pi, pi].
+    time : array_like, shape (n,)
+        When each step begins [s].
+    attrs : dict, optional
+        Attributes to add.
+
+    Raises
+    ------
+    InputError
+        When the shapes disagree or a value is out of range.
+
+    Examples
+    --------
+    >>> build_steps([0.01], [0.2], time=[0.1]).sizes["step"]
+    1
+    """
+    import xarray as xr
+
+    values = {"step_length": step_length, "turning_angle": turning_angle}
+    try:
+        dataset = xr.Dataset(
+            {
+                name: ("step", np.asarray(array, dtype=np.float64), VARIABLES[name])
+                for name, array in values.items()
+            },
+            coords={
+                "time": ("step", np.asarray(time, dtype=np.float64), {"units": "s"}),
+            },
+            attrs={"kind": "steps", "schema_version": SCHEMA_VERSION, **(attrs or {})},
+        )
+    except ValueError as error:
+        raise InputError(f"not a steps dataset: {error}") from error
+    return check_steps(dataset)
+
+
+def check_steps(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the dataset if it is a valid `steps` dataset, else raise `InputError`."""
+    for name in VARIABLES:
+        if name not in dataset or dataset[name].dims != ("step",):
+            raise InputError(
+                f"not a steps dataset: variable '{name}' with dimension (step) is missing"
+            )
+    length, angle = (dataset[name].values for name in VARIABLES)
+    if not (np.isfinite(length) & (length > 0)).all():
+        raise InputError("not a steps dataset: a step_length is not a positive number")
+    if not ((angle > -np.pi) & (angle <= np.pi)).all():
+        raise InputError("not a steps dataset: a turning_angle lies outside (-pi, pi]")
+    return dataset
