@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from driftwalk.core.errors import InputError
-from driftwalk.record.quantum import detect_quantum
+from driftwalk.record.quantum import common_quantum
 from driftwalk.record.raw import (
     ANGLE_UNITS,
     CLOCK_UNITS,
@@ -47,10 +47,10 @@ def convert_units(
     scale, in_pixels = _length_scale(raw, options)
     ticks, rate = _ticks(raw, options)
     flip, flip_theta = _flips(raw, y_axis=y_axis, in_pixels=in_pixels)
-    quantum = max(detect_quantum(values) for body in raw.bodies[:4] for values in (body.x, body.y))
+    quantum = common_quantum(values for body in raw.bodies[:4] for values in (body.x, body.y))
     attrs: dict[str, object] = dict(raw.attrs)
     attrs["y_axis"] = _describe_flips(raw, flip, flip_theta)
-    attrs.setdefault("position_quantum_m", quantum * scale)
+    attrs.setdefault("position_quantum_m", float(quantum * scale))
     if rate is not None:
         attrs["sample_rate_Hz"] = rate
     if in_pixels:
@@ -59,11 +59,14 @@ def convert_units(
     turn = ANGLE_UNITS[raw.angle_unit] * (-1.0 if flip_theta else 1.0)
     bodies = []
     for body in raw.bodies:
-        np.multiply(body.x, scale, out=body.x)
-        np.multiply(body.y, -scale if flip else scale, out=body.y)
-        if body.theta is not None and turn != 1.0:
-            np.multiply(body.theta, turn, out=body.theta)
-        bodies.append(RawBody(body.name, clocks[id(body.clock)], body.x, body.y, body.theta))
+        x, y = _writable(body.x), _writable(body.y)
+        np.multiply(x, scale, out=x)
+        np.multiply(y, -scale if flip else scale, out=y)
+        theta = body.theta
+        if theta is not None and turn != 1.0:
+            theta = _writable(theta)
+            np.multiply(theta, turn, out=theta)
+        bodies.append(RawBody(body.name, clocks[id(body.clock)], x, y, theta))
     return bodies, attrs
 
 
@@ -143,7 +146,13 @@ def _convert_clocks(raw: RawRecording, ticks: float, attrs: dict[str, object]) -
         origin = 0.0
     else:
         attrs["time_origin_unix_s"] = origin / ticks
-    for clock in arrays.values():
+    converted = {key: _writable(clock) for key, clock in arrays.items()}
+    for clock in converted.values():
         np.subtract(clock, origin, out=clock)
         np.divide(clock, ticks, out=clock)
-    return arrays
+    return converted
+
+
+def _writable(values: Array) -> Array:
+    """Return the array itself, or a copy where a reader handed out one that is locked."""
+    return values if values.flags.writeable else values.copy()

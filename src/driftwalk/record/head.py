@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import MISSING, is_number, split_fields
 from driftwalk.record.text import read_head
+
+_CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f]")
+"""Bytes that no text file holds."""
 
 
 def first_lines(head: bytes, count: int = 5) -> list[str]:
@@ -14,7 +18,7 @@ def first_lines(head: bytes, count: int = 5) -> list[str]:
 
     Nothing is returned when the bytes cannot be text.
     """
-    if b"\0" in head:
+    if _CONTROL.search(head):
         return []
     lines = head.split(b"\n")
     return [line.decode("utf-8", "replace").rstrip("\r") for line in lines[:count] if line.strip()]

@@ -251,4 +251,4 @@ def _one_clock(bodies: list[RawBody]) -> tuple[Array, Array, Array, Array | None
 
 def _usual_rate(bodies: list[RawBody]) -> float:
     intervals = [float(np.median(np.diff(body.clock))) for body in bodies if body.clock.size > 1]
-    return 1.0 / float(np.median(intervals)) if intervals else 0.0
+    return float(1.0 / np.median(intervals)) if intervals else 0.0

@@ -24,8 +24,11 @@ def open_netcdf(path: Path) -> xr.Dataset:
     """
     import xarray as xr
 
-    with path.open("rb") as file:
-        magic = file.read(8)
+    try:
+        with path.open("rb") as file:
+            magic = file.read(8)
+    except OSError as error:
+        raise FormatError(f"cannot be opened: {error.strerror or error}", path=path) from error
     if not magic.startswith(MAGIC):
         raise FormatError("is not a NetCDF file", path=path)
     engine = "h5netcdf" if magic.startswith(MAGIC[0]) else "scipy"

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from driftwalk.record.raw import Array
 
 _MAX_SAMPLES = 50_000
 _MAX_DECIMALS = 9
+_ENOUGH = 30
 
 
 def detect_quantum(values: Array) -> float:
@@ -24,7 +27,7 @@ def detect_quantum(values: Array) -> float:
 
     Examples
     --------
-    >>> detect_quantum(np.array([0.25, 1.0, 1.75, 3.5]))
+    >>> detect_quantum(np.arange(100) % 7 * 0.25)
     0.25
     """
     known = values[np.isfinite(values)]
@@ -37,8 +40,23 @@ def detect_quantum(values: Array) -> float:
     return coarse if coarse > 0.0 else decimal
 
 
+def common_quantum(series: Iterable[Array]) -> float:
+    """Return the finest resolution among coordinates that vary, 0 when one has none."""
+    found = [detect_quantum(values) for values in series if _varies(values)]
+    return min(found, default=0.0)
+
+
+def _varies(values: Array) -> bool:
+    known = values[np.isfinite(values)]
+    return bool(known.size) and float(np.ptp(known)) > 0.0
+
+
 def _decimal_quantum(values: Array) -> float:
-    """Return the greatest common divisor of values with few decimals, 0 for more than nine."""
+    """Return the spacing of values with few decimals, 0 for more than nine.
+
+    The greatest common divisor of their differences; of few values, which may have a common divisor
+    by chance, the last decimal place.
+    """
     for decimals in range(_MAX_DECIMALS + 1):
         scaled = values * 10.0**decimals
         whole = np.round(scaled)
@@ -46,7 +64,8 @@ def _decimal_quantum(values: Array) -> float:
             return 0.0
         # One unit in the last place of the value, scaled, is all that rounding may leave.
         if (np.abs(scaled - whole) <= 4.0 * np.spacing(np.abs(scaled) + 1.0)).all():
-            divisor = int(np.gcd.reduce(whole.astype(np.int64)))
+            steps = (whole - whole[0]).astype(np.int64)
+            divisor = int(np.gcd.reduce(steps)) if values.size >= _ENOUGH else 1
             return float(divisor) / 10.0**decimals
     return 0.0
 

@@ -27,7 +27,11 @@ ANGLE_UNITS: dict[str, float] = {"rad": 1.0, "deg": float(np.pi / 180.0)}
 
 @dataclass
 class RawBody:
-    """The samples of one body as the file has them, in the file's order."""
+    """The samples of one body as the file has them, in the file's order.
+
+    Arrays of float64 that the reading of the file made: they are converted in place. Bodies may
+    share a clock, and nothing else.
+    """
 
     name: str
     clock: Array

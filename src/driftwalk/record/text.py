@@ -62,8 +62,9 @@ def open_binary(path: Path) -> IO[bytes]:
         with path.open("rb") as file:
             compressed = file.read(2) == GZIP_MAGIC
         return gzip.open(path, "rb") if compressed else path.open("rb")  # type: ignore[return-value]
-    except OSError as error:
-        raise FormatError(f"cannot be opened: {error.strerror or error}", path=path) from error
+    except (OSError, ValueError) as error:  # ValueError: a name that no file can have
+        reason = getattr(error, "strerror", None) or error
+        raise FormatError(f"cannot be opened: {reason}", path=path) from error
 
 
 def read_head(path: Path) -> bytes:

@@ -1,0 +1,157 @@
+"""Readers never fail with anything but an `InputError`, and what is written is read back."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from driftwalk.core.errors import InputError
+from driftwalk.record import describe, load, save_trajectory
+from driftwalk.record.arena import place_arena
+from driftwalk.record.registry import loaders
+from driftwalk.record.text import _field_counts
+from driftwalk.schema import body_names, body_track, build_trajectory, check_trajectory
+
+OPTIONS = {"frame_rate": 25.0, "metres_per_pixel": 0.001}
+HEADERS = [
+    b"",
+    b"t,x,y,theta\n",
+    b"frame\tx_px\ty_px\n",
+    b"t;x_mm;y_mm;id\n",
+    b"X1\tY1\tProbId1\t\n",
+    b",frame,pos_x,pos_y,id\n",
+    b"pt1_cam1_X,pt1_cam1_Y\n",
+    b"% Frame number, x, y\n",
+    b"% Frame number, Time, X (image), Y (image), X (world), Y (world), Area, Orientation, C\t\n",
+    b"$FRAMENUMBER,1\n",
+    b'\'list(Areas=matrix(c(1,2,3,4),4,1,dimname=list(c("W"),c("05"))))\'\n'
+    b"Area,Territory,X,Y,time,L\n",
+    b"[[1, 2], ",
+    b"\x89HDF\r\n\x1a\n",
+    b"CDF\x01",
+    b"\x1f\x8b",
+]
+FIELDS = st.sampled_from(
+    [
+        *(b"0", b"1.5", b"-2", b"1e5", b"1e999", b"NaN", b"", b" ", b"inf", b"x", b'"', b"\xff"),
+        *(b"1,2", b"$PARTICLE", b"[", b"]", b"null", b"\r", b"05", b"2022-05-01T12:00:00.000"),
+    ]
+)
+ROWS = st.lists(
+    st.tuples(st.sampled_from([b",", b"\t", b";", b" "]), st.lists(FIELDS, max_size=9)).map(
+        lambda row: row[0].join(row[1])
+    ),
+    max_size=8,
+).map(b"\n".join)
+FINITE = st.floats(-1e3, 1e3, allow_nan=False, allow_subnormal=False)
+
+
+def load_or_refuse(path: Path, name: str | None) -> None:
+    for options in (OPTIONS, {}, {"frame_rate": 25.0}, {"metres_per_pixel": 0.001}):
+        try:
+            dataset = load(path, format=name, sort="sort", **options)
+        except InputError:
+            continue
+        else:
+            check_trajectory(dataset)
+            json.loads(dataset.attrs["counts"])
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    head=st.sampled_from(HEADERS),
+    body=st.one_of(st.binary(max_size=200), ROWS),
+    name=st.sampled_from([None, *loaders()]),
+)
+def test_arbitrary_bytes_are_read_or_refused(head: bytes, body: bytes, name: str | None) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "synthetic.bin"
+        path.write_bytes(head + body)
+        load_or_refuse(path, name)
+
+
+@settings(deadline=None, max_examples=40)
+@given(body=ROWS, head=st.sampled_from(HEADERS[1:9]))
+def test_what_looks_like_a_table_is_read_or_refused(body: bytes, head: bytes) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "synthetic.csv"
+        path.write_bytes(head + body)
+        load_or_refuse(path, None)
+
+
+@settings(deadline=None, max_examples=100)
+@given(ROWS, st.sampled_from([",", "\t", ";", " "]))
+def test_fields_are_counted_as_by_splitting(text: bytes, delimiter: str) -> None:
+    block = text + b"\n"
+    lines = block.split(b"\n")[:-1]
+    separator = None if delimiter == " " else delimiter.encode()
+    # `\r` is a blank here and at the end of a line only in real files.
+    lines = [line.replace(b"\r", b" ") for line in lines]
+    expected = [len(line.split(separator)) if line.strip() else 0 for line in lines]
+    assert _field_counts(b"\n".join(lines) + b"\n", delimiter).tolist() == expected
+
+
+@settings(deadline=None, max_examples=12)
+@given(data=st.data(), bodies=st.integers(1, 3), count=st.integers(1, 12))
+def test_round_trip_through_both_formats_is_exact(
+    data: st.DataObject, bodies: int, count: int
+) -> None:
+    values = st.lists(
+        st.one_of(FINITE, st.just(float("nan"))), min_size=count * bodies, max_size=count * bodies
+    )
+    x, y, theta = (np.array(data.draw(values)).reshape(count, bodies) for _ in range(3))
+    steps = data.draw(st.lists(st.floats(1e-3, 10.0), min_size=count, max_size=count))
+    lost = np.isnan(x) | np.isnan(y)
+    x[lost] = y[lost] = theta[lost] = np.nan
+    names = [f"robot {index}" for index in range(bodies)]
+    dataset = build_trajectory(np.cumsum(steps), x, y, theta, body=names)
+    with tempfile.TemporaryDirectory() as folder:
+        netcdf = load(save_trajectory(dataset, Path(folder) / "a.nc"))
+        table = load(save_trajectory(netcdf, Path(folder) / "a.csv"))
+        again = load(save_trajectory(table, Path(folder) / "b.nc"))
+    assert body_names(netcdf) == names
+    for name in ("time", "x", "y", "theta"):
+        np.testing.assert_array_equal(netcdf[name].values, dataset[name].values)
+    for back in (table, again):
+        for name in body_names(back):
+            for found, expected in zip(
+                body_track(back, name), body_track(dataset, name), strict=True
+            ):
+                np.testing.assert_array_equal(found, expected)
+        assert {n for n in names if np.isfinite(dataset["x"].sel(body=n)).any()} <= set(
+            body_names(back)
+        )
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.lists(st.tuples(FINITE, FINITE, st.one_of(FINITE, st.none())), min_size=1, max_size=80))
+def test_describe_is_valid_json_for_any_recording(points: list[tuple[float, ...]]) -> None:
+    x, y, theta = (np.array([p[i] for p in points], dtype=float) for i in range(3))
+    dataset = build_trajectory(np.arange(x.size) * 0.1, x, y, theta)
+    json.dumps(describe(dataset), allow_nan=False)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.one_of(st.text(max_size=20), st.from_regex(r"(circle|rect|polygon|fit):[-0-9x.@,cm]*")))
+def test_an_arena_is_read_or_refused(text: str) -> None:
+    angle = np.linspace(0.0, 6.0, 50)
+    try:
+        placed = place_arena(text, np.cos(angle), np.sin(angle))
+    except InputError:
+        return
+    assert placed.arena["shape"] in ("circle", "rectangle", "polygon")
+
+
+@pytest.mark.parametrize("name", list(loaders()))
+def test_every_format_refuses_an_empty_file_and_a_folder(tmp_path: Path, name: str) -> None:
+    empty = tmp_path / "empty"
+    empty.write_bytes(b"")
+    for path in (empty, tmp_path):
+        with pytest.raises(InputError):
+            load(path, format=name, frame_rate=1.0)

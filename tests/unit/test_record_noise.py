@@ -1,0 +1,140 @@
+"""The tracking noise told apart from the body's own unrest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from driftwalk.record import estimate_tracking_noise
+from driftwalk.schema import Track
+
+STEP_S = 0.1
+
+
+def integrated_wiener(
+    time: np.ndarray, intensity: float, random: np.random.Generator
+) -> np.ndarray:
+    """Return two paths under white acceleration, exact for any intervals."""
+    paths = np.zeros((2, time.size))
+    velocity = np.zeros(2)
+    for index, step in enumerate(np.diff(time)):
+        covariance = intensity * np.array([[step, step**2 / 2], [step**2 / 2, step**3 / 3]])
+        kick = random.multivariate_normal([0.0, 0.0], covariance, size=2, method="cholesky")
+        paths[:, index + 1] = paths[:, index] + velocity * step + kick[:, 1]
+        velocity = velocity + kick[:, 0]
+    return paths
+
+
+def track_of(time: np.ndarray, paths: np.ndarray, theta: np.ndarray | None = None) -> Track:
+    return Track(time, paths[0], paths[1], np.full(time.size, np.nan) if theta is None else theta)
+
+
+@pytest.mark.parametrize(("ratio", "tolerance"), [(0.05, 0.065), (0.5, 0.065), (5.0, 0.08)])
+def test_noise_for_several_ratios_of_unrest_to_noise(ratio: float, tolerance: float) -> None:
+    """The ratio is q h^3 / r^2; 6000 samples. The tolerance is four standard errors."""
+    random = np.random.default_rng(11)
+    time = np.arange(6000) * STEP_S
+    noise = 3e-4
+    intensity = ratio * noise**2 / STEP_S**3
+    paths = integrated_wiener(time, intensity, random) + random.normal(0.0, noise, (2, time.size))
+    found = estimate_tracking_noise(track_of(time, paths))
+    assert found.position_noise_m == pytest.approx(noise, rel=tolerance)
+    error = found.position_noise_m - noise
+    assert abs(error) < 4.0 * found.position_noise_standard_error_m
+    assert found.position_noise_standard_error_m < 0.6 * tolerance * noise
+    if ratio > 1.0:  # below, the unrest drowns in the noise
+        assert found.acceleration_intensity_m2_s3 == pytest.approx(intensity, rel=0.45)
+    assert np.isnan(found.orientation_noise_rad)
+
+
+def test_the_standard_error_covers() -> None:
+    """Forty recordings: the deviations in standard errors have a root mean square near one."""
+    noise = 3e-4
+    scores = []
+    for seed in range(40):
+        random = np.random.default_rng(seed)
+        time = np.arange(3000) * STEP_S
+        drift = np.stack([0.1 * np.sin(0.5 * time), 0.1 * np.cos(0.5 * time)])
+        found = estimate_tracking_noise(
+            track_of(time, drift + random.normal(0.0, noise, (2, time.size)))
+        )
+        scores.append((found.position_noise_m - noise) / found.position_noise_standard_error_m)
+    # Chi-square with 40 degrees of freedom, jackknife of 8 blocks: 0.6 to 1.7 at 1 in 10^4.
+    assert 0.6 < np.sqrt(np.mean(np.square(scores))) < 1.7
+
+
+def test_no_noise_is_none() -> None:
+    random = np.random.default_rng(5)
+    time = np.arange(5000) * STEP_S
+    path = integrated_wiener(time, 4.5e-5, random)
+    found = estimate_tracking_noise(track_of(time, path))
+    assert found.position_noise_m < 0.03e-3  # q h^3 is (0.21 mm)^2
+    assert found.acceleration_intensity_m2_s3 == pytest.approx(4.5e-5, rel=0.1)
+
+
+def test_an_uneven_clock_needs_no_special_case() -> None:
+    random = np.random.default_rng(7)
+    time = np.cumsum(random.uniform(0.065, 0.12, 6000))
+    noise = 3e-4
+    paths = integrated_wiener(time, 9e-5, random) + random.normal(0.0, noise, (2, time.size))
+    found = estimate_tracking_noise(track_of(time, paths))
+    assert found.position_noise_m == pytest.approx(noise, rel=0.05)
+
+
+def test_pixels_act_as_uniform_noise() -> None:
+    random = np.random.default_rng(9)
+    time = np.arange(6000) * STEP_S
+    pixel = 1e-3
+    paths = np.stack([0.1 * np.sin(0.6 * time), 0.1 * np.cos(0.6 * time)])
+    paths = paths + integrated_wiener(time, 9e-5, random)
+    found = estimate_tracking_noise(track_of(time, np.round(paths / pixel) * pixel))
+    assert found.position_noise_m == pytest.approx(pixel / np.sqrt(12.0), rel=0.05)
+
+
+def test_wall_hits_gaps_and_glitches_do_not_pass_for_noise() -> None:
+    random = np.random.default_rng(13)
+    time = np.arange(8000) * STEP_S
+    noise = 3e-4
+    paths = np.stack([0.02 * time, 0.01 * time])
+    hits = np.sort(random.choice(8000, 80, replace=False))
+    for hit in hits:  # the velocity jumps
+        paths[:, hit:] += random.normal(0.0, 0.05, (2, 1)) * (time[hit:] - time[hit])
+    paths = paths + random.normal(0.0, noise, (2, time.size))
+    glitches = random.choice(8000, 20, replace=False)
+    paths[:, glitches] += 0.02
+    present = np.ones(time.size, dtype=bool)
+    present[random.choice(8000, 300, replace=False)] = False
+    present[3000:3400] = False
+    paths[:, 3400:] += 0.5  # what happened in the gap is nobody's noise
+    found = estimate_tracking_noise(track_of(time[present], paths[:, present]))
+    assert found.position_noise_m == pytest.approx(noise, rel=0.05)
+
+
+def test_orientation_noise_across_the_wrap_and_missing_angles() -> None:
+    random = np.random.default_rng(17)
+    time = np.arange(6000) * STEP_S
+    noise = np.radians(0.5)
+    theta = 0.6 * time + 0.3 * np.sin(time) + random.normal(0.0, noise, time.size)
+    theta = np.pi - np.mod(np.pi - theta, 2 * np.pi)
+    theta[random.choice(6000, 100, replace=False)] = np.nan
+    found = estimate_tracking_noise(track_of(time, np.zeros((2, time.size)), theta))
+    assert found.orientation_noise_rad == pytest.approx(noise, rel=0.05)
+    assert found.position_noise_m == 0.0
+
+
+def test_noise_scales_with_the_unit_and_not_with_the_clock() -> None:
+    random = np.random.default_rng(19)
+    time = np.arange(1000) * STEP_S
+    paths = random.normal(0.0, 1.0, (2, time.size))
+    base = estimate_tracking_noise(track_of(time, paths))
+    scaled = estimate_tracking_noise(track_of(time * 50.0 + 3.0, paths * 1e-3))
+    assert scaled.position_noise_m == pytest.approx(1e-3 * base.position_noise_m, rel=1e-6)
+    assert scaled.windows == base.windows
+
+
+@pytest.mark.parametrize("count", [0, 1, 4, 5, 30])
+def test_too_few_samples_give_no_estimate(count: int) -> None:
+    time = np.arange(count) * STEP_S
+    found = estimate_tracking_noise(track_of(time, np.zeros((2, count))))
+    assert np.isnan(found.position_noise_m)
+    assert found.windows == 0
