@@ -267,9 +267,9 @@ def test_study_new_writes_the_template_once(
     path.write_text("[tank]\ndiameter_m = 0.4\n", encoding="utf-8")
     capsys.readouterr()
     assert main(["study", "new", str(path)]) == 2
-    assert "--force" in one_error_line(capsys)
+    assert "--overwrite" in one_error_line(capsys)
     assert load_study(path).tank.diameter_m == 0.4
-    assert main(["study", "new", str(path), "--force"]) == 0
+    assert main(["study", "new", str(path), "--overwrite"]) == 0
     assert load_study(path) == Study()
 
 

@@ -6,6 +6,7 @@ mistake answer at once.
 
 from __future__ import annotations
 
+import inspect
 import sys
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any, Final, NamedTuple
@@ -79,9 +80,15 @@ def _stand_in() -> None:
 def _one_command_app(name: str, function: Callable[..., Any]) -> Any:
     app = typer.Typer(add_completion=False)
     short = COMMANDS[name].help
-    text = short if function is _stand_in else None
+    text = short if function is _stand_in else paragraphs(function.__doc__ or short)
     app.command(name, help=text, short_help=short)(function)
     return to_click_command(app)
+
+
+def paragraphs(docstring: str) -> str:
+    """Return a docstring with each paragraph on one line, for a terminal of any width to wrap."""
+    blocks = inspect.cleandoc(docstring).split("\n\n")
+    return "\n\n".join(" ".join(block.split()) for block in blocks)
 
 
 app = typer.Typer(

@@ -22,7 +22,7 @@ from driftwalk.core.units import parse_quantity
 if TYPE_CHECKING:
     from driftwalk.model import Study
 
-PANEL: Final = "Parameters (over the study file)"
+PANEL: Final = "Parameters"
 
 
 def quantity_parser(unit: str, *words: str) -> Callable[[str], Any]:

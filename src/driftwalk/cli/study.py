@@ -26,7 +26,9 @@ def new(
     path: Annotated[
         Path, typer.Argument(metavar="FILE", help="File to write; - is stdout.")
     ] = Path("study.toml"),
-    force: Annotated[bool, typer.Option("--force", help="Replace a file that exists.")] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace a file that exists.")
+    ] = False,
 ) -> None:
     """Write a study file in which every parameter stands with its unit, default and meaning."""
     from driftwalk.model import study_template
@@ -35,12 +37,10 @@ def new(
         typer.echo(study_template(), nl=False)
         return
     try:
-        with path.open("w" if force else "x", encoding="utf-8") as file:
+        with path.open("w" if overwrite else "x", encoding="utf-8") as file:
             file.write(study_template())
     except FileExistsError as error:
-        raise InputError(
-            f"{path} exists; name another file or give --force to replace it"
-        ) from error
+        raise InputError(f"{path} exists; name another file or add --overwrite") from error
     print_note(f"wrote {path}")
 
 

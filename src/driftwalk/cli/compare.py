@@ -1,0 +1,137 @@
+"""`driftwalk compare`: how far apart two motions are."""
+
+from __future__ import annotations
+
+import json as json_module
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from driftwalk.cli.motion import load_motion
+from driftwalk.cli.options import Json, StepInterval
+from driftwalk.cli.output import print_json, print_note, print_table
+from driftwalk.cli.recording_options import RecordingOptions, with_recording_options
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_NUMBERS = {
+    "ks_distance": "ks_distance",
+    "score": "score",
+    "ks_distance_a": "ks_distance_a",
+    "ks_distance_b": "ks_distance_b",
+    "ks_step_length_m": "ks_step_length",
+    "ks_turning_angle_rad": "ks_turning_angle",
+    "p_value": "p_value",
+    "noise_floor": "noise_floor",
+    "block_length_steps": "block_length",
+    "autocorrelation_time_steps": "autocorrelation_time",
+    "tied_fraction": "tied_fraction",
+}
+_BY_MOTION = {
+    "pairs": "pairs",
+    "zero_length": "zero_length",
+    "gaps": "gaps",
+    "mode": "mode",
+    "mean_step_length_m": "mean_step_length",
+    "median_step_length_m": "median_step_length",
+    "std_turning_angle_rad": "std_turning_angle",
+}
+
+
+@with_recording_options
+def compare(
+    a: Annotated[Path, typer.Argument(metavar="A", help="Recording, or sim.nc.")],
+    b: Annotated[Path, typer.Argument(metavar="B", help="Recording, or sim.nc.")],
+    how: RecordingOptions,
+    body_b: Annotated[
+        str | None,
+        typer.Option("--body-b", help="Body of B, where it is not that of A.", show_default=False),
+    ] = None,
+    replicate: Annotated[
+        int, typer.Option("--replicate", min=0, help="Which replicate of a simulation.")
+    ] = 0,
+    step_interval: StepInterval = None,
+    ties: Annotated[
+        Literal["strict", "limits"],
+        typer.Option("--ties", help="Points that tie with an origin: in no quadrant, or in each."),
+    ] = "strict",
+    permutations: Annotated[
+        int, typer.Option("--permutations", min=0, help="Permutations of the test; 0 is no test.")
+    ] = 999,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the permutations.")] = 1,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE.nc", help="Write the comparison.", show_default=False),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Measure how far apart two motions are.
+
+    Both are turned into step lengths and turning angles at the same step interval; their distance
+    is the two-sample Kolmogorov-Smirnov statistic of Fasano and Franceschini. How to read the
+    recording applies to both files.
+    """
+    from driftwalk.compare import compare as compare_motions
+
+    how_b = how if body_b is None else replace(how, body=body_b)
+    motions = (load_motion(a, how, replicate=replicate), load_motion(b, how_b, replicate=replicate))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        result = compare_motions(
+            *motions,
+            step_interval=None if step_interval == "auto" else step_interval,
+            ties=ties,
+            permutations=permutations,
+            seed=seed,
+        )
+    if out is not None:
+        _save(result, out)
+    summary = summarise(result)
+    # What `compare` warned of in passing stands in the result as well, there with the motion.
+    noted = " ".join(summary["warnings"])
+    summary["warnings"] += [text for text in map(_text, caught) if text not in noted]
+    if json:
+        print_json({"a": a, "b": b, **summary})
+        return
+    _print(summary)
+    for warning in summary["warnings"]:
+        print_note(f"warning: {warning}")
+
+
+def summarise(result: xr.Dataset) -> dict[str, Any]:
+    """Return the numbers of a comparison with units in the keys, ready for JSON."""
+    motions = {
+        f"motion_{name}": {
+            key: result[variable].values[index] for key, variable in _BY_MOTION.items()
+        }
+        for index, name in enumerate("ab")
+    }
+    return {
+        **{key: result[variable].item() for key, variable in _NUMBERS.items()},
+        "step_interval_s": result.attrs["step_interval_s"],
+        **motions,
+        "warnings": json_module.loads(result.attrs["warnings"]),
+    }
+
+
+def _text(caught: warnings.WarningMessage) -> str:
+    return str(caught.message)
+
+
+def _print(summary: dict[str, Any]) -> None:
+    print_table([[key, summary[key]] for key in (*_NUMBERS, "step_interval_s")])
+    print()
+    rows = [[key, summary["motion_a"][key], summary["motion_b"][key]] for key in _BY_MOTION]
+    print_table(rows, columns=["motion", "a", "b"])
+
+
+def _save(result: xr.Dataset, path: Path) -> None:
+    from driftwalk.core.atomic import atomic_path
+
+    with atomic_path(path) as partial:
+        result.to_netcdf(partial, engine="h5netcdf")
+    print_note(f"wrote {path}")

@@ -1,0 +1,60 @@
+"""A motion from a file: a recording in any format, or one replicate of a simulation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from driftwalk.cli.recording_options import RecordingOptions
+from driftwalk.core.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
+def load_motion(path: Path, how: RecordingOptions, *, replicate: int = 0) -> xr.Dataset:
+    """Load a `trajectory` from a recording, or from a file that `driftwalk simulate` wrote.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    how : RecordingOptions
+        How to read a recording; a simulation says all of it itself.
+    replicate : int
+        Which replicate of a simulation, counted from 0.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read or has no such replicate.
+    """
+    simulation = _open_simulation(path)
+    if simulation is None:
+        return how.load(path)
+    count = simulation.sizes["replicate"]
+    if not 0 <= replicate < count:
+        raise InputError(
+            f"{path}: no replicate {replicate}; it has {count}, counted from 0 (--replicate)"
+        )
+    chosen = simulation[["x", "y", "theta"]].isel(replicate=replicate, drop=True)
+    return chosen.assign_attrs(kind="trajectory", source=path.name)
+
+
+def _open_simulation(path: Path) -> xr.Dataset | None:
+    """Return the simulation that the file holds, None when it is anything else."""
+    if not path.is_file():
+        return None
+    with path.open("rb") as file:
+        if file.read(len(_HDF5)) != _HDF5:
+            return None
+    import xarray as xr
+
+    try:
+        with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as dataset:
+            return dataset.load() if dataset.attrs.get("kind") == "simulation" else None
+    except (ValueError, KeyError, OSError):
+        # Damaged, or no NetCDF: the loaders of recordings say what is wrong.
+        return None
