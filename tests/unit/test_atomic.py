@@ -22,6 +22,15 @@ def test_write_makes_and_replaces(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_old_content_is_never_written_into(tmp_path: Path) -> None:
+    """Another name of the old file shows whether a write touched it, however briefly."""
+    path, witness = tmp_path / "seed.txt", tmp_path / "witness"
+    path.write_bytes(b"one")
+    witness.hardlink_to(path)
+    write_atomic(path, b"two")
+    assert witness.read_bytes() == b"one"
+
+
 def test_temporary_has_the_suffix_and_the_folder(tmp_path: Path) -> None:
     with atomic_path(tmp_path / "flow.nc") as temporary:
         assert temporary.parent == tmp_path
