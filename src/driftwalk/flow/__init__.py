@@ -1,3 +1,39 @@
-"""Stage of driftwalk (being built)."""
+"""How did the water move? Flow fields from a floating body's track, a formula or a file.
 
-__all__: list[str] = []
+`extract_flow` is the paper's estimator; `load_flow` and `save_flow` keep a field; the analytic
+fields have exact values.
+"""
+
+from driftwalk.flow.analytic import (
+    flow_from_function,
+    jets_flow,
+    jets_velocity,
+    shear_flow,
+    shear_velocity,
+    uniform_flow,
+    uniform_velocity,
+    vortex_flow,
+    vortex_velocity,
+)
+from driftwalk.flow.evaluate import bilinear
+from driftwalk.flow.extract import extract_flow
+from driftwalk.flow.inertia import inertia_correction
+from driftwalk.flow.read import load_flow
+from driftwalk.flow.write import save_flow
+
+__all__ = [
+    "bilinear",
+    "extract_flow",
+    "flow_from_function",
+    "inertia_correction",
+    "jets_flow",
+    "jets_velocity",
+    "load_flow",
+    "save_flow",
+    "shear_flow",
+    "shear_velocity",
+    "uniform_flow",
+    "uniform_velocity",
+    "vortex_flow",
+    "vortex_velocity",
+]

@@ -63,7 +63,7 @@ def fill_velocity(
     >>> import numpy as np
     >>> line = Grid(np.arange(3.0), np.arange(2.0), 1.0)
     >>> u = np.array([[[0.0, 0.0], [9.0, 9.0], [2.0, 0.0]]] * 2)
-    >>> fill_velocity(line, u, known=[[True, False, True]] * 2)[0, :, 0].tolist()
+    >>> fill_velocity(line, u, known=[[True, False, True]] * 2)[0, :, 0].round(9).tolist()
     [0.0, 1.0, 2.0]
     """
     held = np.asarray(known, dtype=bool)
@@ -120,7 +120,8 @@ def _neighbour(node: Indices, step: tuple[int, int], shape: tuple[int, int]) -> 
 def _wall_blocks(node: Indices, step: tuple[int, int], grid: Grid, wall: Outline) -> Array:
     """Return n nᵀ / d of the links that the wall cuts, shape (k, 2, 2)."""
     row, column = np.divmod(node, grid.shape[1])
-    dy, dx = (np.full(node.size, grid.cell_size * part) for part in step)
+    dy = np.full(node.size, step[0] * (grid.y[1] - grid.y[0]))
+    dx = np.full(node.size, step[1] * (grid.x[1] - grid.x[0]))
     part, normal = wall.leave(grid.x[column], grid.y[row], dx, dy)
     weight = 1.0 / np.maximum(part, _NEAREST_WALL)
     return np.asarray(weight[:, None, None] * normal[:, :, None] * normal[:, None, :])

@@ -1,0 +1,179 @@
+"""`driftwalk flow`: how the water moved, from the track of the body that floats in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from driftwalk.cli.options import (
+    STUDY_KEYS,
+    Depth,
+    Json,
+    Mass,
+    Side,
+    StudyFile,
+    TankDiameter,
+    quantity_option,
+    resolve_study,
+    study_overrides,
+)
+from driftwalk.cli.output import print_json, print_note
+from driftwalk.cli.recording_options import (
+    RecordingFile,
+    RecordingOptions,
+    with_recording_options,
+)
+from driftwalk.cli.study_recording import load_with_study
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+FLOW_KEYS = {
+    **STUDY_KEYS,
+    "cells": "flow.cells",
+    "cell_size": "flow.cell_size_m",
+    "window": "flow.smoothing_window_s",
+    "flow_drag_coefficient": "flow.flow_drag_coefficient",
+    "min_count": "flow.min_count",
+    "inertia": "flow.inertia",
+}
+_PANEL = "Flow field (over the study file)"
+
+
+def _flow_option(name: str, unit: str, help: str) -> Any:
+    option = quantity_option(name, unit, help)
+    option.rich_help_panel = _PANEL
+    return option
+
+
+@with_recording_options
+def flow(
+    recording: RecordingFile,
+    how: RecordingOptions,
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", metavar="FILE", help="File to write; ends in .nc or .csv."),
+    ],
+    study: StudyFile = None,
+    tank_diameter: TankDiameter = None,
+    side: Side = None,
+    mass: Mass = None,
+    depth: Depth = None,
+    cells: Annotated[
+        int | None,
+        typer.Option(
+            "--cells",
+            help="Cells across the longer side of the tank.",
+            rich_help_panel=_PANEL,
+            show_default=False,
+        ),
+    ] = None,
+    cell_size: Annotated[
+        float | None, _flow_option("--cell-size", "m", "Side of a cell, in place of --cells.")
+    ] = None,
+    window: Annotated[float | None, _flow_option("--window", "s", "Smoothing window.")] = None,
+    inertia: Annotated[
+        str | None,
+        typer.Option(
+            "--inertia",
+            metavar="corrected|none",
+            help="Whether to correct for the body's inertia.",
+            rich_help_panel=_PANEL,
+            show_default=False,
+        ),
+    ] = None,
+    flow_drag_coefficient: Annotated[
+        float | None,
+        _flow_option("--flow-drag-coefficient", "1", "Drag coefficient C_x of the correction."),
+    ] = None,
+    min_count: Annotated[
+        int | None,
+        typer.Option(
+            "--min-count",
+            help="Samples that a cell needs to count as measured.",
+            rich_help_panel=_PANEL,
+            show_default=False,
+        ),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace a file that exists.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Take the flow field from a recording.
+
+    The velocity of the body is averaged in each cell and corrected for the body's inertia; cells
+    that it never visited are filled in and flagged. Mass and side are those of the study, by
+    default of the 11.6-g, 3-cm block of the paper.
+    """
+    from driftwalk.flow import save_flow
+    from driftwalk.flow.write import check_target
+
+    existing = "replace" if overwrite else "error"
+    check_target(out, existing=existing)
+    overrides = study_overrides(
+        keys=FLOW_KEYS,
+        tank_diameter=tank_diameter,
+        side=side,
+        mass=mass,
+        depth=depth,
+        cells=cells,
+        cell_size=cell_size,
+        window=window,
+        inertia=inertia,
+        flow_drag_coefficient=flow_drag_coefficient,
+        min_count=min_count,
+    )
+    resolved = resolve_study(study, overrides)
+    if study is None:
+        # Without a study nobody has said how large the tank is: the default one is no answer.
+        trajectory = how.load(recording, tank_diameter=tank_diameter, side=resolved.block.side_m)
+    else:
+        trajectory = load_with_study(recording, resolved, how)
+    field = _extract(trajectory, resolved, body=how.body)
+    save_flow(field, out, existing=existing)
+    _report(field, out, json=json)
+
+
+def _extract(trajectory: xr.Dataset, study: Study, *, body: str | None) -> xr.Dataset:
+    from driftwalk.flow import extract_flow
+
+    return extract_flow(
+        trajectory,
+        body="all" if body == "all" else None,
+        cells=study.flow.cells,
+        cell_size=study.flow.cell_size_m,
+        window=study.flow.smoothing_window_s,
+        inertia=study.flow.inertia,
+        mass=study.block.mass_kg,
+        side=study.block.side_m,
+        depth=study.wetted_depth_m,
+        water_density=study.water.density_kg_m3,
+        flow_drag_coefficient=study.flow.flow_drag_coefficient,
+        min_count=study.flow.min_count,
+    )
+
+
+def _report(field: xr.Dataset, out: Path, *, json: bool) -> None:
+    """Say what was written and what to know about it."""
+    facts = field.attrs
+    if json:
+        shown = {key: value for key, value in facts.items() if key not in ("kind", "arena")}
+        print_json({"out": out, "rows": field.sizes["y"], "columns": field.sizes["x"], **shown})
+        return
+    if "warning" in facts:
+        print_note(f"warning: {facts['warning']}")
+    if facts["inertia"] == "corrected":
+        print_note(
+            f"corrected for a body of {facts['mass_kg']:g} kg and {facts['area_m2']:g} m2 "
+            f"with C_x = {facts['flow_drag_coefficient']:g}"
+        )
+    print_note(
+        f"wrote {out}: {field.sizes['x']} x {field.sizes['y']} cells of "
+        f"{1e3 * facts['cell_size_m']:g} mm from {facts['samples_used']} samples; "
+        f"{100 * facts['measured_share']:.0f} % of the tank measured, the rest filled"
+    )

@@ -1,0 +1,3 @@
+"""Readers of flow-field files: one file per layout."""
+
+__all__: list[str] = []

@@ -1,0 +1,118 @@
+"""From rows x, y, u, v in any order to a regular grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import FormatError
+
+Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.intp]
+
+_SAME = 1e-6
+"""Positions that differ by less than this part of the field's width are one."""
+_EVEN = 0.02
+"""How far a node may lie off an even grid, in spacings: positions are printed with few digits."""
+
+
+@dataclass(frozen=True)
+class FieldRows:
+    """A velocity field as a table, a row per node, in the file's own units."""
+
+    line: Indices
+    """Line of the file, from 1, shape (n,)."""
+    x: Array
+    """Position x, shape (n,)."""
+    y: Array
+    """Position y, shape (n,)."""
+    u: Array
+    """Velocity along x, shape (n,)."""
+    v: Array
+    """Velocity along y, shape (n,)."""
+    valid: npt.NDArray[np.bool_]
+    """Whether the file holds the row's velocity for good, shape (n,)."""
+    metres: float | None = 1.0
+    """Metres per unit of length; None when the file does not say."""
+    metres_per_second: float | None = 1.0
+    """Metres per second per unit of velocity; None when the file does not say."""
+
+
+@dataclass(frozen=True)
+class GriddedField:
+    """A velocity field on a regular grid, in the file's own units."""
+
+    x: Array
+    """Nodes along x, shape (nx,)."""
+    y: Array
+    """Nodes along y, shape (ny,)."""
+    velocity: Array
+    """Velocities, shape (ny, nx, 2)."""
+    valid: npt.NDArray[np.bool_]
+    """Which nodes hold data, shape (ny, nx)."""
+
+
+def grid_rows(rows: FieldRows, path: Path) -> GriddedField:
+    """Put the rows of a file on their grid.
+
+    Raises
+    ------
+    FormatError
+        When a node stands in two rows, is missing, or the nodes are not evenly spaced.
+    """
+    x, column = _axis("x", rows.x, rows.line, path)
+    y, row = _axis("y", rows.y, rows.line, path)
+    node = row * x.size + column
+    _refuse_duplicates(node, rows, path)
+    absent = np.setdiff1d(np.arange(x.size * y.size), node)
+    if absent.size:
+        j, i = divmod(int(absent[0]), x.size)
+        raise FormatError(
+            f"the grid of {x.size} x {y.size} nodes lacks {absent.size} of them, the first at "
+            f"x = {x[i]:.6g}, y = {y[j]:.6g}: write a row for every node",
+            path=path,
+        )
+    order = np.argsort(node)
+    velocity = np.column_stack([rows.u, rows.v])[order].reshape(y.size, x.size, 2)
+    return GriddedField(x, y, velocity, rows.valid[order].reshape(y.size, x.size))
+
+
+def _axis(name: str, values: Array, line: Indices, path: Path) -> tuple[Array, Indices]:
+    """Return the nodes along an axis and the number of each row's node."""
+    order = np.argsort(values, kind="stable")
+    width = float(np.ptp(values))
+    if width == 0.0:
+        raise FormatError(f"all rows have the same {name}: a grid needs 2 at least", path=path)
+    is_new = np.concatenate([[False], np.diff(values[order]) > _SAME * width])
+    number = np.empty(values.size, dtype=np.intp)
+    number[order] = np.cumsum(is_new)
+    count = np.bincount(number)
+    nodes = np.bincount(number, weights=values) / count
+    even = np.linspace(nodes[0], nodes[-1], nodes.size)
+    if abs(nodes - even).max() > _EVEN * (even[1] - even[0]):
+        # Most likely one row has a wrong position, which makes a line of nodes of its own.
+        rarest = int(count.argmin())
+        at = int(np.flatnonzero(number == rarest)[0])
+        raise FormatError(
+            f"the nodes along {name} are not evenly spaced; {name} = {values[at]:.6g} stands in "
+            f"{count[rarest]} of {values.size} rows",
+            path=path,
+            line=int(line[at]),
+        )
+    return np.asarray(even), number
+
+
+def _refuse_duplicates(node: Indices, rows: FieldRows, path: Path) -> None:
+    order = np.argsort(node, kind="stable")
+    again = np.flatnonzero(np.diff(node[order]) == 0)
+    if again.size:
+        first, second = order[again[0]], order[again[0] + 1]
+        raise FormatError(
+            f"the node x = {rows.x[second]:.6g}, y = {rows.y[second]:.6g} stands in line "
+            f"{rows.line[first]} already",
+            path=path,
+            line=int(rows.line[second]),
+        )
