@@ -52,6 +52,7 @@ struct Columns {
 // What a thread keeps between calls, so that a call allocates nothing once it is warm.
 struct Scratch {
   KsWorkspace workspace;
+  KsReference reference;
   Columns columns;
 };
 Scratch& scratch() {
@@ -61,14 +62,27 @@ Scratch& scratch() {
 
 Place place_of(const KsPlace& place) { return {place.x, place.y, place.quadrant, place.index}; }
 
-Result compare(const KsReference& reference, const Points& points, bool limits) {
-  const nb::gil_scoped_release released;
+Result compare_with(const KsReference& reference, const Points& points, bool limits) {
   Scratch& own = scratch();
   own.columns.assign(points);
   const KsResult r =
       ks_two_sample(reference, own.columns.x.data(), own.columns.y.data(), own.columns.size(),
                     own.workspace, limits ? KsTies::limits : KsTies::strict);
   return {r.d1, r.d2, r.n1, r.n2, r.tied, place_of(r.place1), place_of(r.place2)};
+}
+
+Result compare(const KsReference& reference, const Points& points, bool limits) {
+  const nb::gil_scoped_release released;
+  return compare_with(reference, points, limits);
+}
+
+Result compare_once(const Points& a, const Points& b, bool limits) {
+  const nb::gil_scoped_release released;
+  Scratch& own = scratch();
+  own.columns.assign(a);
+  own.reference.assign(own.columns.x.data(), own.columns.y.data(), own.columns.size(),
+                       own.workspace);
+  return compare_with(own.reference, b, limits);
 }
 
 // (D n1 n2, points that tie, place)
@@ -111,5 +125,6 @@ void register_ks(nb::module_& module) {
       .def_prop_ro("size", &KsReference::size)
       .def("compare", &compare, "points"_a, "limits"_a)
       .def("peacock", &peacock, "points"_a);
+  module.def("ks_compare", &compare_once, "a"_a, "b"_a, "limits"_a);
   module.def("ks_permutations", &permute, "pooled"_a, "n1"_a, "block_of"_a, "labels"_a, "limits"_a);
 }

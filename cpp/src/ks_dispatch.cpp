@@ -97,10 +97,14 @@ std::int64_t first_not_finite(const double* x, const double* y, std::int64_t n) 
   return -1;
 }
 
-KsReference::KsReference(const double* x, const double* y, std::int64_t n)
-    : data_(std::make_unique<Data>()) {
-  KsSortScratch scratch;
-  ks_sort(x, y, n, scratch, data_->sorted);
+KsReference::KsReference() : data_(std::make_unique<Data>()) {}
+KsReference::KsReference(const double* x, const double* y, std::int64_t n) : KsReference() {
+  KsWorkspace workspace;
+  assign(x, y, n, workspace);
+}
+void KsReference::assign(const double* x, const double* y, std::int64_t n,
+                         KsWorkspace& workspace) {
+  ks_sort(x, y, n, workspace.data().sort, data_->sorted);
   data_->x.assign(x, x + n);
   data_->y.assign(y, y + n);
 }

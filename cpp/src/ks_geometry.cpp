@@ -4,34 +4,76 @@
 namespace driftwalk {
 namespace {
 
-// Merge two sorted axes into the pooled order and call visit(position, pooled index, key).
-template <class Visit>
-void merge(const KsSortedAxis& first, std::int64_t n1, const KsSortedAxis& second, std::int64_t n2,
-           Visit visit) {
+// One comparison of the merge. Which side comes next is a coin toss: it is selected by masks, as a
+// branch would be guessed wrong half of the time.
+struct Merged {
+  std::uint64_t key;
+  std::int32_t point;
+};
+Merged select(bool take_b, std::uint64_t key_a, std::int32_t point_a, std::uint64_t key_b,
+              std::int32_t point_b) {
+  const std::uint64_t mask = std::uint64_t(0) - std::uint64_t(take_b);
+  return {key_a ^ ((key_a ^ key_b) & mask), point_a ^ ((point_a ^ point_b) & std::int32_t(mask))};
+}
+
+// Merge two sorted axes into the pooled order: call place(position, pooled index), set `starts` to 1
+// where a new value begins and return how many values there are.
+//
+// The merge runs from both ends at once, as either end waits for the outcome of its last comparison.
+template <class Place>
+std::int64_t merge(const KsSortedAxis& first, std::int64_t n1, const KsSortedAxis& second,
+                   std::int64_t n2, std::uint8_t* starts, Place place) {
   const std::uint64_t* const a = first.key.data();
   const std::uint64_t* const b = second.key.data();
+  const std::int32_t* const point_a = first.index.data();
+  const std::int32_t* const point_b = second.index.data();
+  const std::int32_t offset = std::int32_t(n1);
   std::int64_t i = 0;
   std::int64_t j = 0;
-  while (i < n1 && j < n2) {
-    // Which side comes next is a coin toss: selected by masks, as a branch would be guessed wrong
-    // half of the time.
-    const std::uint64_t key_a = a[i];
-    const std::uint64_t key_b = b[j];
-    const std::int32_t point_a = first.index[i];
-    const std::int32_t point_b = second.index[j] + std::int32_t(n1);
-    const std::int64_t take_b = key_b < key_a;
-    const std::uint64_t mask = std::uint64_t(-take_b);
-    const std::int32_t point = point_a ^ ((point_a ^ point_b) & std::int32_t(mask));
-    visit(i + j, point, key_a ^ ((key_a ^ key_b) & mask));
-    i += 1 - take_b;
+  std::int64_t i_end = n1;
+  std::int64_t j_end = n2;
+  std::uint64_t below = 0;                         // the last key from below, and the last from
+  std::uint64_t above = ~std::uint64_t(0);         // above; at first what no finite number has
+  std::int64_t runs = 0;
+  while (i_end - i > 1 && j_end - j > 1) {
+    const bool take_b = b[j] < a[i];
+    const Merged low = select(take_b, a[i], point_a[i], b[j], point_b[j] + offset);
+    place(i + j, low.point);
+    starts[i + j] = low.key != below;
+    runs += low.key != below;
+    below = low.key;
+    i += !take_b;
+    j += take_b;
+
+    const bool take_b_end = b[j_end - 1] >= a[i_end - 1];
+    const Merged high = select(take_b_end, a[i_end - 1], point_a[i_end - 1], b[j_end - 1],
+                               point_b[j_end - 1] + offset);
+    const std::int64_t last = i_end + j_end - 1;
+    place(last, high.point);
+    if (last + 1 < n1 + n2) {
+      starts[last + 1] = high.key != above;
+    }
+    runs += high.key != above;
+    above = high.key;
+    i_end -= !take_b_end;
+    j_end -= take_b_end;
+  }
+  while (i < i_end || j < j_end) {
+    const bool take_b = i == i_end || (j < j_end && b[j] < a[i]);
+    const std::uint64_t key = take_b ? b[j] : a[i];
+    place(i + j, take_b ? point_b[j] + offset : point_a[i]);
+    starts[i + j] = key != below;
+    runs += key != below;
+    below = key;
+    i += !take_b;
     j += take_b;
   }
-  for (; i < n1; ++i) {
-    visit(i + j, first.index[i], a[i]);
+  // Where the two ends meet.
+  if (i + j < n1 + n2) {
+    starts[i + j] = above != below;
+    runs -= above == below;
   }
-  for (; j < n2; ++j) {
-    visit(i + j, second.index[j] + std::int32_t(n1), b[j]);
-  }
+  return runs;
 }
 
 // Start of the run of equal values that each position belongs to, by point; `next` gets the same
@@ -60,9 +102,13 @@ std::int64_t count_tied(const KsGeometry& g) {
 }
 
 // Equal x by descending y, then equal y by descending position in x.
-void order_ties(KsGeometry& g) {
+void order_ties(KsGeometry& g, std::int64_t n1) {
+  ks_grow(g.y_point, g.n);
   ks_grow(g.start_of, g.n);
   ks_grow(g.next, g.n);
+  for (std::int64_t point = 0; point < g.n; ++point) {
+    g.y_point[g.position_of[point]] = std::int32_t(point);
+  }
   run_starts(g.x_starts, g.point.data(), g.n, g.start_of, g.next);
   for (std::int64_t k = g.n - 1; k >= 0; --k) {
     const std::int32_t point = g.y_point[k];
@@ -72,6 +118,7 @@ void order_ties(KsGeometry& g) {
   for (std::int64_t k = g.n - 1; k >= 0; --k) {
     const std::int32_t point = g.point[k];
     g.y_position[k] = g.next[g.start_of[point]]++;
+    g.second[k] = point >= n1;
   }
 }
 
@@ -84,35 +131,25 @@ void ks_geometry(const KsSortedSample& first, const KsSortedSample& second, KsGe
   ks_grow(g.second, g.n);
   ks_grow(g.x_starts, g.n);
   ks_grow(g.y_starts, g.n);
-  ks_grow(g.y_point, g.n);
   ks_grow(g.position_of, g.n);
-  std::int64_t x_runs = 0;
-  std::int64_t y_runs = 0;
-  std::uint64_t previous = 0; // the key of a NaN: no finite number has it
-  merge(first.y, first.n, second.y, second.n,
-        [&](std::int64_t k, std::int32_t point, std::uint64_t key) {
-          g.y_point[k] = point;
-          g.position_of[point] = std::int32_t(k);
-          g.y_starts[k] = key != previous;
-          y_runs += key != previous;
-          previous = key;
-        });
-  previous = 0;
-  merge(first.x, first.n, second.x, second.n,
-        [&](std::int64_t k, std::int32_t point, std::uint64_t key) {
-          g.point[k] = point;
-          g.y_position[k] = g.position_of[point];
-          g.x_starts[k] = key != previous;
-          x_runs += key != previous;
-          previous = key;
-        });
+  const std::int64_t y_runs = merge(
+      first.y, first.n, second.y, second.n, g.y_starts.data(),
+      [position_of = g.position_of.data()](std::int64_t k, std::int32_t point) {
+        position_of[point] = std::int32_t(k);
+      });
+  const std::int64_t x_runs =
+      merge(first.x, first.n, second.x, second.n, g.x_starts.data(),
+            [position_of = g.position_of.data(), points = g.point.data(),
+             y_position = g.y_position.data(), labels = g.second.data(),
+             n1 = first.n](std::int64_t k, std::int32_t point) {
+              points[k] = point;
+              y_position[k] = position_of[point];
+              labels[k] = point >= n1;
+            });
   g.tied = 0;
   if (x_runs != g.n || y_runs != g.n) {
-    order_ties(g);
+    order_ties(g, first.n);
     g.tied = count_tied(g);
-  }
-  for (std::int64_t k = 0; k < g.n; ++k) {
-    g.second[k] = g.point[k] >= first.n;
   }
 }
 

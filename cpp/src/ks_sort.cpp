@@ -30,30 +30,43 @@ struct KeyedIndex {
   }
 };
 
-void sort_range(KsSortedAxis& axis, std::int64_t begin, std::int64_t end) {
-  constexpr std::int64_t insertion_up_to = 24;
-  if (end - begin <= insertion_up_to) {
-    for (std::int64_t i = begin + 1; i < end; ++i) {
-      const std::uint64_t key = axis.key[i];
-      const std::int32_t index = axis.index[i];
-      std::int64_t j = i;
-      for (; j > begin && axis.key[j - 1] > key; --j) {
-        axis.key[j] = axis.key[j - 1];
-        axis.index[j] = axis.index[j - 1];
-      }
-      axis.key[j] = key;
-      axis.index[j] = index;
+void comparison_sort(KsSortedAxis& axis, std::int64_t n) {
+  std::vector<KeyedIndex> items(static_cast<std::size_t>(n));
+  for (std::int64_t i = 0; i < n; ++i) {
+    items[i] = {axis.key[i], axis.index[i]};
+  }
+  std::sort(items.begin(), items.end());
+  for (std::int64_t i = 0; i < n; ++i) {
+    axis.key[i] = items[i].key;
+    axis.index[i] = items[i].index;
+  }
+}
+
+// Insertion sort of what is nearly in order; where it is not, as when many keys agree in their
+// leading bits, a comparison sort takes over.
+void repair_order(KsSortedAxis& axis, std::int64_t n) {
+  constexpr std::int64_t moves_per_point = 8;
+  std::int64_t moves_left = moves_per_point * n;
+  std::uint64_t* const keys = axis.key.data();
+  std::int32_t* const indices = axis.index.data();
+  for (std::int64_t i = 1; i < n; ++i) {
+    if (keys[i - 1] <= keys[i]) {
+      continue;
     }
-    return;
-  }
-  std::vector<KeyedIndex> range(static_cast<std::size_t>(end - begin));
-  for (std::int64_t i = begin; i < end; ++i) {
-    range[i - begin] = {axis.key[i], axis.index[i]};
-  }
-  std::sort(range.begin(), range.end());
-  for (std::int64_t i = begin; i < end; ++i) {
-    axis.key[i] = range[i - begin].key;
-    axis.index[i] = range[i - begin].index;
+    const std::uint64_t key = keys[i];
+    const std::int32_t index = indices[i];
+    std::int64_t j = i;
+    for (; j > 0 && keys[j - 1] > key; --j) {
+      keys[j] = keys[j - 1];
+      indices[j] = indices[j - 1];
+    }
+    keys[j] = key;
+    indices[j] = index;
+    moves_left -= i - j;
+    if (moves_left < 0) {
+      comparison_sort(axis, n);
+      return;
+    }
   }
 }
 
@@ -99,7 +112,7 @@ void ks_sort(const double* values, std::int64_t n, KsSortScratch& scratch, KsSor
       axis.key[i] = key_of(values[i]);
       axis.index[i] = std::int32_t(i);
     }
-    sort_range(axis, 0, n);
+    comparison_sort(axis, n);
     return;
   }
   ks_grow(scratch.key, n);
@@ -121,19 +134,7 @@ void ks_sort(const double* values, std::int64_t n, KsSortScratch& scratch, KsSor
     axis.index[i] = index;
     axis.key[i] = scratch.key[index];
   }
-  // The radix sort keeps the order of the index, so only keys that lie in one bucket are unsorted.
-  for (std::int64_t begin = 0; begin < n;) {
-    std::int64_t end = begin + 1;
-    bool ordered = true;
-    while (end < n && sorted[end] >> 32 == sorted[begin] >> 32) {
-      ordered = ordered && axis.key[end - 1] <= axis.key[end];
-      ++end;
-    }
-    if (!ordered) {
-      sort_range(axis, begin, end);
-    }
-    begin = end;
-  }
+  repair_order(axis, n);
 }
 
 void ks_sort(const double* x, const double* y, std::int64_t n, KsSortScratch& scratch,

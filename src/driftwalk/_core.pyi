@@ -9,15 +9,17 @@ _Floats = npt.NDArray[np.float64]
 _Place = tuple[float, float, int, int]
 
 # --- the KS statistic ---------------------------------------------------------------------------
+# D1 and D2 in units of 1 / (n1 n2), n1, n2, points that tie, place of D1, place of D2
+KsResult = tuple[int, int, int, int, int, _Place, _Place]
+
 class KsReference:
     def __init__(self, points: _Floats) -> None: ...
     @property
     def size(self) -> int: ...
-    def compare(
-        self, points: _Floats, limits: bool
-    ) -> tuple[int, int, int, int, int, _Place, _Place]: ...
+    def compare(self, points: _Floats, limits: bool) -> KsResult: ...
     def peacock(self, points: _Floats) -> tuple[int, int, _Place]: ...
 
+def ks_compare(a: _Floats, b: _Floats, limits: bool) -> KsResult: ...
 def ks_permutations(
     pooled: _Floats,
     n1: int,

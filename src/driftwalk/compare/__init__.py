@@ -4,7 +4,7 @@
 general tool for any two sets of points in the plane.
 """
 
-from driftwalk.compare.autocorrelation import autocorrelation_time
+from driftwalk.compare.autocorrelation import autocorrelation_time, memory_time
 from driftwalk.compare.density import joint_density, step_length_edges, turning_angle_edges
 from driftwalk.compare.ks import (
     QUADRANTS,
@@ -38,6 +38,7 @@ __all__ = [
     "ks_compare",
     "ks_distance",
     "ks_reference",
+    "memory_time",
     "plan_steps",
     "step_length_edges",
     "steps",

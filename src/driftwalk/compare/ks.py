@@ -114,41 +114,10 @@ class KsReference:
     ) -> KsComparison:
         """Return the comparison with another sample, as `ks_compare` does."""
         points = checked_points(other, "other")
-        _check_word("ties", ties, ("strict", "limits"))
-        _check_word("combine", combine, ("mean", "max"))
-        _check_word("method", method, ("fasano-franceschini", "peacock"))
+        _check_options(ties, combine, method)
         if method == "peacock":
-            return self._peacock(points)
-        d1, d2, n1, n2, tied, place1, place2 = self.native.compare(points, ties == "limits")
-        product = n1 * n2
-        tied_fraction = tied / (n1 + n2)
-        if ties == "strict" and tied_fraction > TIED_FRACTION:
-            warnings.warn(
-                f"{100 * tied_fraction:.0f} % of the points share a coordinate with another point, "
-                'and open quadrants leave such points out: consider ties="limits"',
-                ComparisonWarning,
-                stacklevel=3,
-            )
-        return KsComparison(
-            distance=max(d1, d2) / product if combine == "max" else (d1 + d2) / (2 * product),
-            distance_a=d1 / product,
-            distance_b=d2 / product,
-            difference_a=d1,
-            difference_b=d2,
-            n_a=n1,
-            n_b=n2,
-            place_a=_place(place1),
-            place_b=_place(place2),
-            tied_fraction=tied_fraction,
-        )
-
-    def _peacock(self, points: Points) -> KsComparison:
-        d, tied, cut = self.native.peacock(points)
-        n1, n2 = len(self), points.shape[0]
-        distance, place = d / (n1 * n2), _place(cut)
-        return KsComparison(
-            distance, distance, distance, d, d, n1, n2, place, place, tied / (n1 + n2)
-        )
+            return _peacock(self.native, points)
+        return _comparison(self.native.compare(points, ties == "limits"), ties, combine)
 
 
 def ks_reference(sample: npt.ArrayLike) -> KsReference:
@@ -235,7 +204,11 @@ def ks_compare(
     >>> QUADRANTS[ks_compare([[0, 0], [1, 1]], [[5, 5], [6, 6]]).place.quadrant]
     'right above'
     """
-    return KsReference(checked_points(a, "a")).compare(b, ties=ties, combine=combine, method=method)
+    first, second = checked_points(a, "a"), checked_points(b, "b")
+    _check_options(ties, combine, method)
+    if method == "peacock":
+        return _peacock(_core.KsReference(first), second)
+    return _comparison(_core.ks_compare(first, second, ties == "limits"), ties, combine)
 
 
 def checked_points(points: npt.ArrayLike, name: str) -> Points:
@@ -262,6 +235,43 @@ def _place(place: tuple[float, float, int, int]) -> KsPlace:
     return KsPlace(x, y, quadrant, row) if quadrant >= 0 else KsPlace(np.nan, np.nan, -1, -1)
 
 
-def _check_word(option: str, word: str, words: tuple[str, ...]) -> None:
-    if word not in words:
-        raise InputError(f"{option} must be one of {', '.join(words)}, got {word!r}")
+def _comparison(raw: _core.KsResult, ties: Ties, combine: Combine) -> KsComparison:
+    d1, d2, n1, n2, tied, place1, place2 = raw
+    product = n1 * n2
+    tied_fraction = tied / (n1 + n2)
+    if ties == "strict" and tied_fraction > TIED_FRACTION:
+        warnings.warn(
+            f"{100 * tied_fraction:.0f} % of the points share a coordinate with another point, "
+            'and open quadrants leave such points out: consider ties="limits"',
+            ComparisonWarning,
+            stacklevel=4,
+        )
+    return KsComparison(
+        distance=max(d1, d2) / product if combine == "max" else (d1 + d2) / (2 * product),
+        distance_a=d1 / product,
+        distance_b=d2 / product,
+        difference_a=d1,
+        difference_b=d2,
+        n_a=n1,
+        n_b=n2,
+        place_a=_place(place1),
+        place_b=_place(place2),
+        tied_fraction=tied_fraction,
+    )
+
+
+def _peacock(reference: _core.KsReference, points: Points) -> KsComparison:
+    d, tied, cut = reference.peacock(points)
+    n1, n2 = reference.size, points.shape[0]
+    distance, place = d / (n1 * n2), _place(cut)
+    return KsComparison(distance, distance, distance, d, d, n1, n2, place, place, tied / (n1 + n2))
+
+
+def _check_options(ties: str, combine: str, method: str) -> None:
+    for option, word, words in (
+        ("ties", ties, ("strict", "limits")),
+        ("combine", combine, ("mean", "max")),
+        ("method", method, ("fasano-franceschini", "peacock")),
+    ):
+        if word not in words:
+            raise InputError(f"{option} must be one of {', '.join(words)}, got {word!r}")

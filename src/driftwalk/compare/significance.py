@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.compare.autocorrelation import steps_autocorrelation_time
+from driftwalk.compare.autocorrelation import steps_memory_time
 from driftwalk.compare.ks import Points, Ties, checked_points
 from driftwalk.core.errors import InputError
 
@@ -37,7 +37,7 @@ class PermutationTest(NamedTuple):
     block_length: int
     """Steps of a block."""
     autocorrelation_time: float
-    """The longest found in either series [steps]; 1 for independent steps."""
+    """The longest found in either series [steps], see `memory_time`; 1 for independent steps."""
     blocks_a: int
     """Blocks of the first series."""
     blocks_b: int
@@ -68,7 +68,8 @@ def block_permutation_test(
     a, b : array_like, shapes (n, 2), (m, 2)
         Series of points in time order, for example (step length, turning angle).
     block_length : int, optional
-        Points of a block; default: six autocorrelation times, estimated from both series.
+        Points of a block; default: six autocorrelation times (`memory_time` of the ranks of either
+        column, the longest of both series).
     permutations : int
         Number of permutations, >= 1.
     seed : int
@@ -93,7 +94,7 @@ def block_permutation_test(
         raise InputError(f"permutations must be at least 1, got {permutations}")
     if seed < 0:
         raise InputError(f"seed must not be negative, got {seed}")
-    memory = max(steps_autocorrelation_time(first), steps_autocorrelation_time(second))
+    memory = max(steps_memory_time(first), steps_memory_time(second))
     length = math.ceil(BLOCK_TIMES * memory) if block_length is None else int(block_length)
     if length < 1:
         raise InputError(f"block_length must be at least 1, got {block_length}")

@@ -47,14 +47,19 @@ struct KsResult {
 // Index of the first point with a coordinate that is not finite, or -1.
 std::int64_t first_not_finite(const double* x, const double* y, std::int64_t n);
 
-// The fixed sample, sorted on both axes. Immutable: any number of threads may share it.
+class KsWorkspace;
+
+// The fixed sample, sorted on both axes. Once made, any number of threads may share it.
 class KsReference {
 public:
+  KsReference(); // an empty sample
   KsReference(const double* x, const double* y, std::int64_t n);
   ~KsReference();
   KsReference(KsReference&&) noexcept;
   KsReference& operator=(KsReference&&) noexcept;
 
+  // Take another sample and keep the memory.
+  void assign(const double* x, const double* y, std::int64_t n, KsWorkspace& workspace);
   std::int64_t size() const;
 
   struct Data;
