@@ -69,7 +69,7 @@ def inertia_correction(
     factor = math.sqrt(mass / (0.5 * water_density * area * flow_drag_coefficient))
     # a / sqrt|a| tends to 0 with a, though the quotient is 0/0 there.
     root = np.sqrt(np.where(size > 0.0, size, 1.0))
-    return np.asarray(np.where(size > 0.0, factor * a / root, 0.0 * a))
+    return np.asarray(np.where(size > 0.0, factor * a / root, 0.0 * size))
 
 
 def cross_section(area: float | None, side: float | None, depth: float | None) -> float:
