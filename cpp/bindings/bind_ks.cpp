@@ -26,8 +26,8 @@ using Table = nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 // (x, y, quadrant, index)
 using Place = std::tuple<double, double, std::int32_t, std::int64_t>;
 // (D1 n1 n2, D2 n1 n2, n1, n2, points that tie, place of D1, place of D2)
-using Result = std::tuple<std::int64_t, std::int64_t, std::int64_t, std::int64_t, std::int64_t,
-                          Place, Place>;
+using Result =
+    std::tuple<std::int64_t, std::int64_t, std::int64_t, std::int64_t, std::int64_t, Place, Place>;
 
 struct Columns {
   std::vector<double> x;
@@ -60,7 +60,9 @@ Scratch& scratch() {
   return of_this_thread;
 }
 
-Place place_of(const KsPlace& place) { return {place.x, place.y, place.quadrant, place.index}; }
+Place place_of(const KsPlace& place) {
+  return {place.x, place.y, place.quadrant, place.index};
+}
 
 Result compare_with(const KsReference& reference, const Points& points, bool limits) {
   Scratch& own = scratch();
@@ -86,7 +88,8 @@ Result compare_once(const Points& a, const Points& b, bool limits) {
 }
 
 // (D n1 n2, points that tie, place)
-std::tuple<std::int64_t, std::int64_t, Place> peacock(const KsReference& reference, const Points& points) {
+std::tuple<std::int64_t, std::int64_t, Place> peacock(const KsReference& reference,
+                                                      const Points& points) {
   const nb::gil_scoped_release released;
   Scratch& own = scratch();
   own.columns.assign(points);
@@ -95,9 +98,10 @@ std::tuple<std::int64_t, std::int64_t, Place> peacock(const KsReference& referen
   return {r.d, r.tied, place_of(r.place)};
 }
 
-nb::ndarray<nb::numpy, std::int64_t, nb::ndim<1>>
-permute(const Points& pooled, std::int64_t n1, const Row<std::int32_t>& block_of,
-        const Table<std::uint8_t>& labels, bool limits) {
+nb::ndarray<nb::numpy, std::int64_t, nb::ndim<1>> permute(const Points& pooled, std::int64_t n1,
+                                                          const Row<std::int32_t>& block_of,
+                                                          const Table<std::uint8_t>& labels,
+                                                          bool limits) {
   const std::size_t count = labels.shape(0);
   auto* const statistic = new std::int64_t[count];
   nb::capsule owner(statistic, [](void* p) noexcept { delete[] static_cast<std::int64_t*>(p); });

@@ -26,8 +26,8 @@ T* new_row(std::size_t n, nb::capsule& owner) {
 }
 
 // (length, angle, index of the pair in the plan, left out for zero length, left out as missing)
-using Steps = std::tuple<NewRow<double>, NewRow<double>, NewRow<std::int32_t>, std::int64_t,
-                         std::int64_t>;
+using Steps =
+    std::tuple<NewRow<double>, NewRow<double>, NewRow<std::int32_t>, std::int64_t, std::int64_t>;
 
 template <class T>
 Steps apply(const Row<std::int32_t>& left, const Row<double>& weight,
@@ -46,8 +46,8 @@ Steps apply(const Row<std::int32_t>& left, const Row<double>& weight,
   std::size_t written = 0;
   {
     const nb::gil_scoped_release released;
-    written = std::size_t(driftwalk::apply_step_plan(plan, x.data(), y.data(), length, angle,
-                                                     &zero, &missing, kept));
+    written = std::size_t(
+        driftwalk::apply_step_plan(plan, x.data(), y.data(), length, angle, &zero, &missing, kept));
   }
   return {NewRow<double>(length, {written}, length_owner),
           NewRow<double>(angle, {written}, angle_owner),

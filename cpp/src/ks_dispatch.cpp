@@ -86,7 +86,9 @@ double KsResult::distance() const {
   return n1 > 0 && n2 > 0 ? double(d1 + d2) / (2.0 * double(n1) * double(n2))
                           : std::numeric_limits<double>::quiet_NaN();
 }
-const KsPlace& KsResult::place() const { return d1 >= d2 ? place1 : place2; }
+const KsPlace& KsResult::place() const {
+  return d1 >= d2 ? place1 : place2;
+}
 
 std::int64_t first_not_finite(const double* x, const double* y, std::int64_t n) {
   for (std::int64_t i = 0; i < n; ++i) {
@@ -102,8 +104,7 @@ KsReference::KsReference(const double* x, const double* y, std::int64_t n) : KsR
   KsWorkspace workspace;
   assign(x, y, n, workspace);
 }
-void KsReference::assign(const double* x, const double* y, std::int64_t n,
-                         KsWorkspace& workspace) {
+void KsReference::assign(const double* x, const double* y, std::int64_t n, KsWorkspace& workspace) {
   ks_sort(x, y, n, workspace.data().sort, data_->sorted);
   data_->x.assign(x, x + n);
   data_->y.assign(y, y + n);
@@ -111,7 +112,9 @@ void KsReference::assign(const double* x, const double* y, std::int64_t n,
 KsReference::~KsReference() = default;
 KsReference::KsReference(KsReference&&) noexcept = default;
 KsReference& KsReference::operator=(KsReference&&) noexcept = default;
-std::int64_t KsReference::size() const { return data_->sorted.n; }
+std::int64_t KsReference::size() const {
+  return data_->sorted.n;
+}
 
 KsWorkspace::KsWorkspace() : data_(std::make_unique<Data>()) {}
 KsWorkspace::~KsWorkspace() = default;
@@ -157,9 +160,10 @@ KsPeacock ks_peacock(const KsReference& reference, const double* x2, const doubl
   }
   ks_sort(x2, y2, n2, work.sort, work.sorted);
   ks_geometry(first.sorted, work.sorted, work.geometry);
-  const std::int64_t weight[2] = {n2, -n1};
-  const KsCut cut = ks_largest_cut(work.geometry, weight);
-  result.d = cut.value;
+  const std::int64_t common = std::gcd(n1, n2);
+  const std::int64_t weight[2] = {n2 / common, -(n1 / common)};
+  const KsCut cut = ks_largest_cut(work.geometry, weight, n1 * weight[0]);
+  result.d = cut.value * common;
   result.tied = work.geometry.tied;
   if (cut.position >= 0) {
     const auto coordinate = [n1](const std::vector<double>& a, const double* b, std::int64_t i) {

@@ -16,10 +16,11 @@ Merged select(bool take_b, std::uint64_t key_a, std::int32_t point_a, std::uint6
   return {key_a ^ ((key_a ^ key_b) & mask), point_a ^ ((point_a ^ point_b) & std::int32_t(mask))};
 }
 
-// Merge two sorted axes into the pooled order: call place(position, pooled index), set `starts` to 1
-// where a new value begins and return how many values there are.
+// Merge two sorted axes into the pooled order: call place(position, pooled index), set `starts` to
+// 1 where a new value begins and return how many values there are.
 //
-// The merge runs from both ends at once, as either end waits for the outcome of its last comparison.
+// The merge runs from both ends at once, as either end waits for the outcome of its last
+// comparison.
 template <class Place>
 std::int64_t merge(const KsSortedAxis& first, std::int64_t n1, const KsSortedAxis& second,
                    std::int64_t n2, std::uint8_t* starts, Place place) {
@@ -32,8 +33,8 @@ std::int64_t merge(const KsSortedAxis& first, std::int64_t n1, const KsSortedAxi
   std::int64_t j = 0;
   std::int64_t i_end = n1;
   std::int64_t j_end = n2;
-  std::uint64_t below = 0;                         // the last key from below, and the last from
-  std::uint64_t above = ~std::uint64_t(0);         // above; at first what no finite number has
+  std::uint64_t below = 0;                 // the last key from below, and the last from
+  std::uint64_t above = ~std::uint64_t(0); // above; at first what no finite number has
   std::int64_t runs = 0;
   while (i_end - i > 1 && j_end - j > 1) {
     const bool take_b = b[j] < a[i];
@@ -132,20 +133,19 @@ void ks_geometry(const KsSortedSample& first, const KsSortedSample& second, KsGe
   ks_grow(g.x_starts, g.n);
   ks_grow(g.y_starts, g.n);
   ks_grow(g.position_of, g.n);
-  const std::int64_t y_runs = merge(
-      first.y, first.n, second.y, second.n, g.y_starts.data(),
-      [position_of = g.position_of.data()](std::int64_t k, std::int32_t point) {
-        position_of[point] = std::int32_t(k);
-      });
-  const std::int64_t x_runs =
-      merge(first.x, first.n, second.x, second.n, g.x_starts.data(),
-            [position_of = g.position_of.data(), points = g.point.data(),
-             y_position = g.y_position.data(), labels = g.second.data(),
-             n1 = first.n](std::int64_t k, std::int32_t point) {
-              points[k] = point;
-              y_position[k] = position_of[point];
-              labels[k] = point >= n1;
+  const std::int64_t y_runs =
+      merge(first.y, first.n, second.y, second.n, g.y_starts.data(),
+            [position_of = g.position_of.data()](std::int64_t k, std::int32_t point) {
+              position_of[point] = std::int32_t(k);
             });
+  const std::int64_t x_runs = merge(first.x, first.n, second.x, second.n, g.x_starts.data(),
+                                    [position_of = g.position_of.data(), points = g.point.data(),
+                                     y_position = g.y_position.data(), labels = g.second.data(),
+                                     n1 = first.n](std::int64_t k, std::int32_t point) {
+                                      points[k] = point;
+                                      y_position[k] = position_of[point];
+                                      labels[k] = point >= n1;
+                                    });
   g.tied = 0;
   if (x_runs != g.n || y_runs != g.n) {
     order_ties(g, first.n);
@@ -211,8 +211,8 @@ std::int64_t row_weights(const KsGeometry& g, const std::int32_t* x_position, st
 
 } // namespace
 
-void ks_tied_weights(const KsGeometry& g, const std::uint8_t* second,
-                     const std::int64_t weight[2], KsTiedWeights& weights) {
+void ks_tied_weights(const KsGeometry& g, const std::uint8_t* second, const std::int64_t weight[2],
+                     KsTiedWeights& weights) {
   ks_grow(weights.tied, g.n);
   ks_grow(weights.x_position, g.n);
   KsTied* const tied = weights.tied.data();

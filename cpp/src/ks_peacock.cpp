@@ -3,16 +3,20 @@
 #include "driftwalk/stats/ks2d_order.hpp"
 
 #include <algorithm>
+#include <cstdlib>
+#include <limits>
 
 namespace driftwalk {
 namespace {
 
+template <class Weight>
 struct Node {
-  std::int64_t sum = 0;
-  std::int64_t highest = 0; // prefix sum, the empty prefix among them
-  std::int64_t lowest = 0;
+  Weight sum = 0;
+  Weight highest = 0; // prefix sum, the empty prefix among them
+  Weight lowest = 0;
 };
 
+template <class Weight>
 class PrefixTree {
 public:
   explicit PrefixTree(std::int64_t leaves) {
@@ -22,25 +26,26 @@ public:
     nodes_.resize(static_cast<std::size_t>(2 * leaves_));
   }
 
-  void add(std::int64_t leaf, std::int64_t weight) {
+  void add(std::int64_t leaf, Weight weight) {
     std::int64_t i = leaf + leaves_;
-    nodes_[i].sum += weight;
-    nodes_[i].highest = std::max<std::int64_t>(nodes_[i].sum, 0);
-    nodes_[i].lowest = std::min<std::int64_t>(nodes_[i].sum, 0);
+    Node<Weight> node = nodes_[i];
+    node.sum += weight;
+    node.highest = std::max<Weight>(node.sum, 0);
+    node.lowest = std::min<Weight>(node.sum, 0);
+    nodes_[i] = node;
     for (i /= 2; i > 0; i /= 2) {
-      const Node& left = nodes_[2 * i];
-      const Node& right = nodes_[2 * i + 1];
-      nodes_[i].sum = left.sum + right.sum;
-      nodes_[i].highest = std::max(left.highest, left.sum + right.highest);
-      nodes_[i].lowest = std::min(left.lowest, left.sum + right.lowest);
+      const Node<Weight> left = nodes_[2 * i];
+      const Node<Weight> right = nodes_[2 * i + 1];
+      nodes_[i] = {left.sum + right.sum, std::max(left.highest, left.sum + right.highest),
+                   std::min(left.lowest, left.sum + right.lowest)};
     }
   }
 
-  const Node& all() const { return nodes_[1]; }
+  const Node<Weight>& all() const { return nodes_[1]; }
 
 private:
   std::int64_t leaves_ = 1;
-  std::vector<Node> nodes_;
+  std::vector<Node<Weight>> nodes_;
 };
 
 // Rank of every point's y among the distinct values, by position in x.
@@ -83,7 +88,8 @@ void find_y(const KsGeometry& g, const std::int64_t weight[2], KsCut& cut) {
 }
 
 // Check the half plane that the tree now holds: x <= X when it grows to the right.
-void check(const Node& half, std::int64_t position, bool right, KsCut& cut) {
+template <class Weight>
+void check(const Node<Weight>& half, std::int64_t position, bool right, KsCut& cut) {
   const std::int64_t below = std::max(half.highest, -half.lowest);
   const std::int64_t above = std::max(half.sum - half.lowest, half.highest - half.sum);
   const std::int64_t value = std::max(below, above);
@@ -92,26 +98,35 @@ void check(const Node& half, std::int64_t position, bool right, KsCut& cut) {
   }
 }
 
-} // namespace
-
-KsCut ks_largest_cut(const KsGeometry& g, const std::int64_t weight[2]) {
+template <class Weight>
+KsCut sweep_both_ways(const KsGeometry& g, const std::int64_t weight[2]) {
   std::int64_t distinct = 0;
   const std::vector<std::int32_t> rank = y_ranks(g, distinct);
+  const Weight weights[2] = {Weight(weight[0]), Weight(weight[1])};
   KsCut cut;
-  PrefixTree left(distinct);
+  PrefixTree<Weight> left(distinct);
   for (std::int64_t k = 0; k < g.n; ++k) {
-    left.add(rank[k], weight[g.second[k]]);
+    left.add(rank[k], weights[g.second[k]]);
     if (k + 1 == g.n || g.x_starts[k + 1] != 0) {
       check(left.all(), k, false, cut);
     }
   }
-  PrefixTree right(distinct);
+  PrefixTree<Weight> right(distinct);
   for (std::int64_t k = g.n - 1; k > 0; --k) {
-    right.add(rank[k], weight[g.second[k]]);
+    right.add(rank[k], weights[g.second[k]]);
     if (g.x_starts[k] != 0) {
       check(right.all(), k - 1, true, cut);
     }
   }
+  return cut;
+}
+
+} // namespace
+
+KsCut ks_largest_cut(const KsGeometry& g, const std::int64_t weight[2], std::int64_t total) {
+  KsCut cut = total <= std::numeric_limits<std::int32_t>::max() / 2
+                  ? sweep_both_ways<std::int32_t>(g, weight)
+                  : sweep_both_ways<std::int64_t>(g, weight);
   if (cut.position >= 0) {
     find_y(g, weight, cut);
   }

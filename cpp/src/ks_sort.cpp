@@ -1,5 +1,5 @@
-// Sorting one axis of a sample: two passes of a radix sort on the leading bits, then a repair of the
-// few places where those bits agree.
+// Sorting one axis of a sample: two passes of a radix sort on the leading bits, then a repair of
+// the few places where those bits agree.
 #include "driftwalk/stats/ks2d_order.hpp"
 
 #include <algorithm>

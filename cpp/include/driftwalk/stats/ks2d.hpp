@@ -35,13 +35,13 @@ struct KsResult {
   std::int64_t n1 = 0;
   std::int64_t n2 = 0;
   std::int64_t tied = 0; // points of both samples that share a coordinate with another
-  KsPlace place1; // where D1 sits: its origin is a point of sample 1
-  KsPlace place2; // where D2 sits: its origin is a point of sample 2
+  KsPlace place1;        // where D1 sits: its origin is a point of sample 1
+  KsPlace place2;        // where D2 sits: its origin is a point of sample 2
 
-  double distance() const;         // (D1 + D2) / 2; NaN when a sample is empty
-  double distance1() const;        // D1
-  double distance2() const;        // D2
-  const KsPlace& place() const;    // of the larger of the two, of D1 when they are equal
+  double distance() const;      // (D1 + D2) / 2; NaN when a sample is empty
+  double distance1() const;     // D1
+  double distance2() const;     // D2
+  const KsPlace& place() const; // of the larger of the two, of D1 when they are equal
 };
 
 // Index of the first point with a coordinate that is not finite, or -1.

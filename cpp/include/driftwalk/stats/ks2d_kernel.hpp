@@ -149,7 +149,8 @@ inline void ks_strict(const KsCorners<Weight>& c, Weight quadrant[4]) {
   quadrant[0] = ks_abs(c.open);
   quadrant[1] = ks_abs(Weight(c.below - c.open - c.column));
   quadrant[2] = ks_abs(Weight(c.left - c.open - c.row));
-  quadrant[3] = ks_abs(Weight(c.open + c.column + c.row + c.equal - c.left_closed - c.below_closed));
+  quadrant[3] =
+      ks_abs(Weight(c.open + c.column + c.row + c.equal - c.left_closed - c.below_closed));
 }
 
 template <class Weight>
@@ -158,8 +159,8 @@ inline void ks_limits(const KsCorners<Weight>& c, Weight quadrant[4]) {
   for (int closed = 0; closed < 4; ++closed) {
     const bool in_x = (closed & 1) != 0;
     const bool in_y = (closed & 2) != 0;
-    const Weight inside = c.open + (in_x ? c.column : 0) + (in_y ? c.row : 0) +
-                          (in_x && in_y ? c.equal : 0);
+    const Weight inside =
+        c.open + (in_x ? c.column : 0) + (in_y ? c.row : 0) + (in_x && in_y ? c.equal : 0);
     const Weight left = in_x ? c.left_closed : c.left;
     const Weight below = in_y ? c.below_closed : c.below;
     const Weight values[4] = {inside, below - inside, left - inside, inside - left - below};

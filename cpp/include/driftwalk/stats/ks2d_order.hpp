@@ -38,7 +38,7 @@ struct KsSortedSample {
 // The pooled points by position, see KsSweep.
 struct KsGeometry {
   std::int64_t n = 0;
-  std::int64_t tied = 0; // points that share a coordinate with another
+  std::int64_t tied = 0;                // points that share a coordinate with another
   std::vector<std::int32_t> point;      // by position in x: index, sample 2 after sample 1
   std::vector<std::int32_t> y_position; // by position in x
   std::vector<std::uint8_t> second;     // by position in x
@@ -57,14 +57,15 @@ void ks_sort(const double* x, const double* y, std::int64_t n, KsSortScratch& sc
 void ks_geometry(const KsSortedSample& first, const KsSortedSample& second, KsGeometry& geometry);
 
 // The largest weight, by absolute value, over all cuts. `position` is the position in x of the last
-// point with x <= X, `y_position` the same in y. See KsPeacock.
+// point with x <= X, `y_position` the same in y. `weight` and
+// `total` as in KsSweep. See KsPeacock.
 struct KsCut {
   std::int64_t value = 0;
   std::int64_t position = -1;
   std::int64_t y_position = -1;
   std::int32_t quadrant = -1;
 };
-KsCut ks_largest_cut(const KsGeometry& geometry, const std::int64_t weight[2]);
+KsCut ks_largest_cut(const KsGeometry& geometry, const std::int64_t weight[2], std::int64_t total);
 
 // What shares a coordinate with each point, by position in x.
 struct KsTiedWeights {

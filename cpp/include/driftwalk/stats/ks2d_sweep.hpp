@@ -1,7 +1,7 @@
 // The sweep of the KS statistic: plain data passed to the kernels of the instruction sets.
 //
-// Positions. Every pooled point has a position 0 .. n-1 in the order of x and one in the order of y.
-// Points with equal x are ordered by descending y, points with equal y by descending position in
+// Positions. Every pooled point has a position 0 .. n-1 in the order of x and one in the order of
+// y. Points with equal x are ordered by descending y, points with equal y by descending position in
 // x (see ks_geometry). Then "before it in both orders" is exactly "smaller in both coordinates",
 // ties or not, and the sweep only counts along a permutation.
 #pragma once
