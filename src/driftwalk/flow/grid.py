@@ -110,4 +110,14 @@ def _centres(low: float, high: float, size: float) -> Array:
     # 1e-9: a side that is a whole number of cells does not get one more from rounding.
     count = max(2, math.ceil((high - low) / size - 1e-9))
     middle = (low + high) / 2.0
-    return np.asarray(middle + (np.arange(count) - (count - 1) / 2.0) * size)
+    return round_nodes(middle + (np.arange(count) - (count - 1) / 2.0) * size)
+
+
+def round_nodes(nodes: Array) -> Array:
+    """Return nodes without the last digits, which depend on how they were computed.
+
+    xarray lines up two fields by comparing their nodes exactly, and -0.147 is to be -0.147 whether
+    it was computed or read from a file.
+    """
+    decimals = 12 - math.floor(math.log10(nodes[-1] - nodes[0]))
+    return np.asarray(np.round(nodes, decimals))

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError
+from driftwalk.flow.grid import round_nodes
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
@@ -102,7 +103,7 @@ def _axis(name: str, values: Array, line: Indices, path: Path) -> tuple[Array, I
             path=path,
             line=int(line[at]),
         )
-    return np.asarray(even), number
+    return round_nodes(even), number
 
 
 def _refuse_duplicates(node: Indices, rows: FieldRows, path: Path) -> None:
