@@ -104,12 +104,12 @@ def test_mistakes_are_one_line_and_leave_no_file(
     assert not out.exists()
 
 
-def test_an_existing_file_is_found_before_the_work(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_an_existing_file_is_left_as_it_is(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "flow.nc"
     out.write_text("mine")
-    assert run(tmp_path / "absent.csv", "-o", out) == 2
+    assert run(recording, "-o", out, "--tank-diameter", "30cm") == 2
     assert "--overwrite" in capsys.readouterr().err
     assert out.read_text() == "mine"
 

@@ -111,10 +111,7 @@ def flow(
     default of the 11.6-g, 3-cm block of the paper.
     """
     from driftwalk.flow import save_flow
-    from driftwalk.flow.write import check_target
 
-    existing = "replace" if overwrite else "error"
-    check_target(out, existing=existing)
     overrides = study_overrides(
         keys=FLOW_KEYS,
         tank_diameter=tank_diameter,
@@ -135,7 +132,7 @@ def flow(
     else:
         trajectory = load_with_study(recording, resolved, how)
     field = _extract(trajectory, resolved, body=how.body)
-    save_flow(field, out, existing=existing)
+    save_flow(field, out, existing="replace" if overwrite else "error")
     _report(field, out, json=json)
 
 

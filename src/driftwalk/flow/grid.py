@@ -110,7 +110,8 @@ def _centres(low: float, high: float, size: float) -> Array:
     # 1e-9: a side that is a whole number of cells does not get one more from rounding.
     count = max(2, math.ceil((high - low) / size - 1e-9))
     middle = (low + high) / 2.0
-    return round_nodes(middle + (np.arange(count) - (count - 1) / 2.0) * size)
+    steps = np.arange(count, dtype=np.float64) - (count - 1) / 2.0
+    return round_nodes(middle + steps * size)
 
 
 def round_nodes(nodes: Array) -> Array:

@@ -22,7 +22,7 @@ _EVEN = 0.02
 
 @dataclass(frozen=True)
 class FieldRows:
-    """A velocity field as a table, a row per node, in the file's own units."""
+    """A velocity field as a table, a row per node."""
 
     line: Indices
     """Line of the file, from 1, shape (n,)."""
@@ -34,17 +34,11 @@ class FieldRows:
     """Velocity along x, shape (n,)."""
     v: Array
     """Velocity along y, shape (n,)."""
-    valid: npt.NDArray[np.bool_]
-    """Whether the file holds the row's velocity for good, shape (n,)."""
-    metres: float | None = 1.0
-    """Metres per unit of length; None when the file does not say."""
-    metres_per_second: float | None = 1.0
-    """Metres per second per unit of velocity; None when the file does not say."""
 
 
 @dataclass(frozen=True)
 class GriddedField:
-    """A velocity field on a regular grid, in the file's own units."""
+    """A velocity field on a regular grid."""
 
     x: Array
     """Nodes along x, shape (nx,)."""
@@ -52,8 +46,6 @@ class GriddedField:
     """Nodes along y, shape (ny,)."""
     velocity: Array
     """Velocities, shape (ny, nx, 2)."""
-    valid: npt.NDArray[np.bool_]
-    """Which nodes hold data, shape (ny, nx)."""
 
 
 def grid_rows(rows: FieldRows, path: Path) -> GriddedField:
@@ -78,7 +70,7 @@ def grid_rows(rows: FieldRows, path: Path) -> GriddedField:
         )
     order = np.argsort(node)
     velocity = np.column_stack([rows.u, rows.v])[order].reshape(y.size, x.size, 2)
-    return GriddedField(x, y, velocity, rows.valid[order].reshape(y.size, x.size))
+    return GriddedField(x, y, velocity)
 
 
 def _axis(name: str, values: Array, line: Indices, path: Path) -> tuple[Array, Indices]:

@@ -57,7 +57,7 @@ def save_flow(flow: xr.Dataset, path: str | PathLike[str], *, existing: str = "e
     """
     check_flow_field(flow)
     target = Path(path)
-    check_target(target, existing=existing)
+    _check_target(target, existing=existing)
     if target.suffix.lower() == ".csv":
         _write_csv(flow, target)
         return target
@@ -68,8 +68,7 @@ def save_flow(flow: xr.Dataset, path: str | PathLike[str], *, existing: str = "e
     return target
 
 
-def check_target(path: Path, *, existing: str) -> None:
-    """Raise `InputError` when a flow field cannot go to a path; asked before long work."""
+def _check_target(path: Path, *, existing: str) -> None:
     if existing not in ("error", "replace"):
         raise InputError(f"existing is 'error' or 'replace', got '{existing}'")
     if path.suffix.lower() not in (".nc", ".csv"):

@@ -65,7 +65,7 @@ def read_csv(path: Path) -> FieldRows:
     values = read_numbers(fields, columns, width=len(names), path=path)
     x, y, u, v = values.T
     line = np.array([number for number, _ in fields], dtype=np.intp)
-    return FieldRows(line, x, y, u, v, np.ones(line.size, dtype=bool))
+    return FieldRows(line, x, y, u, v)
 
 
 def content_lines(text: str) -> Iterator[tuple[int, str]]:
