@@ -102,7 +102,7 @@ class KsReference:
         method: Method = "fasano-franceschini",
     ) -> float:
         """Return the distance to another sample, as `ks_distance` does."""
-        return self.compare(other, ties=ties, combine=combine, method=method).distance
+        return self._compare(other, ties, combine, method).distance
 
     def compare(
         self,
@@ -113,6 +113,11 @@ class KsReference:
         method: Method = "fasano-franceschini",
     ) -> KsComparison:
         """Return the comparison with another sample, as `ks_compare` does."""
+        return self._compare(other, ties, combine, method)
+
+    def _compare(
+        self, other: npt.ArrayLike, ties: Ties, combine: Combine, method: Method
+    ) -> KsComparison:
         points = checked_points(other, "other")
         _check_options(ties, combine, method)
         if method == "peacock":
@@ -184,7 +189,7 @@ def ks_distance(
     >>> ks_distance([[0, 0], [1, 1], [2, 2]], [[10, 10], [11, 11]])
     1.0
     """
-    return ks_compare(a, b, ties=ties, combine=combine, method=method).distance
+    return _compare_once(a, b, ties, combine, method).distance
 
 
 def ks_compare(
@@ -204,6 +209,12 @@ def ks_compare(
     >>> QUADRANTS[ks_compare([[0, 0], [1, 1]], [[5, 5], [6, 6]]).place.quadrant]
     'right above'
     """
+    return _compare_once(a, b, ties, combine, method)
+
+
+def _compare_once(
+    a: npt.ArrayLike, b: npt.ArrayLike, ties: Ties, combine: Combine, method: Method
+) -> KsComparison:
     first, second = checked_points(a, "a"), checked_points(b, "b")
     _check_options(ties, combine, method)
     if method == "peacock":
@@ -244,7 +255,7 @@ def _comparison(raw: _core.KsResult, ties: Ties, combine: Combine) -> KsComparis
             f"{100 * tied_fraction:.0f} % of the points share a coordinate with another point, "
             'and open quadrants leave such points out: consider ties="limits"',
             ComparisonWarning,
-            stacklevel=4,
+            stacklevel=4,  # the caller of the public function
         )
     return KsComparison(
         distance=max(d1, d2) / product if combine == "max" else (d1 + d2) / (2 * product),

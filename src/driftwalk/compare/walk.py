@@ -71,7 +71,7 @@ def steps(
     if applied.step_length.size == 0:
         raise InputError(
             f"none of the {plan.pairs} step pairs has a direction: the body does not move at a "
-            f"step_interval of {plan.step_interval:.6g} s"
+            f"step_interval of {plan.step_interval:.6g} s: name {_advice(track, plan)}"
         )
     sentences = _warnings(track, plan, applied)
     for sentence in sentences:
@@ -98,12 +98,16 @@ def _warnings(track: Track, plan: StepPlan, applied: AppliedSteps) -> list[str]:
     zero = applied.zero_length / plan.pairs
     if zero <= ZERO_FRACTION:
         return []
-    longer = _longer_interval(track, plan.step_interval)
-    advice = f"a step_interval of {longer:.6g} s or more" if longer else "a longer step_interval"
     return [
         f"{100 * zero:.0f} % of the step pairs hold a step of zero length, which has no direction, "
-        f"and were left out: the body rests, or {advice} is needed for the file's resolution"
+        f"and were left out: the body rests, or {_advice(track, plan)} is needed for the file's "
+        "resolution"
     ]
+
+
+def _advice(track: Track, plan: StepPlan) -> str:
+    longer = _longer_interval(track, plan.step_interval)
+    return f"a step_interval of {longer:.6g} s or more" if longer else "a longer step_interval"
 
 
 def _longer_interval(track: Track, step_interval: float) -> float | None:

@@ -1,0 +1,101 @@
+"""What must hold of the KS distance whatever the points are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from driftwalk.compare import ks_compare, ks_distance
+
+pytestmark = pytest.mark.filterwarnings("ignore::driftwalk.compare.ComparisonWarning")
+
+# Few distinct values, so that ties abound, and both zeros among them.
+coordinate = st.one_of(
+    st.sampled_from([-1.0, -0.0, 0.0, 0.5, 1.0, 2.0]),
+    st.floats(-1e6, 1e6, allow_nan=False, width=32),
+)
+points = st.integers(1, 25).flatmap(lambda n: arrays(np.float64, (n, 2), elements=coordinate))
+ties = st.sampled_from(["strict", "limits"])
+modest = settings(deadline=None, max_examples=60)
+
+MIRRORED_IN_X = {0: 1, 1: 0, 2: 3, 3: 2, -1: -1}
+
+
+@modest
+@given(a=points, ties=ties)
+def test_zero_on_itself(a: np.ndarray, ties: str) -> None:
+    assert ks_distance(a, a, ties=ties) == 0.0  # type: ignore[arg-type]
+    assert ks_distance(a, a, method="peacock") == 0.0
+
+
+@modest
+@given(a=points, b=points, ties=ties)
+def test_symmetric_and_within_bounds(a: np.ndarray, b: np.ndarray, ties: str) -> None:
+    there, back = ks_compare(a, b, ties=ties), ks_compare(b, a, ties=ties)  # type: ignore[arg-type]
+    assert 0.0 <= there.distance <= 1.0
+    assert there.distance == back.distance
+    assert (there.difference_a, there.difference_b) == (back.difference_b, back.difference_a)
+
+
+@modest
+@given(a=points, b=points, seed=st.integers(0, 99))
+def test_order_does_not_matter(a: np.ndarray, b: np.ndarray, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    assert ks_distance(rng.permutation(a), rng.permutation(b)) == ks_distance(a, b)
+
+
+@modest
+@given(a=points, b=points, ties=ties)
+def test_strictly_monotone_maps_do_not_matter(a: np.ndarray, b: np.ndarray, ties: str) -> None:
+    def mapped(sample: np.ndarray) -> np.ndarray:
+        # Exact in floating point: doubling in x, a sign-keeping growth of the exponent in y.
+        return np.column_stack([2 * sample[:, 0], np.copysign(sample[:, 1] * 1024, sample[:, 1])])
+
+    assert ks_distance(mapped(a), mapped(b), ties=ties) == ks_distance(a, b, ties=ties)  # type: ignore[arg-type]
+
+
+@modest
+@given(a=points, b=points)
+def test_ranks_are_all_that_matters(a: np.ndarray, b: np.ndarray) -> None:
+    """A map as crooked as can be: every coordinate replaced by the cube of its rank."""
+    pooled = np.concatenate([a, b])
+    ranks = np.column_stack(
+        [np.unique(column, return_inverse=True)[1].astype(float) ** 3 for column in pooled.T]
+    )
+    assert ks_distance(ranks[: len(a)], ranks[len(a) :]) == ks_distance(a, b)
+
+
+@modest
+@given(a=points, b=points, ties=ties)
+def test_mirroring_and_swapping_axes_do_not_matter(a: np.ndarray, b: np.ndarray, ties: str) -> None:
+    expected = ks_compare(a, b, ties=ties)  # type: ignore[arg-type]
+    for change in (lambda s: s * [-1, 1], lambda s: s * [1, -1], lambda s: s[:, ::-1]):
+        result = ks_compare(change(a), change(b), ties=ties)  # type: ignore[arg-type]
+        assert result.difference_a == expected.difference_a
+        assert result.difference_b == expected.difference_b
+
+
+@modest
+@given(a=points, b=points)
+def test_the_two_zeros_are_one_number(a: np.ndarray, b: np.ndarray) -> None:
+    assert ks_distance(np.where(a == 0, -0.0, a), np.where(b == 0, 0.0, b)) == ks_distance(a, b)
+
+
+@modest
+@given(a=points, b=points)
+def test_the_conventions_are_ordered(a: np.ndarray, b: np.ndarray) -> None:
+    """Limits look at more sets than open quadrants do, and Peacock's cuts at more than limits."""
+    strict = ks_compare(a, b)
+    limits = ks_compare(a, b, ties="limits")
+    cuts = ks_compare(a, b, method="peacock")
+    assert strict.difference_a <= limits.difference_a <= cuts.difference_a
+    assert strict.difference_b <= limits.difference_b <= cuts.difference_b
+
+
+@modest
+@given(a=points, b=points, copies=st.integers(2, 4))
+def test_copies_of_a_sample_do_not_matter(a: np.ndarray, b: np.ndarray, copies: int) -> None:
+    assert ks_distance(np.tile(a, (copies, 1)), b) == pytest.approx(ks_distance(a, b), abs=1e-15)
