@@ -109,9 +109,9 @@ def extract_flow(
         number of smoothed samples. The standard errors treat each visit to a cell as one
         observation, because the samples of a visit share their smoothing windows (a return within
         one `window` continues the visit; `average_cells`); they are NaN with fewer than two
-        visits, and are of the scatter alone, not of the larger bias of Eq. 4. ``attrs`` holds every setting, the shares of
-        measured and filled cells, the samples used and left out, and, where few cells are measured
-        or samples lie beyond the wall, ``warning``.
+        visits, and are of the scatter alone, not of the larger bias of Eq. 4. ``attrs`` holds
+        every setting, the shares of measured and filled cells, the samples used and left out, and,
+        where few cells are measured or samples lie beyond the wall, ``warning``.
 
     Raises
     ------
