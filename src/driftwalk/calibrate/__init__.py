@@ -1,3 +1,5 @@
-"""Stage of driftwalk (being built)."""
+"""Which parameters fit a recording, and how well are they known?"""
 
-__all__: list[str] = []
+from driftwalk.calibrate.run import calibrate
+
+__all__ = ["calibrate"]
