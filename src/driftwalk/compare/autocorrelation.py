@@ -7,8 +7,8 @@ import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
 
-# Sokal's rule: sum up to the first lag that is this many autocorrelation times away.
-WINDOW = 5.0
+# Sokal's rule, five times 1/2 + sum of rho: beyond that lag there is more noise than correlation.
+WINDOW = 2.5
 # Fewer values than this have no correlation worth the name; also one more than the last of the lags
 # that tell how much of a series is correlated.
 FEWEST = 4
@@ -19,7 +19,7 @@ SIGNIFICANT = 3.0
 def autocorrelation_time(series: npt.ArrayLike) -> float:
     """Return the integrated autocorrelation time of a series, in samples.
 
-    tau = 1 + 2 sum of rho(t) over the lags t up to the first one that exceeds 5 tau (Sokal). White
+    tau = 1 + 2 sum of rho(t) over the lags t up to the first one that exceeds 2.5 tau (Sokal). White
     noise gives 1, an AR(1) process of coefficient phi (1 + phi) / (1 - phi). Never below 1.
 
     Parameters
