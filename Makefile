@@ -1,0 +1,88 @@
+# make demo: from nothing to a calibration and its figures. make test: install what the tests need
+# and pass them. Everything goes into the folder .venv; nothing else on the machine is touched.
+#
+# Another interpreter: make demo PYTHON=python3.12
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install --quiet
+
+# What a rebuild of the native core depends on; Python files are live without one.
+NATIVE := $(shell find cpp -name '*.cpp' -o -name '*.hpp') CMakeLists.txt pyproject.toml
+PACKAGE := $(VENV)/.package
+TEST_TOOLS := $(VENV)/.test-tools
+DEV_TOOLS := $(VENV)/.dev-tools
+CPP := $(shell find cpp -name '*.cpp' -o -name '*.hpp')
+
+.PHONY: demo test test-slow doctest lint format cpp-test cpp-test-portable bench docs wheel clean
+
+demo: $(PACKAGE)
+	$(BIN)/driftwalk demo
+	@echo "The figures:"
+	@find demo -name '*.png' -not -path '*/previous/*' | sort | sed 's/^/  /'
+
+test: $(TEST_TOOLS)
+	$(BIN)/python -m pytest -n 2
+
+test-slow: $(TEST_TOOLS)
+	$(BIN)/python -m pytest -n 2 -m slow
+
+doctest: $(TEST_TOOLS)
+	$(BIN)/python -m pytest -n 2 --doctest-modules src/driftwalk
+
+docs: doctest
+	$(BIN)/python -m pytest tests/architecture/test_docs_links.py
+
+lint: $(DEV_TOOLS)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/clang-format --dry-run -Werror $(CPP)
+
+format: $(DEV_TOOLS)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+	$(BIN)/clang-format -i $(CPP)
+
+# The native core alone, no Python: once under the address and undefined-behaviour sanitizers, once
+# without any processor-specific code.
+cpp-test: $(DEV_TOOLS)
+	PATH="$(CURDIR)/$(BIN):$$PATH" .ci/cpp-test sanitize
+
+cpp-test-portable: $(DEV_TOOLS)
+	PATH="$(CURDIR)/$(BIN):$$PATH" .ci/cpp-test portable
+
+bench: $(PACKAGE)
+	$(BIN)/python benchmarks/run_all.py
+
+wheel: $(DEV_TOOLS)
+	$(BIN)/python -m build
+
+clean:
+	rm -rf $(VENV) build dist
+
+$(BIN)/python:
+	@command -v $(PYTHON) > /dev/null || { \
+	  echo "driftwalk needs Python 3.11 or later: '$(PYTHON)' was not found; name one with: make PYTHON=python3.12"; \
+	  exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "driftwalk needs Python 3.11 or later: '$(PYTHON)' is $$($(PYTHON) --version 2>&1); name another with: make PYTHON=python3.12"; \
+	  exit 1; }
+	@command -v c++ > /dev/null || command -v g++ > /dev/null || command -v clang++ > /dev/null || test -n "$$CXX" || { \
+	  echo "driftwalk needs a C++20 compiler and found none: install g++ or clang++, or name one with: make CXX=..."; \
+	  exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+$(PACKAGE): $(BIN)/python $(NATIVE)
+	$(PIP) --editable .
+	@touch $@
+
+# The package is installed by now, so its extras are all that pip adds.
+$(TEST_TOOLS): $(PACKAGE)
+	$(PIP) "driftwalk[test]"
+	@touch $@
+
+$(DEV_TOOLS): $(TEST_TOOLS)
+	$(PIP) "driftwalk[dev]"
+	@touch $@
