@@ -1,5 +1,6 @@
-"""Which parameters fit a recording, and how well are they known?"""
+"""Which parameters fit a recording, and how well they are known."""
 
+from driftwalk.calibrate.own_flow import recording_flow
 from driftwalk.calibrate.run import calibrate
 
-__all__ = ["calibrate"]
+__all__ = ["calibrate", "recording_flow"]

@@ -55,7 +55,11 @@ class Steps(NamedTuple):
 
     def rows(self, chosen: slice) -> Steps:
         """Return some of the rows."""
-        return Steps(*(np.ascontiguousarray(values[chosen]) for values in self))
+        return Steps(
+            np.ascontiguousarray(self.length[chosen]),
+            np.ascontiguousarray(self.angle[chosen]),
+            np.ascontiguousarray(self.pairs[chosen]),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +227,9 @@ def run_bootstrap(
     estimates = run_sweep(compute, units, store=store, progress=progress)
     few = min(FLOOR_REFERENCES, count // 2)
     among = _core.ks_matrix(
-        *recordings.rows(slice(0, few)), *recordings.rows(slice(few, count)), threads=problem.threads
+        *recordings.rows(slice(0, few)),
+        *recordings.rows(slice(few, count)),
+        threads=problem.threads,
     )
     return Bootstrap(
         estimates["drag_coefficient"],
@@ -329,8 +335,8 @@ def _largest_contour(smoother: Smoother, surface: Floats, level: float) -> Float
         for step in (axis[1] - axis[0] if axis.size > 1 else 1.0,)
     ]
     lines = contour_generator(x=axes[1], y=axes[0], z=rimmed).lines(level)
-    longest = max(lines, key=len)
-    return np.asarray(longest[:, ::-1])
+    longest = max((np.asarray(line) for line in lines), key=lambda line: line.shape[0])
+    return np.ascontiguousarray(longest[:, ::-1])
 
 
 def region_contains(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from driftwalk.flow.extract import extract_flow
-from driftwalk.schema import Track, build_trajectory
+from driftwalk.flow import extract_flow
+from driftwalk.schema import Track, body_track, build_trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -13,21 +13,39 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 
-def flow_from_track(track: Track, study: Study) -> xr.Dataset:
-    """Return the flow field that the paper's estimator finds in one track.
+def recording_flow(recording: xr.Dataset, study: Study, *, body: str | None = None) -> xr.Dataset:
+    """Return the flow field that a calibration without a given one takes from the recording.
 
     Parameters
     ----------
-    track : Track
-        The body that is calibrated.
+    recording : xarray.Dataset
+        A `trajectory`.
     study : Study
         Tank, block, water and the section [flow].
+    body : str, optional
+        The body, where there are several.
 
     Returns
     -------
     xarray.Dataset
-        A `flow_field`.
+        A `flow_field`, by the paper's estimator (Eq. 4).
+
+    Raises
+    ------
+    InputError
+        When no cell can be measured.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> int(dw.recording_flow(dw.tank30_recording(), dw.Study()).sizes["x"])
+    50
     """
+    return flow_from_track(body_track(recording, body), study)
+
+
+def flow_from_track(track: Track, study: Study) -> xr.Dataset:
+    """Return the flow field of one track; see `recording_flow`."""
     settings = study.flow
     return extract_flow(
         build_trajectory(track.time, track.x, track.y, track.theta),

@@ -251,4 +251,3 @@ def score_worlds(
             threads=problem.threads,
         )
     )
-

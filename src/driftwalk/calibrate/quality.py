@@ -76,9 +76,7 @@ class Halves(NamedTuple):
     """Noise floor of recordings as long as the second half."""
 
 
-def validate_on_halves(
-    first: Problem, second: Problem, *, steps: tuple[float, float]
-) -> Halves:
+def validate_on_halves(first: Problem, second: Problem, *, steps: tuple[float, float]) -> Halves:
     """Calibrate on the first half of a recording and measure the distance on the second.
 
     The search is the usual one with a single replicate per setting, then two on a refined grid
@@ -141,4 +139,3 @@ def refine(
         details="none",
     )
     return found, window_smoother(window, steps).optimum(found.mean)
-

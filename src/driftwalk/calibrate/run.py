@@ -1,4 +1,4 @@
-"""Which parameters fit a recording, and how well are they known?"""
+"""The whole calibration: which parameters fit a recording, and how well they are known."""
 
 from __future__ import annotations
 
@@ -166,8 +166,10 @@ class _Calibration:
         """Run every stage that the study asks for."""
         search = self.problem.study.calibration
         self.coarse = self._map(
-            "coarse", Window(np.array(search.drag_coefficients), np.array(search.force_stds_N)),
-            search.replicates, "all",
+            "coarse",
+            Window(np.array(search.drag_coefficients), np.array(search.force_stds_N)),
+            search.replicates,
+            "all",
         )
         row, column = self.coarse.cell_of_minimum()
         cell = self.coarse.drag_coefficient[row], self.coarse.force_std[column]
@@ -201,9 +203,7 @@ class _Calibration:
     def _refine(self, wanted: int) -> None:
         window = refined_window(self.coarse, self._steps, self.floor)
         for _ in range(MOST_RECENTRINGS):
-            self.refined = self._map(
-                "refined", window, refined_replicates(window, wanted), "none"
-            )
+            self.refined = self._map("refined", window, refined_replicates(window, wanted), "none")
             self.smoother = window_smoother(window, self._steps)
             self.optimum = self.smoother.optimum(self.refined.mean)
             self.surface = self.smoother.surface(self.refined.mean.ravel())
@@ -227,7 +227,7 @@ class _Calibration:
                     )
 
     def _bootstrap(self, count: int) -> None:
-        assert self.refined is not None  # noqa: S101
+        assert self.refined is not None
         surface = build_surface(
             self.problem, self.refined, self.optimum, self._steps, margin=self.floor
         )
@@ -258,7 +258,7 @@ class _Calibration:
     def _check_window(self, drag: Any, force: Any) -> None:
         """Warn when many bootstrap estimates press against the end of the stored surface."""
         found = self.bootstrap
-        assert found is not None  # noqa: S101
+        assert found is not None
         for axis, values, limits, name in (
             (drag, found.drag_coefficient, self.coarse.drag_coefficient, "drag coefficient"),
             (force, found.force_std, self.coarse.force_std, "force_std"),
@@ -335,7 +335,7 @@ def _finish(
     dataset = build_calibration(problem, found.coarse, found.refined, surface, attrs=attrs)
     if found.bootstrap is not None:
         confidence = study.calibration.confidence
-        assert found.quality is not None  # noqa: S101
+        assert found.quality is not None
         stretch = found.quality.stretch
         region = confidence_region(
             found.smoother, found.surface, found.bootstrap, confidence=confidence, stretch=stretch

@@ -39,7 +39,7 @@ class Map(NamedTuple):
     @property
     def mean(self) -> Floats:
         """Mean distance over the replicates; a setting without a number is as far as can be."""
-        return np.nan_to_num(self.distance, nan=1.0).mean(axis=-1)
+        return np.asarray(np.nan_to_num(self.distance, nan=1.0).mean(axis=-1))
 
     @property
     def standard_error(self) -> Floats:
@@ -207,7 +207,7 @@ def recentre(window: Window, optimum: Optimum, coarse: Map, steps: tuple[float, 
         at_high = axis[-1] - value < 2.5 * step and axis[-1] < limits[-1] - 1e-12
         if at_low or at_high:
             nearest = axis[int(np.argmin(np.abs(axis - value)))]
-            axis = _refined_axis(limits, nearest, step, half, half)  # noqa: PLW2901
+            axis = _refined_axis(limits, nearest, step, half, half)
         axes.append(axis)
     return Window(*axes)
 

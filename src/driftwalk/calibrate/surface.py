@@ -100,9 +100,7 @@ def make_smoother(
             np.meshgrid(drag_coefficient, force_std, indexing="ij"), widths, strict=True
         )
     )
-    rows = [
-        _fit_row(x / widths[0], lattice[1] / widths[1], cell_x, cell_y) for x in lattice[0]
-    ]
+    rows = [_fit_row(x / widths[0], lattice[1] / widths[1], cell_x, cell_y) for x in lattice[0]]
     return Smoother(lattice[0], lattice[1], np.concatenate(rows))
 
 

@@ -19,8 +19,8 @@ SIGNIFICANT = 3.0
 def autocorrelation_time(series: npt.ArrayLike) -> float:
     """Return the integrated autocorrelation time of a series, in samples.
 
-    tau = 1 + 2 sum of rho(t) over the lags t up to the first one that exceeds 2.5 tau (Sokal). White
-    noise gives 1, an AR(1) process of coefficient phi (1 + phi) / (1 - phi). Never below 1.
+    tau = 1 + 2 sum of rho(t) over the lags t up to the first one that exceeds 2.5 tau (Sokal).
+    White noise gives 1, an AR(1) process of coefficient phi (1 + phi) / (1 - phi). Never below 1.
 
     Parameters
     ----------

@@ -56,7 +56,7 @@ class Calibration(Section):
         default=2e-5, description="Largest step of the refined grid in force_std."
     )
     refined_replicates: Annotated[int, Quantity("1", ge=1, le=100_000, whole=True)] = Field(
-        default=16, description="Simulations per setting of the refined grid."
+        default=8, description="Simulations per setting of the refined grid."
     )
     bootstrap: Annotated[int, Quantity("1", ge=0, le=1_000_000, whole=True)] = Field(
         default=200, description="Bootstrap samples behind the intervals; 0 gives no intervals."

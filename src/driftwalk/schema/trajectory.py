@@ -127,7 +127,7 @@ def check_trajectory(dataset: xr.Dataset) -> xr.Dataset:
     for name in VARIABLES:
         if name not in dataset or dataset[name].dims != ("time", "body"):
             raise InputError(
-                f"not a trajectory dataset: variable '{name}' with dimensions (time, body) is missing"
+                f"not a trajectory dataset: no variable '{name}' with dimensions (time, body)"
             )
     time = dataset["time"].values
     if time.size and not np.isfinite(time).all():

@@ -38,7 +38,9 @@ def default_threads() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def native_model(study: Study, flow: xr.Dataset, sample_time: Floats, camera: Camera) -> _core.Model:
+def native_model(
+    study: Study, flow: xr.Dataset, sample_time: Floats, camera: Camera
+) -> _core.Model:
     """Return the native core's form of a model.
 
     Parameters
@@ -116,7 +118,7 @@ def world_table(
     drag_coefficient: npt.ArrayLike,
     force_std: npt.ArrayLike,
 ) -> Floats:
-    """Return the worlds' start poses [m, rad], motions [m/s, rad/s] and parameters, shape (n, 8)."""
+    """Return start poses [m, rad], motions [m/s, rad/s] and parameters of worlds, shape (n, 8)."""
     columns = np.broadcast_arrays(
         *(
             np.atleast_1d(np.asarray(values, dtype=np.float64))

@@ -55,7 +55,9 @@ def _draw_pose(study: Study, key: int) -> tuple[float, float, float]:
     from driftwalk.model.study import block_corners
 
     tank, side = study.tank, study.block.side_m
-    corners = np.asarray(tank.corners_m or [(-tank.extent_m[0] / 2,) * 2, (tank.extent_m[0] / 2,) * 2])
+    corners = np.asarray(
+        tank.corners_m or [(-tank.extent_m[0] / 2,) * 2, (tank.extent_m[0] / 2,) * 2]
+    )
     low, high = corners.min(axis=0), corners.max(axis=0)
     for draw in range(1000):
         words = np.array(_core.philox(key, [0, draw, 0, START_PURPOSE]), dtype=np.float64)
@@ -109,7 +111,9 @@ def recorded_start(track: Track, *, window: float = 0.7) -> Start:
     return Start(*(float(value) for value in (*position, *velocity)))
 
 
-def world_orientations(theta: npt.ArrayLike, keys: npt.NDArray[np.uint64]) -> npt.NDArray[np.float64]:
+def world_orientations(
+    theta: npt.ArrayLike, keys: npt.NDArray[np.uint64]
+) -> npt.NDArray[np.float64]:
     """Return the start orientation of every world [rad]: the given one, or a random one for NaN."""
     given = np.broadcast_to(np.asarray(theta, dtype=np.float64), keys.shape).copy()
     for index in np.flatnonzero(np.isnan(given)):

@@ -146,7 +146,11 @@ def simulate_reference(
     stiffness = 0.5 * model.water_density * drag_coefficient * model.side / model.strips
     stiffness = stiffness * model.depth
     spread = np.stack(
-        [np.ones_like(stiffness), np.ones_like(stiffness), np.full_like(stiffness, model.side**2 / 3)]
+        [
+            np.ones_like(stiffness),
+            np.ones_like(stiffness),
+            np.full_like(stiffness, model.side**2 / 3),
+        ]
     )
     pose, motion, _ = meet_circle(model, pose, motion)
     path = [pose]
@@ -195,7 +199,7 @@ def meet_circle(
 
 def _corner_arms(model: TwinModel, theta: float) -> Floats:
     angles = theta + np.pi / 4 + np.arange(4) * np.pi / 2
-    return model.side / np.sqrt(2) * np.stack([np.cos(angles), np.sin(angles)])
+    return np.asarray(model.side / np.sqrt(2) * np.stack([np.cos(angles), np.sin(angles)]))
 
 
 def _normal(model: TwinModel, centre: Floats, arm: Floats) -> tuple[Floats, float]:

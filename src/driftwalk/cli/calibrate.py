@@ -1,0 +1,204 @@
+"""`driftwalk calibrate`: from a recording to a calibrated motion model."""
+
+from __future__ import annotations
+
+import json as json_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from driftwalk.cli.options import (
+    CALIBRATION_KEYS,
+    Depth,
+    FlowFile,
+    ForceInterval,
+    Json,
+    Mass,
+    OrientationNoise,
+    PositionNoise,
+    Replicates,
+    Seed,
+    Side,
+    StepInterval,
+    StudyFile,
+    TankDiameter,
+    TimeStep,
+    WallFriction,
+    WallRestitution,
+    resolve_study,
+    study_overrides,
+)
+from driftwalk.cli.output import print_json, print_note
+from driftwalk.cli.recording_options import (
+    RecordingFile,
+    RecordingOptions,
+    with_recording_options,
+)
+from driftwalk.cli.study_recording import load_with_study
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Threads = Annotated[
+    int | None,
+    typer.Option(
+        "--threads", min=1, help="Threads; all processors without it.", show_default=False
+    ),
+]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Move a finished run aside and start anew.")
+]
+
+
+@with_recording_options
+def calibrate(
+    recording: RecordingFile,
+    how: RecordingOptions,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="DIR", help="Run directory to make or continue.")
+    ],
+    study: StudyFile = None,
+    flow: FlowFile = None,
+    tank_diameter: TankDiameter = None,
+    side: Side = None,
+    mass: Mass = None,
+    depth: Depth = None,
+    force_interval: ForceInterval = None,
+    wall_friction: WallFriction = None,
+    wall_restitution: WallRestitution = None,
+    time_step: TimeStep = None,
+    step_interval: StepInterval = None,
+    position_noise: PositionNoise = None,
+    orientation_noise: OrientationNoise = None,
+    replicates: Replicates = None,
+    bootstrap: Annotated[
+        int | None,
+        typer.Option(
+            "--bootstrap", min=0, help="Bootstrap recordings; 0 for none.", show_default=False
+        ),
+    ] = None,
+    seed: Seed = None,
+    threads: Threads = None,
+    overwrite: Overwrite = False,
+    json: Json = False,
+) -> None:
+    """Find the drag coefficient and the stochastic force that explain a recording.
+
+    Simulates every setting of a grid as long as the recording, compares step lengths and turning
+    angles, refines around the minimum, and says how well the parameters are known and whether the
+    model explains the motion. Killed and started again, it continues.
+    """
+    from driftwalk.cli.calibration_run import Work, run_calibration
+    from driftwalk.cli.tank import require_inside, study_in_arena
+    from driftwalk.flow import load_flow
+
+    overrides = study_overrides(
+        keys=CALIBRATION_KEYS,
+        tank_diameter=tank_diameter,
+        side=side,
+        mass=mass,
+        depth=depth,
+        force_interval=force_interval,
+        wall_friction=wall_friction,
+        wall_restitution=wall_restitution,
+        time_step=time_step,
+        step_interval=step_interval,
+        position_noise=position_noise,
+        orientation_noise=orientation_noise,
+        replicates=replicates,
+        bootstrap=bootstrap,
+        seed=seed,
+    )
+    chosen = resolve_study(study, overrides)
+    trajectory = load_with_study(recording, chosen, how)
+    chosen = study_in_arena(chosen, trajectory)
+    require_inside(chosen, trajectory, how.body)
+    if study is None and tank_diameter is None and how.arena is None:
+        print_note(f"the tank is the default study's, a {chosen.tank.describe()}")
+    inputs = {"recording": recording}
+    inputs.update({"flow": flow} if flow is not None else {})
+    inputs.update({"study": study} if study is not None else {})
+    given = None if flow is None else load_flow(flow, arena=chosen.tank.to_arena())
+    work = Work(trajectory, chosen, given, how.body, inputs, threads)
+    found = run_calibration(work, out, overwrite=overwrite)
+    if json:
+        print_json(summary(found))
+    else:
+        print_answer(found, out)
+
+
+_KEYS = (
+    "drag_coefficient",
+    "drag_coefficient_interval",
+    "force_std_N",
+    "force_std_N_interval",
+    "confidence",
+    "force_interval_s",
+    "force_noise_intensity_N2_s",
+    "ks_distance",
+    "ks_distance_standard_error",
+    "noise_floor",
+    "noise_floor_upper",
+    "distance_to_floor_ratio",
+    "interval_stretch",
+    "second_half_ks_distance",
+    "second_half_noise_floor",
+    "first_half_drag_coefficient",
+    "first_half_force_std_N",
+    "coarse_drag_coefficient",
+    "coarse_force_std_N",
+    "wetted_depth_m",
+    "position_noise_m",
+    "orientation_noise_rad",
+    "step_interval_s",
+    "time_step_s",
+    "duration_s",
+    "recording_pairs",
+)
+
+
+def summary(found: xr.Dataset) -> dict[str, Any]:
+    """Return what ``--json`` prints: the answer with units in its keys."""
+    values = {key: found.attrs.get(key) for key in _KEYS}
+    return {
+        **values,
+        "recording": found.attrs["recording_name"],
+        "warnings": json_module.loads(found.attrs["warnings"]),
+    }
+
+
+def print_answer(found: xr.Dataset, folder: Path) -> None:
+    """Print the answer for people, and where the figures are."""
+    facts = found.attrs
+    interval = facts["force_interval_s"]
+    if facts["simulated_recording"] == "yes":
+        print("This recording was simulated by another engine (ODE).")
+    percent = f"{facts.get('confidence', 0.9):.0%} interval"
+    drag = facts["drag_coefficient"]
+    force = 1e3 * facts["force_std_N"]
+    print(f"drag coefficient C_d   {drag:.4f}{_interval(facts, 'drag_coefficient', 1, percent)}")
+    print(
+        f"stochastic force σ_F   {force:.4f} mN, drawn anew every {1e3 * interval:g} ms"
+        f"{_interval(facts, 'force_std_N', 1e3, percent)}"
+    )
+    print(f"noise intensity σ_F²·τ {facts['force_noise_intensity_N2_s']:.4g} N² s")
+    print(
+        f"KS distance            {facts['ks_distance']:.4f} at the optimum, "
+        f"noise floor {facts['noise_floor']:.4f}"
+    )
+    if "second_half_ks_distance" in facts:
+        print(
+            f"second half            {facts['second_half_ks_distance']:.4f} for a calibration on "
+            f"the first, noise floor {facts['second_half_noise_floor']:.4f}"
+        )
+    for warning in json_module.loads(facts["warnings"]):
+        print_note(f"warning: {warning}")
+    print(f"figures                {folder / 'figures'}")
+
+
+def _interval(facts: dict[str, Any], key: str, scale: float, percent: str) -> str:
+    ends = facts.get(f"{key}_interval")
+    if ends is None:
+        return ""
+    return f"   {percent} {scale * ends[0]:.4f} to {scale * ends[1]:.4f}"

@@ -1,0 +1,167 @@
+"""A calibration in a run directory: resumable, with its figures and its manifest."""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from driftwalk.cli.progress import ProgressReporter
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.core.rundir import RunDirectory
+    from driftwalk.model import Study
+    from driftwalk.sweep import Store
+
+STAGES = ("coarse", "refined", "bootstrap", "validation")
+WORDS = {
+    "coarse": "map",
+    "refined": "refined map",
+    "bootstrap": "bootstrap",
+    "validation": "halves",
+}
+
+
+@dataclass(frozen=True)
+class Work:
+    """Everything that a calibration run needs.
+
+    Attributes
+    ----------
+    recording : xarray.Dataset
+        A `trajectory`.
+    study : Study
+        The model and the search.
+    flow : xarray.Dataset or None
+        A given flow field; None takes it from the recording.
+    body : str or None
+        The body.
+    inputs : mapping of str to Path
+        The files that were read, by their role.
+    threads : int or None
+        Threads; the result does not depend on them.
+    """
+
+    recording: xr.Dataset
+    study: Study
+    flow: xr.Dataset | None
+    body: str | None
+    inputs: Mapping[str, Path]
+    threads: int | None = None
+
+
+def run_calibration(work: Work, folder: Path, *, overwrite: bool) -> xr.Dataset:
+    """Calibrate in a run directory and return the calibration.
+
+    Writes ``calibration.nc``, ``flow.nc``, ``recording.nc``, ``figures/`` and, last,
+    ``manifest.json``. Killed at any moment and started again it continues.
+
+    Parameters
+    ----------
+    work : Work
+        What to do.
+    folder : Path
+        The run directory.
+    overwrite : bool
+        Whether a finished run there is moved aside; it is refused otherwise.
+
+    Raises
+    ------
+    RunDirectoryError
+        When the directory is in use, holds another run, or cannot be written.
+    """
+    from driftwalk import _core
+    from driftwalk.calibrate import calibrate, recording_flow
+    from driftwalk.core.provenance import manifest
+    from driftwalk.core.rundir import RunDirectory
+    from driftwalk.report import write_figures
+
+    existing = "overwrite" if overwrite else "resume"
+    with RunDirectory(folder, specification=_specification(work), on_existing=existing) as run:  # type: ignore[arg-type]
+        about = manifest(
+            command=["driftwalk", *sys.argv[1:]],
+            study=work.study.to_dict(),
+            seeds={"calibration": work.study.calibration.seed},
+            inputs=dict(work.inputs),
+            instruction_set=_core.instruction_set(),
+        )
+        flow = work.flow
+        if flow is None:
+            flow = recording_flow(work.recording, work.study, body=work.body)
+        run.write("flow.nc", netcdf_bytes(flow))
+        run.write("recording.nc", netcdf_bytes(work.recording))
+        with ProgressReporter("calibrate") as progress:
+            found = calibrate(
+                work.recording,
+                work.study,
+                flow=work.flow,
+                body=work.body,
+                threads=work.threads,
+                stores=_stores(run),
+                tell=lambda stage, done, total: progress.update(
+                    *_overall(stage, done, total), WORDS[stage]
+                ),
+            )
+            run.write("calibration.nc", netcdf_bytes(found))
+            progress.update(100, 100, "figures")
+            write_figures(
+                found,
+                flow=flow,
+                trajectory=work.recording,
+                folder=run.folder("figures"),
+                body=work.body,
+            )
+        run.finish(about)
+    return found
+
+
+def netcdf_bytes(dataset: xr.Dataset) -> bytes:
+    """Return a dataset as the bytes of a NetCDF-4 file, numbers compressed."""
+    packed = {
+        name: {"zlib": True, "complevel": 4, "shuffle": True}
+        for name, variable in dataset.data_vars.items()
+        if variable.dtype.kind in "fiu" and variable.size > 1000
+    }
+    return bytes(dataset.to_netcdf(engine="h5netcdf", encoding=packed))
+
+
+def _specification(work: Work) -> dict[str, Any]:
+    """Return what determines the numbers of a run."""
+    return {
+        "study": work.study.to_dict(),
+        "body": work.body,
+        "recording_sha256": _dataset_hash(work.recording, ("x", "y", "theta")),
+        "flow_sha256": None if work.flow is None else _dataset_hash(work.flow, ("u", "v")),
+    }
+
+
+def _dataset_hash(dataset: xr.Dataset, names: tuple[str, ...]) -> str:
+    digest = hashlib.sha256()
+    for name in (*sorted(str(name) for name in dataset.indexes), *names):
+        values = dataset[name].values
+        digest.update(
+            repr(values.tolist()).encode() if values.dtype == object else values.tobytes()
+        )
+    return digest.hexdigest()
+
+
+def _stores(run: RunDirectory) -> Any:
+    def store(name: str, fingerprint: dict[str, Any]) -> Store:
+        return run.store(name, fingerprint=fingerprint)
+
+    return store
+
+
+# Share of the time that each stage takes, of 100.
+_BEGIN = {"coarse": 0.0, "refined": 40.0, "bootstrap": 65.0, "validation": 93.0}
+_END = {"coarse": 40.0, "refined": 65.0, "bootstrap": 93.0, "validation": 98.0}
+
+
+def _overall(stage: str, done: int, total: int) -> tuple[int, int]:
+    share = done / total if total else 1.0
+    return round(_BEGIN[stage] + share * (_END[stage] - _BEGIN[stage])), 100

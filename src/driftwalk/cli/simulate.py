@@ -1,0 +1,155 @@
+"""`driftwalk simulate`: trajectories of a block in a stirred tank."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from driftwalk.cli.options import (
+    Depth,
+    DragCoefficient,
+    Duration,
+    ForceInterval,
+    ForceStd,
+    Json,
+    Mass,
+    OrientationNoise,
+    PositionNoise,
+    Replicates,
+    SampleRate,
+    Seed,
+    Side,
+    StudyFile,
+    TankDiameter,
+    TimeStep,
+    WallFriction,
+    WallRestitution,
+    resolve_study,
+    study_overrides,
+)
+from driftwalk.cli.output import print_json, print_note
+from driftwalk.core.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def simulate(
+    flow: Annotated[
+        Path,
+        typer.Option("--flow", metavar="FILE", help="Flow field: NetCDF, or CSV with x, y, u, v."),
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.nc", help="File to write.")],
+    study: StudyFile = None,
+    tank_diameter: TankDiameter = None,
+    side: Side = None,
+    mass: Mass = None,
+    depth: Depth = None,
+    drag_coefficient: DragCoefficient = None,
+    force_std: ForceStd = None,
+    force_interval: ForceInterval = None,
+    wall_friction: WallFriction = None,
+    wall_restitution: WallRestitution = None,
+    time_step: TimeStep = None,
+    duration: Duration = None,
+    sample_rate: SampleRate = None,
+    position_noise: PositionNoise = None,
+    orientation_noise: OrientationNoise = None,
+    replicates: Replicates = None,
+    seed: Seed = None,
+    like: Annotated[
+        Path | None,
+        typer.Option(
+            "--like",
+            metavar="RECORDING",
+            help="Start, time stamps and gaps of this recording (driftwalk's NetCDF or plain CSV).",
+            show_default=False,
+        ),
+    ] = None,
+    backend: Annotated[
+        str, typer.Option("--backend", metavar="cpu|reference", help="Single or double precision.")
+    ] = "cpu",
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
+    json: Json = False,
+) -> None:
+    """Simulate the motion of the block."""
+    from driftwalk.core.atomic import write_atomic
+    from driftwalk.flow import load_flow
+    from driftwalk.simulate import simulate as run
+    from driftwalk.simulate import simulate_like
+
+    if backend not in ("cpu", "reference"):
+        raise InputError(f"--backend takes cpu or reference, got '{backend}'")
+    if like is not None and backend == "reference":
+        raise InputError("--like runs on the cpu backend only: leave out --backend")
+    if out.exists() and not overwrite:
+        raise InputError(f"{out} exists; choose another name or --overwrite")
+    overrides = study_overrides(
+        tank_diameter=tank_diameter,
+        side=side,
+        mass=mass,
+        depth=depth,
+        drag_coefficient=drag_coefficient,
+        force_std=force_std,
+        force_interval=force_interval,
+        wall_friction=wall_friction,
+        wall_restitution=wall_restitution,
+        time_step=time_step,
+        duration=duration,
+        sample_rate=sample_rate,
+        position_noise=position_noise,
+        orientation_noise=orientation_noise,
+        replicates=replicates,
+        seed=seed,
+    )
+    chosen = resolve_study(study, overrides)
+    field = load_flow(flow)
+    if like is None:
+        result = run(chosen, field, backend="reference" if backend == "reference" else "cpu")
+    else:
+        from driftwalk.record import load
+
+        result = simulate_like(chosen, field, load(like))
+    from driftwalk.cli.calibration_run import netcdf_bytes
+
+    write_atomic(out, netcdf_bytes(result))
+    facts = summary(result)
+    if json:
+        print_json({"file": str(out), **facts})
+        return
+    print_note(
+        f"wrote {out}: {facts['replicates']} x {facts['samples']} samples over "
+        f"{facts['duration_s']:g} s; σ_F = {1e3 * facts['force_std_N']:g} mN drawn anew every "
+        f"{1e3 * facts['force_interval_s']:g} ms"
+    )
+    for name, count in facts["status"].items():
+        if count:
+            print_note(f"warning: {count} of {facts['replicates']} replicates: {name}")
+
+
+def summary(result: xr.Dataset) -> dict[str, Any]:
+    """Return what a simulation is in a few numbers, units in the keys."""
+    status = result["status"]
+    masks = status.attrs["flag_masks"]
+    names = status.attrs["flag_meanings"].split()
+    path = np.hypot(*(np.diff(result[name].values, axis=1) for name in ("x", "y")))
+    elapsed = float(result["time"].values[-1] - result["time"].values[0])
+    return {
+        "replicates": int(result.sizes["replicate"]),
+        "samples": int(result.sizes["time"]),
+        "duration_s": elapsed,
+        "drag_coefficient": result.attrs["drag_coefficient"],
+        "force_std_N": result.attrs["force_std_N"],
+        "force_interval_s": result.attrs["force_interval_s"],
+        "force_noise_intensity_N2_s": result.attrs["force_noise_intensity_N2_s"],
+        "time_step_s": result.attrs["time_step_s"],
+        "seed": result.attrs["seed"],
+        "mean_speed_m_s": float(np.nansum(path) / (elapsed * path.shape[0])) if elapsed else 0.0,
+        "status": {
+            name: int(((status.values & mask) != 0).sum())
+            for name, mask in zip(names, masks, strict=True)
+        },
+    }

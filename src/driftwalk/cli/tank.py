@@ -1,0 +1,69 @@
+"""The tank of a run: that of the study, or the arena that the recording was read with."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from driftwalk.core.errors import InputError
+from driftwalk.schema import body_track
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+MOST_OUTSIDE = 0.01
+"""Share of positions outside the tank from which on the tank cannot be right."""
+
+
+def study_in_arena(study: Study, recording: xr.Dataset) -> Study:
+    """Return the study with the recording's arena as its tank, the wall's properties kept.
+
+    Parameters
+    ----------
+    study : Study
+        Its [tank] stays where the recording has no arena.
+    recording : xarray.Dataset
+        A `trajectory`, read with an arena or without.
+    """
+    from driftwalk.model import Tank, apply_overrides
+
+    arena = recording.attrs.get("arena")
+    if arena is None:
+        return study
+    wall = study.tank
+    tank = Tank.from_arena(
+        arena,
+        wall_restitution=wall.wall_restitution,
+        wall_friction=wall.wall_friction,
+        bounce_speed_m_s=wall.bounce_speed_m_s,
+    )
+    keys = ("shape", "diameter_m", "width_m", "height_m", "vertices_m")
+    given = {f"tank.{key}": getattr(tank, key) for key in keys if getattr(tank, key) is not None}
+    return apply_overrides(study, given)
+
+
+def require_inside(study: Study, recording: xr.Dataset, body: str | None) -> None:
+    """Refuse a tank that does not hold the recorded positions.
+
+    Raises
+    ------
+    InputError
+        When more than 1 % of the positions lie outside; names the options that say the tank.
+    """
+    track = body_track(recording, body)
+    tank = study.tank
+    if tank.radius_m is not None:
+        outside = np.hypot(track.x, track.y) > tank.radius_m
+    else:
+        points = zip(track.x.tolist(), track.y.tolist(), strict=True)
+        outside = np.array([not tank.contains(x, y) for x, y in points])
+    if outside.size and outside.mean() > MOST_OUTSIDE:
+        raise InputError(
+            f"{outside.mean():.0%} of the positions lie outside the tank, a {tank.describe()} "
+            f"about the origin: the recording spans x {track.x.min():.3g} to "
+            f"{track.x.max():.3g} m, y {track.y.min():.3g} to {track.y.max():.3g} m; say the tank "
+            "with --tank-diameter, --arena or [tank] in a study file"
+        )
