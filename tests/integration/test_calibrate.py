@@ -1,0 +1,125 @@
+"""The whole calibration in memory, on recordings simulated by driftwalk itself (synthetic)."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import driftwalk as dw
+from driftwalk.model import apply_overrides
+from driftwalk.schema import build_trajectory
+
+TRUTH = {"drag_coefficient": 0.45, "force_std_N": 0.6e-3}
+SMALL = {
+    "calibration.drag_coefficient_min": 0.2,
+    "calibration.drag_coefficient_max": 0.8,
+    "calibration.drag_coefficient_step": 0.1,
+    "calibration.force_std_min_N": 0.2e-3,
+    "calibration.force_std_max_N": 1.0e-3,
+    "calibration.force_std_step_N": 0.2e-3,
+    "calibration.replicates": 2,
+    "calibration.refined_drag_coefficient_step": 0.02,
+    "calibration.refined_force_std_step_N": 0.04e-3,
+    "calibration.refined_replicates": 3,
+    "calibration.bootstrap": 30,
+}
+
+
+def synthetic_recording(duration: float, seed: int = 5):
+    study = apply_overrides(
+        dw.Study(),
+        {
+            "forces.drag_coefficient": TRUTH["drag_coefficient"],
+            "forces.force_std_N": TRUTH["force_std_N"],
+            "simulation.duration_s": duration,
+            "observation.position_noise_m": 3e-4,
+            "observation.orientation_noise_rad": 0.01,
+        },
+    )
+    start = dw.Start(0.05, 0.0, 0.0)
+    run = dw.simulate(study, dw.tank30_flow(), start=start, seed=seed).isel(replicate=0, body=0)
+    return build_trajectory(run["time"], run["x"], run["y"], run["theta"])
+
+
+@pytest.fixture(scope="module")
+def found():
+    study = apply_overrides(dw.Study(), SMALL)
+    return dw.calibrate(synthetic_recording(400.0), study, flow=dw.tank30_flow(), threads=2)
+
+
+def test_the_truth_of_a_synthetic_recording_is_found(found):
+    assert found.attrs["drag_coefficient"] == pytest.approx(TRUTH["drag_coefficient"], abs=0.04)
+    assert found.attrs["force_std_N"] == pytest.approx(TRUTH["force_std_N"], abs=1.6e-4)
+    assert found.attrs["distance_to_floor_ratio"] < 1.6
+    assert json.loads(found.attrs["warnings"]) == []
+
+
+def test_sigma_f_comes_with_its_interval_and_the_intensity(found):
+    facts = found.attrs
+    assert facts["force_noise_intensity_N2_s"] == pytest.approx(
+        facts["force_std_N"] ** 2 * facts["force_interval_s"]
+    )
+    low, high = facts["force_std_N_interval"]
+    assert low < facts["force_std_N"] < high
+    low, high = facts["drag_coefficient_interval"]
+    assert low < facts["drag_coefficient"] < high
+
+
+def test_the_camera_noise_was_estimated(found):
+    assert found.attrs["position_noise_m"] == pytest.approx(3e-4, rel=0.15)
+    assert found.attrs["orientation_noise_rad"] == pytest.approx(0.01, rel=0.2)
+
+
+def test_the_dataset_holds_what_is_kept_of_every_setting(found):
+    assert found["ks_distance"].dims == ("drag_coefficient", "force_std")
+    assert np.isfinite(found["ks_distance"]).all()
+    assert found["step_density"].shape == (7, 5, 32, 32)
+    assert found["step_density"].sum(("density_step_length", "density_turning_angle")).values == (
+        pytest.approx(np.ones((7, 5)), abs=1e-5)
+    )
+    assert found["excerpt_x"].sizes["excerpt_sample"] == 301
+    assert found["recording_step_length"].attrs["units"] == "m"
+    assert (found["ks_quadrant"] >= -1).all()
+    assert (found["ks_quadrant"] <= 3).all()
+    assert found["refined_surface"].shape == found["refined_ks_distance"].shape
+    assert found.sizes["bootstrap"] == 30
+
+
+def test_threads_do_not_change_a_single_bit(found):
+    study = apply_overrides(dw.Study(), SMALL)
+    again = dw.calibrate(synthetic_recording(400.0), study, flow=dw.tank30_flow(), threads=1)
+    assert again.identical(found)
+
+
+def test_an_optimum_at_the_edge_of_the_grid_is_warned_of():
+    study = apply_overrides(
+        dw.Study(),
+        {
+            **SMALL,
+            "calibration.drag_coefficient_min": 0.6,
+            "calibration.drag_coefficient_max": 0.9,
+            "calibration.bootstrap": 10,
+        },
+    )
+    found = dw.calibrate(synthetic_recording(200.0), study, flow=dw.tank30_flow())
+    warnings = json.loads(found.attrs["warnings"])
+    assert any("edge of the grid" in text for text in warnings)
+    assert any("does not explain" in text for text in warnings)
+    assert found.attrs["interval_stretch"] > 2.0
+
+
+def test_a_coarse_map_alone_is_possible():
+    study = apply_overrides(dw.Study(), {**SMALL, "calibration.refine": "none"})
+    found = dw.calibrate(synthetic_recording(100.0), study, flow=dw.tank30_flow())
+    assert "refined_ks_distance" not in found
+    assert "drag_coefficient_interval" not in found.attrs
+    assert found.attrs["drag_coefficient"] in found["drag_coefficient"].values
+
+
+def test_without_a_given_flow_it_is_extracted_from_the_recording():
+    study = apply_overrides(dw.Study(), {**SMALL, "calibration.bootstrap": 10})
+    found = dw.calibrate(dw.tank30_recording().isel(time=slice(0, 3000)), study)
+    assert 0.2 <= found.attrs["drag_coefficient"] <= 0.8
+    assert found.attrs["simulated_recording"] == "yes"
