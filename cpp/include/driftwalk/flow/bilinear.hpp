@@ -84,15 +84,16 @@ inline void load_cells(const std::int16_t* table, IntPack<16> index, IntPack<16>
 #else
 template <int N>
 inline void load_cells(const std::int16_t* table, IntPack<N> index, IntPack<N>* out) {
-  for (int k = 0; k < 4; ++k) {
-    out[k] = IntPack<N>(Int32(0));
-  }
+  Int32 columns[4][N];
   for (int lane = 0; lane < N; ++lane) {
     Int32 record[4];
     std::memcpy(record, table + flow_record * std::int64_t(index.v[lane]), sizeof record);
     for (int k = 0; k < 4; ++k) {
-      out[k].v[lane] = record[k];
+      columns[k][lane] = record[k];
     }
+  }
+  for (int k = 0; k < 4; ++k) {
+    std::memcpy(&out[k].v, columns[k], sizeof columns[k]);
   }
 }
 #endif
