@@ -159,6 +159,29 @@ inline void push_out(const Contact<Real>& c, Pose<Real>& pose) {
   pose.y = pose.y - c.ny * shift;
 }
 
+// Between edges that meet at less than a right angle, leaving one can mean entering the next: go
+// round until all are clear. Lanes that are clear stay as they are, bit for bit.
+template <class Real, class T>
+inline void push_inside(const WallView<T>& wall, T h, Pose<Real>& pose) {
+  constexpr int most_rounds = 16;
+  Contact<Real> first, second;
+  Axes<Real> axes;
+  sincos(bounded_angle(pose.theta), axes.sine, axes.cosine);
+  for (int round = 0; round < most_rounds; ++round) {
+    bool moved = false;
+    for (int e = 0; e < wall.edge_count; ++e) {
+      const WallEdge<T>& edge = wall.edges[e];
+      leading_corners(Real(edge.normal_x), Real(edge.normal_y), h, axes, first, second);
+      measure_edge(first, edge, pose.x, pose.y);
+      moved = moved || any(first.depth > Real(T(0)));
+      push_out<Real, T>(first, pose);
+    }
+    if (!moved) {
+      return;
+    }
+  }
+}
+
 // Returns where a wall touched the block.
 template <class Real, class T>
 inline auto meet_wall(const WallView<T>& wall, T h, Real per_inertia, Pose<Real>& pose,
@@ -205,6 +228,9 @@ inline auto meet_wall(const WallView<T>& wall, T h, Real per_inertia, Pose<Real>
     touched = touched | (first.depth > zero);
     resolve_contacts(first, second, wall, per_inertia, motion);
     push_out<Real, T>(first, pose);
+  }
+  if (any(touched)) {
+    push_inside(wall, h, pose);
   }
   return touched;
 }

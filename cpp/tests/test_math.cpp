@@ -1,0 +1,179 @@
+// Elementary functions of the float packs against double, over their whole stated domains.
+#include "check.hpp"
+#include "driftwalk/math/elementary.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+namespace {
+
+using driftwalk::FloatPack;
+using driftwalk::IntPack;
+using driftwalk::UIntPack;
+constexpr int lanes = 4;
+using Real = FloatPack<lanes>;
+
+float float_of_bits(std::uint32_t bits) {
+  float value;
+  std::memcpy(&value, &bits, sizeof value);
+  return value;
+}
+
+// Distance from a float to a double in units of the last place of the double's float neighbour.
+double ulps(float got, double exact) {
+  const float near = std::fabs(static_cast<float>(exact));
+  const double ulp = double(std::nextafter(near, INFINITY)) - double(near);
+  return std::fabs(double(got) - exact) / ulp;
+}
+
+struct Worst {
+  double log = 0, sine = 0, cosine = 0, absolute = 0;
+};
+
+void measure_log(const float* x, Worst& worst) {
+  Real in;
+  for (int k = 0; k < lanes; ++k) {
+    in.set(k, x[k]);
+  }
+  const Real out = driftwalk::log(in);
+  for (int k = 0; k < lanes; ++k) {
+    worst.log = std::max(worst.log, ulps(out[k], std::log(double(x[k]))));
+  }
+}
+
+void measure_sincos(const float* x, Worst& worst) {
+  Real in, sine, cosine;
+  for (int k = 0; k < lanes; ++k) {
+    in.set(k, x[k]);
+  }
+  driftwalk::sincos(in, sine, cosine);
+  for (int k = 0; k < lanes; ++k) {
+    const double s = std::sin(double(x[k])), c = std::cos(double(x[k]));
+    worst.sine = std::max(worst.sine, ulps(sine[k], s));
+    worst.cosine = std::max(worst.cosine, ulps(cosine[k], c));
+    worst.absolute = std::max({worst.absolute, std::fabs(sine[k] - s), std::fabs(cosine[k] - c)});
+  }
+}
+
+// Every value that Box-Muller can ask for is k 2^-24, 1 <= k <= 2^24: a sieve of them, all of the
+// first and last thousands, and floats of every binade in between.
+void check_log() {
+  Worst worst;
+  std::vector<float> x;
+  for (std::uint32_t k = 1; k <= 1u << 24; k += (k < 4096 || k > (1u << 24) - 4096) ? 1 : 29) {
+    x.push_back(float(k) * 0x1p-24f);
+  }
+  for (std::uint32_t bits = 0x33800000u; bits <= 0x3f800000u; bits += 1009) {
+    x.push_back(float_of_bits(bits));
+  }
+  x.resize(x.size() / lanes * lanes);
+  for (std::size_t k = 0; k < x.size(); k += lanes) {
+    measure_log(x.data() + k, worst);
+  }
+  std::printf("log: %.3f ulp over %zu values\n", worst.log, x.size());
+  CHECK(worst.log < 1.0);
+  Real one{1.0f};
+  CHECK(driftwalk::log(one)[0] == 0.0f);
+}
+
+void check_sincos() {
+  Worst worst;
+  std::vector<float> x;
+  for (std::uint32_t bits = 0; bits <= 0x41000000u; bits += 1201) {
+    x.push_back(float_of_bits(bits));
+    x.push_back(-float_of_bits(bits));
+  }
+  // The hard places: next to the multiples of pi / 4, where quadrants change and zeros lie.
+  for (int quarter = -10; quarter <= 10; ++quarter) {
+    float at = static_cast<float>(quarter * (driftwalk::pi_value / 4));
+    for (int k = 0; k < 2000; ++k) {
+      at = std::nextafter(at, -100.0f);
+    }
+    for (int k = 0; k < 4000; ++k) {
+      if (std::fabs(at) <= 8.0f) {
+        x.push_back(at);
+      }
+      at = std::nextafter(at, 100.0f);
+    }
+  }
+  x.resize(x.size() / lanes * lanes);
+  for (std::size_t k = 0; k < x.size(); k += lanes) {
+    measure_sincos(x.data() + k, worst);
+  }
+  std::printf("sine: %.3f ulp, cosine: %.3f ulp, %.3g absolute, over %zu values\n", worst.sine,
+              worst.cosine, worst.absolute, x.size());
+  CHECK(worst.sine < 2.0);
+  CHECK(worst.cosine < 2.0);
+  CHECK(worst.absolute < 1e-7);
+}
+
+// Packs against the plain rule, at equal, unordered and signed-zero operands.
+void check_select_rules() {
+  const float values[] = {0.0f, -0.0f, 1.0f, -1.0f, NAN, INFINITY, -INFINITY, 3.5f};
+  for (const float a : values) {
+    for (const float b : values) {
+      const float most = a > b ? a : b, least = a < b ? a : b;
+      Real first, second; // lane by lane: the broadcast 0 + value has no negative zero
+      for (int lane = 0; lane < lanes; ++lane) {
+        first.set(lane, a);
+        second.set(lane, b);
+      }
+      const float got_most = driftwalk::max(first, second)[0];
+      const float got_least = driftwalk::min(first, second)[0];
+      CHECK(std::memcmp(&most, &got_most, sizeof most) == 0);
+      CHECK(std::memcmp(&least, &got_least, sizeof least) == 0);
+    }
+  }
+  // A clamp turns NaN into a bound, so that no table is ever read at a NaN.
+  CHECK(driftwalk::bounded_angle(Real(NAN))[0] == -8.0f);
+  CHECK(driftwalk::bounded_angle(double(NAN)) == -8.0);
+  CHECK(driftwalk::bounded_angle(Real(INFINITY))[2] == 8.0f);
+  Real mixed{0.0f};
+  mixed.set(3, 1.0f);
+  CHECK(driftwalk::any(mixed > 0.5f) && !driftwalk::any(mixed > 1.5f));
+}
+
+void check_wrap_angle() {
+  const double pi = driftwalk::pi_value;
+  for (int k = -200; k <= 200; ++k) {
+    const double angle = k * (2 * pi / 200);
+    const double wrapped = driftwalk::wrap_angle(angle);
+    CHECK(std::fabs(wrapped) <= pi);
+    CHECK_NEAR(std::remainder(wrapped - angle, 2 * pi), 0.0, 1e-14);
+    const float single = driftwalk::wrap_angle(Real(static_cast<float>(angle)))[1];
+    CHECK(std::fabs(single) <= 3.1415928f);
+    CHECK_NEAR(std::remainder(double(single) - angle, 2 * pi), 0.0, 1e-6);
+  }
+}
+
+void check_wide_products() {
+  std::uint32_t word = 1;
+  for (int k = 0; k < 2000; ++k) {
+    word = word * 747796405u + 2891336453u;
+    const std::uint32_t factor = k % 3 == 0 ? 0xffffffffu : word ^ 0x9E3779B9u;
+    UIntPack<lanes> b;
+    for (int lane = 0; lane < lanes; ++lane) {
+      b.set(lane, k == 7 ? 0xffffffffu : word + 0x10001u * std::uint32_t(lane));
+    }
+    UIntPack<lanes> high, low;
+    driftwalk::multiply_wide(factor, b, high, low);
+    for (int lane = 0; lane < lanes; ++lane) {
+      const std::uint64_t product = std::uint64_t(factor) * b[lane];
+      CHECK(high[lane] == product >> 32 && low[lane] == (product & 0xffffffffu));
+    }
+  }
+}
+
+} // namespace
+
+int main() {
+  check_log();
+  check_sincos();
+  check_select_rules();
+  check_wrap_angle();
+  check_wide_products();
+  return check::result();
+}
