@@ -37,10 +37,15 @@ Out<T> hand_out(std::vector<T>&& values, std::vector<std::size_t> shape) {
 class Model {
 public:
   Model(driftwalk::BatchModel model, In<double, 2> edges, In<double, 3> u, In<double, 3> v,
-        In<double, 1> frame_time, In<double, 1> sample_time)
+        In<double, 1> frame_time, In<double, 1> sample_time,
+        const std::optional<In<double, 2>>& view_edges)
       : samples_(model.samples = static_cast<std::int64_t>(sample_time.size())) {
     model.edges = edges.data();
     model.edge_count = static_cast<int>(edges.shape(0));
+    if (view_edges) {
+      model.view_edges = view_edges->data();
+      model.view_edge_count = static_cast<int>(view_edges->shape(0));
+    }
     model.flow_u = u.data();
     model.flow_v = v.data();
     model.frames = static_cast<int>(u.shape(0));
@@ -254,7 +259,9 @@ void register_simulate(nb::module_& module) {
              double friction, double bounce_speed, In<double, 3> u, In<double, 3> v,
              In<double, 1> frame_time, double origin_x, double origin_y, double spacing_x,
              double spacing_y, double time_step, int steps_per_interval, In<double, 1> sample_time,
-             double position_noise, double orientation_noise, double position_quantum) {
+             double position_noise, double orientation_noise, double position_quantum,
+             double view_radius, double view_x, double view_y,
+             std::optional<In<double, 2>> view_edges) {
             BatchModel model;
             model.side = side;
             model.mass = mass;
@@ -275,13 +282,17 @@ void register_simulate(nb::module_& module) {
             model.position_noise = position_noise;
             model.orientation_noise = orientation_noise;
             model.position_quantum = position_quantum;
-            new (self) Model(model, edges, u, v, frame_time, sample_time);
+            model.view_radius = view_radius;
+            model.view_x = view_x;
+            model.view_y = view_y;
+            new (self) Model(model, edges, u, v, frame_time, sample_time, view_edges);
           },
           nb::kw_only(), "side"_a, "mass"_a, "inertia"_a, "depth"_a, "strips"_a, "water_density"_a,
           "radius"_a, "edges"_a, "restitution"_a, "friction"_a, "bounce_speed"_a, "u"_a, "v"_a,
           "frame_time"_a, "origin_x"_a, "origin_y"_a, "spacing_x"_a, "spacing_y"_a, "time_step"_a,
           "steps_per_interval"_a, "sample_time"_a, "position_noise"_a, "orientation_noise"_a,
-          "position_quantum"_a)
+          "position_quantum"_a, "view_radius"_a = 0.0, "view_x"_a = 0.0,
+          "view_y"_a = 0.0, "view_edges"_a = nb::none())
       .def_prop_ro("samples", &Model::samples);
   module.def("simulate", &simulate, "model"_a, "worlds"_a, "key"_a, nb::kw_only(), "threads"_a,
              "precision"_a);

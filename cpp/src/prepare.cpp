@@ -32,6 +32,16 @@ void arena_extent(const BatchModel& model, double& low_x, double& high_x, double
   }
 }
 
+template <class T>
+std::vector<PreparedEdge<T>> prepare_edges(const double* edges, int count) {
+  std::vector<PreparedEdge<T>> prepared(static_cast<std::size_t>(count));
+  for (PreparedEdge<T>& edge : prepared) {
+    edge = {static_cast<T>(edges[0]), static_cast<T>(edges[1]), static_cast<T>(edges[2])};
+    edges += 3;
+  }
+  return prepared;
+}
+
 int padding(double reach, double spacing) { return static_cast<int>(std::ceil(reach / spacing)) + 1; }
 }  // namespace
 
@@ -53,6 +63,7 @@ PreparedRun<T>::PreparedRun(const BatchModel& model) {
   prepare_wall(model);
   prepare_flow(model);
   prepare_samples(model);
+  prepare_view(model);
 }
 
 template <class T>
@@ -61,13 +72,19 @@ void PreparedRun<T>::prepare_wall(const BatchModel& model) {
   view_.restitution = static_cast<T>(model.restitution);
   view_.friction = static_cast<T>(model.friction);
   view_.bounce_speed = static_cast<T>(model.bounce_speed);
-  edges_.resize(static_cast<std::size_t>(model.edge_count));
-  for (std::size_t e = 0; e < edges_.size(); ++e) {
-    edges_[e] = {static_cast<T>(model.edges[3 * e]), static_cast<T>(model.edges[3 * e + 1]),
-                 static_cast<T>(model.edges[3 * e + 2])};
-  }
+  edges_ = prepare_edges<T>(model.edges, model.edge_count);
   view_.edges = edges_.data();
   view_.edge_count = model.edge_count;
+}
+
+template <class T>
+void PreparedRun<T>::prepare_view(const BatchModel& model) {
+  view_.view_radius = static_cast<T>(model.view_radius);
+  view_.view_x = static_cast<T>(model.view_x);
+  view_.view_y = static_cast<T>(model.view_y);
+  view_edges_ = prepare_edges<T>(model.view_edges, model.view_edge_count);
+  view_.view_edges = view_edges_.data();
+  view_.view_edge_count = model.view_edge_count;
 }
 
 // One record per node; beyond the grid the nearest node's value goes on. Velocities are rounded to

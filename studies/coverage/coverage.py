@@ -49,9 +49,7 @@ def main() -> None:
     track = body_track(dw.tank30_recording())
     study = dw.Study()
     camera = recorded_camera(track, study, position_quantum=0.0)
-    problem = prepare_problem(
-        track, study, dw.tank30_flow(), camera=camera, threads=wanted.threads
-    )
+    problem = prepare_problem(track, study, dw.tank30_flow(), camera=camera, threads=wanted.threads)
     for index, truth in enumerate(TRUTHS):
         calibrate_truth(problem, index, truth, wanted)
     report()

@@ -47,9 +47,7 @@ def test_the_region_is_the_level_set_of_the_quantile_of_the_excess():
 def test_stretch_raises_the_level_and_widens_the_region():
     excess = np.linspace(0.0, 0.05, 101)
     plain = confidence_region(SMOOTHER, SURFACE, bootstrap_with(excess), confidence=0.9)
-    wide = confidence_region(
-        SMOOTHER, SURFACE, bootstrap_with(excess), confidence=0.9, stretch=2.0
-    )
+    wide = confidence_region(SMOOTHER, SURFACE, bootstrap_with(excess), confidence=0.9, stretch=2.0)
     assert wide.level - 0.02 == pytest.approx(2 * (plain.level - 0.02))
     assert np.ptp(wide.force_std) > 1.3 * np.ptp(plain.force_std)
 
@@ -76,7 +74,5 @@ def test_a_region_that_reaches_the_end_of_the_grid_is_closed_along_it():
     [((0.4, 6e-4), True), ((0.42, 6.2e-4), True), ((0.45, 6e-4), False), ((0.7, 6e-4), False)],
 )
 def test_a_point_is_in_the_region_where_the_surface_is_low(point, inside):
-    region = confidence_region(
-        SMOOTHER, SURFACE, bootstrap_with(np.full(10, 0.09)), confidence=0.9
-    )
+    region = confidence_region(SMOOTHER, SURFACE, bootstrap_with(np.full(10, 0.09)), confidence=0.9)
     assert region_contains(SMOOTHER, SURFACE, region, *point) is inside

@@ -48,9 +48,7 @@ def hand_made(minimum=(0.4, 6e-4), floor=0.02, slope=0.3):
 
 
 def test_a_map_is_what_simulating_and_comparing_each_setting_gives(problem):
-    found = run_map(
-        problem, [0.3, 0.5], [4e-4, 8e-4], stage="coarse", replicates=2, details="all"
-    )
+    found = run_map(problem, [0.3, 0.5], [4e-4, 8e-4], stage="coarse", replicates=2, details="all")
     study = dw.Study()
     model = dw.model.apply_overrides(
         study,
@@ -65,9 +63,7 @@ def test_a_map_is_what_simulating_and_comparing_each_setting_gives(problem):
     from driftwalk import _core
     from driftwalk.simulate.backend import native_model, world_table
 
-    worlds = world_table(
-        **problem.start._asdict(), drag_coefficient=0.5, force_std=4e-4
-    )
+    worlds = world_table(**problem.start._asdict(), drag_coefficient=0.5, force_std=4e-4)
     native = native_model(model, problem.flow, problem.sample_time, problem.camera)
     x, y, _, _ = _core.simulate(native, worlds, key, threads=1, precision="single")
     steps = apply_steps(problem.plan, x[0].astype(float), y[0].astype(float))
@@ -82,18 +78,14 @@ def test_a_map_is_what_simulating_and_comparing_each_setting_gives(problem):
 def test_a_map_does_not_depend_on_the_order_or_company_of_its_settings(problem):
     # The address is the index within the stage, so a grid that begins the same way agrees.
     small = run_map(problem, [0.3], [4e-4, 8e-4], stage="coarse", replicates=2, details="none")
-    large = run_map(
-        problem, [0.3, 0.5], [4e-4, 8e-4], stage="coarse", replicates=2, details="none"
-    )
+    large = run_map(problem, [0.3, 0.5], [4e-4, 8e-4], stage="coarse", replicates=2, details="none")
     np.testing.assert_array_equal(small.distance[0], large.distance[0])
 
 
 def test_a_setting_in_which_nothing_moves_is_as_far_as_can_be(track):
     still = dw.uniform_flow(0.0, 0.0, arena=dw.Study().tank.to_arena())
     rest = Track(track.time, track.x, track.y, track.theta)
-    problem = prepare_problem(
-        rest, dw.Study(), still, camera=Camera(3e-4, 0.0, 0.0), threads=1
-    )
+    problem = prepare_problem(rest, dw.Study(), still, camera=Camera(3e-4, 0.0, 0.0), threads=1)
     found = run_map(problem, [1.0], [0.0, 5e-4], stage="coarse", replicates=2, details="none")
     assert (found.arrays["status"][0, 0] & 4).all()
     assert (found.distance[0, 0] == 1.0).all()

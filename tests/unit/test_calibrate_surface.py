@@ -43,9 +43,11 @@ def test_the_optimum_of_a_bowl_is_its_bottom(centre):
 
 def test_noise_moves_the_optimum_less_than_it_moves_the_luckiest_cell():
     random = np.random.default_rng(20)
-    bowl = 0.03 + 0.4 * ((DRAG[:, None] - 0.4) / 0.1) ** 2 + 0.1 * (
-        (FORCE[None, :] - 6e-4) / 2e-4
-    ) ** 2
+    bowl = (
+        0.03
+        + 0.4 * ((DRAG[:, None] - 0.4) / 0.1) ** 2
+        + 0.1 * ((FORCE[None, :] - 6e-4) / 2e-4) ** 2
+    )
     smooth, lucky = [], []
     for _ in range(60):
         noisy = bowl + random.normal(0.0, 0.01, bowl.shape)

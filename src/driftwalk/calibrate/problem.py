@@ -15,6 +15,7 @@ from driftwalk.core.seeds import world_keys
 from driftwalk.record import estimate_tracking_noise
 from driftwalk.simulate.backend import Camera, default_threads, native_model, world_table
 from driftwalk.simulate.initial import Start, recorded_start, world_orientations
+from driftwalk.simulate.run import without_gaps
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,9 +54,10 @@ class Problem:
     flow : xarray.Dataset
         The water's velocity.
     sample_time : ndarray, shape (n,)
-        The recording's time stamps from its first sample on [s].
+        Time stamps of a world [s]: the recording's, from its first sample on.
     plan : StepPlan
-        Which samples form steps; the same for the recording and for every world.
+        Which samples of a world form steps: those of the recording, unless the study leaves out
+        its gaps.
     steps : ndarray, shape (pairs, 2)
         The recording's step lengths [m] and turning angles [rad].
     start : Start
@@ -137,6 +139,10 @@ def prepare_problem(
             "it hardly moves, is too short, or its clock does not suit the step interval "
             "(--step-interval)"
         )
+    # Without the recording's gaps the worlds have time stamps, and so a plan, of their own.
+    if study.observation.gaps == "none":
+        time = without_gaps(time)
+        plan = plan_steps(time, step_interval=plan.step_interval)
     return Problem(
         study=study,
         flow=flow,

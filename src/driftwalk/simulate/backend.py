@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,8 @@ from driftwalk.schema import check_flow_field
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.model import Study, Tank
+    from driftwalk.model import Study
+    from driftwalk.model.tank import Outline
 
 Floats = npt.NDArray[np.float64]
 
@@ -91,15 +92,27 @@ def native_model(
         position_noise=camera.position_noise,
         orientation_noise=camera.orientation_noise,
         position_quantum=camera.position_quantum,
+        **_field_of_view(study),
     )
 
 
-def wall_edges(tank: Tank) -> Floats:
-    """Return the edges of a polygonal tank: outward normal and distance from the origin [m].
+def _field_of_view(study: Study) -> dict[str, Any]:
+    """Return what the camera sees, in the words of the native core."""
+    view = study.observation.field_of_view
+    if view is None:
+        return {"view_radius": 0.0, "view_x": 0.0, "view_y": 0.0, "view_edges": np.zeros((0, 3))}
+    x, y = view.center_m
+    edges = wall_edges(view)
+    edges[:, 2] += edges[:, 0] * x + edges[:, 1] * y
+    return {"view_radius": view.radius_m or 0.0, "view_x": x, "view_y": y, "view_edges": edges}
+
+
+def wall_edges(outline: Outline) -> Floats:
+    """Return the edges of a rectangle or polygon: outward normal and distance from the origin [m].
 
     Shape (edges, 3); empty for a circle.
     """
-    corners = np.asarray(tank.corners_m, dtype=np.float64).reshape(-1, 2)
+    corners = np.asarray(outline.corners_m, dtype=np.float64).reshape(-1, 2)
     along = np.roll(corners, -1, axis=0) - corners
     # Counter-clockwise corners: the outside is to the right of each edge.
     normal = np.stack([along[:, 1], -along[:, 0]], axis=1)

@@ -95,6 +95,14 @@ def recorded_start(track: Track, *, window: float = 0.7) -> Start:
     ------
     InputError
         When the track has no sample.
+
+    Examples
+    --------
+    >>> from driftwalk.schema import Track
+    >>> time = np.arange(20) / 10
+    >>> track = Track(time, 0.05 * time, 0.0 * time, 0.0 * time)
+    >>> round(float(recorded_start(track).vx), 3)
+    0.05
     """
     if track.time.size == 0:
         raise InputError("the recording has no sample to start from")

@@ -102,7 +102,6 @@ def simulate(
         threads=threads or default_threads(),
         precision="double" if backend == "reference" else "single",
     )
-    hide_unseen(study, x, y, theta)
     return _dataset(study, times, (x, y, theta), status, {"seed": chosen, "backend": backend})
 
 
@@ -152,6 +151,8 @@ def simulate_like(
     track = body_track(recording, body)
     begin = recorded_start(track)
     times = track.time - track.time[0]
+    if study.observation.gaps == "none":
+        times = without_gaps(times)
     return simulate(
         study,
         flow,
@@ -163,29 +164,17 @@ def simulate_like(
     )
 
 
+def without_gaps(time: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return even time stamps [s] over the same span, at the median interval of the given ones."""
+    interval = float(np.median(np.diff(time)))
+    return np.arange(int(np.floor(time[-1] / interval + 1e-6)) + 1) * interval
+
+
 def plain_camera(study: Study) -> Camera:
     """Return the camera of a study in which "estimate" and "recording" stand for none."""
     seen = study.observation
     values = (seen.position_noise_m, seen.orientation_noise_rad, seen.position_quantum_m)
     return Camera(*(0.0 if isinstance(value, str) else value for value in values))
-
-
-def hide_unseen(study: Study, x: Any, y: Any, theta: Any) -> None:
-    """Make the samples outside the field of view missing, in place."""
-    field = study.observation.field_of_view
-    if field is None:
-        return
-    if field.radius_m is not None:
-        seen = np.hypot(x - field.center_m[0], y - field.center_m[1]) <= field.radius_m
-    else:
-        corners = np.asarray(field.corners_m)
-        along = np.roll(corners, -1, axis=0) - corners
-        seen = np.ones(x.shape, dtype=bool)
-        for (cx, cy), (ax, ay) in zip(corners, along, strict=True):
-            side = ax * (y - field.center_m[1] - cy) - ay * (x - field.center_m[0] - cx)
-            seen &= side >= 0
-    for values in (x, y, theta):
-        values[~seen] = np.nan
 
 
 def _default_times(study: Study) -> npt.NDArray[np.float64]:

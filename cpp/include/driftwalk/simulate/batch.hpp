@@ -39,6 +39,11 @@ struct BatchModel {
   std::int64_t samples = 0;
   // camera
   double position_noise = 0, orientation_noise = 0, position_quantum = 0;
+  // What the camera sees: a circle, or the edges of a convex polygon (nx, ny, distance) x count;
+  // neither means everything. Samples outside are missing (NaN).
+  double view_radius = 0, view_x = 0, view_y = 0;
+  const double* view_edges = nullptr;
+  int view_edge_count = 0;
 };
 
 // One entry per world.

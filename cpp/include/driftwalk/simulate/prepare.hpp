@@ -22,9 +22,11 @@ private:
   void prepare_wall(const BatchModel& model);
   void prepare_flow(const BatchModel& model);
   void prepare_samples(const BatchModel& model);
+  void prepare_view(const BatchModel& model);
 
   Prepared<T> view_{};
   std::vector<PreparedEdge<T>> edges_;
+  std::vector<PreparedEdge<T>> view_edges_;
   std::vector<typename FlowNumber<T>::type> table_;
   std::vector<double> frame_time_;
   std::vector<std::int64_t> sample_step_;

@@ -66,6 +66,10 @@ struct Prepared {
   const T* sample_weight;
   // camera
   T position_noise, orientation_noise, position_quantum;
+  // field of view: a circle of positive radius, or edges, or neither
+  T view_radius, view_x, view_y;
+  const PreparedEdge<T>* view_edges;
+  int view_edge_count;
 };
 
 // Where the samples of a run go: sample k of lane l stands at [l * lane_stride + k].

@@ -18,7 +18,9 @@ inline void load_worlds(const BatchWorlds& worlds, std::int64_t first, int count
   UInt32 low[lanes], high[lanes];
   for (int lane = 0; lane < lanes; ++lane) {
     const std::int64_t world = first + (lane < count ? lane : count - 1);
-    const double values[8] = {worlds.x[world],  worlds.y[world],     worlds.theta[world],
+    // A start angle may count turns; the kernels keep theirs within [-pi, pi].
+    const double theta = __builtin_remainder(worlds.theta[world], 2 * pi_value);
+    const double values[8] = {worlds.x[world],  worlds.y[world],     theta,
                               worlds.vx[world], worlds.vy[world],    worlds.omega[world],
                               worlds.drag_coefficient[world], worlds.force_std[world]};
     for (int k = 0; k < 8; ++k) {
@@ -53,10 +55,31 @@ inline void draw_normals(const Philox<typename Numbers<Real>::UInt>& stream, Pur
   normal_pair(words[2], words[3], out[2], out[3]);
 }
 
+// The nearest multiple of `quantum`; what has no number of quanta in 31 bits stays as it is, a NaN
+// above all.
 template <class Real, class T>
 inline Real quantise(Real value, T quantum) {
+  const T most = T(1 << 30);
   const Real scaled = value / Real(quantum);
-  return to_real(value, truncate(scaled + copy_sign(Real(T(0.5)), scaled))) * quantum;
+  const Real bounded = clamp_to(scaled, -most, most);
+  const Real rounded =
+      to_real(value, truncate(bounded + copy_sign(Real(T(0.5)), bounded))) * quantum;
+  return select(abs(scaled) < Real(most), rounded, value);
+}
+
+template <class T>
+inline bool is_seen(const Prepared<T>& run, T x, T y) {
+  if (run.view_radius > T(0)) {
+    const T dx = x - run.view_x, dy = y - run.view_y;
+    return dx * dx + dy * dy <= run.view_radius * run.view_radius;
+  }
+  for (int e = 0; e < run.view_edge_count; ++e) {
+    const PreparedEdge<T>& edge = run.view_edges[e];
+    if (x * edge.normal_x + y * edge.normal_y > edge.distance) {
+      return false;
+    }
+  }
+  return true;
 }
 
 // The pose as the camera reports it, written to every lane's own column.
@@ -70,6 +93,8 @@ inline void write_sample(const Prepared<T>& run, const SampleSink<T>& sink, std:
     x = x + noise[0] * run.position_noise;
     y = y + noise[1] * run.position_noise;
     theta = theta + noise[2] * run.orientation_noise;
+    // Noise of the largest allowed spread, 3.2 rad, can add up to three turns.
+    theta = wrap_angle(wrap_angle(theta));
   }
   if (run.position_quantum > T(0)) {
     x = quantise(x, run.position_quantum);
@@ -78,10 +103,13 @@ inline void write_sample(const Prepared<T>& run, const SampleSink<T>& sink, std:
   theta = wrap_angle(theta);
   for (int lane = 0; lane < count; ++lane) {
     const std::int64_t at = lane * sink.lane_stride + sample;
-    sink.x[at] = lane_of(x, lane);
-    sink.y[at] = lane_of(y, lane);
+    const T sample_x = lane_of(x, lane), sample_y = lane_of(y, lane);
+    const bool seen = is_seen(run, sample_x, sample_y);
+    const T missing = static_cast<T>(__builtin_nan(""));
+    sink.x[at] = seen ? sample_x : missing;
+    sink.y[at] = seen ? sample_y : missing;
     if (sink.theta != nullptr) {
-      sink.theta[at] = lane_of(theta, lane);
+      sink.theta[at] = seen ? lane_of(theta, lane) : missing;
     }
   }
 }
