@@ -47,6 +47,11 @@ def memory_time(series: npt.ArrayLike) -> float:
     ----------
     series : array_like, shape (n,)
         Values.
+
+    Examples
+    --------
+    >>> memory_time([1.0, 1.0, 1.0])
+    1.0
     """
     rho = _autocorrelation(np.asarray(series, dtype=np.float64))
     if rho.size < FEWEST:

@@ -37,7 +37,18 @@ def step_length_edges(*step_length: npt.ArrayLike, bins: int = BINS) -> Floats:
 
 
 def turning_angle_edges(*, bins: int = BINS) -> Floats:
-    """Return bin edges for turning angles [rad]: from -pi to pi."""
+    """Return bin edges for turning angles [rad]: from -pi to pi.
+
+    Parameters
+    ----------
+    bins : int
+        Number of bins.
+
+    Examples
+    --------
+    >>> turning_angle_edges(bins=2).round(3).tolist()
+    [-3.142, 0.0, 3.142]
+    """
     return np.linspace(-np.pi, np.pi, bins + 1)
 
 

@@ -133,6 +133,11 @@ def ks_reference(sample: npt.ArrayLike) -> KsReference:
     sample : array_like, shape (n, 2)
         Points; finite, n >= 1.
 
+    Returns
+    -------
+    KsReference
+        Its `distance` and `compare` take the other sample.
+
     Raises
     ------
     InputError
@@ -202,7 +207,12 @@ def ks_compare(
 ) -> KsComparison:
     """Return the KS distance with its two parts and the place where each sits.
 
-    Parameters and errors are those of `ks_distance`.
+    Parameters
+    ----------
+    a, b : array_like, shapes (n, 2), (m, 2)
+        Points; see `ks_distance`, whose errors these are as well.
+    ties, combine, method : str
+        As in `ks_distance`.
 
     Examples
     --------

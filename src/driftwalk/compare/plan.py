@@ -105,6 +105,11 @@ def plan_steps(
     tolerance : float
         How far an interval may be from its nominal value, as a fraction of it.
 
+    Returns
+    -------
+    StepPlan
+        Good for every trajectory with samples at these times.
+
     Raises
     ------
     InputError
@@ -162,6 +167,11 @@ def apply_steps(plan: StepPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> AppliedSt
     x, y : array_like, shape (plan.samples,)
         Positions [m], float32 or float64; a pair that needs a position that is not finite is left
         out and counted.
+
+    Returns
+    -------
+    AppliedSteps
+        Step lengths [m] and turning angles [rad], and what was left out.
 
     Raises
     ------

@@ -77,6 +77,11 @@ def block_permutation_test(
     ties : {"strict", "limits"}
         As in `ks_distance`.
 
+    Returns
+    -------
+    PermutationTest
+        D, the p-value, the noise floor, and the block length that was used.
+
     Raises
     ------
     InputError

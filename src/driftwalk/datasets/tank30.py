@@ -52,7 +52,7 @@ def tank30_recording(
 
 
 def tank30_flow() -> xr.Dataset:
-    """Load the true flow field of the bundled recording, a `flow_field` of 50 x 50 nodes.
+    """Return the true flow field of the bundled recording, a `flow_field` of 50 x 50 nodes.
 
     Examples
     --------

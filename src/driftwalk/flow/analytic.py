@@ -35,7 +35,19 @@ JET_SPREADING = 0.1
 def uniform_velocity(
     x: npt.ArrayLike, y: npt.ArrayLike, *, u: float = 0.0, v: float = 0.0
 ) -> tuple[Array, Array]:
-    """Return the same velocity (u, v) [m/s] at every position [m].
+    """Return the same velocity at every position.
+
+    Parameters
+    ----------
+    x, y : array_like
+        Positions [m].
+    u, v : float, optional
+        The velocity [m/s].
+
+    Returns
+    -------
+    tuple of ndarray
+        u and v [m/s] at the positions.
 
     Examples
     --------
@@ -231,7 +243,19 @@ def flow_from_function(
 
 
 def uniform_flow(u: float, v: float, **grid: Any) -> xr.Dataset:
-    """Return a flow of one velocity (u, v) [m/s]; see `flow_from_function` for the options.
+    """Return a flow of one velocity.
+
+    Parameters
+    ----------
+    u, v : float
+        The velocity [m/s].
+    **grid
+        ``arena``, ``cells``, ``cell_size``: see `flow_from_function`.
+
+    Returns
+    -------
+    xarray.Dataset
+        A `flow_field`.
 
     Examples
     --------
@@ -244,7 +268,21 @@ def uniform_flow(u: float, v: float, **grid: Any) -> xr.Dataset:
 def vortex_flow(
     angular_velocity: float, *, core_radius: float | None = None, **grid: Any
 ) -> xr.Dataset:
-    """Return a vortex; see `vortex_velocity`, and `flow_from_function` for the other options.
+    """Return the flow of a vortex about the origin, see `vortex_velocity`.
+
+    Parameters
+    ----------
+    angular_velocity : float
+        Rotation of the core [rad/s], counter-clockwise positive.
+    core_radius : float, optional
+        Radius of the solid rotation [m]; all of it is when left out.
+    **grid
+        ``arena``, ``cells``, ``cell_size``: see `flow_from_function`.
+
+    Returns
+    -------
+    xarray.Dataset
+        A `flow_field`.
 
     Examples
     --------
@@ -256,7 +294,21 @@ def vortex_flow(
 
 
 def shear_flow(rate: float, *, at_rest: float = 0.0, **grid: Any) -> xr.Dataset:
-    """Return a shear flow; see `shear_velocity`, and `flow_from_function` for the other options.
+    """Return a flow along x that grows along y, see `shear_velocity`.
+
+    Parameters
+    ----------
+    rate : float
+        Shear rate [1/s].
+    at_rest : float, optional
+        The y [m] at which the water is at rest.
+    **grid
+        ``arena``, ``cells``, ``cell_size``: see `flow_from_function`.
+
+    Returns
+    -------
+    xarray.Dataset
+        A `flow_field`.
 
     Examples
     --------
@@ -267,7 +319,21 @@ def shear_flow(rate: float, *, at_rest: float = 0.0, **grid: Any) -> xr.Dataset:
 
 
 def jets_flow(*, diameter: float = 0.3, cells: int = 50, **jets: Any) -> xr.Dataset:
-    """Return the flow of a round tank of the diameter given [m]; `jets_velocity` has the options.
+    """Return the flow of a round tank with inlets in its wall, see `jets_velocity`.
+
+    Parameters
+    ----------
+    diameter : float, optional
+        Diameter of the tank [m].
+    cells : int, optional
+        Cells across it.
+    **jets
+        ``jet_speed``, ``swirl_speed`` and the other options of `jets_velocity`.
+
+    Returns
+    -------
+    xarray.Dataset
+        A `flow_field`.
 
     Examples
     --------

@@ -149,6 +149,11 @@ def load_study(path: str | Path) -> Study:
         A TOML file. Keys that it lacks have their defaults; a number may be text with a unit
         (``force_std_N = "0.55mN"``).
 
+    Returns
+    -------
+    Study
+        Frozen.
+
     Raises
     ------
     ConfigurationError
@@ -184,6 +189,11 @@ def parse_study(text: str, *, source: str = "study") -> Study:
     ------
     ConfigurationError
         See `load_study`.
+
+    Examples
+    --------
+    >>> parse_study('forces.force_std_N = "0.6mN"').forces.force_std_N
+    0.0006
     """
     try:
         return Study(**tomllib.loads(text))

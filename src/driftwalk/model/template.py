@@ -60,6 +60,11 @@ def parameter_table(name: str) -> str:
     ----------
     name : str
         Name of the section.
+
+    Examples
+    --------
+    >>> parameter_table("steps").splitlines()[0]
+    '| key | default | values | meaning |'
     """
     section = getattr(Study(), name)
     rows = ["| key | default | values | meaning |", "|---|---|---|---|"]

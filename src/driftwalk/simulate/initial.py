@@ -99,7 +99,7 @@ def recorded_start(track: Track, *, window: float = 0.7) -> Start:
     Examples
     --------
     >>> from driftwalk.schema import Track
-    >>> time = np.arange(20) / 10
+    >>> time = np.arange(40) / 20
     >>> track = Track(time, 0.05 * time, 0.0 * time, 0.0 * time)
     >>> round(float(recorded_start(track).vx), 3)
     0.05

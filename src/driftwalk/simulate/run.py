@@ -76,7 +76,7 @@ def simulate(
     Examples
     --------
     >>> import driftwalk as dw
-    >>> still = dw.uniform_flow(0.0, 0.0, extent=0.3)
+    >>> still = dw.uniform_flow(0.0, 0.0)
     >>> run = dw.simulate(dw.Study(), still, sample_time=[0.0, 0.1, 0.2], seed=1)
     >>> run.sizes["time"]
     3

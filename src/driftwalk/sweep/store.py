@@ -53,6 +53,13 @@ class MemoryStore:
 def collect(store: Store, units: Iterable[Unit]) -> Arrays:
     """Join the results of units along their first dimension, in the order of the units.
 
+    Parameters
+    ----------
+    store : Store
+        Where the results are.
+    units : iterable of Unit
+        The units, each with a result in the store.
+
     Returns
     -------
     dict of str to numpy.ndarray
