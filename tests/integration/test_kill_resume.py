@@ -54,9 +54,12 @@ def compute(path, seed, mode="resume", pause_s=0.0, threads=0, units={UNITS}):
         run.finish({{"seeds": {{"calibration": seed}}}})
 """
 
+# SIGINT is set because a program started in the background inherits that it is ignored.
 COMMAND = (
     PROGRAM
     + """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
 path, seed, mode, pause_s, threads = sys.argv[1:]
 try:
     compute(path, int(seed), mode, float(pause_s), int(threads))
