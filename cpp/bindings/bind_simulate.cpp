@@ -139,8 +139,8 @@ nb::dict score(const Model& model, In<double, 2> table, In<std::uint64_t, 1> key
   const Worlds worlds(table, key);
   const std::size_t count = worlds.count();
   driftwalk::Scoring scoring;
-  scoring.plan = {left.data(), weight.data(), triple.data(),
-                  static_cast<std::int64_t>(left.size()), static_cast<std::int64_t>(triple.size())};
+  scoring.plan = {left.data(), weight.data(), triple.data(), static_cast<std::int64_t>(left.size()),
+                  static_cast<std::int64_t>(triple.size())};
   scoring.length_bins = scoring.angle_bins = bins;
   scoring.length_limit = length_limit;
   scoring.angle_limit = angle_limit;
@@ -229,8 +229,8 @@ std::tuple<double, double, double> drag(const Model& model, double drag_coeffici
   driftwalk::Axes<double> axes;
   driftwalk::sincos(theta, axes.sine, axes.cosine);
   const driftwalk::BlockShape<double> block{run.half_side, run.strip_width, run.strips};
-  const driftwalk::DragSums<double> sums = driftwalk::drag_sums(
-      block, run.flow, x, y, axes, driftwalk::Motion<double>{vx, vy, omega});
+  const driftwalk::DragSums<double> sums =
+      driftwalk::drag_sums(block, run.flow, x, y, axes, driftwalk::Motion<double>{vx, vy, omega});
   const double scale = run.drag_scale * drag_coefficient;
   return {sums.force_x * scale, sums.force_y * scale, sums.torque * scale};
 }
@@ -246,7 +246,7 @@ std::vector<std::uint32_t> philox(std::uint64_t key, const std::vector<std::uint
   return out;
 }
 
-}  // namespace
+} // namespace
 
 void register_simulate(nb::module_& module);
 void register_simulate(nb::module_& module) {
@@ -291,14 +291,14 @@ void register_simulate(nb::module_& module) {
           "radius"_a, "edges"_a, "restitution"_a, "friction"_a, "bounce_speed"_a, "u"_a, "v"_a,
           "frame_time"_a, "origin_x"_a, "origin_y"_a, "spacing_x"_a, "spacing_y"_a, "time_step"_a,
           "steps_per_interval"_a, "sample_time"_a, "position_noise"_a, "orientation_noise"_a,
-          "position_quantum"_a, "view_radius"_a = 0.0, "view_x"_a = 0.0,
-          "view_y"_a = 0.0, "view_edges"_a = nb::none())
+          "position_quantum"_a, "view_radius"_a = 0.0, "view_x"_a = 0.0, "view_y"_a = 0.0,
+          "view_edges"_a = nb::none())
       .def_prop_ro("samples", &Model::samples);
   module.def("simulate", &simulate, "model"_a, "worlds"_a, "key"_a, nb::kw_only(), "threads"_a,
              "precision"_a);
   module.def("score", &score, "model"_a, "worlds"_a, "key"_a, nb::kw_only(), "left"_a, "weight"_a,
-             "triple"_a, "reference"_a.none(), "bins"_a, "length_limit"_a, "angle_limit"_a, "excerpt"_a,
-             "keep_steps"_a, "threads"_a);
+             "triple"_a, "reference"_a.none(), "bins"_a, "length_limit"_a, "angle_limit"_a,
+             "excerpt"_a, "keep_steps"_a, "threads"_a);
   module.def("ks_matrix", &ks_matrix, "a_length"_a, "a_angle"_a, "a_count"_a, "b_length"_a,
              "b_angle"_a, "b_count"_a, nb::kw_only(), "threads"_a);
   module.def("drag", &drag, "model"_a, nb::kw_only(), "drag_coefficient"_a, "x"_a, "y"_a, "theta"_a,

@@ -48,7 +48,7 @@ InstructionSet best_available() {
   }
   return InstructionSet::baseline;
 }
-}  // namespace
+} // namespace
 
 InstructionSet chosen_instruction_set() {
   const char* const wanted = std::getenv("DRIFTWALK_INSTRUCTION_SET");
@@ -69,4 +69,4 @@ InstructionSet chosen_instruction_set() {
                               " is unknown: use baseline, avx2 or avx512");
 }
 
-}  // namespace driftwalk
+} // namespace driftwalk

@@ -42,8 +42,10 @@ std::vector<PreparedEdge<T>> prepare_edges(const double* edges, int count) {
   return prepared;
 }
 
-int padding(double reach, double spacing) { return static_cast<int>(std::ceil(reach / spacing)) + 1; }
-}  // namespace
+int padding(double reach, double spacing) {
+  return static_cast<int>(std::ceil(reach / spacing)) + 1;
+}
+} // namespace
 
 template <class T>
 PreparedRun<T>::PreparedRun(const BatchModel& model) {
@@ -133,8 +135,8 @@ void PreparedRun<T>::prepare_flow(const BatchModel& model) {
   const auto node = [&](const double* values, int frame, int row, int column) {
     row = std::clamp(row - bottom_pad, 0, model.rows - 1);
     column = std::clamp(column - left_pad, 0, model.columns - 1);
-    const double rounded =
-        std::round(values[(std::int64_t(frame) * model.rows + row) * model.columns + column] / step);
+    const double rounded = std::round(
+        values[(std::int64_t(frame) * model.rows + row) * model.columns + column] / step);
     return static_cast<Node>(quantised ? rounded : rounded * step);
   };
   Node* out = table_.data();
@@ -177,4 +179,4 @@ void PreparedRun<T>::prepare_samples(const BatchModel& model) {
 template class PreparedRun<float>;
 template class PreparedRun<double>;
 
-}  // namespace driftwalk
+} // namespace driftwalk

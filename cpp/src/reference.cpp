@@ -8,4 +8,4 @@ void simulate_reference(const Prepared<double>& run, const BatchWorlds& worlds, 
   run_worlds<double, double>(run, worlds, world, 1, sink, status);
 }
 
-}  // namespace driftwalk
+} // namespace driftwalk

@@ -1,4 +1,5 @@
-// Worlds are scored as they finish: their trajectories live in a thread's scratch and go no further.
+// Worlds are scored as they finish: their trajectories live in a thread's scratch and go no
+// further.
 #include "driftwalk/simulate/lanes.hpp"
 #include "driftwalk/simulate/simulate.hpp"
 #include "driftwalk/simulate/threads.hpp"
@@ -14,8 +15,7 @@ void bin_steps(const Scoring& scoring, const double* length, const double* angle
   std::fill(density, density + cells, 0.0f);
   for (std::int64_t k = 0; k < pairs; ++k) {
     const double across = length[k] / scoring.length_limit * scoring.length_bins;
-    const double around =
-        (angle[k] / scoring.angle_limit + 1) * 0.5 * scoring.angle_bins;
+    const double around = (angle[k] / scoring.angle_limit + 1) * 0.5 * scoring.angle_bins;
     const int row = static_cast<int>(std::min(across, scoring.length_bins - 1.0));
     const int column = static_cast<int>(std::clamp(around, 0.0, scoring.angle_bins - 1.0));
     density[row * scoring.angle_bins + column] += 1.0f;
@@ -39,7 +39,8 @@ public:
 
   void operator()(std::int64_t pack) {
     const std::int64_t first = pack * kernel_.lanes;
-    const int count = static_cast<int>(std::min<std::int64_t>(kernel_.lanes, worlds_.count - first));
+    const int count =
+        static_cast<int>(std::min<std::int64_t>(kernel_.lanes, worlds_.count - first));
     const SampleSink<float> sink{x_.data(), y_.data(), nullptr, stride_, blended_.data()};
     kernel_.run(run_.view(), worlds_, first, count, sink, out_.status + first);
     for (int lane = 0; lane < count; ++lane) {
@@ -105,7 +106,7 @@ void widen(const StepTable& table, std::int64_t row, std::vector<double>& length
   angle.assign(table.angle + at, table.angle + at + count);
 }
 
-}  // namespace
+} // namespace
 
 void score_batch(const PreparedRun<float>& run, const BatchWorlds& worlds, const Scoring& scoring,
                  int threads, const Scores& out) {
@@ -133,4 +134,4 @@ void ks_matrix(const StepTable& references, const StepTable& samples, int thread
   });
 }
 
-}  // namespace driftwalk
+} // namespace driftwalk

@@ -29,7 +29,8 @@ void simulate_batch(const PreparedRun<float>& run, const BatchWorlds& worlds, in
     return [&, blended = std::vector<std::int16_t>(
                    static_cast<std::size_t>(run.blended_flow_size()))](std::int64_t pack) mutable {
       const std::int64_t first = pack * kernel.lanes;
-      const int count = static_cast<int>(std::min<std::int64_t>(kernel.lanes, worlds.count - first));
+      const int count =
+          static_cast<int>(std::min<std::int64_t>(kernel.lanes, worlds.count - first));
       const std::int64_t at = first * samples;
       const SampleSink<float> sink{out.x + at, out.y + at,
                                    out.theta == nullptr ? nullptr : out.theta + at, samples,
@@ -54,4 +55,4 @@ void simulate_batch(const PreparedRun<double>& run, const BatchWorlds& worlds, i
   });
 }
 
-}  // namespace driftwalk
+} // namespace driftwalk

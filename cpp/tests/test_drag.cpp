@@ -24,12 +24,15 @@ void wavy(double x, double y, double& u, double& v) {
 }
 
 // Bilinear interpolation by definition, on clamped positions.
-double bilinear(const synthetic::Tank& tank, const std::vector<double>& values, double x, double y) {
+double bilinear(const synthetic::Tank& tank, const std::vector<double>& values, double x,
+                double y) {
   const int last = tank.nodes - 1;
   const double column = std::clamp(x / tank.spacing + last / 2, 0.0, double(last));
   const double row = std::clamp(y / tank.spacing + last / 2, 0.0, double(last));
   const int i = std::min(int(column), last - 1), j = std::min(int(row), last - 1);
-  const auto at = [&](int dj, int di) { return values[std::size_t((j + dj) * tank.nodes + i + di)]; };
+  const auto at = [&](int dj, int di) {
+    return values[std::size_t((j + dj) * tank.nodes + i + di)];
+  };
   const double fx = column - i, fy = row - j;
   return (at(0, 0) * (1 - fx) + at(0, 1) * fx) * (1 - fy) +
          (at(1, 0) * (1 - fx) + at(1, 1) * fx) * fy;
@@ -56,8 +59,8 @@ void lookup(const driftwalk::FlowView<T>& flow, double x, double y, double& u, d
 }
 
 template <class Real, class T>
-double worst_lookup(const driftwalk::FlowView<T>& flow, const synthetic::Tank& tank,
-                    double limit, bool on_nodes) {
+double worst_lookup(const driftwalk::FlowView<T>& flow, const synthetic::Tank& tank, double limit,
+                    bool on_nodes) {
   synthetic::Uniform draw;
   double worst = 0;
   for (int k = 0; k < 4000; ++k) {
@@ -204,9 +207,8 @@ void check_at_rest_in_the_water() {
   const driftwalk::PreparedRun<double> run(tank.finished());
   const BlockShape<double> block{run.view().half_side, run.view().strip_width, 8};
   const Axes<double> axes{0.8, 0.6};
-  const DragSums<double> sums =
-      driftwalk::drag_sums(block, run.view().flow, 0.05, 0.02, axes,
-                           Motion<double>{-0.31 * 0.02, 0.31 * 0.05, 0.31});
+  const DragSums<double> sums = driftwalk::drag_sums(
+      block, run.view().flow, 0.05, 0.02, axes, Motion<double>{-0.31 * 0.02, 0.31 * 0.05, 0.31});
   CHECK(std::fabs(sums.force_x) < 1e-30 && std::fabs(sums.force_y) < 1e-30);
   CHECK(std::fabs(sums.torque) < 1e-30 && std::fabs(sums.conductance) < 1e-15);
 }

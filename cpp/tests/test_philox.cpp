@@ -78,7 +78,9 @@ void check_lanes_are_independent() {
   }
 }
 
-double normal_cdf(double x) { return 0.5 * std::erfc(-x * 0.70710678118654752440); }
+double normal_cdf(double x) {
+  return 0.5 * std::erfc(-x * 0.70710678118654752440);
+}
 
 // Moments within 6 standard errors (false alarm 2e-9 each) and the KS distance to the normal
 // distribution below its 1e-6 quantile, sqrt(-ln(1e-6 / 2) / 2 / n).

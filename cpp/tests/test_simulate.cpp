@@ -1,4 +1,5 @@
-// Whole runs: float against double, samples, status, tanks of every shape, flow that varies in time.
+// Whole runs: float against double, samples, status, tanks of every shape, flow that varies in
+// time.
 #include "check.hpp"
 #include "driftwalk/dispatch.hpp"
 #include "synthetic_tank.hpp"
@@ -40,8 +41,8 @@ void check_float_against_double() {
   const auto twice = synthetic::simulate<double>(tank, batch);
   double worst = 0;
   for (std::size_t k = 0; k < twice.x.size(); ++k) {
-    worst = std::max({worst, std::fabs(single.x[k] - twice.x[k]),
-                      std::fabs(single.y[k] - twice.y[k])});
+    worst =
+        std::max({worst, std::fabs(single.x[k] - twice.x[k]), std::fabs(single.y[k] - twice.y[k])});
   }
   std::printf("float against double over 1 s: %.3g m\n", worst);
   CHECK(worst < 5e-6);

@@ -166,12 +166,12 @@ void check_random_impacts(const WallView<double>& shape, const char* name, doubl
     gained = std::max(gained, energy(motion) / before - 1);
     outside = std::max(outside, deepest(wall, pose));
     if (wall.edge_count == 0) {
-      const WallView<float> narrow{float(wall.radius),      nullptr,
-                                   0,                       float(wall.restitution),
-                                   float(wall.friction),    float(wall.bounce_speed)};
+      const WallView<float> narrow{
+          float(wall.radius),      nullptr, 0, float(wall.restitution), float(wall.friction),
+          float(wall.bounce_speed)};
       driftwalk::meet_wall(narrow, float(half), Pack(float(per_inertia)), packed_pose, packed);
-      single_gained = std::max(
-          single_gained, energy({packed.vx[1], packed.vy[1], packed.omega[1]}) / before - 1);
+      single_gained = std::max(single_gained,
+                               energy({packed.vx[1], packed.vy[1], packed.omega[1]}) / before - 1);
     }
   }
   std::printf("%s: %d hits, energy gained %.2g (float %.2g), outside %.2g m\n", name, hits, gained,

@@ -15,4 +15,4 @@ bool is_available(InstructionSet set);
 // unknown or not available here.
 InstructionSet chosen_instruction_set();
 
-}  // namespace driftwalk
+} // namespace driftwalk

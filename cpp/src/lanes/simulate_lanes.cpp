@@ -17,10 +17,12 @@ void simulate(const Prepared<float>& run, const BatchWorlds& worlds, std::int64_
               const SampleSink<float>& sink, std::uint32_t* status) {
   run_worlds<FloatPack<float_lanes>, float>(run, worlds, first, count, sink, status);
 }
-}  // namespace
+} // namespace
 
 inline constexpr SimulateKernel kernel{simulate, float_lanes};
 
 DRIFTWALK_LANES_END
 
-driftwalk::SimulateKernel driftwalk::DRIFTWALK_PER_ISA(simulate_kernel_)() { return kernel; }
+driftwalk::SimulateKernel driftwalk::DRIFTWALK_PER_ISA(simulate_kernel_)() {
+  return kernel;
+}

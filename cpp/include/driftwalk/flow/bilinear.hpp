@@ -18,7 +18,7 @@ DRIFTWALK_LANES_BEGIN
 inline void load_cells(const std::int16_t* table, IntPack<4> index, IntPack<4>* out) {
   alignas(16) Int32 at[4];
   std::memcpy(at, &index.v, sizeof at);
-  __asm__("" : "+m"(at));  // keep the store: extracting lanes one by one is slower
+  __asm__("" : "+m"(at)); // keep the store: extracting lanes one by one is slower
   __m128 r[4];
   for (int k = 0; k < 4; ++k) {
     r[k] = _mm_loadu_ps(reinterpret_cast<const float*>(table + flow_record * std::int64_t(at[k])));
@@ -167,8 +167,10 @@ public:
     const double* record =
         flow_.table + flow_record * ((std::int64_t(row) << flow_.stride_bits) + column);
     const double* next = record + flow_record;
-    u = (record[0] * (1 - fx) + next[0] * fx) * (1 - fy) + (record[1] * (1 - fx) + next[1] * fx) * fy;
-    v = (record[2] * (1 - fx) + next[2] * fx) * (1 - fy) + (record[3] * (1 - fx) + next[3] * fx) * fy;
+    u = (record[0] * (1 - fx) + next[0] * fx) * (1 - fy) +
+        (record[1] * (1 - fx) + next[1] * fx) * fy;
+    v = (record[2] * (1 - fx) + next[2] * fx) * (1 - fy) +
+        (record[3] * (1 - fx) + next[3] * fx) * fy;
   }
 
   void advance() {

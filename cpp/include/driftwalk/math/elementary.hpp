@@ -16,9 +16,11 @@ inline constexpr double pi_value = 3.14159265358979323846;
 template <class Real>
 inline void sincos_reduced(Real r, Real& sine, Real& cosine) {
   const Real z = r * r;
-  const Real s = ((Real(-1.9515295891e-4f) * z + 8.3321608736e-3f) * z - 1.6666654611e-1f) * z * r + r;
+  const Real s =
+      ((Real(-1.9515295891e-4f) * z + 8.3321608736e-3f) * z - 1.6666654611e-1f) * z * r + r;
   const Real c =
-      ((Real(2.443315711809948e-5f) * z - 1.388731625493765e-3f) * z + 4.166664568298827e-2f) * z * z -
+      ((Real(2.443315711809948e-5f) * z - 1.388731625493765e-3f) * z + 4.166664568298827e-2f) * z *
+          z -
       0.5f * z + 1.0f;
   sine = s;
   cosine = c;
@@ -46,8 +48,8 @@ inline void sincos(FloatPack<N> x, FloatPack<N>& sine, FloatPack<N>& cosine) {
   const IntPack<N> quadrant = truncate(scaled + copy_sign(Real(0.5f), scaled));
   const Real k = to_real(x, quadrant);
   // pi/2 in three parts, the first two exact in few bits, so that k * part is exact.
-  const Real r = ((x - k * 1.5703125f) - k * 4.8351287841796875e-4f) - k * 3.13855707645416259765625e-7f -
-                 k * 6.0771005e-11f;
+  const Real r = ((x - k * 1.5703125f) - k * 4.8351287841796875e-4f) -
+                 k * 3.13855707645416259765625e-7f - k * 6.0771005e-11f;
   sincos_reduced(r, sine, cosine);
   rotate_quadrant(quadrant, sine, cosine);
 }
@@ -81,7 +83,9 @@ inline FloatPack<N> log(FloatPack<N> x) {
   const Real e = to_real(x, exponent);
   return ((p * f * z + e * -2.12194440e-4f) - 0.5f * z) + f + e * 0.693359375f;
 }
-DRIFTWALK_HD inline double log(double x) { return __builtin_log(x); }
+DRIFTWALK_HD inline double log(double x) {
+  return __builtin_log(x);
+}
 
 template <class Real, class T>
 inline Real clamp_to(Real value, T low, T high) {

@@ -1,8 +1,8 @@
 // A pack of lanes, one world per lane, and the same operations on a single number.
 //
 // Physics is written once over a number type `Real`: Pack<float, W> in the batch kernels, double in
-// the reference, float in a GPU thread. Branches are select(mask, a, b). Only what the compiler does
-// not see by itself is written with intrinsics, and each has a plain form behind it.
+// the reference, float in a GPU thread. Branches are select(mask, a, b). Only what the compiler
+// does not see by itself is written with intrinsics, and each has a plain form behind it.
 #pragma once
 
 #include "driftwalk/config.hpp"
@@ -41,8 +41,6 @@ struct Pack {
   T operator[](int lane) const { return v[lane]; }
   void set(int lane, T value) { v[lane] = value; }
 };
-
-
 
 template <int N>
 using FloatPack = Pack<float, N>;
@@ -160,7 +158,9 @@ DRIFTWALK_HD inline T select(bool mask, T yes, T no) {
   return mask ? yes : no;
 }
 
-DRIFTWALK_HD inline bool any(bool mask) { return mask; }
+DRIFTWALK_HD inline bool any(bool mask) {
+  return mask;
+}
 template <int N>
 inline bool any(Mask<N> mask) {
 #if defined(DRIFTWALK_USE_X86)
@@ -258,16 +258,24 @@ template <class T>
 DRIFTWALK_HD inline T min(T a, T b) {
   return a < b ? a : b;
 }
-DRIFTWALK_HD inline double sqrt(double a) { return __builtin_sqrt(a); }
-DRIFTWALK_HD inline float sqrt(float a) { return __builtin_sqrtf(a); }
+DRIFTWALK_HD inline double sqrt(double a) {
+  return __builtin_sqrt(a);
+}
+DRIFTWALK_HD inline float sqrt(float a) {
+  return __builtin_sqrtf(a);
+}
 
 template <int N>
 inline FloatPack<N> abs(FloatPack<N> a) {
   typedef typename IntPack<N>::Vector Bits;
   return (typename FloatPack<N>::Vector)((Bits)a.v & 0x7fffffff);
 }
-DRIFTWALK_HD inline double abs(double a) { return a < 0 ? -a : a; }
-DRIFTWALK_HD inline float abs(float a) { return a < 0 ? -a : a; }
+DRIFTWALK_HD inline double abs(double a) {
+  return a < 0 ? -a : a;
+}
+DRIFTWALK_HD inline float abs(float a) {
+  return a < 0 ? -a : a;
+}
 
 // `magnitude` with the sign of `sign`; a zero counts as positive or negative by its sign bit.
 template <int N>
@@ -276,16 +284,24 @@ inline FloatPack<N> copy_sign(FloatPack<N> magnitude, FloatPack<N> sign) {
   const Bits mask = Bits{} + Int32(0x80000000);
   return (typename FloatPack<N>::Vector)(((Bits)magnitude.v & ~mask) | ((Bits)sign.v & mask));
 }
-DRIFTWALK_HD inline double copy_sign(double a, double s) { return __builtin_copysign(a, s); }
-DRIFTWALK_HD inline float copy_sign(float a, float s) { return __builtin_copysignf(a, s); }
+DRIFTWALK_HD inline double copy_sign(double a, double s) {
+  return __builtin_copysign(a, s);
+}
+DRIFTWALK_HD inline float copy_sign(float a, float s) {
+  return __builtin_copysignf(a, s);
+}
 
 // --- conversions -------------------------------------------------------------------------------
 template <int N>
 inline IntPack<N> truncate(FloatPack<N> a) {
   return __builtin_convertvector(a.v, typename IntPack<N>::Vector);
 }
-DRIFTWALK_HD inline Int32 truncate(double a) { return static_cast<Int32>(a); }
-DRIFTWALK_HD inline Int32 truncate(float a) { return static_cast<Int32>(a); }
+DRIFTWALK_HD inline Int32 truncate(double a) {
+  return static_cast<Int32>(a);
+}
+DRIFTWALK_HD inline Int32 truncate(float a) {
+  return static_cast<Int32>(a);
+}
 
 template <int N>
 inline FloatPack<N> to_real(FloatPack<N>, IntPack<N> a) {
@@ -301,7 +317,9 @@ template <int N>
 inline IntPack<N> as_signed(UIntPack<N> a) {
   return (typename IntPack<N>::Vector)a.v;
 }
-DRIFTWALK_HD inline Int32 as_signed(UInt32 a) { return static_cast<Int32>(a); }
+DRIFTWALK_HD inline Int32 as_signed(UInt32 a) {
+  return static_cast<Int32>(a);
+}
 
 // The product of two 32-bit words, as its high and its low word.
 template <int N>
@@ -313,8 +331,8 @@ inline void multiply_wide(UInt32 a, UIntPack<N> b, UIntPack<N>& high, UIntPack<N
     const __m512i factor = _mm512_set1_epi32(Int32(a));
     const __m512i even = _mm512_mul_epu32(factor, (__m512i)b.v);
     const __m512i odd = _mm512_mul_epu32(factor, _mm512_srli_epi64((__m512i)b.v, 32));
-    high = (typename UIntPack<N>::Vector)_mm512_mask_blend_epi32(
-        0xaaaa, _mm512_srli_epi64(even, 32), odd);
+    high = (typename UIntPack<N>::Vector)_mm512_mask_blend_epi32(0xaaaa,
+                                                                 _mm512_srli_epi64(even, 32), odd);
     return;
   }
 #endif
@@ -356,17 +374,23 @@ inline void load_lanes(const double* values, FloatPack<N>& out) {
     out.v[lane] = static_cast<float>(values[lane]);
   }
 }
-DRIFTWALK_HD inline void load_lanes(const double* values, double& out) { out = values[0]; }
+DRIFTWALK_HD inline void load_lanes(const double* values, double& out) {
+  out = values[0];
+}
 
 template <int N>
 inline float lane_of(FloatPack<N> a, int lane) {
   return a.v[lane];
 }
-DRIFTWALK_HD inline double lane_of(double a, int) { return a; }
+DRIFTWALK_HD inline double lane_of(double a, int) {
+  return a;
+}
 template <int N>
 inline bool lane_of(Mask<N> a, int lane) {
   return a.v[lane] != 0;
 }
-DRIFTWALK_HD inline bool lane_of(bool a, int) { return a; }
+DRIFTWALK_HD inline bool lane_of(bool a, int) {
+  return a;
+}
 
 DRIFTWALK_LANES_END

@@ -15,11 +15,11 @@ DRIFTWALK_LANES_BEGIN
 
 template <class Real>
 struct Pose {
-  Real x, y, theta;  // [m, m, rad]
+  Real x, y, theta; // [m, m, rad]
 };
 template <class Real>
 struct Motion {
-  Real vx, vy, omega;  // [m/s, m/s, rad/s]
+  Real vx, vy, omega; // [m/s, m/s, rad/s]
 };
 
 // The block's axes: cosine and sine of its orientation.
@@ -30,17 +30,17 @@ struct Axes {
 
 template <class T>
 struct BlockShape {
-  T half_side;      // h = a/2 [m]
-  T strip_width;    // a/N [m]
-  int strips;       // N
+  T half_side;   // h = a/2 [m]
+  T strip_width; // a/N [m]
+  int strips;    // N
 };
 
 // Everything divided by K = 1/2 rho C_d (a/N) d.
 template <class Real>
 struct DragSums {
-  Real force_x, force_y;  // [m^2/s^2]
-  Real torque;            // [m^3/s^2]
-  Real conductance;       // sum of s over all strips [m/s]: how strongly drag damps motion
+  Real force_x, force_y; // [m^2/s^2]
+  Real torque;           // [m^3/s^2]
+  Real conductance;      // sum of s over all strips [m/s]: how strongly drag damps motion
 };
 
 template <class Real, class T>

@@ -17,21 +17,21 @@ template <class Real>
 struct World {
   Pose<Real> pose;
   Motion<Real> motion;
-  Motion<Real> drag;  // a-: [m/s^2, m/s^2, rad/s^2]
+  Motion<Real> drag; // a-: [m/s^2, m/s^2, rad/s^2]
 };
 
 // What a world keeps through a run.
 template <class Real>
 struct WorldConstants {
-  Real drag_per_mass;     // K/m [1/m]
-  Real drag_per_inertia;  // K/I [1/m^3]
+  Real drag_per_mass;    // K/m [1/m]
+  Real drag_per_inertia; // K/I [1/m^3]
 };
 
 template <class T>
 struct StepConstants {
-  T dt;           // [s]
-  T per_dt;       // 1/dt
-  T per_inertia;  // m/I [1/m^2]
+  T dt;          // [s]
+  T per_dt;      // 1/dt
+  T per_inertia; // m/I [1/m^2]
 };
 
 template <class Real, class T>

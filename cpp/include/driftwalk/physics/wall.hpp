@@ -21,19 +21,19 @@ using WallEdge = PreparedEdge<T>;
 
 template <class T>
 struct WallView {
-  T radius;                // of a circle [m]; 0 for a polygon
-  const WallEdge<T>* edges;  // of a polygon
+  T radius;                 // of a circle [m]; 0 for a polygon
+  const WallEdge<T>* edges; // of a polygon
   int edge_count;
   T restitution;
   T friction;
-  T bounce_speed;  // no bounce below it [m/s]
+  T bounce_speed; // no bounce below it [m/s]
 };
 
 template <class Real>
 struct Contact {
-  Real rx, ry;     // corner from the centre of mass [m]
-  Real nx, ny;     // outward normal there
-  Real depth;      // penetration [m], negative when clear
+  Real rx, ry; // corner from the centre of mass [m]
+  Real nx, ny; // outward normal there
+  Real depth;  // penetration [m], negative when clear
 };
 
 // How easily an impulse at the corner changes the speed there: 1 / (1 + lever^2 m/I).
@@ -82,15 +82,17 @@ inline void apply_friction(const Contact<Real>& c, const Response<Real>& r, Real
 }
 
 template <class Real, class T>
-inline void resolve_contacts(const Contact<Real>& a, const Contact<Real>& b, const WallView<T>& wall,
-                             Real per_inertia, Motion<Real>& m) {
+inline void resolve_contacts(const Contact<Real>& a, const Contact<Real>& b,
+                             const WallView<T>& wall, Real per_inertia, Motion<Real>& m) {
   const Real zero{T(0)}, one{T(1)};
   const Real speed_a = closing_speed(a, m), speed_b = closing_speed(b, m);
   const auto hit_a = (a.depth > zero) & (speed_a > zero);
   const auto hit_b = (b.depth > zero) & (speed_b > zero);
   const Real bounce{wall.bounce_speed}, restitution{wall.restitution};
-  const Real want_a = select(hit_a, speed_a * (one + select(speed_a > bounce, restitution, zero)), zero);
-  const Real want_b = select(hit_b, speed_b * (one + select(speed_b > bounce, restitution, zero)), zero);
+  const Real want_a =
+      select(hit_a, speed_a * (one + select(speed_a > bounce, restitution, zero)), zero);
+  const Real want_b =
+      select(hit_b, speed_b * (one + select(speed_b > bounce, restitution, zero)), zero);
   const Real lever_a = normal_lever(a), lever_b = normal_lever(b);
   const Real aa = one + lever_a * lever_a * per_inertia;
   const Real bb = one + lever_b * lever_b * per_inertia;

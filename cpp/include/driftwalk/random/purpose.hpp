@@ -7,9 +7,9 @@
 namespace driftwalk {
 
 enum class Purpose : std::uint32_t {
-  force = 1,        // stochastic force, one draw per force interval
-  observation = 2,  // camera noise, one draw per sample
-  start = 3,        // start pose
+  force = 1,       // stochastic force, one draw per force interval
+  observation = 2, // camera noise, one draw per sample
+  start = 3,       // start pose
 };
 
-}  // namespace driftwalk
+} // namespace driftwalk

@@ -8,9 +8,9 @@ namespace driftwalk {
 // Bits of a world's status. In a batch a failure is data: the other worlds go on.
 enum Status : std::uint32_t {
   status_ok = 0,
-  status_non_finite = 1u << 0,  // a pose stopped being a number
-  status_escaped = 1u << 1,     // the centre left the arena's bounding box
-  status_no_motion = 1u << 2,   // mean speed below 1 um/s in the second half of the run
+  status_non_finite = 1u << 0, // a pose stopped being a number
+  status_escaped = 1u << 1,    // the centre left the arena's bounding box
+  status_no_motion = 1u << 2,  // mean speed below 1 um/s in the second half of the run
 };
 
 // The same for every world of a batch. Lengths in m, times in s, SI throughout.
@@ -33,7 +33,7 @@ struct BatchModel {
   double origin_x = 0, origin_y = 0, spacing_x = 0, spacing_y = 0;
   // time
   double time_step = 0;
-  int steps_per_interval = 1;  // force interval / time step
+  int steps_per_interval = 1; // force interval / time step
   // sampling: times from the start [s], increasing, from 0
   const double* sample_time = nullptr;
   std::int64_t samples = 0;
@@ -51,7 +51,7 @@ struct BatchWorlds {
   std::int64_t count = 0;
   const double* drag_coefficient = nullptr;
   const double* force_std = nullptr;  // [N]
-  const std::uint64_t* key = nullptr;  // hash of (seed, trial, replicate)
+  const std::uint64_t* key = nullptr; // hash of (seed, trial, replicate)
   const double* x = nullptr;
   const double* y = nullptr;
   const double* theta = nullptr;
@@ -60,4 +60,4 @@ struct BatchWorlds {
   const double* omega = nullptr;
 };
 
-}  // namespace driftwalk
+} // namespace driftwalk

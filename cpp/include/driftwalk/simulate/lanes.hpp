@@ -7,7 +7,7 @@ namespace driftwalk {
 
 struct SimulateKernel {
   SimulateLanes run;
-  int lanes;  // worlds per call
+  int lanes; // worlds per call
 };
 
 // The kernel of the chosen instruction set (dispatch.hpp).
@@ -17,4 +17,4 @@ SimulateKernel simulate_kernel_baseline();
 SimulateKernel simulate_kernel_avx2();
 SimulateKernel simulate_kernel_avx512();
 
-}  // namespace driftwalk
+} // namespace driftwalk

@@ -33,4 +33,4 @@ private:
   std::vector<T> sample_weight_;
 };
 
-}  // namespace driftwalk
+} // namespace driftwalk

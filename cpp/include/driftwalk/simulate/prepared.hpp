@@ -10,8 +10,8 @@ namespace driftwalk {
 // An edge of a polygonal arena.
 template <class T>
 struct PreparedEdge {
-  T normal_x, normal_y;  // outward unit normal
-  T distance;            // of the edge from the origin along the normal [m]
+  T normal_x, normal_y; // outward unit normal
+  T distance;           // of the edge from the origin along the normal [m]
 };
 
 // Numbers in one node's record of the flow table: (u, u above, v, v above).
@@ -29,14 +29,14 @@ struct FlowNumber<float> {
 
 template <class T>
 struct FlowView {
-  const typename FlowNumber<T>::type* table;  // [rows][1 << stride_bits][flow_record]
+  const typename FlowNumber<T>::type* table; // [rows][1 << stride_bits][flow_record]
   int stride_bits;
-  T unit;              // velocity of a looked-up number of 1 [m/s]
-  T origin_x;          // position of node (0, 0) [m]
+  T unit;     // velocity of a looked-up number of 1 [m/s]
+  T origin_x; // position of node (0, 0) [m]
   T origin_y;
-  T per_spacing_x;     // 1 / node spacing [1/m]
+  T per_spacing_x; // 1 / node spacing [1/m]
   T per_spacing_y;
-  T low_x, high_x;     // where a block's centre may be for every strip to be on the table [m]
+  T low_x, high_x; // where a block's centre may be for every strip to be on the table [m]
   T low_y, high_y;
 };
 
@@ -49,7 +49,7 @@ struct Prepared {
   int strips;
   T dt, per_dt, per_inertia;
   int steps_per_interval;
-  double drag_scale;          // 1/2 rho (a/N) d [kg/m^2]: K = drag_scale * C_d
+  double drag_scale; // 1/2 rho (a/N) d [kg/m^2]: K = drag_scale * C_d
   double mass, inertia;
   // wall
   T radius, restitution, friction, bounce_speed;
@@ -90,4 +90,4 @@ using SimulateLanes = void (*)(const Prepared<float>&, const BatchWorlds&, std::
 void simulate_reference(const Prepared<double>&, const BatchWorlds&, std::int64_t world,
                         const SampleSink<double>&, std::uint32_t* status);
 
-}  // namespace driftwalk
+} // namespace driftwalk

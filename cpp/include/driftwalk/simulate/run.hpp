@@ -20,9 +20,14 @@ inline void load_worlds(const BatchWorlds& worlds, std::int64_t first, int count
     const std::int64_t world = first + (lane < count ? lane : count - 1);
     // A start angle may count turns; the kernels keep theirs within [-pi, pi].
     const double theta = __builtin_remainder(worlds.theta[world], 2 * pi_value);
-    const double values[8] = {worlds.x[world],  worlds.y[world],     theta,
-                              worlds.vx[world], worlds.vy[world],    worlds.omega[world],
-                              worlds.drag_coefficient[world], worlds.force_std[world]};
+    const double values[8] = {worlds.x[world],
+                              worlds.y[world],
+                              theta,
+                              worlds.vx[world],
+                              worlds.vy[world],
+                              worlds.omega[world],
+                              worlds.drag_coefficient[world],
+                              worlds.force_std[world]};
     for (int k = 0; k < 8; ++k) {
       column[k][lane] = values[k];
     }
@@ -144,7 +149,7 @@ struct Motionless {
 
   template <class Run>
   explicit Motionless(const Run& run) : x(T(0)), y(T(0)), path(T(0)), from(run.samples / 2) {
-    constexpr double slowest = 1e-6;  // [m/s]
+    constexpr double slowest = 1e-6; // [m/s]
     const std::int64_t steps = run.sample_step[run.samples - 1] - run.sample_step[from];
     threshold = static_cast<T>(slowest * static_cast<double>(steps) * static_cast<double>(run.dt));
   }

@@ -46,4 +46,4 @@ void run_tasks(std::int64_t tasks, int threads, const MakeWorker& make_worker) {
   }
 }
 
-}  // namespace driftwalk
+} // namespace driftwalk
