@@ -1,0 +1,142 @@
+"""How long the whole calibration of the bundled recording takes, stage by stage, and its memory.
+
+    python benchmarks/bench_calibrate.py [--quick] [--threads N]
+
+The default study of `driftwalk demo`: 1,681 settings, four replicates of 30 minutes each, then the
+refined map, the bootstrap, the validation on halves and the figures. Nothing is stored on the way.
+One run: it takes minutes of all cores. The plain baseline beside it is the same map by the double
+reference, timed on a few worlds and extrapolated, marked "~".
+
+Checked, else the script fails: the joint answer is near the parameters with which the recording was
+made. `--quick` is the small search of `driftwalk demo --quick`, to try the script.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import sys
+import tempfile
+import time
+from typing import Any
+
+import numpy as np
+from timing import machine
+
+from driftwalk import _core
+from driftwalk.calibrate import calibrate
+from driftwalk.calibrate.problem import prepare_problem, recorded_camera, worlds_of
+from driftwalk.cli.demo import demo_study
+from driftwalk.datasets import tank30_flow, tank30_recording, tank30_truth
+from driftwalk.report import write_figures
+from driftwalk.schema import body_track
+from driftwalk.simulate.backend import default_threads
+
+TARGET_MAP_S = 60.0
+TARGET_ALL_S = 120.0
+TARGET_MEMORY_GB = 2.0
+# How far the answer may be from the truth, as a share of it.
+TOLERANCE = 0.15
+BASELINE_WORLDS = 2
+WORDS = {"coarse": "map", "refined": "refined map", "validation": "halves"}
+
+
+class Stages:
+    """Wall and processor time of each stage, from what `calibrate` tells."""
+
+    def __init__(self) -> None:
+        self.times: dict[str, list[float]] = {}
+        self._name = "setup"
+        self._since = self._now()
+
+    def tell(self, stage: str, done: int, total: int) -> None:  # noqa: ARG002
+        if stage != self._name:
+            self.begin(stage)
+
+    def begin(self, stage: str) -> None:
+        now = self._now()
+        spent = self.times.setdefault(self._name, [0.0, 0.0])
+        for k in range(2):
+            spent[k] += now[k] - self._since[k]
+        self._name, self._since = stage, now
+
+    @staticmethod
+    def _now() -> tuple[float, float]:
+        return time.perf_counter(), time.process_time()
+
+
+def peak_memory_gb() -> float:
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (1e9 if sys.platform == "darwin" else 1e6 / 1.024)
+
+
+def baseline_seconds(recording: Any, flow: Any, study: Any, threads: int) -> float:
+    """Processor time of the coarse map's worlds by the double reference, from a few of them."""
+    track = body_track(recording)
+    quantum = float(recording.attrs.get("position_quantum_m", 0.0))
+    camera = recorded_camera(track, study, position_quantum=quantum)
+    problem = prepare_problem(track, study, flow, camera=camera, threads=threads)
+    forces = study.forces
+    table, keys = worlds_of(
+        problem,
+        forces.drag_coefficient,
+        forces.force_std_N,
+        stage="coarse",
+        first=0,
+        replicates=BASELINE_WORLDS,
+    )
+    model = problem.model()
+    begin = time.process_time()
+    _core.simulate(model, table, keys, threads=1, precision="double")
+    per_world = (time.process_time() - begin) / BASELINE_WORLDS
+    search = study.calibration
+    settings = len(search.drag_coefficients) * len(search.force_stds_N)
+    return per_world * settings * search.replicates
+
+
+def check_answer(found: Any) -> None:
+    truth = tank30_truth()
+    for key in ("drag_coefficient", "force_std_N"):
+        ratio = found.attrs[key] / truth[key]
+        if not abs(ratio - 1) < TOLERANCE:
+            sys.exit(f"wrong answer: {key} = {found.attrs[key]:.3g}, the truth is {truth[key]:.3g}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--threads", type=int, default=default_threads())
+    options = parser.parse_args()
+    print(f"{machine()}; {options.threads} threads, {_core.instruction_set()}")
+    stages = Stages()
+    recording, flow, study = tank30_recording(), tank30_flow(), demo_study(quick=options.quick)
+    found = calibrate(recording, study, flow=flow, threads=options.threads, tell=stages.tell)
+    stages.begin("figures")
+    with tempfile.TemporaryDirectory() as folder:
+        write_figures(found, flow=flow, trajectory=recording, folder=folder)
+    stages.begin("end")
+    memory = peak_memory_gb()
+
+    search = study.calibration
+    settings = len(search.drag_coefficients) * len(search.force_stds_N)
+    minutes = (float(recording["time"][-1]) - float(recording["time"][0])) / 60
+    print(f"{settings} settings x {search.replicates} replicates x {minutes:.0f} min")
+    plain = baseline_seconds(recording, flow, study, options.threads)
+    print(f"\n{'stage':<20} {'wall [s]':>9} {'processor [s]':>14} {'target [s]':>11}")
+    for name, (wall, processor) in stages.times.items():
+        target = f"{TARGET_MAP_S:>11.0f}" if name == "coarse" and not options.quick else ""
+        print(f"{WORDS.get(name, name):<20} {wall:>9.1f} {processor:>14.1f} {target}")
+    wall, processor = np.sum(list(stages.times.values()), axis=0)
+    target = "" if options.quick else f"{TARGET_ALL_S:>11.0f}"
+    print(f"{'all':<20} {wall:>9.1f} {processor:>14.1f} {target}")
+    print(f"{'map, plain (double)':<20} {'':>9} {'~' + format(plain, '.0f'):>14}")
+    print(f"peak memory {memory:.2f} GB (target {TARGET_MEMORY_GB:.0f} GB)")
+    print(
+        f"C_d = {found.attrs['drag_coefficient']:.3f}, "
+        f"sigma_F = {1e3 * found.attrs['force_std_N']:.3f} mN"
+    )
+    check_answer(found)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,320 @@
+// One floating block in a stirred tank on the Open Dynamics Engine: the peer of bench_ode.py.
+//
+//     ode_peer CASE impulse|boxes STEPS
+//
+// The same physics as driftwalk's single-block worlds, written the usual way for an engine: force and
+// torque of the strips are summed by hand and handed to the body, then the world makes one step.
+// Worlds run one after another. The wall is either an impulse computed by hand at the corners
+// ("impulse": ODE only integrates), or 64 static boxes in a ring that ODE collides the block with.
+//
+// CASE holds numbers divided by white space: side, mass, depth, water density, radius, restitution,
+// friction, bounce speed, time step, steps per sample; nodes per axis, first node, spacing, all
+// u row by row, all v; worlds, and for each x, y, theta, vx, vy, omega, C_d, sigma_F. Printed: one
+// line of JSON.
+#include <ode/ode.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <fstream>
+#include <iostream>
+#include <random>
+#include <string>
+#include <vector>
+
+namespace {
+
+constexpr int strips = 8;
+constexpr int wall_boxes = 64;
+constexpr int most_contacts = 8;
+constexpr double pi = 3.14159265358979323846;
+
+struct Start {
+  double x, y, theta, vx, vy, omega, drag_coefficient, force_std;
+};
+
+struct Case {
+  double side, mass, depth, density, radius, restitution, friction, bounce_speed, dt;
+  int period;
+  int nodes;
+  double origin, spacing;
+  std::vector<double> u, v;
+  std::vector<Start> starts;
+};
+
+Case read_case(const char* path) {
+  std::ifstream in(path);
+  Case c;
+  in >> c.side >> c.mass >> c.depth >> c.density >> c.radius >> c.restitution >> c.friction >>
+      c.bounce_speed >> c.dt >> c.period >> c.nodes >> c.origin >> c.spacing;
+  c.u.resize(static_cast<std::size_t>(c.nodes) * c.nodes);
+  c.v.resize(c.u.size());
+  for (double& value : c.u) {
+    in >> value;
+  }
+  for (double& value : c.v) {
+    in >> value;
+  }
+  std::size_t worlds = 0;
+  in >> worlds;
+  c.starts.resize(worlds);
+  for (Start& s : c.starts) {
+    in >> s.x >> s.y >> s.theta >> s.vx >> s.vy >> s.omega >> s.drag_coefficient >> s.force_std;
+  }
+  if (!in) {
+    std::cerr << "cannot read the case " << path << "\n";
+    std::exit(2);
+  }
+  return c;
+}
+
+struct Planar {
+  double x, y;
+};
+
+Planar flow_at(const Case& c, double x, double y) {
+  const double last = c.nodes - 1.000001;
+  const double column = std::clamp((x - c.origin) / c.spacing, 0.0, last);
+  const double row = std::clamp((y - c.origin) / c.spacing, 0.0, last);
+  const int i = static_cast<int>(column), j = static_cast<int>(row);
+  const double fx = column - i, fy = row - j;
+  const std::size_t at = static_cast<std::size_t>(j) * c.nodes + i, up = at + c.nodes;
+  const double w00 = (1 - fx) * (1 - fy), w10 = fx * (1 - fy), w01 = (1 - fx) * fy, w11 = fx * fy;
+  return {w00 * c.u[at] + w10 * c.u[at + 1] + w01 * c.u[up] + w11 * c.u[up + 1],
+          w00 * c.v[at] + w10 * c.v[at + 1] + w01 * c.v[up] + w11 * c.v[up + 1]};
+}
+
+struct State {
+  double x, y, cosine, sine, vx, vy, omega;
+};
+
+State state_of(dBodyID body) {
+  const dReal* p = dBodyGetPosition(body);
+  const dReal* r = dBodyGetRotation(body);  // rows of four
+  const dReal* v = dBodyGetLinearVel(body);
+  return {p[0], p[1], r[0], r[4], v[0], v[1], dBodyGetAngularVel(body)[2]};
+}
+
+struct Wrench {
+  double x, y, torque;
+};
+
+Wrench drag(const Case& c, double drag_coefficient, const State& s) {
+  const double half = c.side / 2, width = c.side / strips;
+  const double scale = 0.5 * c.density * drag_coefficient * width * c.depth;
+  Wrench sum{0, 0, 0};
+  double nx = s.cosine, ny = s.sine;
+  for (int face = 0; face < 4; ++face) {
+    for (int k = 0; k < strips; ++k) {
+      const double offset = (k + 0.5) * width - half;
+      const double rx = nx * half - ny * offset, ry = ny * half + nx * offset;
+      const Planar water = flow_at(c, s.x + rx, s.y + ry);
+      const double wx = water.x - (s.vx - s.omega * ry), wy = water.y - (s.vy + s.omega * rx);
+      const double facing = -(nx * wx + ny * wy);
+      if (facing > 0) {
+        const double fx = scale * facing * wx, fy = scale * facing * wy;
+        sum.x += fx;
+        sum.y += fy;
+        sum.torque += rx * fy - ry * fx;
+      }
+    }
+    const double turned = nx;
+    nx = -ny;
+    ny = turned;
+  }
+  return sum;
+}
+
+// Impulses at the corners beyond the circle, and the block moved back inside.
+void meet_circle(const Case& c, dBodyID body) {
+  State s = state_of(body);
+  const double half = c.side / 2, reach = std::sqrt(2.0) * half;
+  const double inner = c.radius - reach;
+  if (s.x * s.x + s.y * s.y < inner * inner) {
+    return;
+  }
+  const double per_inertia = 6 / (c.side * c.side);  // mass / inertia
+  bool touched = false;
+  for (int corner = 0; corner < 4; ++corner) {
+    const double a = corner & 1 ? half : -half, b = corner & 2 ? half : -half;
+    const double rx = a * s.cosine - b * s.sine, ry = a * s.sine + b * s.cosine;
+    const double distance = std::hypot(s.x + rx, s.y + ry);
+    if (distance <= c.radius) {
+      continue;
+    }
+    touched = true;
+    const double nx = (s.x + rx) / distance, ny = (s.y + ry) / distance;
+    const double closing = (s.vx - s.omega * ry) * nx + (s.vy + s.omega * rx) * ny;
+    if (closing > 0) {
+      const double lever = rx * ny - ry * nx, bounce = closing > c.bounce_speed ? c.restitution : 0;
+      const double push = closing * (1 + bounce) / (1 + lever * lever * per_inertia);
+      s.vx -= push * nx;
+      s.vy -= push * ny;
+      s.omega -= push * lever * per_inertia;
+      const double arm = rx * nx + ry * ny;
+      const double sliding = (s.vy + s.omega * rx) * nx - (s.vx - s.omega * ry) * ny;
+      const double stop = -sliding / (1 + arm * arm * per_inertia);
+      const double rub = std::clamp(stop, -c.friction * push, c.friction * push);
+      s.vx -= rub * ny;
+      s.vy += rub * nx;
+      s.omega += rub * arm * per_inertia;
+    }
+    s.x -= nx * (distance - c.radius);
+    s.y -= ny * (distance - c.radius);
+  }
+  if (touched) {
+    dBodySetPosition(body, s.x, s.y, 0);
+    dBodySetLinearVel(body, s.vx, s.vy, 0);
+    dBodySetAngularVel(body, 0, 0, s.omega);
+  }
+}
+
+class Tank {
+public:
+  Tank(const Case& c, bool boxes) : c_(c), boxes_(boxes), world_(dWorldCreate()) {
+    dWorldSetGravity(world_, 0, 0, 0);
+    body_ = dBodyCreate(world_);
+    dMass mass;
+    dMassSetBoxTotal(&mass, c.mass, c.side, c.side, c.side);
+    dBodySetMass(body_, &mass);
+    if (boxes_) {
+      build_wall();
+    }
+  }
+  ~Tank() {
+    if (boxes_) {
+      dGeomDestroy(block_);
+      dSpaceDestroy(wall_);
+      dJointGroupDestroy(contacts_);
+    }
+    dWorldDestroy(world_);
+  }
+  Tank(const Tank&) = delete;
+  Tank& operator=(const Tank&) = delete;
+
+  void place(const Start& start) {
+    dMatrix3 rotation;
+    dRFromAxisAndAngle(rotation, 0, 0, 1, start.theta);
+    dBodySetPosition(body_, start.x, start.y, 0);
+    dBodySetRotation(body_, rotation);
+    dBodySetLinearVel(body_, start.vx, start.vy, 0);
+    dBodySetAngularVel(body_, 0, 0, start.omega);
+  }
+
+  void step(const Start& start, double noise_x, double noise_y) {
+    const Wrench w = drag(c_, start.drag_coefficient, state_of(body_));
+    dBodyAddForce(body_, w.x + noise_x, w.y + noise_y, 0);
+    dBodyAddTorque(body_, 0, 0, w.torque);
+    if (boxes_) {
+      dSpaceCollide2(block_, reinterpret_cast<dGeomID>(wall_), this, &Tank::near);
+    }
+    dWorldQuickStep(world_, c_.dt);
+    if (boxes_) {
+      dJointGroupEmpty(contacts_);
+    } else {
+      meet_circle(c_, body_);
+    }
+  }
+
+  State state() const { return state_of(body_); }
+
+private:
+  void build_wall() {
+    block_ = dCreateBox(nullptr, c_.side, c_.side, c_.side);
+    dGeomSetBody(block_, body_);
+    wall_ = dHashSpaceCreate(nullptr);
+    contacts_ = dJointGroupCreate(0);
+    dJointAttach(dJointCreatePlane2D(world_, nullptr), body_, nullptr);
+    const double thick = c_.radius / 4;
+    const double length = 2 * (c_.radius + thick) * std::tan(pi / wall_boxes);
+    for (int k = 0; k < wall_boxes; ++k) {
+      const double angle = 2 * pi * k / wall_boxes, at = c_.radius + thick / 2;
+      const dGeomID box = dCreateBox(wall_, thick, length, 4 * c_.side);
+      dMatrix3 rotation;
+      dRFromAxisAndAngle(rotation, 0, 0, 1, angle);
+      dGeomSetPosition(box, at * std::cos(angle), at * std::sin(angle), 0);
+      dGeomSetRotation(box, rotation);
+    }
+  }
+
+  static void near(void* data, dGeomID a, dGeomID b) {
+    auto& tank = *static_cast<Tank*>(data);
+    dContact contact[most_contacts];
+    const int found = dCollide(a, b, most_contacts, &contact[0].geom, sizeof(dContact));
+    for (int k = 0; k < found; ++k) {
+      contact[k].surface = {};
+      contact[k].surface.mode = dContactBounce | dContactApprox1;
+      contact[k].surface.mu = tank.c_.friction;
+      contact[k].surface.bounce = tank.c_.restitution;
+      contact[k].surface.bounce_vel = tank.c_.bounce_speed;
+      dJointAttach(dJointCreateContact(tank.world_, tank.contacts_, &contact[k]),
+                   dGeomGetBody(contact[k].geom.g1), dGeomGetBody(contact[k].geom.g2));
+    }
+  }
+
+  const Case& c_;
+  bool boxes_;
+  dWorldID world_;
+  dBodyID body_;
+  dGeomID block_ = nullptr;
+  dSpaceID wall_ = nullptr;
+  dJointGroupID contacts_ = nullptr;
+};
+
+double seconds_since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::string wall = argc == 4 ? argv[2] : "";
+  if (wall != "impulse" && wall != "boxes") {
+    std::cerr << "usage: ode_peer CASE impulse|boxes STEPS\n";
+    return 2;
+  }
+  const Case c = read_case(argv[1]);
+  const int steps = std::stoi(argv[3]);
+  const auto setup = std::chrono::steady_clock::now();
+  dInitODE();
+  std::vector<double> lengths, largest;
+  double setup_s = 0, run_s = 0, processor_s = 0;
+  {
+    Tank tank(c, wall == "boxes");
+    setup_s = seconds_since(setup);
+    std::mt19937_64 random(7);
+    std::normal_distribution<double> normal;
+    const auto run = std::chrono::steady_clock::now();
+    const std::clock_t processor = std::clock();
+    for (const Start& start : c.starts) {
+      tank.place(start);
+      State last = tank.state();
+      for (int step = 1; step <= steps; ++step) {
+        const double noise_x = normal(random) * start.force_std;
+        const double noise_y = normal(random) * start.force_std;
+        tank.step(start, noise_x, noise_y);
+        if (step % c.period == 0) {
+          const State now = tank.state();
+          lengths.push_back(std::hypot(now.x - last.x, now.y - last.y));
+          largest.push_back(std::hypot(now.x, now.y));
+          last = now;
+        }
+      }
+    }
+    run_s = seconds_since(run);
+    processor_s = static_cast<double>(std::clock() - processor) / CLOCKS_PER_SEC;
+  }
+  dCloseODE();
+  double sum = 0;
+  for (const double length : lengths) {
+    sum += length;
+  }
+  std::cout.precision(9);
+  std::cout << "{\"block_steps\": " << static_cast<double>(steps) * c.starts.size()
+            << ", \"setup_s\": " << setup_s << ", \"run_s\": " << run_s
+            << ", \"processor_s\": " << processor_s << ", \"mean_step_length_m\": "
+            << sum / static_cast<double>(lengths.size()) << ", \"largest_distance_m\": "
+            << *std::max_element(largest.begin(), largest.end()) << "}\n";
+  return 0;
+}
