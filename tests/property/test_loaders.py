@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from driftwalk.core.errors import InputError
@@ -69,6 +69,7 @@ def load_or_refuse(path: Path, name: str | None) -> None:
     body=st.one_of(st.binary(max_size=200), ROWS),
     name=st.sampled_from([None, *loaders()]),
 )
+@example(head=b",frame,pos_x,pos_y,id\n", body=b"\n", name=None)
 def test_arbitrary_bytes_are_read_or_refused(head: bytes, body: bytes, name: str | None) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "synthetic.bin"

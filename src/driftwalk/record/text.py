@@ -103,6 +103,9 @@ def read_table(path: Path, layout: TableLayout) -> Table:
     labels: dict[int, dict[str, int]] = {column: {} for column in layout.texts}
     rows = 0
     for line, block in _blocks(path, layout.skip_lines):
+        # pandas fails on a table of blank lines alone.
+        if not block.strip(b" \r\n"):
+            continue
         frame = _parse(block, layout, path=path, line=line)
         rows += len(frame)
         for column, parts in chunks.items():
