@@ -162,6 +162,8 @@ def test_second_process_is_refused_and_the_first_unharmed(
     path = tmp_path / "run"
     first = start(path, pause_s=0.04)
     wait_for_shards(path, 1, first)
+    # Halted, it cannot be done before the others have started, however slow the machine.
+    first.send_signal(signal.SIGSTOP)
     for mode in ("resume", "overwrite"):
         code, errors = end(start(path, mode=mode))
         assert code == 2
@@ -169,6 +171,7 @@ def test_second_process_is_refused_and_the_first_unharmed(
             f"{path} is in use by another process; wait until it is done or choose another "
             "directory"
         ]
+    first.send_signal(signal.SIGCONT)
     assert end(first) == (0, "")
     assert results(path) == uninterrupted
 
