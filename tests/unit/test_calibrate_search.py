@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -22,6 +24,7 @@ from driftwalk.compare import apply_steps
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.schema import Track, body_track
+from driftwalk.simulate import Start
 from driftwalk.simulate.backend import Camera
 
 STEPS = (0.01, 2e-5)
@@ -86,6 +89,7 @@ def test_a_setting_in_which_nothing_moves_is_as_far_as_can_be(track):
     still = dw.uniform_flow(0.0, 0.0, arena=dw.Study().tank.to_arena())
     rest = Track(track.time, track.x, track.y, track.theta)
     problem = prepare_problem(rest, dw.Study(), still, camera=Camera(3e-4, 0.0, 0.0), threads=1)
+    problem = dataclasses.replace(problem, start=Start(0.0, 0.0, 0.0))
     found = run_map(problem, [1.0], [0.0, 5e-4], stage="coarse", replicates=2, details="none")
     assert (found.arrays["status"][0, 0] & 4).all()
     assert (found.distance[0, 0] == 1.0).all()

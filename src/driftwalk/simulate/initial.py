@@ -83,7 +83,7 @@ def recorded_start(track: Track, *, window: float = 0.7) -> Start:
     track : Track
         The recorded body.
     window : float
-        Length of the local quadratic fit [s].
+        Time from the first sample on over which a quadratic is fitted [s].
 
     Returns
     -------
@@ -110,7 +110,8 @@ def recorded_start(track: Track, *, window: float = 0.7) -> Start:
     time = track.time[first]
     turn = np.unwrap(np.where(np.isfinite(track.theta[first]), track.theta[first], 0.0))
     values = np.column_stack([track.x[first], track.y[first], turn])
-    position, velocity, _ = (fit[0] for fit in local_quadratic(time, values, window=window))
+    # The first sample has neighbours on one side only: half of this window holds none.
+    position, velocity, _ = (fit[0] for fit in local_quadratic(time, values, window=2.0 * window))
     raw = values[0]
     position = np.where(np.isfinite(position), position, raw)
     velocity = np.where(np.isfinite(velocity), velocity, 0.0)
