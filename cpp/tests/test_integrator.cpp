@@ -10,11 +10,11 @@ namespace {
 using synthetic::Batch;
 using synthetic::Tank;
 
-// A block along a uniform flow U: m dv/dt = 1/2 rho C_d a d (U - v)^2, so with k = 1/2 rho C_d a d/m
-// the slip is q0 / (1 + k q0 t) and the path U t - ln(1 + k q0 t) / k.
+// A block along a uniform flow U: m dv/dt = 1/2 rho C_d a d (U - v)^2, so with k = 1/2 rho C_d a
+// d/m the slip is q0 / (1 + k q0 t) and the path U t - ln(1 + k q0 t) / k.
 void check_relaxation() {
   Tank tank;
-  tank.model.radius = 10;
+  tank.model.radius = 1;
   tank.set_flow([](double, double, double& u, double& v) {
     u = 0.05;
     v = 0;
@@ -64,8 +64,8 @@ void check_spin_decay() {
     for (std::size_t s = 0; s < path.x.size(); ++s) {
       const double t = tank.sample_time[s];
       const double turned = c > 1e-9 ? std::log(1 + c * spin * t) / c : spin * t;
-      error = std::max(error, std::fabs(std::remainder(path.theta[s] - 0.4 - turned,
-                                                       2 * std::acos(-1.0))));
+      error = std::max(
+          error, std::fabs(std::remainder(path.theta[s] - 0.4 - turned, 2 * std::acos(-1.0))));
       CHECK_NEAR(path.x[s], 0.01, 1e-14);
       CHECK_NEAR(path.y[s], -0.02, 1e-14);
     }
@@ -84,8 +84,9 @@ double path_error(int parts, double force, const Batch& batch, Tank& tank,
   const auto path = synthetic::simulate<double>(tank, forced);
   double error = 0;
   for (std::size_t k = 0; k < path.x.size(); ++k) {
-    error = std::max({error, std::fabs(path.x[k] - exact.x[k]), std::fabs(path.y[k] - exact.y[k]),
-                      0.01 * std::fabs(std::remainder(path.theta[k] - exact.theta[k], 2 * 3.141592653589793))});
+    error = std::max(
+        {error, std::fabs(path.x[k] - exact.x[k]), std::fabs(path.y[k] - exact.y[k]),
+         0.01 * std::fabs(std::remainder(path.theta[k] - exact.theta[k], 2 * 3.141592653589793))});
   }
   return error;
 }
@@ -94,7 +95,7 @@ double path_error(int parts, double force, const Batch& batch, Tank& tank,
 // noise and with a noise that does not depend on the step.
 void check_second_order() {
   Tank tank;
-  tank.model.radius = 10;
+  tank.model.radius = 1;
   tank.set_flow([](double x, double y, double& u, double& v) {
     u = -0.31 * y;
     v = 0.155 * x;
@@ -125,7 +126,7 @@ void check_second_order() {
 // Without drag the path is a polygon of parabolas, exact at any step.
 void check_force_without_drag() {
   Tank tank;
-  tank.model.radius = 10;
+  tank.model.radius = 1;
   tank.set_flow([](double, double, double& u, double& v) { u = v = 0; });
   tank.sample_every(0.04, 26);
   Batch batch;

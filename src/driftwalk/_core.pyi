@@ -36,3 +36,91 @@ def apply_step_plan(
     x: npt.NDArray[Any],
     y: npt.NDArray[Any],
 ) -> tuple[_Floats, _Floats, npt.NDArray[np.int32], int, int]: ...
+
+# --- simulation ---------------------------------------------------------------------------------
+_Singles = npt.NDArray[np.float32]
+_Keys = npt.NDArray[np.uint64]
+_Counts = npt.NDArray[np.int64]
+
+class Model:
+    def __init__(
+        self,
+        *,
+        side: float,
+        mass: float,
+        inertia: float,
+        depth: float,
+        strips: int,
+        water_density: float,
+        radius: float,
+        edges: _Floats,
+        restitution: float,
+        friction: float,
+        bounce_speed: float,
+        u: _Floats,
+        v: _Floats,
+        frame_time: _Floats,
+        origin_x: float,
+        origin_y: float,
+        spacing_x: float,
+        spacing_y: float,
+        time_step: float,
+        steps_per_interval: int,
+        sample_time: _Floats,
+        position_noise: float,
+        orientation_noise: float,
+        position_quantum: float,
+        view_radius: float = 0.0,
+        view_x: float = 0.0,
+        view_y: float = 0.0,
+        view_edges: _Floats | None = None,
+    ) -> None: ...
+    @property
+    def samples(self) -> int: ...
+
+# x, y, theta of shape (worlds, samples), float32 or float64 by precision, and status (worlds,)
+def simulate(
+    model: Model, worlds: _Floats, key: _Keys, *, threads: int, precision: str
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[np.uint32]]: ...
+def score(
+    model: Model,
+    worlds: _Floats,
+    key: _Keys,
+    *,
+    left: npt.NDArray[np.int32],
+    weight: _Floats,
+    triple: npt.NDArray[np.int32],
+    reference: _Floats | None,
+    bins: int,
+    length_limit: float,
+    angle_limit: float,
+    excerpt: int,
+    keep_steps: bool,
+    threads: int,
+) -> dict[str, npt.NDArray[Any]]: ...
+def ks_matrix(
+    a_length: _Singles,
+    a_angle: _Singles,
+    a_count: _Counts,
+    b_length: _Singles,
+    b_angle: _Singles,
+    b_count: _Counts,
+    *,
+    threads: int,
+) -> _Floats: ...
+
+# Force x, y [N] and torque [N m].
+def drag(
+    model: Model,
+    *,
+    drag_coefficient: float,
+    x: float,
+    y: float,
+    theta: float,
+    vx: float,
+    vy: float,
+    omega: float,
+) -> tuple[float, float, float]: ...
+def philox(key: int, counter: list[int]) -> list[int]: ...
+def instruction_set() -> str: ...
+def available_instruction_sets() -> list[str]: ...

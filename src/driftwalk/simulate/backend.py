@@ -59,11 +59,11 @@ def native_model(
     Raises
     ------
     InputError
-        When there is no sample, times do not increase, or the dataset is no flow field.
+        When there is no sample, times are not finite or do not increase, or the dataset is no flow
+        field.
     """
     check_flow_field(flow)
-    if sample_time.size == 0 or sample_time[0] < 0 or (np.diff(sample_time) <= 0).any():
-        raise InputError("sampling times must be increasing, from 0 on, and at least one")
+    _check_sample_time(sample_time)
     tank = study.tank
     x, y = flow["x"].values, flow["y"].values
     step = study.time_step_s
@@ -94,6 +94,15 @@ def native_model(
         position_quantum=camera.position_quantum,
         **_field_of_view(study),
     )
+
+
+def _check_sample_time(time: Floats) -> None:
+    # Without a finite end a run would never come to its last sample.
+    sound = time.ndim == 1 and time.size > 0 and np.isfinite(time).all()
+    if not sound or time[0] < 0 or (np.diff(time) <= 0).any():
+        raise InputError(
+            "sampling times must be a list of finite, increasing times from 0 s on, at least one"
+        )
 
 
 def _field_of_view(study: Study) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -71,7 +71,7 @@ def simulate(
     Raises
     ------
     InputError
-        When times do not increase or `flow` is no flow field.
+        When times do not increase, `flow` is no flow field, or the backend is unknown.
 
     Examples
     --------
@@ -85,6 +85,8 @@ def simulate(
     count = settings.replicates if replicates is None else replicates
     if count < 1:
         raise InputError(f"replicates must be at least 1, got {count}")
+    if backend not in get_args(Backend):
+        raise InputError(f"backend must be one of {', '.join(get_args(Backend))}, got {backend!r}")
     chosen = settings.seed if seed is None else seed
     times = _default_times(study) if sample_time is None else np.asarray(sample_time, np.float64)
     keys = world_keys(chosen, trial=0, replicate=np.arange(count))
@@ -166,8 +168,11 @@ def simulate_like(
 
 def without_gaps(time: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """Return even time stamps [s] over the same span, at the median interval of the given ones."""
+    if time.size < 2:
+        return time
     interval = float(np.median(np.diff(time)))
-    return np.arange(int(np.floor(time[-1] / interval + 1e-6)) + 1) * interval
+    count = int(np.floor(time[-1] / interval + 1e-6)) + 1
+    return np.arange(count, dtype=np.float64) * interval
 
 
 def plain_camera(study: Study) -> Camera:
