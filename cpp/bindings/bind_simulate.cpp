@@ -164,7 +164,7 @@ nb::dict score(const Model& model, In<double, 2> table, In<std::uint64_t, 1> key
   std::vector<std::int64_t> pair_count(count);
   std::vector<std::uint32_t> status(count);
   std::vector<float> density(count * cells), excerpt_x(count * kept), excerpt_y(count * kept);
-  std::vector<float> length(stored), angle(stored);
+  std::vector<double> length(stored), angle(stored);
   const auto wanted = [](auto& values) { return values.empty() ? nullptr : values.data(); };
   {
     nb::gil_scoped_release release;
@@ -197,7 +197,7 @@ nb::dict score(const Model& model, In<double, 2> table, In<std::uint64_t, 1> key
   return out;
 }
 
-driftwalk::StepTable step_table(const In<float, 2>& length, const In<float, 2>& angle,
+driftwalk::StepTable step_table(const In<double, 2>& length, const In<double, 2>& angle,
                                 const In<std::int64_t, 1>& count) {
   if (length.shape(0) != angle.shape(0) || length.shape(1) != angle.shape(1) ||
       count.size() != length.shape(0)) {
@@ -207,8 +207,8 @@ driftwalk::StepTable step_table(const In<float, 2>& length, const In<float, 2>& 
           static_cast<std::int64_t>(length.shape(1))};
 }
 
-Out<double> ks_matrix(In<float, 2> a_length, In<float, 2> a_angle, In<std::int64_t, 1> a_count,
-                      In<float, 2> b_length, In<float, 2> b_angle, In<std::int64_t, 1> b_count,
+Out<double> ks_matrix(In<double, 2> a_length, In<double, 2> a_angle, In<std::int64_t, 1> a_count,
+                      In<double, 2> b_length, In<double, 2> b_angle, In<std::int64_t, 1> b_count,
                       int threads) {
   const driftwalk::StepTable a = step_table(a_length, a_angle, a_count);
   const driftwalk::StepTable b = step_table(b_length, b_angle, b_count);

@@ -121,21 +121,19 @@ KsWorkspace::~KsWorkspace() = default;
 KsWorkspace::KsWorkspace(KsWorkspace&&) noexcept = default;
 KsWorkspace& KsWorkspace::operator=(KsWorkspace&&) noexcept = default;
 
-KsResult ks_two_sample(const KsReference& reference, const double* x2, const double* y2,
-                       std::int64_t n2, KsWorkspace& workspace, KsTies ties) {
-  const KsReference::Data& first = reference.data();
-  KsWorkspace::Data& work = workspace.data();
+namespace {
+
+// The statistic between two sorted samples; x2 and y2 are the points of the second.
+KsResult compare_sorted(const KsReference::Data& first, const KsSortedSample& second,
+                        const double* x2, const double* y2, KsWorkspace::Data& work, KsTies ties) {
   KsResult result;
   result.n1 = first.sorted.n;
-  result.n2 = n2;
-  if (result.n1 == 0 || n2 == 0) {
-    return result;
-  }
-  ks_sort(x2, y2, n2, work.sort, work.sorted);
-  ks_geometry(first.sorted, work.sorted, work.geometry);
+  result.n2 = second.n;
+  ks_geometry(first.sorted, second, work.geometry);
   result.tied = work.geometry.tied;
   KsBest best[2];
-  work.sweep(work.geometry.second.data(), result.n1, n2, ties, chosen_instruction_set(), best);
+  work.sweep(work.geometry.second.data(), result.n1, result.n2, ties, chosen_instruction_set(),
+             best);
   result.d1 = best[0].value;
   result.d2 = best[1].value;
   if (best[0].position >= 0) {
@@ -147,6 +145,35 @@ KsResult ks_two_sample(const KsReference& reference, const double* x2, const dou
     result.place2 = {x2[i], y2[i], best[1].quadrant, i};
   }
   return result;
+}
+
+KsResult without_points(std::int64_t n1, std::int64_t n2) {
+  KsResult result;
+  result.n1 = n1;
+  result.n2 = n2;
+  return result;
+}
+
+} // namespace
+
+KsResult ks_two_sample(const KsReference& reference, const double* x2, const double* y2,
+                       std::int64_t n2, KsWorkspace& workspace, KsTies ties) {
+  if (reference.size() == 0 || n2 == 0) {
+    return without_points(reference.size(), n2);
+  }
+  KsWorkspace::Data& work = workspace.data();
+  ks_sort(x2, y2, n2, work.sort, work.sorted);
+  return compare_sorted(reference.data(), work.sorted, x2, y2, work, ties);
+}
+
+KsResult ks_two_sample(const KsReference& first, const KsReference& second, KsWorkspace& workspace,
+                       KsTies ties) {
+  if (first.size() == 0 || second.size() == 0) {
+    return without_points(first.size(), second.size());
+  }
+  const KsReference::Data& other = second.data();
+  return compare_sorted(first.data(), other.sorted, other.x.data(), other.y.data(),
+                        workspace.data(), ties);
 }
 
 KsPeacock ks_peacock(const KsReference& reference, const double* x2, const double* y2,

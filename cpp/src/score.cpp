@@ -99,11 +99,18 @@ private:
   KsWorkspace workspace_;
 };
 
-void widen(const StepTable& table, std::int64_t row, std::vector<double>& length,
-           std::vector<double>& angle) {
-  const std::int64_t at = row * table.stride, count = table.count[row];
-  length.assign(table.length + at, table.length + at + count);
-  angle.assign(table.angle + at, table.angle + at + count);
+// Rows first .. first + count - 1 of a table, sorted for comparison.
+std::vector<KsReference> prepare_rows(const StepTable& table, std::int64_t first,
+                                      std::int64_t count, int threads) {
+  std::vector<KsReference> rows(static_cast<std::size_t>(count));
+  run_tasks(count, threads, [&] {
+    return [&, workspace = KsWorkspace()](std::int64_t row) mutable {
+      const std::int64_t at = (first + row) * table.stride;
+      rows[static_cast<std::size_t>(row)].assign(table.length + at, table.angle + at,
+                                                 table.count[first + row], workspace);
+    };
+  });
+  return rows;
 }
 
 } // namespace
@@ -116,22 +123,22 @@ void score_batch(const PreparedRun<float>& run, const BatchWorlds& worlds, const
 }
 
 void ks_matrix(const StepTable& references, const StepTable& samples, int threads, double* out) {
-  run_tasks(references.rows, threads, [&] {
-    return [&, length = std::vector<double>(), angle = std::vector<double>(),
-            workspace = KsWorkspace()](std::int64_t row) mutable {
-      widen(references, row, length, angle);
-      const KsReference reference(length.data(), angle.data(), references.count[row]);
-      for (std::int64_t column = 0; column < samples.rows; ++column) {
-        widen(samples, column, length, angle);
-        out[row * samples.rows + column] =
-            samples.count[column] == 0 || references.count[row] == 0
-                ? 1.0
-                : ks_two_sample(reference, length.data(), angle.data(), samples.count[column],
-                                workspace)
-                      .distance();
-      }
-    };
-  });
+  // Prepared samples take some 40 bytes a step: a block of them at a time bounds the memory.
+  constexpr std::int64_t block = 64;
+  const std::vector<KsReference> rows = prepare_rows(references, 0, references.rows, threads);
+  for (std::int64_t first = 0; first < samples.rows; first += block) {
+    const std::int64_t width = std::min(block, samples.rows - first);
+    const std::vector<KsReference> columns = prepare_rows(samples, first, width, threads);
+    run_tasks(references.rows * width, threads, [&] {
+      return [&, workspace = KsWorkspace()](std::int64_t task) mutable {
+        const std::int64_t row = task / width, column = task % width;
+        const KsReference& a = rows[static_cast<std::size_t>(row)];
+        const KsReference& b = columns[static_cast<std::size_t>(column)];
+        out[row * samples.rows + first + column] =
+            a.size() == 0 || b.size() == 0 ? 1.0 : ks_two_sample(a, b, workspace).distance();
+      };
+    });
+  }
 }
 
 } // namespace driftwalk

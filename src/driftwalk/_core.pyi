@@ -38,7 +38,6 @@ def apply_step_plan(
 ) -> tuple[_Floats, _Floats, npt.NDArray[np.int32], int, int]: ...
 
 # --- simulation ---------------------------------------------------------------------------------
-_Singles = npt.NDArray[np.float32]
 _Keys = npt.NDArray[np.uint64]
 _Counts = npt.NDArray[np.int64]
 
@@ -99,11 +98,11 @@ def score(
     threads: int,
 ) -> dict[str, npt.NDArray[Any]]: ...
 def ks_matrix(
-    a_length: _Singles,
-    a_angle: _Singles,
+    a_length: _Floats,
+    a_angle: _Floats,
     a_count: _Counts,
-    b_length: _Singles,
-    b_angle: _Singles,
+    b_length: _Floats,
+    b_angle: _Floats,
     b_count: _Counts,
     *,
     threads: int,

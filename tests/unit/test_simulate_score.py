@@ -58,10 +58,8 @@ def test_distances_are_those_of_the_simulated_paths() -> None:
         place = compared.place
         got = [scored[f"ks_{key}"][world] for key in ("step_length", "turning_angle", "quadrant")]
         assert got == [place.x, place.y, place.quadrant]
-        np.testing.assert_array_equal(scored["step_length"][world], steps[:, 0].astype(np.float32))
-        np.testing.assert_array_equal(
-            scored["turning_angle"][world], steps[:, 1].astype(np.float32)
-        )
+        np.testing.assert_array_equal(scored["step_length"][world], steps[:, 0])
+        np.testing.assert_array_equal(scored["turning_angle"][world], steps[:, 1])
 
 
 def test_densities_are_histograms_of_the_steps() -> None:
@@ -143,7 +141,7 @@ def test_matrix_of_distances_is_the_pairwise_one() -> None:
     for row in range(4):
         for column in range(0, WORLDS - 4, 3):
             a, b = (
-                np.column_stack([t[0][i, : t[2][i]], t[1][i, : t[2][i]]]).astype(np.float64)
+                np.column_stack([t[0][i, : t[2][i]], t[1][i, : t[2][i]]])
                 for t, i in zip(tables, (row, column), strict=True)
             )
             expected = dw.ks_distance(a, b) if len(a) and len(b) else 1.0
@@ -152,7 +150,7 @@ def test_matrix_of_distances_is_the_pairwise_one() -> None:
 
 
 def test_tables_of_different_shapes_are_refused() -> None:
-    table = np.zeros((2, 3), np.float32)
+    table = np.zeros((2, 3))
     count = np.array([3, 3])
     with pytest.raises(ValueError, match="do not match"):
         _core.ks_matrix(table, table[:, :2].copy(), count, table, table, count, threads=1)

@@ -49,8 +49,8 @@ FLOOR_REFERENCES = 8
 class Steps(NamedTuple):
     """The steps of many simulated recordings, one row each; a row's tail is unused."""
 
-    length: npt.NDArray[np.float32]
-    angle: npt.NDArray[np.float32]
+    length: npt.NDArray[np.float64]
+    angle: npt.NDArray[np.float64]
     pairs: npt.NDArray[np.int64]
 
     def rows(self, chosen: slice) -> Steps:

@@ -44,8 +44,8 @@ struct Scores {
   float* density = nullptr;   // [world][length_bins][angle_bins], fractions
   float* excerpt_x = nullptr; // [world][excerpt]
   float* excerpt_y = nullptr;
-  float* length = nullptr; // [world][plan.pairs]: the steps themselves
-  float* angle = nullptr;
+  double* length = nullptr; // [world][plan.pairs]: the steps themselves
+  double* angle = nullptr;
 };
 
 void score_batch(const PreparedRun<float>& run, const BatchWorlds& worlds, const Scoring& scoring,
@@ -53,8 +53,8 @@ void score_batch(const PreparedRun<float>& run, const BatchWorlds& worlds, const
 
 // Steps of many recordings: row r holds count[r] values from r * stride on.
 struct StepTable {
-  const float* length;
-  const float* angle;
+  const double* length;
+  const double* angle;
   const std::int64_t* count;
   std::int64_t rows, stride;
 };

@@ -88,6 +88,10 @@ private:
 KsResult ks_two_sample(const KsReference& reference, const double* x2, const double* y2,
                        std::int64_t n2, KsWorkspace& workspace, KsTies ties = KsTies::strict);
 
+// The same where both samples are prepared: a sample that is met many times is sorted once.
+KsResult ks_two_sample(const KsReference& first, const KsReference& second, KsWorkspace& workspace,
+                       KsTies ties = KsTies::strict);
+
 // Peacock's statistic: the largest difference over every cut of the plane, not only over cuts at a
 // point. A cut at (X, Y) parts {x <= X} from {x > X} and {y <= Y} from {y > Y}.
 struct KsPeacock {
