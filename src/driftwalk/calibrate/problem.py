@@ -179,7 +179,7 @@ def recorded_camera(track: Track, study: Study, *, position_quantum: float) -> C
         if orientation == "estimate":
             orientation = estimate.orientation_noise_rad
     angle = float(orientation) if np.isfinite(orientation) else 0.0
-    if seen.position_quantum_m == "recording" and quantum < NEGLIGIBLE_QUANTUM * position:
+    if seen.position_quantum_m == "recording" and quantum < NEGLIGIBLE_QUANTUM * float(position):
         quantum = 0.0
     return Camera(float(position), angle, float(quantum))
 
