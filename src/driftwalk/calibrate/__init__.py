@@ -1,6 +1,7 @@
 """Which parameters fit a recording, and how well they are known."""
 
+from driftwalk.calibrate.check import check_recording
 from driftwalk.calibrate.own_flow import recording_flow
 from driftwalk.calibrate.run import calibrate
 
-__all__ = ["calibrate", "recording_flow"]
+__all__ = ["calibrate", "check_recording", "recording_flow"]

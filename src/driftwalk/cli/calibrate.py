@@ -35,6 +35,7 @@ from driftwalk.cli.recording_options import (
     RecordingOptions,
     with_recording_options,
 )
+from driftwalk.cli.require_motion import require_motion
 from driftwalk.cli.study_recording import load_with_study
 
 if TYPE_CHECKING:
@@ -110,17 +111,19 @@ def calibrate(
         bootstrap=bootstrap,
         seed=seed,
     )
-    chosen = resolve_study(study, overrides)
+    chosen = resolve_study(study, overrides, keys=CALIBRATION_KEYS)
     trajectory = load_with_study(recording, chosen, how)
+    require_motion(trajectory, recording, body=how.body)
     chosen = study_in_arena(chosen, trajectory)
     require_inside(chosen, trajectory, how.body)
-    if study is None and tank_diameter is None and how.arena is None:
-        print_note(f"the tank is the default study's, a {chosen.tank.describe()}")
     inputs = {"recording": recording}
     inputs.update({"flow": flow} if flow is not None else {})
     inputs.update({"study": study} if study is not None else {})
     given = None if flow is None else load_flow(flow, arena=chosen.tank.to_arena())
-    work = Work(trajectory, chosen, given, how.body, inputs, threads)
+    remark = None
+    if study is None and tank_diameter is None and how.arena is None:
+        remark = f"the tank is the default study's, a {chosen.tank.describe()}"
+    work = Work(trajectory, chosen, given, how.body, inputs, threads, remark)
     found = run_calibration(work, out, overwrite=overwrite)
     if json:
         print_json(summary(found))

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from driftwalk.cli.output import print_note
 from driftwalk.cli.progress import ProgressReporter
+from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -45,6 +47,8 @@ class Work:
         The files that were read, by their role.
     threads : int or None
         Threads; the result does not depend on them.
+    remark : str or None
+        What the user should know when the run begins.
     """
 
     recording: xr.Dataset
@@ -53,6 +57,7 @@ class Work:
     body: str | None
     inputs: Mapping[str, Path]
     threads: int | None = None
+    remark: str | None = None
 
 
 def run_calibration(work: Work, folder: Path, *, overwrite: bool) -> xr.Dataset:
@@ -72,15 +77,18 @@ def run_calibration(work: Work, folder: Path, *, overwrite: bool) -> xr.Dataset:
 
     Raises
     ------
+    InputError
+        When the recording cannot be calibrated on; nothing is written then.
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
     """
     from driftwalk import _core
-    from driftwalk.calibrate import calibrate, recording_flow
+    from driftwalk.calibrate import calibrate
     from driftwalk.core.provenance import manifest
     from driftwalk.core.rundir import RunDirectory
     from driftwalk.report import write_figures
 
+    flow = _checked_flow(work)
     existing = "overwrite" if overwrite else "resume"
     with RunDirectory(folder, specification=_specification(work), on_existing=existing) as run:  # type: ignore[arg-type]
         about = manifest(
@@ -90,9 +98,8 @@ def run_calibration(work: Work, folder: Path, *, overwrite: bool) -> xr.Dataset:
             inputs=dict(work.inputs),
             instruction_set=_core.instruction_set(),
         )
-        flow = work.flow
-        if flow is None:
-            flow = recording_flow(work.recording, work.study, body=work.body)
+        if work.remark is not None:
+            print_note(work.remark)
         run.write("flow.nc", netcdf_bytes(flow))
         run.write("recording.nc", netcdf_bytes(work.recording))
         with ProgressReporter("calibrate") as progress:
@@ -118,6 +125,20 @@ def run_calibration(work: Work, folder: Path, *, overwrite: bool) -> xr.Dataset:
             )
         run.finish(about)
     return found
+
+
+def _checked_flow(work: Work) -> xr.Dataset:
+    """Return the flow field of a run; refuse a recording before anything is written for it."""
+    from driftwalk.calibrate import check_recording, recording_flow
+
+    try:
+        flow = work.flow
+        if flow is None:
+            flow = recording_flow(work.recording, work.study, body=work.body)
+        check_recording(work.recording, work.study, flow=flow, body=work.body)
+    except InputError as error:
+        raise InputError(f"{work.inputs['recording']}: {error}") from error
+    return flow
 
 
 def netcdf_bytes(dataset: xr.Dataset) -> bytes:

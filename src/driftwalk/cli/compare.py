@@ -12,7 +12,7 @@ import typer
 
 from driftwalk.cli.motion import load_motion
 from driftwalk.cli.options import Json, StepInterval
-from driftwalk.cli.output import print_json, print_note, print_table
+from driftwalk.cli.output import print_json, print_note, print_table, require_place
 from driftwalk.cli.recording_options import RecordingOptions, with_recording_options
 
 if TYPE_CHECKING:
@@ -67,6 +67,9 @@ def compare(
         Path | None,
         typer.Option("--out", metavar="FILE.nc", help="Write the comparison.", show_default=False),
     ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace a file that exists.")
+    ] = False,
     json: Json = False,
 ) -> None:
     """Measure how far apart two motions are.
@@ -77,6 +80,8 @@ def compare(
     """
     from driftwalk.compare import compare as compare_motions
 
+    if out is not None:
+        require_place(out, existing="replace" if overwrite else "error")
     how_b = how if body_b is None else replace(how, body=body_b)
     motions = (load_motion(a, how, replicate=replicate), load_motion(b, how_b, replicate=replicate))
     with warnings.catch_warnings(record=True) as caught:
@@ -130,8 +135,9 @@ def _print(summary: dict[str, Any]) -> None:
 
 
 def _save(result: xr.Dataset, path: Path) -> None:
-    from driftwalk.core.atomic import atomic_path
+    from driftwalk.cli.calibration_run import netcdf_bytes
+    from driftwalk.core.atomic import write_atomic
 
-    with atomic_path(path) as partial:
-        result.to_netcdf(partial, engine="h5netcdf")
+    # In memory first: HDF5 does not survive a disk that fills while it writes.
+    write_atomic(path, netcdf_bytes(result))
     print_note(f"wrote {path}")

@@ -25,6 +25,7 @@ from driftwalk.cli.recording_options import (
     RecordingOptions,
     with_recording_options,
 )
+from driftwalk.cli.require_motion import require_motion
 from driftwalk.cli.study_recording import load_with_study
 
 if TYPE_CHECKING:
@@ -125,12 +126,13 @@ def flow(
         flow_drag_coefficient=flow_drag_coefficient,
         min_count=min_count,
     )
-    resolved = resolve_study(study, overrides)
+    resolved = resolve_study(study, overrides, keys=FLOW_KEYS)
     if study is None:
         # Without a study nobody has said how large the tank is: the default one is no answer.
         trajectory = how.load(recording, tank_diameter=tank_diameter, side=resolved.block.side_m)
     else:
         trajectory = load_with_study(recording, resolved, how)
+    require_motion(trajectory, recording, body=how.body)
     field = _extract(trajectory, resolved, body=how.body)
     save_flow(field, out, existing="replace" if overwrite else "error")
     _report(field, out, json=json)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from driftwalk.cli.recording_options import RecordingOptions
+from driftwalk.cli.require_motion import require_motion
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -29,11 +30,13 @@ def load_motion(path: Path, how: RecordingOptions, *, replicate: int = 0) -> xr.
     Raises
     ------
     InputError
-        When the file cannot be read or has no such replicate.
+        When the file cannot be read, has no such replicate, or the body never moves.
     """
     simulation = _open_simulation(path)
     if simulation is None:
-        return how.load(path)
+        recording = how.load(path)
+        require_motion(recording, path, body=how.body)
+        return recording
     count = simulation.sizes["replicate"]
     if not 0 <= replicate < count:
         raise InputError(

@@ -195,7 +195,12 @@ def study_overrides(*, keys: Mapping[str, str] = STUDY_KEYS, **options: Any) -> 
     return overrides
 
 
-def resolve_study(study_path: Path | None, overrides: Mapping[str, Any]) -> Study:
+def resolve_study(
+    study_path: Path | None,
+    overrides: Mapping[str, Any],
+    *,
+    keys: Mapping[str, str] = STUDY_KEYS,
+) -> Study:
     """Return the study of a file, or the default one, with the options of the command line over it.
 
     Parameters
@@ -204,6 +209,8 @@ def resolve_study(study_path: Path | None, overrides: Mapping[str, Any]) -> Stud
         A study file.
     overrides : mapping
         From ``"section.key"`` to the value, as `study_overrides` makes it.
+    keys : mapping
+        That of `study_overrides`: an error names the options.
 
     Raises
     ------
@@ -221,14 +228,14 @@ def resolve_study(study_path: Path | None, overrides: Mapping[str, Any]) -> Stud
     try:
         return apply_overrides(study, overrides)
     except ConfigurationError as error:
-        given = [option_name(key) for key in overrides]
+        given = [option_name(key, keys=keys) for key in overrides]
         base = f"{study_path}" if study_path is not None else "the default study"
         raise ConfigurationError(f"{', '.join(given)} over {base}: {error}") from error
 
 
-def option_name(key: str) -> str:
+def option_name(key: str, *, keys: Mapping[str, str] = STUDY_KEYS) -> str:
     """Return the option that sets a key of the study, the key itself where there is none."""
     key = "block.depth" if key == "block.depth_m" else key
-    declared = (*STUDY_KEYS.items(), *CALIBRATION_KEYS.items())
+    declared = (*keys.items(), *STUDY_KEYS.items(), *CALIBRATION_KEYS.items())
     names = [name for name, known in declared if known == key]
     return f"--{names[0].replace('_', '-')}" if names else key

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import sys
 from collections.abc import Mapping, Sequence
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import Any
+
+from driftwalk.core.errors import InputError
 
 
 def print_json(values: Mapping[str, Any]) -> None:
@@ -91,6 +94,29 @@ def print_table(
 def print_note(text: str) -> None:
     """Print a remark or warning on stderr, where it does not disturb the output."""
     print(f"driftwalk: {' '.join(text.split())}", file=sys.stderr)
+
+
+def require_place(path: Path, *, existing: str) -> None:
+    """Refuse a file that cannot be written, before the work that it is for.
+
+    Parameters
+    ----------
+    path : Path
+        The file to be written.
+    existing : {"error", "replace"}
+        What to do when it is there already.
+
+    Raises
+    ------
+    InputError
+        When it is there and not to be replaced, or its folder is not there or not writable.
+    """
+    if path.exists() and existing == "error":
+        raise InputError(f"{path} exists already: name another file, or add --overwrite")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist")
+    if not os.access(path.parent, os.W_OK):
+        raise InputError(f"{path}: permission denied to write in the folder {path.parent}")
 
 
 def _cell(value: Any) -> str:

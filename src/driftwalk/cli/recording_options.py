@@ -119,8 +119,10 @@ class RecordingOptions:
         Raises
         ------
         InputError
-            As `driftwalk.load`, and when ``--arena`` and ``--tank-diameter`` are both given.
+            As `driftwalk.load`; when no row holds a position; when ``--arena`` and
+            ``--tank-diameter`` are both given.
         """
+        from driftwalk.cli.require_motion import require_positions
         from driftwalk.record import load
 
         values: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
@@ -132,7 +134,9 @@ class RecordingOptions:
         values["columns"] = parse_columns(self.columns or [])
         words = {"tab": "\t", "\\t": "\t", "space": " "}
         values["delimiter"] = words.get(self.delimiter or "", self.delimiter)
-        return load(path, block_side=side, **values)
+        recording = load(path, block_side=side, **values)
+        require_positions(recording, path)
+        return recording
 
 
 def parse_columns(texts: list[str]) -> dict[str, str]:

@@ -30,7 +30,8 @@ from driftwalk.cli.options import (
     resolve_study,
     study_overrides,
 )
-from driftwalk.cli.output import print_json, print_note
+from driftwalk.cli.output import print_json, print_note, require_place
+from driftwalk.cli.recording_options import RecordingOptions
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -69,6 +70,10 @@ def simulate(
             show_default=False,
         ),
     ] = None,
+    body: Annotated[
+        str | None,
+        typer.Option("--body", metavar="NAME", help="Body of --like.", show_default=False),
+    ] = None,
     backend: Annotated[
         str, typer.Option("--backend", metavar="cpu|reference", help="Single or double precision.")
     ] = "cpu",
@@ -85,8 +90,7 @@ def simulate(
         raise InputError(f"--backend takes cpu or reference, got '{backend}'")
     if like is not None and backend == "reference":
         raise InputError("--like runs on the cpu backend only: leave out --backend")
-    if out.exists() and not overwrite:
-        raise InputError(f"{out} exists; choose another name or --overwrite")
+    require_place(out, existing="replace" if overwrite else "error")
     overrides = study_overrides(
         tank_diameter=tank_diameter,
         side=side,
@@ -110,9 +114,8 @@ def simulate(
     if like is None:
         result = run(chosen, field, backend="reference" if backend == "reference" else "cpu")
     else:
-        from driftwalk.record import load
-
-        result = simulate_like(chosen, field, load(like))
+        recording = RecordingOptions(body=body).load(like)
+        result = simulate_like(chosen, field, recording)
     from driftwalk.cli.calibration_run import netcdf_bytes
 
     write_atomic(out, netcdf_bytes(result))

@@ -8,8 +8,7 @@ from typing import Annotated
 import typer
 
 from driftwalk.cli.options import Json
-from driftwalk.cli.output import print_json, print_note
-from driftwalk.core.errors import InputError
+from driftwalk.cli.output import print_json, print_note, require_place
 
 study_app = typer.Typer(name="study", add_completion=False, help="Write and check study files.")
 
@@ -31,16 +30,14 @@ def new(
     ] = False,
 ) -> None:
     """Write a study file in which every parameter stands with its unit, default and meaning."""
+    from driftwalk.core.atomic import write_atomic
     from driftwalk.model import study_template
 
     if str(path) == "-":
         typer.echo(study_template(), nl=False)
         return
-    try:
-        with path.open("w" if overwrite else "x", encoding="utf-8") as file:
-            file.write(study_template())
-    except FileExistsError as error:
-        raise InputError(f"{path} exists; name another file or add --overwrite") from error
+    require_place(path, existing="replace" if overwrite else "error")
+    write_atomic(path, study_template().encode())
     print_note(f"wrote {path}")
 
 

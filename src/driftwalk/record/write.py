@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from driftwalk.core.atomic import atomic_path
 from driftwalk.core.errors import InputError
 from driftwalk.schema import body_names, check_trajectory
 
@@ -48,6 +48,8 @@ def save_trajectory(
     ------
     InputError
         When the file exists, its folder does not, or its ending is neither ``.nc`` nor ``.csv``.
+    RunDirectoryError
+        When the place cannot be written.
 
     Examples
     --------
@@ -72,20 +74,15 @@ def save_trajectory(
         raise InputError(f"{target}: the folder {target.parent} does not exist")
     if target.exists() and existing == "error":
         raise InputError(f"{target} exists already: name another file, or add --overwrite")
-    partial = target.with_name(f".{target.name}.{os.getpid()}.partial")
-    try:
+    with atomic_path(target) as partial:
         writer(dataset, partial)
-        partial.replace(target)
-    except OSError as error:
-        raise InputError(f"{target} cannot be written: {error.strerror or error}") from error
-    finally:
-        partial.unlink(missing_ok=True)
     return target
 
 
 def _write_netcdf(dataset: xr.Dataset, path: Path) -> None:
     encoding = {name: {"zlib": True, "complevel": 4} for name in ("x", "y", "theta")}
-    dataset.to_netcdf(path, engine="h5netcdf", encoding=encoding)
+    # In memory first: HDF5 does not survive a disk that fills while it writes.
+    path.write_bytes(dataset.to_netcdf(engine="h5netcdf", encoding=encoding))
 
 
 def _write_csv(dataset: xr.Dataset, path: Path) -> None:
