@@ -7,6 +7,7 @@ import pytest
 
 import driftwalk as dw
 from driftwalk.calibrate.problem import prepare_problem, score_worlds, worlds_of
+from driftwalk.core.errors import InputError
 from driftwalk.model import apply_overrides
 from driftwalk.schema import body_track
 from driftwalk.simulate.backend import Camera
@@ -74,3 +75,16 @@ def test_the_recordings_gaps_are_kept_unless_the_study_leaves_them_out():
         for chosen in (dw.Study(), study)
     ]
     assert pairs == [20 * 43, 993]
+
+
+def test_a_grid_too_fine_for_the_tank_is_refused():
+    fine = dw.tank30_flow().isel(x=slice(0, 2), y=slice(0, 2))
+    fine = fine.assign_coords(x=[0.0, 1e-6], y=[0.0, 1e-6])
+    with pytest.raises(InputError, match="too fine"):
+        dw.simulate(dw.Study(), fine, sample_time=[0.0, 0.1])
+
+
+@pytest.mark.parametrize("seed", [-1, 2**63])
+def test_a_seed_out_of_range_is_refused(seed):
+    with pytest.raises(InputError, match="seed"):
+        dw.simulate(dw.Study(), dw.tank30_flow(), sample_time=[0.0, 0.1], seed=seed)

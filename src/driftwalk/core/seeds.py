@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.errors import InputError
+
 _GAMMA = np.uint64(0x9E3779B97F4A7C15)
 
 
@@ -33,11 +35,18 @@ def world_keys(
     ndarray of uint64
         One key per world, flattened in C order.
 
+    Raises
+    ------
+    InputError
+        When the seed is out of range.
+
     Examples
     --------
     >>> world_keys(1, trial=[0, 0, 1], replicate=[0, 1, 0]).size
     3
     """
+    if not 0 <= seed < 2**63:
+        raise InputError(f"seed: expected a whole number from 0 to 2**63 - 1, got {seed}")
     trials, replicates = np.broadcast_arrays(
         np.asarray(trial, dtype=np.uint64), np.asarray(replicate, dtype=np.uint64)
     )

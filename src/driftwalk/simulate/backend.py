@@ -24,6 +24,9 @@ Floats = npt.NDArray[np.float64]
 STATUS: Final[dict[str, int]] = {"non_finite": 1, "escaped": 2, "no_motion": 4}
 """Bits of a world's status; 0 is sound."""
 
+MOST_NODES_PER_SIDE: Final = 16_000
+MOST_NODES: Final = 50_000_000
+
 
 @dataclass(frozen=True)
 class Camera:
@@ -66,6 +69,7 @@ def native_model(
     _check_sample_time(sample_time)
     tank = study.tank
     x, y = flow["x"].values, flow["y"].values
+    _require_table(flow, tank)
     step = study.time_step_s
     return _core.Model(
         side=study.block.side_m,
@@ -102,6 +106,24 @@ def _check_sample_time(time: Floats) -> None:
     if not sound or time[0] < 0 or (np.diff(time) <= 0).any():
         raise InputError(
             "sampling times must be a list of finite, increasing times from 0 s on, at least one"
+        )
+
+
+def _require_table(flow: xr.Dataset, tank: Outline) -> None:
+    """Refuse a grid so fine that its table, which reaches to the wall, would not fit."""
+    width, height = tank.extent_m
+    sides = []
+    for axis, extent in (("x", width), ("y", height)):
+        nodes = flow[axis].values
+        spacing = (nodes[-1] - nodes[0]) / (nodes.size - 1)
+        sides.append(nodes.size + 2.0 * extent / spacing)
+    frames = flow.sizes.get("time", 1)
+    if max(sides) > MOST_NODES_PER_SIDE or frames * sides[0] * sides[1] > MOST_NODES:
+        raise InputError(
+            f"the flow field's grid is too fine for the tank: {sides[0]:.0f} x {sides[1]:.0f} "
+            f"nodes and {frames} frames would reach its wall, at most {MOST_NODES_PER_SIDE} a side "
+            f"and {MOST_NODES:.0e} in all are possible; use a coarser grid (a block feels nothing "
+            "much finer than its strips)"
         )
 
 

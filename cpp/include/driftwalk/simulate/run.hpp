@@ -133,7 +133,10 @@ inline const Node* flow_table_at(const Prepared<T>& run, double time, Node* scra
   const Node* after = before + run.frame_size;
   for (std::int64_t k = 0; k < run.frame_size; ++k) {
     const T low = static_cast<T>(before[k]);
-    scratch[k] = static_cast<Node>(low + (static_cast<T>(after[k]) - low) * weight);
+    const T blended = low + (static_cast<T>(after[k]) - low) * weight;
+    // Integer nodes are rounded to the nearest, halves away from zero.
+    constexpr T half = std::is_integral_v<Node> ? T(0.5) : T(0);
+    scratch[k] = static_cast<Node>(blended + copy_sign(half, blended));
   }
   return scratch;
 }
