@@ -56,11 +56,11 @@ def machine() -> str:
     facts = Path("/proc/cpuinfo")
     if facts.exists():
         text = facts.read_text()
+        keys = {"model name": "", "cpu family": "family ", "model": "model "}
         known = {
-            key: re.search(rf"^{key}\s*:\s*(.+)$", text, re.MULTILINE)
-            for key in ("model name", "cpu family", "model")
+            words: re.search(rf"^{key}\s*:\s*(.+)$", text, re.MULTILINE)
+            for key, words in keys.items()
         }
-        name = " ".join(f"{key} {found[1]}" for key, found in known.items() if found)
-        name = name.removeprefix("model name ")
+        name = ", ".join(words + found[1] for words, found in known.items() if found) or name
     load = f", load average {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
     return f"{name}; {os.cpu_count()} cores{load}"
