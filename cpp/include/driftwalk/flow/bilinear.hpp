@@ -66,11 +66,10 @@ inline void load_cells(const std::int16_t* table, IntPack<16> index, IntPack<16>
   };
   __m512 r[4];
   for (int k = 0; k < 4; ++k) {
-    // A masked broadcast is a load and a blend, cheaper than an insertion.
-    __m512 row = _mm512_castps128_ps512(cell(k));
-    row = _mm512_mask_broadcast_f32x4(row, 0x00f0, cell(k + 4));
-    row = _mm512_mask_broadcast_f32x4(row, 0x0f00, cell(k + 8));
-    r[k] = _mm512_mask_broadcast_f32x4(row, 0xf000, cell(k + 12));
+    // Halves first: two 16-byte insertions and one of 32 bytes beat three into a 64-byte register.
+    const __m256 low = _mm256_insertf128_ps(_mm256_castps128_ps256(cell(k)), cell(k + 4), 1);
+    const __m256 high = _mm256_insertf128_ps(_mm256_castps128_ps256(cell(k + 8)), cell(k + 12), 1);
+    r[k] = _mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1);
   }
   const __m512 t0 = _mm512_unpacklo_ps(r[0], r[1]), t1 = _mm512_unpackhi_ps(r[0], r[1]);
   const __m512 t2 = _mm512_unpacklo_ps(r[2], r[3]), t3 = _mm512_unpackhi_ps(r[2], r[3]);
