@@ -116,6 +116,9 @@ inline void resolve_contacts(const Contact<Real>& a, const Contact<Real>& b,
     const Contact<Real>& c = corner == 0 ? a : b;
     const Response<Real>& r = corner == 0 ? response_a : response_b;
     const Real left = select(c.depth > zero, max(closing_speed(c, m), zero), zero);
+    if (!any(left > zero)) {
+      continue;
+    }
     const Real push = left * r.normal;
     apply_impulse(c, push, zero, per_inertia, m);
     apply_friction(c, r, push, wall.friction, per_inertia, m);
@@ -209,8 +212,11 @@ inline auto meet_wall(const WallView<T>& wall, T h, Real per_inertia, Pose<Real>
     measure_circle(second, wall.radius, pose.x, pose.y);
     resolve_contacts(first, second, wall, per_inertia, motion);
     push_out<Real, T>(first, pose);
-    measure_circle(second, wall.radius, pose.x, pose.y);
-    push_out<Real, T>(second, pose);
+    // The first corner's way out leads the second one inwards too.
+    if (any(second.depth > zero)) {
+      measure_circle(second, wall.radius, pose.x, pose.y);
+      push_out<Real, T>(second, pose);
+    }
     return touched;
   }
   auto touched = zero > zero;
