@@ -99,8 +99,7 @@ inline void load_cells(const std::int16_t* table, IntPack<N> index, IntPack<N>* 
 
 template <int N>
 inline IntPack<N> to_fixed_point(FloatPack<N> spacings) {
-  const FloatPack<N> scaled = spacings * 65536.0f;
-  return truncate(scaled + copy_sign(FloatPack<N>(0.5f), scaled));
+  return nearest(spacings * 65536.0f);
 }
 
 // Walks along the strips of a face, `step` apart, and reads the flow at each; positions are in node

@@ -44,8 +44,7 @@ inline void rotate_quadrant(IntPack<N> quadrant, FloatPack<N>& sine, FloatPack<N
 template <int N>
 inline void sincos(FloatPack<N> x, FloatPack<N>& sine, FloatPack<N>& cosine) {
   using Real = FloatPack<N>;
-  const Real scaled = x * 0.636619772f;
-  const IntPack<N> quadrant = truncate(scaled + copy_sign(Real(0.5f), scaled));
+  const IntPack<N> quadrant = nearest(x * 0.636619772f);
   const Real k = to_real(x, quadrant);
   // pi/2 in three parts, the first two exact in few bits, so that k * part is exact.
   const Real r = ((x - k * 1.5703125f) - k * 4.8351287841796875e-4f) -

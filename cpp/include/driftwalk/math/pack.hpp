@@ -303,6 +303,32 @@ DRIFTWALK_HD inline Int32 truncate(float a) {
   return static_cast<Int32>(a);
 }
 
+// The nearest integer, halves to the even one (the rounding mode that every program starts with).
+template <int N>
+inline IntPack<N> nearest(FloatPack<N> a) {
+#if defined(DRIFTWALK_USE_X86)
+  using Vector = typename IntPack<N>::Vector;
+#if defined(__AVX512F__)
+  if constexpr (N == 16) {
+    return IntPack<N>((Vector)_mm512_cvtps_epi32((__m512)a.v));
+  }
+#endif
+#if defined(__AVX__)
+  if constexpr (N == 8) {
+    return IntPack<N>((Vector)_mm256_cvtps_epi32((__m256)a.v));
+  }
+#endif
+  if constexpr (N == 4) {
+    return IntPack<N>((Vector)_mm_cvtps_epi32((__m128)a.v));
+  }
+#endif
+  FloatPack<N> whole = a;
+  for (int lane = 0; lane < N; ++lane) {
+    whole.set(lane, __builtin_rintf(a[lane]));
+  }
+  return truncate(whole);
+}
+
 template <int N>
 inline FloatPack<N> to_real(FloatPack<N>, IntPack<N> a) {
   return __builtin_convertvector(a.v, typename FloatPack<N>::Vector);
