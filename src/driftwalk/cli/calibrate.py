@@ -119,7 +119,9 @@ def calibrate(
     inputs = {"recording": recording}
     inputs.update({"flow": flow} if flow is not None else {})
     inputs.update({"study": study} if study is not None else {})
-    given = None if flow is None else load_flow(flow, arena=chosen.tank.to_arena())
+    given = None
+    if flow is not None:
+        given = load_flow(flow, arena=chosen.tank.to_arena(), own_flags="keep")
     remark = None
     if study is None and tank_diameter is None and how.arena is None:
         remark = f"the tank is the default study's, a {chosen.tank.describe()}"
@@ -203,5 +205,5 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
 def _interval(facts: dict[str, Any], key: str, scale: float, percent: str) -> str:
     ends = facts.get(f"{key}_interval")
     if ends is None:
-        return ""
+        return "   no interval without a bootstrap"
     return f"   {percent} {scale * ends[0]:.4f} to {scale * ends[1]:.4f}"

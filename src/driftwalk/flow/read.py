@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -27,7 +27,10 @@ Array = npt.NDArray[np.float64]
 
 
 def load_flow(
-    path: str | PathLike[str], *, arena: Mapping[str, Any] | str | None = None
+    path: str | PathLike[str],
+    *,
+    arena: Mapping[str, Any] | str | None = None,
+    own_flags: Literal["refuse", "keep"] = "refuse",
 ) -> xr.Dataset:
     """Load a flow field from NetCDF or CSV, recognised by content.
 
@@ -39,6 +42,8 @@ def load_flow(
         and m/s, a row for every node of a regular grid, in any order.
     arena : mapping or str, optional
         The tank, for a file that does not know it: nodes beyond its wall are flagged *outside*.
+    own_flags : {"refuse", "keep"}
+        What to do with `arena` for a file that has flags of its own: "keep" leaves it aside.
 
     Returns
     -------
@@ -72,7 +77,7 @@ def load_flow(
         )
     dataset = open_netcdf(source)
     if dataset.attrs.get("kind") == "flow_field" and "flag" in dataset:
-        if arena is not None:
+        if arena is not None and own_flags == "refuse":
             raise InputError(f"{source} has flags of its own: leave the arena out")
         return _checked(dataset, source)
     si = to_si(dataset, source)
