@@ -70,6 +70,7 @@ def load_or_refuse(path: Path, name: str | None) -> None:
     name=st.sampled_from([None, *loaders()]),
 )
 @example(head=b",frame,pos_x,pos_y,id\n", body=b"\n", name=None)
+@example(head=b"", body=b"0,", name="tracktor")
 def test_arbitrary_bytes_are_read_or_refused(head: bytes, body: bytes, name: str | None) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "synthetic.bin"

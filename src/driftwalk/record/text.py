@@ -98,6 +98,12 @@ def read_table(path: Path, layout: TableLayout) -> Table:
         With line and column, when a row has another number of fields than the header or a field is
         not a number.
     """
+    needed = 1 + max((*layout.numbers, *layout.texts))
+    if needed > len(layout.names):
+        raise FormatError(
+            f"expected at least {needed} columns, got {len(layout.names)}: is it of another format?",
+            path=path,
+        )
     chunks: dict[int, list[Array]] = {column: [] for column in layout.numbers}
     codes: dict[int, list[npt.NDArray[np.int32]]] = {column: [] for column in layout.texts}
     labels: dict[int, dict[str, int]] = {column: {} for column in layout.texts}
