@@ -101,7 +101,7 @@ def read_table(path: Path, layout: TableLayout) -> Table:
     needed = 1 + max((*layout.numbers, *layout.texts))
     if needed > len(layout.names):
         raise FormatError(
-            f"expected at least {needed} columns, got {len(layout.names)}: is it of another format?",
+            f"expected at least {needed} columns, got {len(layout.names)}: is it another format?",
             path=path,
         )
     chunks: dict[int, list[Array]] = {column: [] for column in layout.numbers}
