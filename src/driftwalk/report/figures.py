@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from driftwalk.core.atomic import atomic_path
 from driftwalk.core.errors import InputError
 from driftwalk.report.plot_density_panels import plot_density_panels, shared_setting_text
 from driftwalk.report.plot_flow import COMPONENTS, SPEED_LABEL, plot_flow, velocity_of
@@ -77,6 +78,8 @@ def write_figures(
     ------
     InputError
         When a format is not known, or a dataset lacks what a figure draws.
+    RunDirectoryError
+        When a figure cannot be written.
 
     Examples
     --------
@@ -223,6 +226,7 @@ def _save(figure: Figure, stem: Path, formats: Sequence[str]) -> list[Path]:
     written = []
     for name in formats:
         path = stem.with_suffix(f".{name}")
-        figure.savefig(path, metadata=METADATA[name])
+        with atomic_path(path) as temporary:
+            figure.savefig(temporary, metadata=METADATA[name])
         written.append(path)
     return written

@@ -1,0 +1,281 @@
+"""A calibration that is killed, interrupted, raced or out of disk, and started again.
+
+Whatever happened, the second start ends with the arrays of a run that nothing happened to.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import xarray as xr
+from command_line import (
+    FLOW,
+    GRID,
+    RECORDING,
+    apart,
+    assert_same_bits,
+    calibration,
+    contents,
+    end,
+    here,
+    refusal,
+    start,
+)
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+
+# Figures take most of the time of a short run, and come after everything that resumes.
+PLAIN = "import driftwalk.report\ndriftwalk.report.write_figures = lambda *a, **k: []\n"
+# A moment after every finished unit, so that a test can see it and act in it.
+SLOW = """
+import time
+from driftwalk.core import shards
+write = shards.ShardStore.write
+def slow(self, unit, arrays):
+    write(self, unit, arrays)
+    time.sleep(0.25)
+shards.ShardStore.write = slow
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a study with more units than `GRID`: 3 of the map, and 4 of the bootstrap."""
+    path = tmp_path_factory.mktemp("study") / "study.toml"
+    text = GRID.replace('force_std_step_N = "0.2mN"', 'force_std_step_N = "0.05mN"')
+    text = text.replace("drag_coefficient_step = 0.1\n", "drag_coefficient_step = 0.05\n", 1)
+    path.write_text(text.replace("bootstrap = 10", "bootstrap = 40"), encoding="utf-8")
+    return path
+
+
+def words(study: Path, folder: Path) -> list[object]:
+    return [
+        *("calibrate", RECORDING, "--to", "60s", "--flow", FLOW, "--study", study),
+        *("--out", folder, "--threads", "1"),
+    ]
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(study: Path, tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+    folder = tmp_path_factory.mktemp("uninterrupted") / "run"
+    done = apart(*words(study, folder), before=PLAIN)
+    assert done.code == 0, done.err
+    return calibration(folder)
+
+
+def shards(folder: Path) -> dict[Path, int]:
+    return {path: path.stat().st_mtime_ns for path in folder.glob(".shards/*/[0-9]*.npz")}
+
+
+def wait_for_shards(folder: Path, count: int, process: subprocess.Popen[str]) -> None:
+    deadline = time.monotonic() + 300
+    while len(shards(folder)) < count:
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < deadline, "the run makes no progress"
+        time.sleep(0.005)
+
+
+def assert_whole(folder: Path, expected: xr.Dataset) -> None:
+    assert_same_bits(calibration(folder), expected)
+    assert json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["files"]
+    assert not (folder / ".shards").exists()
+    assert not list(folder.rglob("*partial*"))
+
+
+def test_interrupted_and_continued(study: Path, uninterrupted: xr.Dataset, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    process = start(*words(study, folder), before=PLAIN + SLOW)
+    wait_for_shards(folder, 2, process)
+    process.send_signal(signal.SIGINT)
+    done = end(process)
+    assert (done.code, done.out, done.err) == (130, "", "driftwalk: interrupted\n")
+    kept = shards(folder)
+    assert len(kept) >= 2
+    process = start(*words(study, folder), before=PLAIN + SLOW)
+    wait_for_shards(folder, len(kept) + 1, process)
+    # What had been finished is not computed again.
+    assert {path: shards(folder)[path] for path in kept} == kept
+    assert end(process).code == 0
+    assert_whole(folder, uninterrupted)
+
+
+@pytest.mark.slow
+def test_killed_at_several_moments(study: Path, uninterrupted: xr.Dataset, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    count = 0
+    for more in (1, 2, 3):
+        process = start(*words(study, folder), before=PLAIN + SLOW)
+        wait_for_shards(folder, count + more, process)
+        process.kill()
+        assert end(process).code == -signal.SIGKILL
+        count = len(shards(folder))
+        assert not (folder / "manifest.json").exists()
+    assert apart(*words(study, folder), before=PLAIN).code == 0
+    assert_whole(folder, uninterrupted)
+
+
+# Kills itself before the n-th change of the file system under the run directory.
+KILL = """
+import os, signal, sys
+left = {count}
+folder = {folder!r}
+def hook(event, arguments):
+    global left
+    writes = event == "open" and (arguments[2] or 0) & (os.O_WRONLY | os.O_RDWR)
+    changes = event in {{"os.rename", "os.remove", "os.mkdir", "os.rmdir"}}
+    if (writes or changes) and str(arguments[0]).startswith(folder):
+        left -= 1
+        if left < 0:
+            os.kill(os.getpid(), signal.SIGKILL)
+sys.addaudithook(hook)
+"""
+
+
+@pytest.mark.slow
+def test_killed_between_any_two_changes(
+    study: Path, uninterrupted: xr.Dataset, tmp_path: Path
+) -> None:
+    kills = 0
+    for count in range(0, 1000, 9):
+        folder = tmp_path / f"run-{count}"
+        before = PLAIN + KILL.format(count=count, folder=str(folder))
+        code = apart(*words(study, folder), before=before).code
+        if code == 0:
+            break
+        assert code == -signal.SIGKILL
+        kills += 1
+        if not (folder / "manifest.json").exists():
+            done = apart(*words(study, folder), before=PLAIN)
+            assert done.code == 0, done.err
+        assert_same_bits(calibration(folder), uninterrupted)
+    assert kills > 3
+
+
+@pytest.mark.slow
+def test_killed_while_the_figures_are_drawn(
+    study: Path, uninterrupted: xr.Dataset, tmp_path: Path
+) -> None:
+    folder = tmp_path / "run"
+    process = start(*words(study, folder))
+    while not list(folder.glob("figures/steps*")):
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.01)
+    process.kill()
+    end(process)
+    assert apart(*words(study, folder)).code == 0
+    assert len(list(folder.glob("figures/*"))) == 14
+    assert_whole(folder, uninterrupted)
+
+
+@pytest.mark.slow
+def test_two_processes_at_once(study: Path, uninterrupted: xr.Dataset, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    first = start(*words(study, folder), before=PLAIN + SLOW)
+    wait_for_shards(folder, 1, first)
+    for more in ([], ["--overwrite"]):
+        line = refusal(apart(*words(study, folder), *more, before=PLAIN))
+        assert f"{folder} is in use by another process" in line
+    assert first.poll() is None
+    assert end(first).code == 0
+    assert_whole(folder, uninterrupted)
+
+
+@pytest.mark.slow
+def test_other_parameters_do_not_continue_a_run(
+    study: Path, uninterrupted: xr.Dataset, tmp_path: Path
+) -> None:
+    folder = tmp_path / "run"
+    process = start(*words(study, folder), before=PLAIN + SLOW)
+    wait_for_shards(folder, 2, process)
+    process.kill()
+    end(process)
+    before = contents(folder)
+    line = refusal(here(*words(study, folder), "--seed", "2"))
+    assert "seed" in line
+    assert {n: d for n, d in contents(folder).items() if n != ".lock"} == {
+        n: d for n, d in before.items() if n != ".lock" and "partial" not in n
+    }
+    assert apart(*words(study, folder), before=PLAIN).code == 0
+    assert_whole(folder, uninterrupted)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("bytes_allowed", [6_000, 30_000, 70_000])
+def test_files_that_may_not_grow(
+    bytes_allowed: int, study: Path, uninterrupted: xr.Dataset, tmp_path: Path
+) -> None:
+    """A limit on the size of files fails a write as a full disk does, at several stages."""
+    folder = tmp_path / "run"
+    limit = (
+        "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({bytes_allowed}, resource.RLIM_INFINITY))\n"
+    )
+    line = refusal(apart(*words(study, folder), before=PLAIN + limit))
+    assert str(folder) in line
+    assert "run the same command again to continue" in line
+    assert not list(folder.rglob("*partial*"))
+    assert apart(*words(study, folder), before=PLAIN).code == 0
+    assert_whole(folder, uninterrupted)
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """Return the place of a disk of 8 MB, where this user may mount one."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", "size=8m", "none", str(place)]
+    if shutil.which("mount") is None or subprocess.run(command, capture_output=True).returncode:
+        pytest.skip("no disk can be mounted here")
+    yield place
+    subprocess.run(["umount", str(place)], check=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("free", [40_000, 600_000, 1_300_000, 2_000_000])
+def test_a_disk_that_is_full(
+    free: int, study: Path, uninterrupted: xr.Dataset, small_disk: Path
+) -> None:
+    ballast = small_disk / "ballast"
+    ballast.write_bytes(bytes(os.statvfs(small_disk).f_bavail * 4096 - free))
+    folder = small_disk / "run"
+    line = refusal(apart(*words(study, folder)))
+    assert "the disk is full" in line
+    assert str(folder) in line
+    ballast.unlink()
+    assert not list(folder.rglob("*partial*"))
+    done = apart(*words(study, folder), before=PLAIN)
+    assert done.code == 0, done.err
+    assert_same_bits(calibration(folder), uninterrupted)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["convert", "flow", "simulate", "compare", "study"])
+def test_a_full_disk_keeps_the_file_that_was_there(command: str, small_disk: Path) -> None:
+    out = small_disk / "out.nc"
+    out.write_bytes(b"precious")
+    (small_disk / "ballast").write_bytes(bytes(os.statvfs(small_disk).f_bavail * 4096))
+    line = refusal(
+        apart(
+            *{
+                "convert": ["convert", RECORDING, out],
+                "flow": ["flow", RECORDING, "--tank-diameter", "30cm", "--out", out],
+                "simulate": ["simulate", "--flow", FLOW, "--duration", "60s", "--out", out],
+                "compare": ["compare", RECORDING, RECORDING, "--permutations", 0, "--out", out],
+                "study": ["study", "new", out],
+            }[command],
+            "--overwrite",
+        )
+    )
+    assert "the disk is full" in line
+    assert str(out) in line
+    assert out.read_bytes() == b"precious"
+    assert sorted(path.name for path in small_disk.iterdir()) == ["ballast", "out.nc"]
