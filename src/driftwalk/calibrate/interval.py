@@ -161,6 +161,23 @@ def simulated_steps(
     return Steps(found["step_length"], found["turning_angle"], found["pairs"])
 
 
+def recordings_at(
+    problem: Problem, optimum: Optimum, *, stage: str, count: int
+) -> tuple[Steps, Floats]:
+    """Simulate recordings at an optimum; return their steps and distances to the real one."""
+    worlds = worlds_of(
+        problem,
+        [optimum.drag_coefficient],
+        [optimum.force_std],
+        stage=stage,
+        first=0,
+        replicates=count,
+    )
+    found = score_worlds(problem, problem.model(), worlds, keep_steps="yes")
+    steps = Steps(found["step_length"], found["turning_angle"], found["pairs"])
+    return steps, np.asarray(found["ks_distance"])
+
+
 class Bootstrap(NamedTuple):
     """Recordings simulated at the optimum, and what is learnt from them."""
 
@@ -202,16 +219,7 @@ def run_bootstrap(
     progress : callable, optional
         Told the number of recordings done and in all.
     """
-    worlds = worlds_of(
-        problem,
-        [optimum.drag_coefficient],
-        [optimum.force_std],
-        stage="bootstrap",
-        first=0,
-        replicates=count,
-    )
-    scored = score_worlds(problem, problem.model(), worlds, keep_steps="yes")
-    recordings = Steps(scored["step_length"], scored["turning_angle"], scored["pairs"])
+    recordings, to_recording = recordings_at(problem, optimum, stage="bootstrap", count=count)
 
     def compute(unit: WorkUnit) -> dict[str, npt.NDArray[Any]]:
         rows = recordings.rows(slice(unit.start, unit.stop))
@@ -235,7 +243,7 @@ def run_bootstrap(
         estimates["drag_coefficient"],
         estimates["force_std"],
         estimates["excess"],
-        scored["ks_distance"],
+        to_recording,
         among,
     )
 

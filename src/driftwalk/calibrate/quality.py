@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from driftwalk import _core
-from driftwalk.calibrate.interval import Bootstrap, Steps, simulated_steps
-from driftwalk.calibrate.problem import Problem, score_worlds, worlds_of
+from driftwalk.calibrate.interval import Bootstrap, recordings_at, simulated_steps
+from driftwalk.calibrate.problem import Problem
 from driftwalk.calibrate.search import Map, Window, refined_window, run_map, window_smoother
 from driftwalk.calibrate.surface import Optimum
 
@@ -101,22 +101,15 @@ def validate_on_halves(first: Problem, second: Problem, *, steps: tuple[float, f
     doubled = (2 * steps[0], 2 * steps[1])
     window = refined_window(coarse, doubled, 0.0)
     optimum = refine(first, window, doubled, stage="first_half_refined", replicates=2)[1]
-    worlds = worlds_of(
-        second,
-        [optimum.drag_coefficient],
-        [optimum.force_std],
-        stage="second_half",
-        first=0,
-        replicates=VALIDATION_REPLICATES,
+    recordings, distances = recordings_at(
+        second, optimum, stage="second_half", count=VALIDATION_REPLICATES
     )
-    found = score_worlds(second, second.model(), worlds, keep_steps="yes")
-    recordings = Steps(found["step_length"], found["turning_angle"], found["pairs"])
     among = _core.ks_matrix(*recordings, *recordings, threads=second.threads)
     floor = np.median(among[np.triu_indices(VALIDATION_REPLICATES, 1)])
     return Halves(
         optimum.drag_coefficient,
         optimum.force_std,
-        float(found["ks_distance"].mean()),
+        float(distances.mean()),
         float(floor),
     )
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from driftwalk.core.errors import RunDirectoryError
+from driftwalk.core.errors import InputError, RunDirectoryError
 
 # In the name of every temporary file, so that what a killed process left can be told from a file
 # of the user's.
@@ -167,3 +167,30 @@ def _flush_folder(folder: Path) -> None:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
+
+
+def require_target(path: Path, *, existing: str, endings: tuple[str, ...]) -> None:
+    """Refuse a file that must not, or cannot, be written.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write.
+    existing : {"error", "replace"}
+        What to do when it is there already.
+    endings : tuple of str
+        What its name may end in, such as ``".nc"``.
+
+    Raises
+    ------
+    InputError
+        When the ending is another one, the folder does not exist, or the file does.
+    """
+    if existing not in ("error", "replace"):
+        raise InputError(f"existing is 'error' or 'replace', got '{existing}'")
+    if path.suffix.lower() not in endings:
+        raise InputError(f"{path}: write to a file that ends in {' or '.join(endings)}")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist")
+    if path.exists() and existing == "error":
+        raise InputError(f"{path} exists already: name another file, or add --overwrite")

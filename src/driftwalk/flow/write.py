@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from driftwalk.core.atomic import atomic_path, write_atomic
+from driftwalk.core.atomic import atomic_path, require_target, write_atomic
 from driftwalk.core.errors import InputError
 from driftwalk.schema import check_flow_field
 
@@ -57,7 +57,7 @@ def save_flow(flow: xr.Dataset, path: str | PathLike[str], *, existing: str = "e
     """
     check_flow_field(flow)
     target = Path(path)
-    _check_target(target, existing=existing)
+    require_target(target, existing=existing, endings=(".nc", ".csv"))
     if target.suffix.lower() == ".csv":
         _write_csv(flow, target)
         return target
@@ -66,17 +66,6 @@ def save_flow(flow: xr.Dataset, path: str | PathLike[str], *, existing: str = "e
     stored = flow.assign_attrs(Conventions=CONVENTIONS)
     write_atomic(target, stored.to_netcdf(engine="h5netcdf", encoding=encoding))
     return target
-
-
-def _check_target(path: Path, *, existing: str) -> None:
-    if existing not in ("error", "replace"):
-        raise InputError(f"existing is 'error' or 'replace', got '{existing}'")
-    if path.suffix.lower() not in (".nc", ".csv"):
-        raise InputError(f"{path}: write to a file that ends in .nc or .csv")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist")
-    if path.exists() and existing == "error":
-        raise InputError(f"{path} exists already: name another file, or add --overwrite")
 
 
 def _write_csv(flow: xr.Dataset, path: Path) -> None:

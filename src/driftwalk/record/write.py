@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from driftwalk.core.atomic import atomic_path
-from driftwalk.core.errors import InputError
+from driftwalk.core.atomic import atomic_path, require_target
 from driftwalk.schema import body_names, check_trajectory
 
 if TYPE_CHECKING:
@@ -60,22 +58,11 @@ def save_trajectory(
     'a.csv'
     """
     check_trajectory(dataset)
-    if existing not in ("error", "replace"):
-        raise InputError(f"existing is 'error' or 'replace', got '{existing}'")
     target = Path(path)
-    writers: dict[str, Callable[[xr.Dataset, Path], None]] = {
-        ".nc": _write_netcdf,
-        ".csv": _write_csv,
-    }
-    writer = writers.get(target.suffix.lower())
-    if writer is None:
-        raise InputError(f"{target}: write to a file that ends in .nc or .csv")
-    if not target.parent.is_dir():
-        raise InputError(f"{target}: the folder {target.parent} does not exist")
-    if target.exists() and existing == "error":
-        raise InputError(f"{target} exists already: name another file, or add --overwrite")
+    require_target(target, existing=existing, endings=(".nc", ".csv"))
+    write = _write_csv if target.suffix.lower() == ".csv" else _write_netcdf
     with atomic_path(target) as partial:
-        writer(dataset, partial)
+        write(dataset, partial)
     return target
 
 
