@@ -282,6 +282,7 @@ CHATTY = (
 )
 
 
+@pytest.mark.slow
 def test_threads_and_instruction_sets_do_not_change_a_bit(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -315,6 +316,7 @@ def test_progress_through_a_pipe_is_plain_lines(study: Path, tmp_path: Path) -> 
     assert "\x1b" not in done.err
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals of POSIX")
 def test_progress_on_a_terminal_is_a_bar_with_the_time_left(study: Path, tmp_path: Path) -> None:
     import os
