@@ -36,7 +36,7 @@ from driftwalk.cli.recording_options import (
     with_recording_options,
 )
 from driftwalk.cli.require_motion import require_motion
-from driftwalk.cli.study_recording import load_with_study
+from driftwalk.cli.study_recording import load_for_run
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -93,6 +93,7 @@ def calibrate(
     from driftwalk.cli.calibration_run import Work, run_calibration
     from driftwalk.cli.tank import require_inside, study_in_arena
     from driftwalk.flow import load_flow
+    from driftwalk.model import Tank
 
     overrides = study_overrides(
         keys=CALIBRATION_KEYS,
@@ -112,7 +113,8 @@ def calibrate(
         seed=seed,
     )
     chosen = resolve_study(study, overrides, keys=CALIBRATION_KEYS)
-    trajectory = load_with_study(recording, chosen, how)
+    unsaid = study is None and tank_diameter is None and how.arena is None
+    trajectory = load_for_run(recording, chosen, how, tank="unsaid" if unsaid else "stated")
     require_motion(trajectory, recording, body=how.body)
     chosen = study_in_arena(chosen, trajectory)
     require_inside(chosen, trajectory, how.body)
@@ -123,7 +125,7 @@ def calibrate(
     if flow is not None:
         given = load_flow(flow, arena=chosen.tank.to_arena(), own_flags="keep")
     remark = None
-    if study is None and tank_diameter is None and how.arena is None:
+    if unsaid and chosen.tank == Tank():
         remark = f"the tank is the default study's, a {chosen.tank.describe()}"
     work = Work(trajectory, chosen, given, how.body, inputs, threads, remark)
     found = run_calibration(work, out, overwrite=overwrite)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from driftwalk.cli.recording_options import RecordingOptions
 
@@ -43,6 +43,27 @@ def load_with_study(path: Path, study: Study, how: RecordingOptions) -> xr.Datas
     if study.tank.shape == "polygon" and study.recording.arena == "tank" and how.arena is None:
         trajectory = trajectory.assign_attrs(arena=study.tank.to_arena_json())
     return trajectory
+
+
+def load_for_run(
+    path: Path, study: Study, how: RecordingOptions, *, tank: Literal["stated", "unsaid"]
+) -> xr.Dataset:
+    """Load a recording; where nobody said the tank, an arena that the file itself holds is used.
+
+    Parameters
+    ----------
+    path, study, how
+        As in `load_with_study`.
+    tank : {"stated", "unsaid"}
+        Whether a study file or an option says the tank.
+    """
+    from driftwalk.model import apply_overrides
+
+    if tank == "unsaid" and path.suffix.lower() == ".nc":
+        own = load_with_study(path, apply_overrides(study, {"recording.arena": "file"}), how)
+        if "arena" in own.attrs:
+            return own
+    return load_with_study(path, study, how)
 
 
 def completed(how: RecordingOptions, study: Study) -> RecordingOptions:
