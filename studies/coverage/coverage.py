@@ -28,10 +28,11 @@ from driftwalk.calibrate.interval import (
     run_bootstrap,
     simulated_steps,
 )
-from driftwalk.calibrate.problem import prepare_problem, recorded_camera
+from driftwalk.calibrate.problem import prepare_problem
 from driftwalk.calibrate.quality import noise_floor_at, quality_of_fit
 from driftwalk.calibrate.search import Map, Window, window_smoother
 from driftwalk.schema import body_track
+from driftwalk.simulate import recorded_camera
 
 TRUTHS = ((0.45, 0.55e-3), (0.80, 0.90e-3))
 STEPS = (0.01, 2e-5)

@@ -19,7 +19,6 @@ import xarray as xr
 from driftwalk.calibrate.problem import (
     Problem,
     prepare_problem,
-    recorded_camera,
     score_worlds,
     worlds_of,
 )
@@ -34,6 +33,7 @@ from driftwalk.report.style import (
     print_style,
 )
 from driftwalk.schema import body_track
+from driftwalk.simulate import recorded_camera
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

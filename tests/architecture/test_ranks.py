@@ -21,17 +21,16 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "model": GROUND,
     "compare": GROUND,
     "sweep": GROUND,
-    "simulate": GROUND | {"model"},
     # `record` for the tracking noise of a recording, which is what "estimate" stands for.
-    "calibrate": GROUND | {"record", "simulate", "compare", "flow", "model", "sweep"},
+    "simulate": GROUND | {"model", "record"},
+    "calibrate": GROUND | {"simulate", "compare", "flow", "model", "sweep"},
     "assemble": GROUND | {"simulate", "compare", "flow", "model", "sweep"},
     "datasets": GROUND | {"record", "flow", "model", "compare", "sweep", "simulate"},
-    "testing": GROUND | {"record", "flow", "model", "compare", "sweep", "simulate"},
     "report": GROUND,
     "viewer": GROUND,
     "cli": GROUND
     | {"record", "flow", "model", "compare", "sweep", "simulate", "calibrate", "assemble"}
-    | {"datasets", "testing", "report", "viewer"},
+    | {"datasets", "report", "viewer"},
 }
 HEAVY = frozenset({"xarray", "scipy", "pandas", "cv2", "matplotlib", "dask", "optuna", "h5netcdf"})
 # `driftwalk.core` and `driftwalk.schema` are used by module; a stage by the names in its `__all__`.

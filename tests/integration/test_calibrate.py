@@ -123,3 +123,20 @@ def test_without_a_given_flow_it_is_extracted_from_the_recording():
     found = dw.calibrate(dw.tank30_recording().isel(time=slice(0, 3000)), study)
     assert 0.2 <= found.attrs["drag_coefficient"] <= 0.8
     assert found.attrs["simulated_recording"] == "yes"
+
+
+def test_an_interval_that_reaches_the_end_of_the_refined_grid_is_warned_of():
+    # Steps so small that the refined grid is narrower than what a minute can tell.
+    study = apply_overrides(
+        dw.Study(),
+        {
+            **SMALL,
+            "calibration.refined_drag_coefficient_step": 0.002,
+            "calibration.refined_force_std_step_N": 0.004e-3,
+        },
+    )
+    found = dw.calibrate(synthetic_recording(60.0), study, flow=dw.tank30_flow())
+    window = found["refined_force_std"].values
+    interval = found.attrs["force_std_N_interval"]
+    assert np.isclose(interval[0], window[0]) or np.isclose(interval[1], window[-1])
+    assert "force_std reaches the end of the refined grid" in found.attrs["warnings"]

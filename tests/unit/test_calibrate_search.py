@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import driftwalk as dw
-from driftwalk.calibrate.problem import prepare_problem, recorded_camera
+from driftwalk.calibrate.problem import prepare_problem
 from driftwalk.calibrate.search import (
     MOST_REFINED_WORLDS,
     WINDOW_STEPS,
@@ -24,7 +24,7 @@ from driftwalk.compare import apply_steps
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.schema import Track, body_track
-from driftwalk.simulate import Start
+from driftwalk.simulate import Start, recorded_camera
 from driftwalk.simulate.backend import Camera
 
 STEPS = (0.01, 2e-5)

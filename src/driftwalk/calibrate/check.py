@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from driftwalk.calibrate.problem import prepare_problem, recorded_camera
+from driftwalk.calibrate.problem import prepare_problem
 from driftwalk.schema import body_track
+from driftwalk.simulate import recorded_camera
 
 if TYPE_CHECKING:
     import xarray as xr

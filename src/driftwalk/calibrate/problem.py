@@ -12,7 +12,6 @@ from driftwalk import _core
 from driftwalk.compare import StepPlan, apply_steps, plan_steps
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
-from driftwalk.record import estimate_tracking_noise
 from driftwalk.simulate.backend import Camera, default_threads, native_model, world_table
 from driftwalk.simulate.initial import Start, recorded_start, world_orientations
 from driftwalk.simulate.run import without_gaps
@@ -28,8 +27,6 @@ Floats = npt.NDArray[np.float64]
 DENSITY_BINS: Final = 32
 EXCERPT_S: Final = 30.0
 FEWEST_PAIRS: Final = 30
-NEGLIGIBLE_QUANTUM: Final = 0.05
-"""A file's resolution below this share of the noise is not simulated."""
 
 STAGES: Final[dict[str, int]] = {
     "coarse": 1,
@@ -157,31 +154,6 @@ def prepare_problem(
         angle_limit=min(np.pi, 2.5 * float(np.quantile(np.abs(steps[:, 1]), 0.98))) or np.pi,
         threads=threads or default_threads(),
     )
-
-
-def recorded_camera(track: Track, study: Study, *, position_quantum: float) -> Camera:
-    """Return the camera of a recording: what the study says, the rest estimated from the track.
-
-    Rounding adds q^2/12 to the variance of the noise; where positions are rounded in simulation,
-    that part of the estimate is taken away again. A resolution finer than a twentieth of the noise
-    (a file with many digits) changes the variance by less than 0.03 % and is left out: it would
-    only make steps tie.
-    """
-    seen = study.observation
-    quantum = seen.position_quantum_m
-    quantum = position_quantum if quantum == "recording" else quantum
-    position, orientation = seen.position_noise_m, seen.orientation_noise_rad
-    if "estimate" in (position, orientation):
-        estimate = estimate_tracking_noise(track)
-        if position == "estimate":
-            variance = estimate.position_noise_m**2 - quantum**2 / 12.0
-            position = float(np.sqrt(max(variance, 0.0)))
-        if orientation == "estimate":
-            orientation = estimate.orientation_noise_rad
-    angle = float(orientation) if np.isfinite(orientation) else 0.0
-    if seen.position_quantum_m == "recording" and quantum < NEGLIGIBLE_QUANTUM * float(position):
-        quantum = 0.0
-    return Camera(float(position), angle, float(quantum))
 
 
 def worlds_of(

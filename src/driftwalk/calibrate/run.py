@@ -9,11 +9,12 @@ import numpy as np
 
 from driftwalk.calibrate.interval import (
     Bootstrap,
+    Region,
     build_surface,
     confidence_region,
     run_bootstrap,
 )
-from driftwalk.calibrate.problem import Problem, prepare_problem, recorded_camera
+from driftwalk.calibrate.problem import Problem, prepare_problem
 from driftwalk.calibrate.quality import (
     FAR_ABOVE_FLOOR,
     Halves,
@@ -35,6 +36,7 @@ from driftwalk.calibrate.search import (
 from driftwalk.calibrate.surface import Optimum
 from driftwalk.core.errors import InputError
 from driftwalk.schema import Track, body_track
+from driftwalk.simulate import recorded_camera
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -157,6 +159,7 @@ class _Calibration:
         self.warnings: list[str] = []
         self.bootstrap: Bootstrap | None = None
         self.quality: Quality | None = None
+        self.region: Region | None = None
         self._keep = keep
         self._say = say
         grid = problem.study.calibration
@@ -247,6 +250,13 @@ class _Calibration:
         )
         self.quality = quality_of_fit(self.bootstrap)
         self.floor = self.quality.floor
+        self.region = confidence_region(
+            self.smoother,
+            self.surface,
+            self.bootstrap,
+            confidence=self.problem.study.calibration.confidence,
+            stretch=self.quality.stretch,
+        )
         self._check_window(*axes)
         if not self.quality.explained:
             self.warnings.append(
@@ -256,19 +266,38 @@ class _Calibration:
             )
 
     def _check_window(self, drag: Any, force: Any) -> None:
-        """Warn when many bootstrap estimates press against the end of the stored surface."""
-        found = self.bootstrap
+        """Warn where what could be the truth goes on beyond the settings that were simulated.
+
+        `drag` and `force` are the axes on which the bootstrap's recordings were estimated.
+        """
+        found, region = self.bootstrap, self.region
         assert found is not None
-        for axis, values, limits, name in (
-            (drag, found.drag_coefficient, self.coarse.drag_coefficient, "drag coefficient"),
-            (force, found.force_std, self.coarse.force_std, "force_std"),
+        assert region is not None
+        for axis, values, window, limits, interval, name in (
+            (
+                drag,
+                found.drag_coefficient,
+                self.window.drag_coefficient,
+                self.coarse.drag_coefficient,
+                region.drag_coefficient_interval,
+                "drag coefficient",
+            ),
+            (
+                force,
+                found.force_std,
+                self.window.force_std,
+                self.coarse.force_std,
+                region.force_std_interval,
+                "force_std",
+            ),
         ):
-            for edge, end in ((axis[0], limits[0]), (axis[-1], limits[-1])):
-                share = float(np.mean(np.abs(values - edge) < 1e-9))
-                if share > WIDE_SHARE and abs(edge - end) > 1e-9:
+            for side in (0, -1):
+                crowded = np.mean(np.isclose(values, axis[side])) > WIDE_SHARE
+                cut = np.isclose(interval[side], window[side])
+                if (crowded or cut) and not np.isclose(window[side], limits[side]):
                     self.warnings.append(
-                        f"{share:.0%} of the bootstrap estimates of the {name} lie at the end of "
-                        f"the refined grid ({edge:g}): its interval is wider than stated"
+                        f"the interval of the {name} reaches the end of the refined grid "
+                        f"({window[side]:g}): it is wider than stated"
                     )
 
 
@@ -334,18 +363,14 @@ def _finish(
         surface = found.surface[::FINENESS, ::FINENESS]
     dataset = build_calibration(problem, found.coarse, found.refined, surface, attrs=attrs)
     if found.bootstrap is not None:
-        confidence = study.calibration.confidence
         assert found.quality is not None
-        stretch = found.quality.stretch
-        region = confidence_region(
-            found.smoother, found.surface, found.bootstrap, confidence=confidence, stretch=stretch
-        )
-        dataset.attrs["region_level"] = region.level
-        dataset = add_uncertainty(dataset, found.bootstrap, region)
-        dataset.attrs["interval_stretch"] = stretch
-        dataset.attrs["drag_coefficient_interval"] = list(region.drag_coefficient_interval)
-        dataset.attrs["force_std_N_interval"] = list(region.force_std_interval)
-        dataset.attrs["confidence"] = confidence
+        assert found.region is not None
+        dataset = add_uncertainty(dataset, found.bootstrap, found.region)
+        dataset.attrs["region_level"] = found.region.level
+        dataset.attrs["interval_stretch"] = found.quality.stretch
+        dataset.attrs["drag_coefficient_interval"] = list(found.region.drag_coefficient_interval)
+        dataset.attrs["force_std_N_interval"] = list(found.region.force_std_interval)
+        dataset.attrs["confidence"] = study.calibration.confidence
     dataset.attrs["warnings"] = as_json(found.warnings)
     return dataset
 

@@ -122,7 +122,7 @@ def simulate_like(
     Parameters
     ----------
     study, flow
-        As in `simulate`; noise that is to be estimated must be numbers by now.
+        As in `simulate`; noise and resolution that the study leaves open are the recording's.
     recording : xarray.Dataset
         A `trajectory`; its present samples give the time stamps, its first samples the start.
     body : str, optional
@@ -148,9 +148,21 @@ def simulate_like(
     >>> run.sizes["time"]
     100
     """
+    from driftwalk.model import apply_overrides
     from driftwalk.schema import body_track
+    from driftwalk.simulate.camera import recorded_camera
 
     track = body_track(recording, body)
+    quantum = float(recording.attrs.get("position_quantum_m", 0.0))
+    camera = recorded_camera(track, study, position_quantum=quantum)
+    study = apply_overrides(
+        study,
+        {
+            "observation.position_noise_m": camera.position_noise,
+            "observation.orientation_noise_rad": camera.orientation_noise,
+            "observation.position_quantum_m": camera.position_quantum,
+        },
+    )
     begin = recorded_start(track)
     times = track.time - track.time[0]
     if study.observation.gaps == "none":

@@ -1,3 +1,0 @@
-"""Stage of driftwalk (being built)."""
-
-__all__: list[str] = []
