@@ -25,11 +25,12 @@ from timing import machine
 
 from driftwalk import _core
 from driftwalk.calibrate import calibrate
-from driftwalk.calibrate.problem import prepare_problem, recorded_camera, worlds_of
+from driftwalk.calibrate.problem import prepare_problem, worlds_of
 from driftwalk.cli.demo import demo_study
 from driftwalk.datasets import tank30_flow, tank30_recording, tank30_truth
 from driftwalk.report import write_figures
 from driftwalk.schema import body_track
+from driftwalk.simulate import recorded_camera
 from driftwalk.simulate.backend import default_threads
 
 TARGET_MAP_S = 60.0
