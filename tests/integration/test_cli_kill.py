@@ -181,10 +181,13 @@ def test_two_processes_at_once(study: Path, uninterrupted: xr.Dataset, tmp_path:
     folder = tmp_path / "run"
     first = start(*words(study, folder), before=PLAIN + SLOW)
     wait_for_shards(folder, 1, first)
+    # Halted, it holds the folder for as long as the others need, however busy the machine.
+    first.send_signal(signal.SIGSTOP)
     for more in ([], ["--overwrite"]):
         line = refusal(apart(*words(study, folder), *more, before=PLAIN))
         assert f"{folder} is in use by another process" in line
     assert first.poll() is None
+    first.send_signal(signal.SIGCONT)
     assert end(first).code == 0
     assert_whole(folder, uninterrupted)
 
