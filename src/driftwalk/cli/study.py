@@ -23,17 +23,18 @@ def study(ctx: typer.Context) -> None:
 @study_app.command()
 def new(
     path: Annotated[
-        Path, typer.Argument(metavar="FILE", help="File to write; - is stdout.")
-    ] = Path("study.toml"),
+        Path | None,
+        typer.Argument(metavar="[FILE]", help="File to write; stdout without it, or for -."),
+    ] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a file that exists.")
     ] = False,
 ) -> None:
-    """Write a study file in which every parameter stands with its unit, default and meaning."""
+    """Print a study file in which every parameter stands with its unit, default and meaning."""
     from driftwalk.core.atomic import write_atomic
     from driftwalk.model import study_template
 
-    if str(path) == "-":
+    if path is None or str(path) == "-":
         typer.echo(study_template(), nl=False)
         return
     require_place(path, existing="replace" if overwrite else "error")
