@@ -33,7 +33,7 @@ from driftwalk.calibrate.search import (
     run_map,
     window_smoother,
 )
-from driftwalk.calibrate.surface import Optimum
+from driftwalk.calibrate.surface import FINENESS, Optimum
 from driftwalk.core.errors import InputError
 from driftwalk.schema import Track, body_track
 from driftwalk.simulate import recorded_camera
@@ -358,8 +358,6 @@ def _finish(
     # The lattice of the surface meets the refined settings at every FINENESS-th point.
     surface = None
     if found.surface is not None:
-        from driftwalk.calibrate.surface import FINENESS
-
         surface = found.surface[::FINENESS, ::FINENESS]
     dataset = build_calibration(problem, found.coarse, found.refined, surface, attrs=attrs)
     if found.bootstrap is not None:

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import Any
 
+from driftwalk.core.atomic import require_free
 from driftwalk.core.errors import InputError
 
 
@@ -111,10 +112,7 @@ def require_place(path: Path, *, existing: str) -> None:
     InputError
         When it is there and not to be replaced, or its folder is not there or not writable.
     """
-    if path.exists() and existing == "error":
-        raise InputError(f"{path} exists already: name another file, or add --overwrite")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist")
+    require_free(path, existing=existing)
     if not os.access(path.parent, os.W_OK):
         raise InputError(f"{path}: permission denied to write in the folder {path.parent}")
 

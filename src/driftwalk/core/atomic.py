@@ -186,10 +186,28 @@ def require_target(path: Path, *, existing: str, endings: tuple[str, ...]) -> No
     InputError
         When the ending is another one, the folder does not exist, or the file does.
     """
-    if existing not in ("error", "replace"):
-        raise InputError(f"existing is 'error' or 'replace', got '{existing}'")
     if path.suffix.lower() not in endings:
         raise InputError(f"{path}: write to a file that ends in {' or '.join(endings)}")
+    require_free(path, existing=existing)
+
+
+def require_free(path: Path, *, existing: str) -> None:
+    """Refuse a file that is there and not to be replaced, or whose folder is not there.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write.
+    existing : {"error", "replace"}
+        What to do when it is there already.
+
+    Raises
+    ------
+    InputError
+        When the folder does not exist, or the file does.
+    """
+    if existing not in ("error", "replace"):
+        raise InputError(f"existing is 'error' or 'replace', got '{existing}'")
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist")
     if path.exists() and existing == "error":
