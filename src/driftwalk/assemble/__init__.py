@@ -1,0 +1,1 @@
+"""What many blocks build, with what certainty, and how much that depends on the model."""
