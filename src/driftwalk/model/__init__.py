@@ -1,11 +1,13 @@
 """What is simulated and how: frozen parameters with units, read from and written to TOML."""
 
+from driftwalk.model.assembly import Assembly
 from driftwalk.model.block import Block
 from driftwalk.model.calibration import Calibration
 from driftwalk.model.flow import Flow
 from driftwalk.model.forces import Forces
 from driftwalk.model.observation import Observation
 from driftwalk.model.recording import Columns, Recording
+from driftwalk.model.sensitivity import Sensitivity
 from driftwalk.model.simulation import Pose, Simulation
 from driftwalk.model.steps import Steps
 from driftwalk.model.study import Study, apply_overrides, load_study, parse_study
@@ -14,6 +16,7 @@ from driftwalk.model.template import parameter_table, study_template
 from driftwalk.model.water import Water
 
 __all__ = [
+    "Assembly",
     "Block",
     "Calibration",
     "Columns",
@@ -23,6 +26,7 @@ __all__ = [
     "Observation",
     "Pose",
     "Recording",
+    "Sensitivity",
     "Simulation",
     "Steps",
     "Study",

@@ -71,15 +71,7 @@ class Calibration(Section):
     @model_validator(mode="after")
     def _grid_has_settings(self) -> Self:
         for name, low, high, step in self._axes():
-            if high < low:
-                raise ConfigurationError(
-                    f"the grid has no setting: {name}_max = {high:g} is below {name}_min = {low:g}"
-                )
-            if (high - low) / step > MOST_SETTINGS:
-                raise ConfigurationError(
-                    f"{name}: a step of {step:g} from {low:g} to {high:g} gives more than "
-                    f"{MOST_SETTINGS} values"
-                )
+            check_axis(name, low, high, step)
         settings = len(self.drag_coefficients) * len(self.force_stds_N)
         if settings > MOST_SETTINGS:
             raise ConfigurationError(
@@ -109,6 +101,25 @@ class Calibration(Section):
                 self.drag_coefficient_step,
             ),
             ("force_std", self.force_std_min_N, self.force_std_max_N, self.force_std_step_N),
+        )
+
+
+def check_axis(name: str, low: float, high: float, step: float) -> None:
+    """Refuse an axis of a grid without a value, or with more than anybody could simulate.
+
+    Raises
+    ------
+    ConfigurationError
+        Names the axis and its ends.
+    """
+    if high < low:
+        raise ConfigurationError(
+            f"the grid has no setting: {name}_max = {high:g} is below {name}_min = {low:g}"
+        )
+    if (high - low) / step > MOST_SETTINGS:
+        raise ConfigurationError(
+            f"{name}: a step of {step:g} from {low:g} to {high:g} gives more than "
+            f"{MOST_SETTINGS} values"
         )
 
 

@@ -7,7 +7,7 @@ declaration checks the value, writes the commented template and makes the refere
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar, get_args
 
@@ -143,13 +143,28 @@ def quantity_of(section: type[Section], key: str) -> Quantity | None:
     return next((item for item in metadata if isinstance(item, Quantity)), None)
 
 
+def item_quantity_of(section: type[Section], key: str) -> Quantity | None:
+    """Return the declared quantity of the items of a list, None for any other field."""
+    parts = _parts(section.model_fields[key].annotation)
+    return next((part for part in parts if isinstance(part, Quantity)), None)
+
+
+def is_list(section: type[Section], key: str) -> bool:
+    """Return whether a field is a list of any length."""
+    return Ellipsis in _parts(section.model_fields[key].annotation)
+
+
 def words_of(section: type[Section], key: str) -> tuple[str, ...]:
-    """Return the words that a field accepts, empty when it accepts any or none."""
-    annotation = section.model_fields[key].annotation
-    arguments = (annotation, *get_args(annotation))
-    words = [word for item in arguments for word in get_args(item) if isinstance(word, str)]
-    words += [item for item in get_args(annotation) if isinstance(item, str)]
-    return tuple(dict.fromkeys(words))
+    """Return the words that a field, or an item of a list, accepts; empty for any or none."""
+    parts = _parts(section.model_fields[key].annotation)
+    return tuple(dict.fromkeys(part for part in parts if isinstance(part, str)))
+
+
+def _parts(annotation: Any) -> Iterator[Any]:
+    """Yield everything that an annotation is made of, itself first."""
+    yield annotation
+    for part in get_args(annotation):
+        yield from _parts(part)
 
 
 def _describe(section: type[Section], error: ValidationError) -> str:
@@ -178,6 +193,8 @@ def _sentence(section: type[Section], problem: ErrorDetails) -> str:
     where = f"[{name}] {key}" if name else key
     if cause is not None:
         return f"{where}: {cause}"
+    if kind == "tuple_type":
+        return f"{where} must be a list, got {value!r}"
     if kind == "missing":
         return f"{where} is missing"
     if kind == "literal_error":

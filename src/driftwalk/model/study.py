@@ -11,6 +11,7 @@ from typing import Any, Self
 from pydantic import Field, model_validator
 
 from driftwalk.core.errors import ConfigurationError
+from driftwalk.model.assembly import Assembly
 from driftwalk.model.block import Block
 from driftwalk.model.calibration import Calibration
 from driftwalk.model.flow import Flow
@@ -18,6 +19,7 @@ from driftwalk.model.forces import Forces
 from driftwalk.model.observation import Observation
 from driftwalk.model.recording import Recording
 from driftwalk.model.section import Section, did_you_mean
+from driftwalk.model.sensitivity import Sensitivity
 from driftwalk.model.simulation import Pose, Simulation, resolve_time_step
 from driftwalk.model.steps import Steps
 from driftwalk.model.tank import Tank
@@ -60,6 +62,12 @@ class Study(Section):
     steps: Steps = Field(default_factory=Steps, description="How steps are formed.")
     calibration: Calibration = Field(
         default_factory=Calibration, description="What a calibration searches."
+    )
+    assembly: Assembly = Field(
+        default_factory=Assembly, description="How blocks assemble, and how often it is simulated."
+    )
+    sensitivity: Sensitivity = Field(
+        default_factory=Sensitivity, description="What a sensitivity analysis varies."
     )
 
     @model_validator(mode="after")

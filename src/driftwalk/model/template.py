@@ -7,7 +7,15 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
-from driftwalk.model.section import Quantity, Section, quantity_of, quoted, words_of
+from driftwalk.model.section import (
+    Quantity,
+    Section,
+    is_list,
+    item_quantity_of,
+    quantity_of,
+    quoted,
+    words_of,
+)
 from driftwalk.model.study import Study
 
 _WIDTH = 96
@@ -94,12 +102,13 @@ def _example(kind: type[Section], key: str) -> str:
 
 def _accepted(kind: type[Section], key: str) -> str:
     """Return unit, range and words of a parameter, in short."""
-    quantity = quantity_of(kind, key)
+    quantity = quantity_of(kind, key) or item_quantity_of(kind, key)
     words = words_of(kind, key)
     parts = [_number_text(quantity)] if quantity is not None else []
     if words:
         parts.append(quoted(words))
-    return ", or ".join(parts)
+    text = ", or ".join(parts)
+    return f"list of {text}" if text and is_list(kind, key) else text
 
 
 def _number_text(quantity: Quantity) -> str:

@@ -1,0 +1,86 @@
+"""How many blocks assemble, how often, for how long, and by which rule they latch."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Final, Literal
+
+from pydantic import Field
+
+from driftwalk.model.section import Quantity, Section
+
+MOST_BLOCKS: Final = 1000
+
+Latching = Literal["collision", "connector", "none"]
+HiddenFaceDrag = Literal["none", "full"]
+Chirality = Literal["merged", "distinct"]
+
+
+class Assembly(Section):
+    """Self-assembly of many blocks: how many, how often, for how long, and the latching rule.
+
+    Examples
+    --------
+    >>> Assembly(duration_s="5min").duration_s
+    300.0
+    """
+
+    section_name: ClassVar[str] = "assembly"
+
+    blocks: Annotated[int, Quantity("1", ge=1, le=MOST_BLOCKS, whole=True)] = Field(
+        default=4, description="Blocks in the tank."
+    )
+    runs: Annotated[int, Quantity("1", ge=1, le=10_000_000, whole=True)] = Field(
+        default=1000, description="Simulated runs, each with its own start and random numbers."
+    )
+    duration_s: Annotated[float, Quantity("s", gt=0, le=1e6)] = Field(
+        default=300.0,
+        description="Length of a run; a run in which all blocks have become one ends earlier.",
+    )
+    seed: Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)] = Field(
+        default=1, description="Seed of the starts, the forces and the drawn parameters."
+    )
+    latching: Latching = Field(
+        default="collision",
+        description=(
+            'When two blocks latch: "collision", whenever they touch (the paper); "connector", '
+            'when two faces are within the tolerances of a connector; "none", never: hard bodies.'
+        ),
+    )
+    connector_distance_m: Annotated[float, Quantity("m", ge=0, le=10)] = Field(
+        default=0.010,
+        description="Largest distance between the centres of two faces at which connectors latch.",
+    )
+    connector_axis_rad: Annotated[float, Quantity("rad", ge=0, le=3.15)] = Field(
+        default=0.2,
+        description="Largest angle between the axes of two connectors that latch.",
+    )
+    connector_rotation_rad: Annotated[float, Quantity("rad", ge=0, le=3.15)] = Field(
+        default=0.2,
+        description=(
+            "Largest rotation of two connectors against each other about their axis. Blocks float "
+            "upright, so that this rotation is always 0 and the condition is always met; the key "
+            "is here so that a connector is stated whole."
+        ),
+    )
+    hidden_face_drag: HiddenFaceDrag = Field(
+        default="none",
+        description=(
+            'Drag on faces that are joined to another block: "none", or "full" as on a free face.'
+        ),
+    )
+    chirality: Chirality = Field(
+        default="merged",
+        description=(
+            'Shapes that are mirror images of each other: "merged", one class (the paper), or '
+            '"distinct".'
+        ),
+    )
+    block_restitution: Annotated[float, Quantity("1", ge=0, le=1)] = Field(
+        default=0.5, description="Restitution of an impact between two blocks that do not latch."
+    )
+    block_friction: Annotated[float, Quantity("1", ge=0, le=100)] = Field(
+        default=0.0, description="Coulomb friction between two blocks; 0 for wet faces."
+    )
+    confidence: Annotated[float, Quantity("1", gt=0, lt=1)] = Field(
+        default=0.9, description="Simultaneous confidence of the intervals of the proportions."
+    )

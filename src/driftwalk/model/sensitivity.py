@@ -1,0 +1,123 @@
+"""What a sensitivity analysis varies: the map over C_d and σ_F, and further axes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Final, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from driftwalk.core.errors import ConfigurationError
+from driftwalk.model.assembly import MOST_BLOCKS, HiddenFaceDrag, Latching
+from driftwalk.model.calibration import MOST_SETTINGS, check_axis, grid_values
+from driftwalk.model.section import Quantity, Section
+
+LISTS: Final = ("tank_diameter_m", "blocks", "flow", "latching", "hidden_face_drag")
+
+
+class Sensitivity(Section):
+    """The settings whose outcomes are compared with those of a reference.
+
+    Examples
+    --------
+    >>> len(Sensitivity().drag_coefficients), len(Sensitivity().force_stds_N)
+    (31, 31)
+    """
+
+    section_name: ClassVar[str] = "sensitivity"
+
+    drag_coefficient_min: Annotated[float, Quantity("1", ge=0, le=100)] = Field(
+        default=0.0, description="Smallest drag coefficient of the map."
+    )
+    drag_coefficient_max: Annotated[float, Quantity("1", ge=0, le=100)] = Field(
+        default=1.5, description="Largest drag coefficient of the map, included."
+    )
+    drag_coefficient_step: Annotated[float, Quantity("1", gt=0, le=100)] = Field(
+        default=0.05, description="Step of the map in the drag coefficient."
+    )
+    force_std_min_N: Annotated[float, Quantity("N", ge=0, le=10)] = Field(
+        default=0.0, description="Smallest force_std of the map."
+    )
+    force_std_max_N: Annotated[float, Quantity("N", ge=0, le=10)] = Field(
+        default=1.5e-3, description="Largest force_std of the map, included."
+    )
+    force_std_step_N: Annotated[float, Quantity("N", gt=0, le=10)] = Field(
+        default=5e-5, description="Step of the map in force_std."
+    )
+    runs: Annotated[int, Quantity("1", ge=1, le=10_000_000, whole=True)] = Field(
+        default=1000,
+        description="Simulated runs per setting, and per realisation of the reference.",
+    )
+    reference_realisations: Annotated[int, Quantity("1", ge=2, le=100_000, whole=True)] = Field(
+        default=10, description="Realisations of the reference, which is their mean."
+    )
+    seed: Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)] = Field(
+        default=1, description="Seed of the random numbers."
+    )
+    tank_diameter_m: tuple[Annotated[float, Quantity("m", gt=0, le=1e3)], ...] | None = Field(
+        default=None,
+        description="Diameters of circular tanks to compare, an axis of the map.",
+        examples=["[0.25, 0.3]"],
+    )
+    blocks: tuple[Annotated[int, Quantity("1", ge=1, le=MOST_BLOCKS, whole=True)], ...] | None = (
+        Field(
+            default=None,
+            description="Numbers of blocks to compare, an axis of the map.",
+            examples=["[3, 4, 5]"],
+        )
+    )
+    flow: tuple[str, ...] | None = Field(
+        default=None,
+        description="Files of flow fields to compare, an axis of the map.",
+        examples=['["flow_a.nc", "flow_b.nc"]'],
+    )
+    latching: tuple[Latching, ...] | None = Field(
+        default=None,
+        description="Latching rules to compare, an axis of the map.",
+        examples=['["collision", "connector"]'],
+    )
+    hidden_face_drag: tuple[HiddenFaceDrag, ...] | None = Field(
+        default=None,
+        description="Rules for the drag on joined faces to compare, an axis of the map.",
+        examples=['["none", "full"]'],
+    )
+
+    @field_validator(*LISTS)
+    @classmethod
+    def _distinct(cls, values: tuple[Any, ...] | None) -> tuple[Any, ...] | None:
+        if values is not None and not values:
+            raise ConfigurationError("the list is empty; leave the key out or name a value")
+        if values is not None and len(set(values)) < len(values):
+            raise ConfigurationError(f"the list names a value twice: {list(values)}")
+        return values
+
+    @model_validator(mode="after")
+    def _grid_has_settings(self) -> Self:
+        for name, low, high, step in self._grids():
+            check_axis(name, low, high, step)
+        settings = len(self.drag_coefficients) * len(self.force_stds_N)
+        if settings > MOST_SETTINGS:
+            raise ConfigurationError(
+                f"the map has {len(self.drag_coefficients)} x {len(self.force_stds_N)} = "
+                f"{settings} settings, more than {MOST_SETTINGS}: enlarge a step"
+            )
+        return self
+
+    @property
+    def drag_coefficients(self) -> tuple[float, ...]:
+        """Drag coefficients of the map."""
+        return grid_values(
+            self.drag_coefficient_min, self.drag_coefficient_max, self.drag_coefficient_step
+        )
+
+    @property
+    def force_stds_N(self) -> tuple[float, ...]:
+        """Values of force_std of the map [N]."""
+        return grid_values(self.force_std_min_N, self.force_std_max_N, self.force_std_step_N)
+
+    def _grids(self) -> Iterator[tuple[str, float, float, float]]:
+        for name, unit in (("drag_coefficient", ""), ("force_std", "_N")):
+            low, high, step = (
+                getattr(self, f"{name}_{end}{unit}") for end in ("min", "max", "step")
+            )
+            yield name, low, high, step
