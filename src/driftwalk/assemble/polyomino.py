@@ -1,0 +1,263 @@
+"""Polyominoes: shapes of unit squares joined edge to edge; their names, and all there are.
+
+A shape is called by its canonical code: its rows from the top, ``x`` for a cell and ``.`` for none,
+joined by ``/``. Of all the ways to turn it (and, with chirality "merged", to mirror it) the code is
+that of the fewest rows, and among those the one with cells the earliest. Shapes of up to four cells
+have shorter names: 1, 2, I3, L3, I, O, T, S, L, and with chirality "distinct" Z and J, as seen from
+above with y up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import Final, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+
+Chirality = Literal["merged", "distinct"]
+Cell = tuple[int, int]
+Cells = tuple[Cell, ...]
+
+LARGEST: Final = 10
+"""Largest size of which all shapes are listed: there are 4655, and four times more per cell."""
+
+# As people draw them, which is not always the canonical code. The order is that of all lists.
+_DRAWN: Final = {
+    "1": "x",
+    "2": "xx",
+    "I3": "xxx",
+    "L3": "x./xx",
+    "I": "xxxx",
+    "O": "xx/xx",
+    "T": "xxx/.x.",
+    "S": ".xx/xx.",
+    "Z": "xx./.xx",
+    "L": "x./x./xx",
+    "J": ".x/.x/xx",
+}
+_MIRRORED: Final = frozenset({"Z", "J"})
+_LARGEST_NAMED: Final = 4
+# Cells before gaps, and wide shapes before narrow ones.
+_BY_CELLS: Final = str.maketrans("x/.", "012")
+
+
+def polyomino_name(cells: npt.ArrayLike, *, chirality: Chirality = "merged") -> str:
+    """Name the shape of some cells of the square lattice.
+
+    Parameters
+    ----------
+    cells : array_like of int, shape (n, 2)
+        Columns and rows (ix, iy), y up, in any order and at any place.
+    chirality : {"merged", "distinct"}
+        Whether mirror images are one shape (free polyominoes) or two (one-sided ones).
+
+    Returns
+    -------
+    str
+        A name such as "L3", or for five cells and more a code such as "xxx/x.x".
+
+    Raises
+    ------
+    InputError
+        When there is no cell, one stands there twice, or they are not joined edge to edge.
+
+    Examples
+    --------
+    >>> polyomino_name([(0, 0), (0, 1), (1, 1), (0, 2)])
+    'T'
+    >>> polyomino_name([(0, 0), (1, 0), (1, 1), (2, 1)], chirality="distinct")
+    'S'
+    """
+    require_chirality(chirality)
+    array = np.asarray(cells)
+    if array.ndim != 2 or array.shape[1] != 2 or not len(array) or array.dtype.kind not in "iu":
+        raise InputError(
+            f"cells are pairs of whole numbers, shape (n, 2), got shape {array.shape} of "
+            f"{array.dtype}"
+        )
+    return name_of(moved_to_origin(tuple(map(tuple, array.tolist()))), chirality)
+
+
+def polyomino_cells(name: str) -> npt.NDArray[np.int32]:
+    """Return the cells of a shape, as it is usually drawn.
+
+    Parameters
+    ----------
+    name : str
+        As `polyomino_name` gives it, with either chirality.
+
+    Returns
+    -------
+    numpy.ndarray of int32, shape (n, 2)
+        Columns and rows (ix, iy), y up, the least of each 0, sorted.
+
+    Raises
+    ------
+    InputError
+        When no shape has this name.
+
+    Examples
+    --------
+    >>> polyomino_cells("L3").tolist()
+    [[0, 0], [0, 1], [1, 0]]
+    """
+    cells = _cells_of_rows(_DRAWN.get(name, name))
+    if not cells or name not in {name_of(cells, chirality) for chirality in get_args(Chirality)}:
+        raise InputError(
+            f"no shape is called '{name}': the names are {', '.join(_DRAWN)}, and for five cells "
+            "and more rows such as xxx/x.x"
+        )
+    return np.array(cells, dtype=np.int32)
+
+
+@lru_cache(maxsize=64)
+def polyominoes(size: int, *, chirality: Chirality = "merged") -> tuple[str, ...]:
+    """List all shapes of a number of cells.
+
+    Parameters
+    ----------
+    size : int
+        Number of cells, 1 to 10.
+    chirality : {"merged", "distinct"}
+        As in `polyomino_name`.
+
+    Returns
+    -------
+    tuple of str
+        The names, in the order of all lists of driftwalk: I O T S L for four cells; for five and
+        more those with fewer rows first, mirror images side by side.
+
+    Raises
+    ------
+    InputError
+        When the size is out of range.
+
+    Examples
+    --------
+    >>> polyominoes(4)
+    ('I', 'O', 'T', 'S', 'L')
+    >>> polyominoes(4, chirality="distinct")
+    ('I', 'O', 'T', 'S', 'Z', 'L', 'J')
+    """
+    require_chirality(chirality)
+    if not 1 <= size <= LARGEST:
+        raise InputError(f"all shapes are listed for 1 to {LARGEST} cells, got {size}")
+    if size == 1:
+        return ("1",)
+    found = {
+        name_of(moved_to_origin((*cells, new)), chirality)
+        for name in polyominoes(size - 1, chirality=chirality)
+        for cells in [_cells_of_rows(_DRAWN.get(name, name))]
+        for new in _neighbours(cells)
+    }
+    return tuple(sorted(found, key=shape_order))
+
+
+@lru_cache(maxsize=1 << 16)
+def shape_order(name: str) -> tuple[int, int, str, str]:
+    """Return what shapes are sorted by: their size, then their place among those of that size."""
+    if name in _DRAWN:
+        return shape_size(name), list(_DRAWN).index(name), "", ""
+    both = merged_shape(name), name
+    merged, own = (code.translate(_BY_CELLS) for code in both)
+    return shape_size(name), name.count("/"), merged, own
+
+
+def shape_size(name: str) -> int:
+    """Return the number of cells of a shape."""
+    return _DRAWN.get(name, name).count("x")
+
+
+@lru_cache(maxsize=1 << 16)
+def merged_shape(name: str) -> str:
+    """Return the name of a shape when mirror images count as one."""
+    return name_of(_cells_of_rows(_DRAWN.get(name, name)), "merged")
+
+
+@lru_cache(maxsize=1 << 16)
+def name_of(cells: Cells, chirality: Chirality) -> str:
+    """Name a shape given as `moved_to_origin` returns it; fast for one that came before."""
+    if len(set(cells)) < len(cells):
+        raise InputError("a cell stands there twice")
+    if not _is_connected(cells):
+        raise InputError("the cells are not joined edge to edge")
+    code = _canonical_code(cells, chirality)
+    return _short_names(chirality).get(code, code) if len(cells) <= _LARGEST_NAMED else code
+
+
+def moved_to_origin(cells: Cells) -> Cells:
+    """Return the cells sorted, the least column and the least row being 0."""
+    left = min(x for x, _ in cells)
+    bottom = min(y for _, y in cells)
+    return tuple(sorted((x - left, y - bottom) for x, y in cells))
+
+
+def require_chirality(chirality: str) -> None:
+    """Refuse a word that is no chirality."""
+    if chirality not in get_args(Chirality):
+        raise InputError(f"chirality is 'merged' or 'distinct', got '{chirality}'")
+
+
+@lru_cache(maxsize=2)
+def _short_names(chirality: Chirality) -> dict[str, str]:
+    """Return the names of the small shapes by their canonical codes."""
+    return {
+        _canonical_code(_cells_of_rows(rows), chirality): name
+        for name, rows in _DRAWN.items()
+        if chirality == "distinct" or name not in _MIRRORED
+    }
+
+
+def _canonical_code(cells: Cells, chirality: Chirality) -> str:
+    codes = [_code(turned) for turned in _orientations(cells, chirality)]
+    fewest = min(code.count("/") for code in codes)
+    # Of codes with the same rows, "x" counts for more than ".".
+    return max(code for code in codes if code.count("/") == fewest)
+
+
+def _orientations(cells: Cells, chirality: Chirality) -> Iterator[Cells]:
+    mirrored = [tuple((-x, y) for x, y in cells)] if chirality == "merged" else []
+    for turned in (cells, *mirrored):
+        for _ in range(4):
+            yield turned
+            turned = tuple((-y, x) for x, y in turned)
+
+
+def _code(cells: Cells) -> str:
+    xs, ys = zip(*cells, strict=True)
+    left, top = min(xs), max(ys)
+    rows = [["."] * (max(xs) - left + 1) for _ in range(top - min(ys) + 1)]
+    for x, y in cells:
+        rows[top - y][x - left] = "x"
+    return "/".join(map("".join, rows))
+
+
+def _cells_of_rows(code: str) -> Cells:
+    """Return the cells of a code; none when it is no code."""
+    rows = code.split("/")
+    if set(code) - set("x./") or len({len(row) for row in rows}) > 1 or "x" not in code:
+        return ()
+    return moved_to_origin(
+        tuple(
+            (x, -y) for y, row in enumerate(rows) for x, letter in enumerate(row) if letter == "x"
+        )
+    )
+
+
+def _neighbours(cells: Cells) -> set[Cell]:
+    around = {(x + dx, y + dy) for x, y in cells for dx, dy in ((1, 0), (0, 1), (-1, 0), (0, -1))}
+    return around - set(cells)
+
+
+def _is_connected(cells: Cells) -> bool:
+    left, ahead = set(cells), [cells[0]]
+    while ahead:
+        cell = ahead.pop()
+        if cell in left:
+            left.remove(cell)
+            ahead += _neighbours((cell,)) & left
+    return not left
