@@ -1,8 +1,9 @@
 """The NumPy twin of the native core: the same model, written plainly, for reading and for tests.
 
-Same equations, same random numbers, float64, one strip, face and contact at a time, vectorised over
-worlds only. It is slow and is no product: results come from the native core, which is held against
-this page. The two agree to rounding as long as a path is not chaotic, and in distribution after.
+Same equations, same random numbers, float64, one face and contact at a time, vectorised over worlds
+and strips only. It is slow and is no product: results come from the native core, which is held
+against this page. The two agree to rounding as long as a path is not chaotic, and in distribution
+after. The twin of the self-assembly kernel takes its drag, random numbers and impulses from here.
 """
 
 from __future__ import annotations
@@ -46,7 +47,9 @@ class TwinModel:
         return self.mass * self.side**2 / 6.0
 
 
-def philox(key: npt.NDArray[np.uint64], counter: tuple[int, int, int, int]) -> list[Floats]:
+def philox(
+    key: npt.NDArray[np.uint64], counter: tuple[int, npt.ArrayLike, int, int]
+) -> list[Floats]:
     """Return the four words of Philox 4x32-10 for every key, as uint64 arrays below 2**32."""
     c0, c1, c2, c3 = (np.full(key.shape, word, dtype=np.uint64) for word in counter)
     k0, k1 = key & _LOW, key >> np.uint64(32)
@@ -73,9 +76,14 @@ def normal_pair(word0: Floats, word1: Floats) -> tuple[Floats, Floats]:
     return radius * np.cos(angle), radius * np.sin(angle)
 
 
-def force_normals(key: npt.NDArray[np.uint64], interval: int) -> tuple[Floats, Floats]:
-    """Return the two standard normals of a force interval; one Philox block serves two."""
-    words = philox(key, (interval >> 1 & 0xFFFFFFFF, 0, interval >> 33, FORCE_PURPOSE))
+def force_normals(
+    key: npt.NDArray[np.uint64], interval: int, body: npt.ArrayLike = 0
+) -> tuple[Floats, Floats]:
+    """Return the two standard normals of a force interval; one Philox block serves two.
+
+    `body` is the block's number within its world, one for all keys or one for each.
+    """
+    words = philox(key, (interval >> 1 & 0xFFFFFFFF, body, interval >> 33, FORCE_PURPOSE))
     half = 2 * (interval & 1)
     return normal_pair(words[half], words[half + 1])
 
@@ -92,19 +100,27 @@ def flow_at(model: TwinModel, x: Floats, y: Floats) -> tuple[Floats, Floats]:
     step = max(np.abs(model.flow_u).max(), np.abs(model.flow_v).max()) / 32767 or 1.0
     parts = []
     for values in (model.flow_u, model.flow_v):
-        nodes = np.round(values / step) * step
-        parts.append(
-            (nodes[j, i] * (1 - fx) + nodes[j, i + 1] * fx) * (1 - fy)
-            + (nodes[j + 1, i] * (1 - fx) + nodes[j + 1, i + 1] * fx) * fy
+        a, b, c, d = (
+            np.round(values[row, column] / step) * step
+            for row, column in ((j, i), (j, i + 1), (j + 1, i), (j + 1, i + 1))
         )
+        parts.append((a * (1 - fx) + b * fx) * (1 - fy) + (c * (1 - fx) + d * fx) * fy)
     return parts[0], parts[1]
 
 
 def drag(
-    model: TwinModel, drag_coefficient: Floats, pose: Floats, motion: Floats
+    model: TwinModel,
+    drag_coefficient: Floats,
+    pose: Floats,
+    motion: Floats,
+    hidden: npt.NDArray[np.bool_] | None = None,
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return force x, y [N], torque [N m] and conductance [m/s], summed strip by strip (Eq. 2)."""
+    """Return force x, y [N], torque [N m] and conductance [m/s], summed face by face (Eq. 2).
+
+    A face that is `hidden`, shape (4, worlds), adds nothing to any of them.
+    """
     half, width = model.side / 2, model.side / model.strips
+    offset = ((np.arange(model.strips) + 0.5) * width - half)[:, None]
     scale = 0.5 * model.water_density * drag_coefficient * width * model.depth
     x, y, theta = pose
     vx, vy, omega = motion
@@ -112,19 +128,19 @@ def drag(
     for face in range(4):
         angle = theta + face * np.pi / 2
         normal_x, normal_y = np.cos(angle), np.sin(angle)
-        for strip in range(model.strips):
-            offset = (strip + 0.5) * width - half
-            arm_x = half * normal_x - offset * normal_y
-            arm_y = half * normal_y + offset * normal_x
-            u, v = flow_at(model, x + arm_x, y + arm_y)
-            relative_x = u - (vx - omega * arm_y)
-            relative_y = v - (vy + omega * arm_x)
-            facing = np.maximum(0.0, -(normal_x * relative_x + normal_y * relative_y))
-            strip_x, strip_y = scale * facing * relative_x, scale * facing * relative_y
-            force_x += strip_x
-            force_y += strip_y
-            torque += arm_x * strip_y - arm_y * strip_x
-            conductance += facing
+        arm_x = half * normal_x - offset * normal_y
+        arm_y = half * normal_y + offset * normal_x
+        u, v = flow_at(model, x + arm_x, y + arm_y)
+        relative_x = u - (vx - omega * arm_y)
+        relative_y = v - (vy + omega * arm_x)
+        facing = np.maximum(0.0, -(normal_x * relative_x + normal_y * relative_y))
+        if hidden is not None:
+            facing = np.where(hidden[face], 0.0, facing)
+        strip_x, strip_y = scale * facing * relative_x, scale * facing * relative_y
+        force_x += strip_x.sum(axis=0)
+        force_y += strip_y.sum(axis=0)
+        torque += (arm_x * strip_y - arm_y * strip_x).sum(axis=0)
+        conductance += facing.sum(axis=0)
     return force_x, force_y, torque, conductance
 
 
@@ -218,27 +234,48 @@ def _jacobian(direction: Floats, arm: Floats) -> Floats:
 
 
 def _resolve(model: TwinModel, contacts: list[tuple[Floats, Floats]], motion: Floats) -> Floats:
-    inverse_mass = np.array([1.0, 1.0, model.mass / model.inertia])
-    normals = [_jacobian(contact[:2], arm) for contact, arm in contacts]
-    tangents = [_jacobian(np.array([-c[1], c[0]]), arm) for c, arm in contacts]
-    speeds = [float(row @ motion) for row in normals]
-    active = [c[2] > 0 and s > 0 for (c, _), s in zip(contacts, speeds, strict=True)]
-    wanted = np.array(
-        [
-            s * (1 + (model.restitution if s > model.bounce_speed else 0.0)) if on else 0.0
-            for s, on in zip(speeds, active, strict=True)
-        ]
+    return resolve_contacts(
+        normals=np.array([_jacobian(contact[:2], arm) for contact, arm in contacts]),
+        tangents=np.array([_jacobian(np.array([-c[1], c[0]]), arm) for c, arm in contacts]),
+        depths=np.array([contact[2] for contact, _ in contacts]),
+        inverse_mass=np.array([1.0, 1.0, model.mass / model.inertia]),
+        motion=motion,
+        restitution=model.restitution,
+        friction=model.friction,
+        bounce_speed=model.bounce_speed,
     )
-    pushes = _normal_impulses(np.array(normals), inverse_mass, wanted, all(active))
+
+
+def resolve_contacts(
+    *,
+    normals: Floats,
+    tangents: Floats,
+    depths: Floats,
+    inverse_mass: Floats,
+    motion: Floats,
+    restitution: float,
+    friction: float,
+    bounce_speed: float,
+) -> Floats:
+    """Return the motion after the impulses of one or two contacts.
+
+    Row k of `normals` times the motion is the speed at which contact k closes, row k of `tangents`
+    the speed at which it slides; contacts of positive depth can push.
+    """
+    speeds = normals @ motion
+    active = (depths > 0) & (speeds > 0)
+    bounce = np.where(speeds > bounce_speed, restitution, 0.0)
+    wanted = np.where(active, speeds * (1 + bounce), 0.0)
+    pushes = _normal_impulses(normals, inverse_mass, wanted, bool(active.all()))
     for row, push in zip(normals, pushes, strict=True):
         motion = motion - inverse_mass * row * push
     for row, push in zip(tangents, pushes, strict=True):
-        motion = _rub(model, row, inverse_mass, motion, push)
-    for (contact, _), row, tangent in zip(contacts, normals, tangents, strict=True):
-        left = max(float(row @ motion), 0.0) if contact[2] > 0 else 0.0
+        motion = _rub(friction, row, inverse_mass, motion, push)
+    for depth, row, tangent in zip(depths, normals, tangents, strict=True):
+        left = max(float(row @ motion), 0.0) if depth > 0 else 0.0
         push = left / float(row @ (inverse_mass * row))
         motion = motion - inverse_mass * row * push
-        motion = _rub(model, tangent, inverse_mass, motion, push)
+        motion = _rub(friction, tangent, inverse_mass, motion, push)
     return motion
 
 
@@ -249,12 +286,10 @@ def _normal_impulses(rows: Floats, inverse_mass: Floats, wanted: Floats, joint: 
         if (both > 0).all():
             return np.asarray(both)
     alone = wanted / np.diag(matrix)
-    return np.where(np.arange(2) == int(alone[1] > alone[0]), alone, 0.0)
+    return np.where(np.arange(alone.size) == np.argmax(alone), alone, 0.0)
 
 
-def _rub(
-    model: TwinModel, row: Floats, inverse_mass: Floats, motion: Floats, push: float
-) -> Floats:
+def _rub(friction: float, row: Floats, inverse_mass: Floats, motion: Floats, push: float) -> Floats:
     stop = -float(row @ motion) / float(row @ (inverse_mass * row))
-    limit = model.friction * push
+    limit = friction * push
     return np.asarray(motion + inverse_mass * row * min(max(stop, -limit), limit))

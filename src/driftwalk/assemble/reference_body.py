@@ -1,0 +1,137 @@
+"""Rigid assemblies of square blocks, for the NumPy twin of the self-assembly kernel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+NEIGHBOURS: Ints = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
+"""Cell beyond face 0 .. 3 of a cell at the origin."""
+
+
+def cross(a: Floats, b: Floats) -> Floats:
+    """Return a x b of vectors in the plane, along the last axis."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def turned(vectors: Floats, angle: float) -> Floats:
+    """Return vectors (..., 2) turned by an angle [rad]."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    x, y = vectors[..., 0], vectors[..., 1]
+    return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
+
+
+def wrapped(angle: float) -> float:
+    """Return an angle in (-pi, pi]."""
+    return float(np.pi - np.mod(np.pi - angle, 2 * np.pi))
+
+
+@dataclass(frozen=True)
+class Square:
+    """What all blocks have in common: side a [m] and mass m [kg]."""
+
+    side: float
+    mass: float
+
+    @property
+    def half(self) -> float:
+        """Half a side h [m]."""
+        return self.side / 2
+
+    @property
+    def inertia(self) -> float:
+        """Moment of inertia about the vertical [kg m^2]."""
+        return self.mass * self.side**2 / 6
+
+
+@dataclass(eq=False)
+class Assembly:
+    """Blocks on a square lattice that move as one.
+
+    Member k is block ``blocks[k]``; it sits in cell ``cells[k]`` and its own frame is the
+    assembly's, turned by ``quarters[k]`` quarter turns. Pose and motion are the centre of mass's;
+    `drag` is the last step's drag acceleration. All three are (x, y, angle) in SI units.
+    """
+
+    square: Square
+    blocks: list[int]
+    cells: Ints
+    quarters: Ints
+    pose: Floats
+    motion: Floats = field(default_factory=lambda: np.zeros(3))
+    drag: Floats = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def size(self) -> int:
+        """Number of blocks."""
+        return len(self.blocks)
+
+    @property
+    def mass(self) -> float:
+        """Mass M [kg]."""
+        return self.square.mass * self.size
+
+    @property
+    def offsets(self) -> Floats:
+        """Members from the centre of mass in the assembly's frame [m], shape (n, 2)."""
+        return np.asarray(self.square.side * (self.cells - self.cells.mean(axis=0)))
+
+    @property
+    def inertia(self) -> float:
+        """Moment of inertia about the centre of mass [kg m^2]."""
+        about_own = self.square.inertia * self.size
+        return about_own + self.square.mass * float((self.offsets**2).sum())
+
+    @property
+    def inverse_mass(self) -> Floats:
+        """(1/M, 1/M, 1/I)."""
+        return np.array([1 / self.mass, 1 / self.mass, 1 / self.inertia])
+
+    @property
+    def hidden(self) -> npt.NDArray[np.bool_]:
+        """Which faces, in the assembly's frame, a member covers, shape (n, 4)."""
+        occupied = {(int(x), int(y)) for x, y in self.cells}
+        return np.array(
+            [
+                [(int(x + dx), int(y + dy)) in occupied for dx, dy in NEIGHBOURS]
+                for x, y in self.cells
+            ]
+        )
+
+    def arms(self, angle: float | None = None) -> Floats:
+        """Return the members from the centre of mass [m], shape (n, 2), at an angle or its own."""
+        return turned(self.offsets, self.pose[2] if angle is None else angle)
+
+    def centres(self) -> Floats:
+        """Return the positions of the members [m], shape (n, 2)."""
+        return np.asarray(self.pose[:2] + self.arms())
+
+    def centre_of(self, block: int) -> Floats:
+        """Return the position of a member [m]."""
+        return np.asarray(self.centres()[self.blocks.index(block)])
+
+    def face_normal(self, face: int) -> Floats:
+        """Return the outward normal of face 0 .. 3, in the assembly's frame, of any member."""
+        return turned(np.array([1.0, 0.0]), self.pose[2] + face * np.pi / 2)
+
+    def block_poses(self) -> Floats:
+        """Return the poses of the members [m, m, rad], shape (n, 3)."""
+        angles = [wrapped(self.pose[2] + quarter * np.pi / 2) for quarter in self.quarters]
+        return np.column_stack([self.centres(), angles])
+
+
+def single_block(square: Square, block: int, pose: Floats) -> Assembly:
+    """Return a block at rest, an assembly of its own."""
+    x, y, theta = pose
+    return Assembly(
+        square,
+        [block],
+        np.zeros((1, 2), dtype=np.int64),
+        np.zeros(1, dtype=np.int64),
+        np.array([x, y, wrapped(theta)]),
+    )
