@@ -123,3 +123,28 @@ def drag(
 def philox(key: int, counter: list[int]) -> list[int]: ...
 def instruction_set() -> str: ...
 def available_instruction_sets() -> list[str]: ...
+
+# --- self-assembly ------------------------------------------------------------------------------
+# Start poses [m, m, rad] of shape (worlds, blocks, 3), and how many blocks of each world found a
+# place.
+def place_blocks(
+    model: Model, *, blocks: int, key: _Keys, threads: int
+) -> tuple[_Floats, npt.NDArray[np.int32]]: ...
+def assemble(
+    model: Model,
+    *,
+    start: _Floats,
+    key: _Keys,
+    drag_coefficient: _Floats,
+    force_std: _Floats,
+    steps: int,
+    latching: str,
+    connector_distance: float,
+    connector_axis: float,
+    hidden_face_drag: str,
+    block_restitution: float,
+    block_friction: float,
+    sample_every: int,
+    threads: int,
+    precision: str,
+) -> dict[str, npt.NDArray[Any] | int]: ...

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from driftwalk.core.errors import ConfigurationError
@@ -88,7 +90,7 @@ def test_lists_are_read_with_units_and_survive_the_file() -> None:
     ],
 )
 def test_refusal_names_section_and_key(
-    section: type[Assembly] | type[Sensitivity], values: dict[str, object], words: str
+    section: type[Assembly] | type[Sensitivity], values: dict[str, Any], words: str
 ) -> None:
     with pytest.raises(ConfigurationError) as caught:
         section(**values)
