@@ -286,7 +286,7 @@ def integrate(world: World, force: Floats) -> None:
     for body, noise in zip(world.assemblies, noises, strict=True):
         aheads.append(body.motion + dt / 2 * (body.drag + noise))
         middles.append(body.pose + dt / 4 * (body.motion + aheads[-1]))
-    drags = _drag_sums(world, middles, aheads)
+    drags = drag_sums(world, middles, aheads)
     for body, noise, ahead, (acceleration, stiffness) in zip(
         world.assemblies, noises, aheads, drags, strict=True
     ):
@@ -305,7 +305,7 @@ def _acceleration(body: Assembly, force: Floats) -> Floats:
     return np.array([*own.sum(axis=0), torque]) * body.inverse_mass
 
 
-def _drag_sums(
+def drag_sums(
     world: World, poses: list[Floats], motions: list[Floats]
 ) -> list[tuple[Floats, Floats]]:
     """Return drag acceleration and damping rate [1/s] (x, y, angle) of each assembly."""

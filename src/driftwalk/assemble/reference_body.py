@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -55,7 +56,8 @@ class Assembly:
 
     Member k is block ``blocks[k]``; it sits in cell ``cells[k]`` and its own frame is the
     assembly's, turned by ``quarters[k]`` quarter turns. Pose and motion are the centre of mass's;
-    `drag` is the last step's drag acceleration. All three are (x, y, angle) in SI units.
+    `drag` is the last step's drag acceleration. All three are (x, y, angle) in SI units and change;
+    members and cells stay: a merge makes a new assembly.
     """
 
     square: Square
@@ -76,23 +78,23 @@ class Assembly:
         """Mass M [kg]."""
         return self.square.mass * self.size
 
-    @property
+    @cached_property
     def offsets(self) -> Floats:
         """Members from the centre of mass in the assembly's frame [m], shape (n, 2)."""
         return np.asarray(self.square.side * (self.cells - self.cells.mean(axis=0)))
 
-    @property
+    @cached_property
     def inertia(self) -> float:
         """Moment of inertia about the centre of mass [kg m^2]."""
         about_own = self.square.inertia * self.size
         return about_own + self.square.mass * float((self.offsets**2).sum())
 
-    @property
+    @cached_property
     def inverse_mass(self) -> Floats:
         """(1/M, 1/M, 1/I)."""
         return np.array([1 / self.mass, 1 / self.mass, 1 / self.inertia])
 
-    @property
+    @cached_property
     def hidden(self) -> npt.NDArray[np.bool_]:
         """Which faces, in the assembly's frame, a member covers, shape (n, 4)."""
         occupied = {(int(x), int(y)) for x, y in self.cells}
