@@ -106,7 +106,8 @@ def polyomino_cells(name: str) -> npt.NDArray[np.int32]:
     [[0, 0], [0, 1], [1, 0]]
     """
     cells = _cells_of_rows(_DRAWN.get(name, name))
-    if not cells or name not in {name_of(cells, chirality) for chirality in get_args(Chirality)}:
+    words: tuple[Chirality, ...] = get_args(Chirality) if _is_connected(cells) else ()
+    if name not in {name_of(cells, chirality) for chirality in words}:
         raise InputError(
             f"no shape is called '{name}': the names are {', '.join(_DRAWN)}, and for five cells "
             "and more rows such as xxx/x.x"
@@ -254,10 +255,10 @@ def _neighbours(cells: Cells) -> set[Cell]:
 
 
 def _is_connected(cells: Cells) -> bool:
-    left, ahead = set(cells), [cells[0]]
+    left, ahead = set(cells), list(cells[:1])
     while ahead:
         cell = ahead.pop()
         if cell in left:
             left.remove(cell)
             ahead += _neighbours((cell,)) & left
-    return not left
+    return bool(cells) and not left

@@ -1,0 +1,184 @@
+"""Which faces of recorded blocks are joined, and from when to when.
+
+Two faces fit when their centres are near each other and they look at each other. A join begins
+where they fit without a break for the shortest duration that counts, and it ends where they are
+beyond a looser pair of tolerances for as long; both are dated back to the first such sample. So one
+noisy sample neither makes a join nor ends one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import ConfigurationError
+
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+Booleans = npt.NDArray[np.bool_]
+
+QUARTER: Final = math.pi / 2
+# Time stamps are decimal numbers: 0.8 - 0.3 must count as half a second.
+ROUNDING: Final = 1e-9
+
+
+@dataclass(frozen=True)
+class JoinRules:
+    """What counts as joined: lengths [m], angles [rad], times [s]."""
+
+    side: float
+    join_distance: float
+    join_angle: float
+    release_distance: float
+    release_angle: float
+    min_duration: float
+    hold: float
+
+    def __post_init__(self) -> None:
+        for name in self.__dataclass_fields__:
+            value = getattr(self, name)
+            if name == "min_duration" and value == 0:
+                continue
+            if not (math.isfinite(value) and value > 0):
+                raise ConfigurationError(f"{name} must be more than 0, got {value:g}")
+        if not self.join_distance <= self.release_distance < self.side:
+            raise ConfigurationError(
+                f"join_distance {self.join_distance:g} m, release_distance "
+                f"{self.release_distance:g} m and the side {self.side:g} m must come in this order"
+            )
+        if not self.join_angle <= self.release_angle < QUARTER / 2:
+            raise ConfigurationError(
+                f"join_angle {math.degrees(self.join_angle):g} deg and release_angle "
+                f"{math.degrees(self.release_angle):g} deg must come in this order, below 45 deg"
+            )
+
+
+class Join(NamedTuple):
+    """Two faces that were joined for a while."""
+
+    blocks: tuple[int, int]
+    """The blocks, the lower first."""
+    faces: tuple[int, int]
+    """Their faces, each in its block's own frame."""
+    start: int
+    """First sample at which they are joined."""
+    stop: int
+    """First sample at which they are not joined any more; the number of samples when to the end."""
+    looseness: float
+    """How badly they fit while joined: the median of the larger of distance and angle, each in
+    units of the tolerance at which a join begins."""
+
+
+class Poses(NamedTuple):
+    """The recorded poses, shapes (time, block), and their time stamps."""
+
+    time: Floats
+    x: Floats
+    y: Floats
+    theta: Floats
+
+    @property
+    def seen(self) -> Booleans:
+        """Where the pose of a block is known."""
+        return np.isfinite(self.x) & np.isfinite(self.y) & np.isfinite(self.theta)
+
+
+def find_joins(poses: Poses, rules: JoinRules) -> list[Join]:
+    """Find all joins of a recording, in order of the blocks and of time."""
+    seen = poses.seen
+    return [
+        join
+        for blocks in combinations(range(seen.shape[1]), 2)
+        for join in _joins_of_pair(poses, blocks, seen[:, blocks[0]] & seen[:, blocks[1]], rules)
+    ]
+
+
+def smallest_distance(poses: Poses) -> float:
+    """Return the smallest distance that two centres ever had [m]; NaN when never seen together."""
+    seen = poses.seen
+    x, y = (np.where(seen, values, np.nan) for values in (poses.x, poses.y))
+    smallest = math.inf
+    for i, j in combinations(range(seen.shape[1]), 2):
+        distance = np.hypot(x[:, j] - x[:, i], y[:, j] - y[:, i])
+        smallest = min(smallest, float(np.fmin.reduce(distance, initial=math.inf)))
+    return smallest if math.isfinite(smallest) else math.nan
+
+
+class _Pair(NamedTuple):
+    """Two blocks at the samples (n,) that show both; the faces are (2, n) or (2, 1)."""
+
+    time: Floats
+    apart: Floats
+    """From the centre of the first to that of the second, (2, n)."""
+    theta: Floats
+    """Orientations, (2, n)."""
+
+    def nearest_faces(self) -> Integers:
+        """Return the face of each block that looks most towards the other."""
+        bearing = np.arctan2(self.apart[1], self.apart[0])
+        towards = np.stack([bearing, bearing + np.pi]) - self.theta
+        return np.rint(towards / QUARTER).astype(np.int64) % 4
+
+    def misfit(self, faces: Integers, side: float) -> tuple[Floats, Floats]:
+        """Return distance [m] and angle [rad] between two faces."""
+        normal = self.theta + faces * QUARTER
+        arms = 0.5 * side * np.stack([np.cos(normal), np.sin(normal)])
+        distance = np.hypot(*(self.apart + arms[:, 1] - arms[:, 0]))
+        turned = normal[1] - normal[0]
+        return distance, np.abs(np.remainder(turned, 2.0 * np.pi) - np.pi)
+
+
+def _joins_of_pair(
+    poses: Poses, blocks: tuple[int, int], both: Booleans, rules: JoinRules
+) -> list[Join]:
+    at = np.flatnonzero(both)
+    i, j = blocks
+    apart = np.stack([values[at, j] - values[at, i] for values in (poses.x, poses.y)])
+    # The centres of blocks that fit are hardly farther apart than a side.
+    if not (np.hypot(*apart) <= rules.side + rules.join_distance).any():
+        return []
+    pair = _Pair(poses.time[at], apart, poses.theta[at][:, blocks].T)
+    nearest = pair.nearest_faces()
+    distance, angle = pair.misfit(nearest, rules.side)
+    fits = (distance <= rules.join_distance) & (angle <= rules.join_angle)
+    kind = np.where(fits, 4 * nearest[0] + nearest[1], -1)
+    joins = []
+    start = _first_streak(pair.time, kind, 0, rules)
+    while start is not None:
+        faces = nearest[:, start]
+        distance, angle = pair.misfit(faces[:, None], rules.side)
+        beyond = (distance > rules.release_distance) | (angle > rules.release_angle)
+        stop = _first_streak(pair.time, np.where(beyond, 0, -1), start, rules)
+        looseness = np.maximum(distance / rules.join_distance, angle / rules.join_angle)
+        joins.append(
+            Join(
+                blocks,
+                (int(faces[0]), int(faces[1])),
+                int(at[start]),
+                int(at[stop]) if stop is not None else len(poses.time),
+                float(np.median(looseness[start:stop])),
+            )
+        )
+        start = None if stop is None else _first_streak(pair.time, kind, stop, rules)
+    return joins
+
+
+def _first_streak(time: Floats, kind: Integers, begin: int, rules: JoinRules) -> int | None:
+    """Return where the first streak of one kind (>= 0) begins that lasts long enough.
+
+    A streak does not go on across a gap that is longer than `hold`.
+    """
+    if begin >= time.size:
+        return None
+    clock, value = time[begin:], kind[begin:]
+    breaks = (np.diff(value) != 0) | (np.diff(clock) > rules.hold * (1 + ROUNDING))
+    first = np.concatenate([[0], np.flatnonzero(breaks) + 1])
+    last = np.append(first[1:] - 1, value.size - 1)
+    enough = clock[last] - clock[first] >= rules.min_duration * (1 - ROUNDING)
+    found = np.flatnonzero(enough & (value[first] >= 0))
+    return begin + int(first[found[0]]) if found.size else None

@@ -1,0 +1,239 @@
+"""`driftwalk classify`: what the blocks of a recording assembled into."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from driftwalk.cli.options import Json, Side, StudyFile, quantity_option, resolve_study
+from driftwalk.cli.output import print_json, print_note, print_table
+from driftwalk.cli.recording_options import RecordingOptions, with_recording_options
+from driftwalk.cli.study_recording import load_with_study
+from driftwalk.core.errors import ConfigurationError, InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_PANEL = "What counts as joined"
+# Centres of blocks that touch are a side apart, and noise takes off a little.
+_TOO_CLOSE = 0.8
+
+
+def _tolerance(name: str, unit: str, help: str) -> Any:
+    option = quantity_option(name, unit, help)
+    option.rich_help_panel = _PANEL
+    return option
+
+
+@with_recording_options
+def classify(
+    poses: Annotated[
+        Path,
+        typer.Argument(metavar="POSES", help="Recording of all blocks with their orientations."),
+    ],
+    how: RecordingOptions,
+    study: StudyFile = None,
+    side: Side = None,
+    chirality: Annotated[
+        Literal["merged", "distinct"],
+        typer.Option("--chirality", help="Mirror images: one shape, or two."),
+    ] = "merged",
+    join_distance: Annotated[
+        float | None,
+        _tolerance(
+            "--join-distance", "m", "Distance of face centres that join; a tenth of a side."
+        ),
+    ] = None,
+    join_angle: Annotated[
+        float | None, _tolerance("--join-angle", "rad", "Angle between faces that join; 10deg.")
+    ] = None,
+    release_distance: Annotated[
+        float | None,
+        _tolerance("--release-distance", "m", "Distance that parts them; twice that to join."),
+    ] = None,
+    release_angle: Annotated[
+        float | None,
+        _tolerance("--release-angle", "rad", "Angle that parts them; twice that to join."),
+    ] = None,
+    min_duration: Annotated[
+        float | None,
+        _tolerance(
+            "--min-duration", "s", "Shortest join, and shortest parting, that counts; 0.5s."
+        ),
+    ] = None,
+    hold: Annotated[
+        float | None,
+        _tolerance("--hold", "s", "How long a block that is not seen keeps its joins; 1s."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="FILE.nc", help="Write the result.", show_default=False
+        ),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace a file that exists.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Say what the blocks of a recording assembled into, and when.
+
+    Blocks are joined where two faces stay close to each other and look at each other; the outcome
+    class is the multiset of the shapes that they make up. The side of the blocks is that of the
+    study, by default 3 cm.
+    """
+    from driftwalk.assemble import classify as classify_recording
+    from driftwalk.core.atomic import require_target
+
+    if out is not None:
+        require_target(out, existing="replace" if overwrite else "error", endings=(".nc",))
+    recording, block_side = _load(poses, how, study, side)
+    tolerances = {
+        "join_distance": join_distance,
+        "join_angle": join_angle,
+        "release_distance": release_distance,
+        "release_angle": release_angle,
+        "min_duration": min_duration,
+        "hold": hold,
+    }
+    given: dict[str, Any] = {key: value for key, value in tolerances.items() if value is not None}
+    try:
+        found = classify_recording(recording, side=block_side, chirality=chirality, **given)
+    except ConfigurationError:
+        raise
+    except InputError as error:
+        raise InputError(f"{poses}: {error}") from error
+    if out is not None:
+        _save(found, out)
+    summary = summarise(found)
+    if json:
+        print_json({"poses": poses, **summary})
+        return
+    _print(summary)
+    for warning in summary["warnings"]:
+        print_note(f"warning: {warning}")
+
+
+def summarise(found: xr.Dataset) -> dict[str, Any]:
+    """Return what a classification found with units in the keys, ready for JSON."""
+    names = [str(name) for name in found["class"].values]
+    facts = {
+        key: value
+        for key, value in found.attrs.items()
+        if key not in ("kind", "schema_version", "source", "arena")
+    }
+    classes = _changes(found, names)
+    final = _name(names, found["outcome"].values[-1])
+    return {
+        **facts,
+        "bodies": found["body"].values,
+        "classes": classes,
+        "proportions": {
+            name: share
+            for name, share in zip(names, found["proportion"].values.tolist(), strict=True)
+            if share > 0
+        },
+        "final": final,
+        "complete": "+" not in final if final else None,
+        "events": _events(found, names),
+        "warnings": _warnings(found),
+    }
+
+
+def _load(
+    path: Path, how: RecordingOptions, study: Path | None, side: float | None
+) -> tuple[xr.Dataset, float]:
+    """Return the recording and the side of its blocks [m]."""
+    from driftwalk.model import Study
+
+    if study is None:
+        # Without a study nobody has said how large the tank is: the blocks need not fit into it.
+        own = Study().block.side_m if side is None else side
+        return how.load(path, side=own), own
+    resolved = resolve_study(study, {} if side is None else {"block.side_m": side})
+    return load_with_study(path, resolved, how), resolved.block.side_m
+
+
+def _name(names: list[str], index: int) -> str:
+    return names[index] if index >= 0 else ""
+
+
+def _changes(found: xr.Dataset, names: list[str]) -> list[dict[str, Any]]:
+    """Return the class at the first sample and at each sample where it is another one."""
+    outcome, time = found["outcome"].values.tolist(), found["time"].values.tolist()
+    return [
+        {"time_s": time[at], "outcome": _name(names, outcome[at])}
+        for at in range(len(outcome))
+        if at == 0 or outcome[at] != outcome[at - 1]
+    ]
+
+
+def _events(found: xr.Dataset, names: list[str]) -> list[dict[str, Any]]:
+    """Return joins and partings in order of time, at the same sample partings first."""
+    bodies = [str(name) for name in found["body"].values]
+    events = [
+        {
+            "time_s": found[f"{kind}_time"].values[at],
+            "kind": word,
+            "bodies": [bodies[block] for block in found[f"{kind}_block"].values[at]],
+            "faces": found[f"{kind}_face"].values[at],
+            "outcome": _name(names, found[f"{kind}_class"].values[at]),
+        }
+        for kind, word in (("split", "split"), ("event", "join"))
+        for at in range(int(found[f"{kind}_count"]))
+    ]
+    return sorted(events, key=lambda event: float(event["time_s"]))
+
+
+def _warnings(found: xr.Dataset) -> list[str]:
+    facts = found.attrs
+    said = []
+    if facts["closest_m"] < _TOO_CLOSE * facts["block_side_m"]:
+        said.append(
+            f"two blocks come as close as {100 * facts['closest_m']:.3g} cm, which a side of "
+            f"{100 * facts['block_side_m']:.3g} cm does not allow: is it right (--side)?"
+        )
+    if facts["dropped_joins"]:
+        said.append(
+            f"{facts['dropped_joins']} joins contradict others on the lattice and were dropped"
+        )
+    if facts["unknown_samples"]:
+        said.append(
+            f"at {facts['unknown_samples']} of {found.sizes['time']} samples the class is unknown: "
+            f"a block was not seen for more than {facts['hold_s']:g} s (--hold)"
+        )
+    return said
+
+
+def _print(summary: dict[str, Any]) -> None:
+    known = summary["known_s"]
+    rows = [[name, 100.0 * share, share * known] for name, share in summary["proportions"].items()]
+    print_table(rows, columns=["class", "share of time [%]", "time [s]"])
+    print()
+    listed = [
+        [
+            event["time_s"],
+            event["kind"],
+            *(f"{body}:{face}" for body, face in zip(event["bodies"], event["faces"], strict=True)),
+            event["outcome"],
+        ]
+        for event in summary["events"]
+    ]
+    if listed:
+        columns = ["time [s]", "event", "block:face", "block:face", "class afterwards"]
+        print_table(listed, columns=columns)
+    else:
+        print("no blocks joined")
+    print()
+    print_table([["at the end", summary["final"] or "unknown"]])
+
+
+def _save(found: xr.Dataset, path: Path) -> None:
+    from driftwalk.cli.calibration_run import netcdf_bytes
+    from driftwalk.core.atomic import write_atomic
+
+    # In memory first: HDF5 does not survive a disk that fills while it writes.
+    write_atomic(path, netcdf_bytes(found))
+    print_note(f"wrote {path}")
