@@ -42,7 +42,7 @@ def draw_flow(flow: xr.Dataset, *, seed: int, trial: int, draw: int) -> xr.Datas
     Examples
     --------
     >>> import driftwalk as dw
-    >>> still = dw.uniform_flow()
+    >>> still = dw.uniform_flow(0.0, 0.0)
     >>> error = 0.0 * still["u"] + 1e-3
     >>> still = still.assign(u_standard_error=error, v_standard_error=error)
     >>> round(float(draw_flow(still, seed=1, trial=0, draw=0)["u"].std()), 4)

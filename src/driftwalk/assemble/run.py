@@ -101,7 +101,7 @@ def assemble(
     Examples
     --------
     >>> import driftwalk as dw
-    >>> still = dw.uniform_flow()
+    >>> still = dw.uniform_flow(0.0, 0.0)
     >>> found = dw.assemble(dw.Study(), still, blocks=2, runs=3, duration=1.0)
     >>> found["outcome"].dims, found["class"].values.tolist()
     (('run',), ['2', '1+1'])
@@ -116,9 +116,7 @@ def assemble(
         threads=threads,
         backend=backend,
     )
-    return _run(
-        plan, start_poses(plan, start), store=store, progress=progress, attrs={"drawn": "no"}
-    )
+    return _run(plan, start, store=store, progress=progress, drawn="no")
 
 
 def assemble_drawn(
@@ -193,9 +191,7 @@ def assemble_drawn(
         flow_draw=np.arange(settings.runs) // RUNS_PER_FLOW if moves else None,
     )
     what = "drag_coefficient force_std" + (" flow" if moves else "")
-    return _run(
-        plan, start_poses(plan, start), store=store, progress=progress, attrs={"drawn": what}
-    )
+    return _run(plan, start, store=store, progress=progress, drawn=what)
 
 
 def assembly_path(
@@ -243,7 +239,7 @@ def assembly_path(
     Examples
     --------
     >>> import driftwalk as dw
-    >>> still = dw.uniform_flow()
+    >>> still = dw.uniform_flow(0.0, 0.0)
     >>> path = dw.assembly_path(dw.Study(), still, blocks=2, duration=1.0, sample_interval=0.5)
     >>> path["time"].values.tolist()
     [0.0, 0.5, 1.0]
@@ -291,7 +287,7 @@ def check_assembly(
     Examples
     --------
     >>> import driftwalk as dw
-    >>> dw.check_assembly(dw.Study(), dw.uniform_flow())
+    >>> dw.check_assembly(dw.Study(), dw.uniform_flow(0.0, 0.0))
     """
     start_poses(make_plan(study, flow, settings={}, trial=trial, threads=threads), None)
 

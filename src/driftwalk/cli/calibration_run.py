@@ -156,12 +156,13 @@ def _specification(work: Work) -> dict[str, Any]:
     return {
         "study": work.study.to_dict(),
         "body": work.body,
-        "recording_sha256": _dataset_hash(work.recording, ("x", "y", "theta")),
-        "flow_sha256": None if work.flow is None else _dataset_hash(work.flow, ("u", "v")),
+        "recording_sha256": dataset_hash(work.recording, ("x", "y", "theta")),
+        "flow_sha256": None if work.flow is None else dataset_hash(work.flow, ("u", "v")),
     }
 
 
-def _dataset_hash(dataset: xr.Dataset, names: tuple[str, ...]) -> str:
+def dataset_hash(dataset: xr.Dataset, names: tuple[str, ...]) -> str:
+    """Return a hash of the coordinates and the named variables of a dataset."""
     digest = hashlib.sha256()
     for name in (*sorted(str(name) for name in dataset.indexes), *names):
         values = dataset[name].values

@@ -36,6 +36,7 @@ COMMANDS: Final[dict[str, Command]] = {
     "calibrate": Command(
         "calibrate", "calibrate", "Find the drag coefficient and the stochastic force."
     ),
+    "assemble": Command("assemble", "assemble", "Simulate what many blocks build."),
     "demo": Command("demo", "demo", "Calibrate a bundled recording, from file to report."),
 }
 

@@ -142,6 +142,73 @@ Replicates = Annotated[
     ),
 ]
 
+Blocks = Annotated[
+    int | None,
+    typer.Option(
+        "--blocks",
+        min=1,
+        help="Blocks in the tank.",
+        rich_help_panel=PANEL,
+        show_default=False,
+    ),
+]
+Runs = Annotated[
+    int | None,
+    typer.Option(
+        "--runs", min=1, help="Simulated runs.", rich_help_panel=PANEL, show_default=False
+    ),
+]
+RunDuration = Annotated[float | None, quantity_option("--duration", "s", "Length of a run.")]
+BlockLatching = Annotated[
+    str | None,
+    typer.Option(
+        "--latching",
+        metavar="collision|connector|none",
+        help="When two blocks latch.",
+        rich_help_panel=PANEL,
+        show_default=False,
+    ),
+]
+ConnectorDistance = Annotated[
+    float | None,
+    quantity_option("--connector-distance", "m", "Distance at which two connectors latch."),
+]
+ConnectorAxis = Annotated[
+    float | None,
+    quantity_option("--connector-axis", "rad", "Angle at which two connectors latch."),
+]
+HiddenFaces = Annotated[
+    str | None,
+    typer.Option(
+        "--hidden-face-drag",
+        metavar="none|full",
+        help="Drag on faces that are joined.",
+        rich_help_panel=PANEL,
+        show_default=False,
+    ),
+]
+MirrorImages = Annotated[
+    str | None,
+    typer.Option(
+        "--chirality",
+        metavar="merged|distinct",
+        help="Whether mirror images are one class or two.",
+        rich_help_panel=PANEL,
+        show_default=False,
+    ),
+]
+BlockRestitution = Annotated[
+    float | None,
+    quantity_option("--block-restitution", "1", "Restitution between blocks, 0 to 1."),
+]
+BlockFriction = Annotated[
+    float | None, quantity_option("--block-friction", "1", "Coulomb friction between blocks.")
+]
+Confidence = Annotated[
+    float | None,
+    quantity_option("--confidence", "1", "Simultaneous confidence of the intervals."),
+]
+
 STUDY_KEYS: Final[dict[str, str]] = {
     "tank_diameter": "tank.diameter_m",
     "wall_friction": "tank.wall_friction",
@@ -172,6 +239,23 @@ CALIBRATION_KEYS: Final[dict[str, str]] = {
 }
 """The same for a calibration, where seed and replicates are those of its simulations."""
 
+ASSEMBLY_KEYS: Final[dict[str, str]] = {
+    **STUDY_KEYS,
+    "blocks": "assembly.blocks",
+    "runs": "assembly.runs",
+    "duration": "assembly.duration_s",
+    "seed": "assembly.seed",
+    "latching": "assembly.latching",
+    "connector_distance": "assembly.connector_distance_m",
+    "connector_axis": "assembly.connector_axis_rad",
+    "hidden_face_drag": "assembly.hidden_face_drag",
+    "chirality": "assembly.chirality",
+    "block_restitution": "assembly.block_restitution",
+    "block_friction": "assembly.block_friction",
+    "confidence": "assembly.confidence",
+}
+"""The same for self-assembly, where seed, duration and confidence are those of its runs."""
+
 
 def study_overrides(*, keys: Mapping[str, str] = STUDY_KEYS, **options: Any) -> dict[str, Any]:
     """Return the keys of the study that the options given set; an option that is None sets none.
@@ -179,7 +263,7 @@ def study_overrides(*, keys: Mapping[str, str] = STUDY_KEYS, **options: Any) -> 
     Parameters
     ----------
     keys : mapping
-        `STUDY_KEYS`, or `CALIBRATION_KEYS`.
+        `STUDY_KEYS`, `CALIBRATION_KEYS` or `ASSEMBLY_KEYS`.
     **options
         Values by the names in `keys`.
 
@@ -222,14 +306,38 @@ def resolve_study(
     >>> resolve_study(None, {"forces.force_std_N": 1e-3}).forces.force_std_N
     0.001
     """
-    from driftwalk.model import Study, apply_overrides, load_study
+    from driftwalk.model import Study, load_study
 
     study = load_study(study_path) if study_path is not None else Study()
+    base = f"{study_path}" if study_path is not None else "the default study"
+    return override_study(study, overrides, base=base, keys=keys)
+
+
+def override_study(
+    study: Study, overrides: Mapping[str, Any], *, base: str, keys: Mapping[str, str] = STUDY_KEYS
+) -> Study:
+    """Return a study with the options of the command line over it.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    overrides, keys
+        As in `resolve_study`.
+    base : str
+        Where the study is from, for an error.
+
+    Raises
+    ------
+    ConfigurationError
+        When an option contradicts the study; the message names both.
+    """
+    from driftwalk.model import apply_overrides
+
     try:
         return apply_overrides(study, overrides)
     except ConfigurationError as error:
         given = [option_name(key, keys=keys) for key in overrides]
-        base = f"{study_path}" if study_path is not None else "the default study"
         raise ConfigurationError(f"{', '.join(given)} over {base}: {error}") from error
 
 

@@ -1,0 +1,327 @@
+"""`driftwalk assemble`: what many blocks build, and how often."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from driftwalk.cli.calibrate import Overwrite, Threads
+from driftwalk.cli.options import (
+    ASSEMBLY_KEYS,
+    BlockFriction,
+    BlockLatching,
+    BlockRestitution,
+    Blocks,
+    Confidence,
+    ConnectorAxis,
+    ConnectorDistance,
+    Depth,
+    DragCoefficient,
+    FlowFile,
+    ForceInterval,
+    ForceStd,
+    HiddenFaces,
+    Json,
+    Mass,
+    MirrorImages,
+    RunDuration,
+    Runs,
+    Seed,
+    Side,
+    StudyFile,
+    TankDiameter,
+    TimeStep,
+    WallFriction,
+    WallRestitution,
+    option_name,
+    override_study,
+    resolve_study,
+    study_overrides,
+)
+from driftwalk.cli.output import print_json, print_note, print_table
+from driftwalk.core.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.cli.assembly_run import AssemblyResult, AssemblyWork
+    from driftwalk.model import Study
+
+FOUND_BY_CALIBRATION = (
+    "forces.drag_coefficient",
+    "forces.force_std_N",
+    "forces.force_interval_s",
+)
+
+
+def assemble(
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="DIR", help="Run directory to make or continue.")
+    ],
+    run: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="RUN", help="Run directory of a finished calibration.", show_default=False
+        ),
+    ] = None,
+    study: StudyFile = None,
+    flow: FlowFile = None,
+    blocks: Blocks = None,
+    runs: Runs = None,
+    duration: RunDuration = None,
+    tank_diameter: TankDiameter = None,
+    side: Side = None,
+    mass: Mass = None,
+    depth: Depth = None,
+    drag_coefficient: DragCoefficient = None,
+    force_std: ForceStd = None,
+    force_interval: ForceInterval = None,
+    wall_friction: WallFriction = None,
+    wall_restitution: WallRestitution = None,
+    time_step: TimeStep = None,
+    latching: BlockLatching = None,
+    connector_distance: ConnectorDistance = None,
+    connector_axis: ConnectorAxis = None,
+    hidden_face_drag: HiddenFaces = None,
+    chirality: MirrorImages = None,
+    block_restitution: BlockRestitution = None,
+    block_friction: BlockFriction = None,
+    confidence: Confidence = None,
+    seed: Seed = None,
+    threads: Threads = None,
+    overwrite: Overwrite = False,
+    json: Json = False,
+) -> None:
+    """Simulate what many blocks build, and say how often each structure comes.
+
+    From a calibration RUN with its parameters and its flow field: once with the parameters that it
+    found, and once with parameters drawn from its joint region, so that the difference is what the
+    calibration leaves open. Or with the parameters of a study and a flow field (--flow). Killed and
+    started again, it continues.
+    """
+    from driftwalk.cli.assembly_run import run_assembly
+
+    overrides = study_overrides(
+        keys=ASSEMBLY_KEYS,
+        blocks=blocks,
+        runs=runs,
+        duration=duration,
+        tank_diameter=tank_diameter,
+        side=side,
+        mass=mass,
+        depth=depth,
+        drag_coefficient=drag_coefficient,
+        force_std=force_std,
+        force_interval=force_interval,
+        wall_friction=wall_friction,
+        wall_restitution=wall_restitution,
+        time_step=time_step,
+        latching=latching,
+        connector_distance=connector_distance,
+        connector_axis=connector_axis,
+        hidden_face_drag=hidden_face_drag,
+        chirality=chirality,
+        block_restitution=block_restitution,
+        block_friction=block_friction,
+        confidence=confidence,
+        seed=seed,
+    )
+    if run is None:
+        work, warnings = _from_flow(study, flow, overrides, threads)
+    else:
+        work, warnings = _from_calibration(run, study, flow, overrides, threads)
+    result = run_assembly(work, out, overwrite=overwrite)
+    warnings = [*warnings, *_left_out(result)]
+    if json:
+        print_json({**summary(work.study, result), "warnings": warnings})
+        return
+    print_answer(work.study, result, out)
+    for warning in warnings:
+        print_note(f"warning: {warning}")
+
+
+def _from_flow(
+    study_file: Path | None, flow_file: Path | None, overrides: dict[str, Any], threads: int | None
+) -> tuple[AssemblyWork, list[str]]:
+    from driftwalk.cli.assembly_run import AssemblyWork
+
+    if flow_file is None:
+        raise InputError(
+            "nothing says how the water moves: give the run directory of a calibration, or a flow "
+            "field (--flow)"
+        )
+    chosen = resolve_study(study_file, overrides, keys=ASSEMBLY_KEYS)
+    inputs = {"flow": flow_file, **({} if study_file is None else {"study": study_file})}
+    return AssemblyWork(chosen, _load_flow(flow_file, chosen), None, inputs, threads), []
+
+
+def _from_calibration(
+    folder: Path,
+    study_file: Path | None,
+    flow_file: Path | None,
+    overrides: dict[str, Any],
+    threads: int | None,
+) -> tuple[AssemblyWork, list[str]]:
+    from driftwalk.cli.assembly_run import AssemblyWork
+    from driftwalk.cli.calibrated import read_calibrated
+
+    refused = [option_name(key) for key in FOUND_BY_CALIBRATION if key in overrides]
+    if study_file is not None:
+        refused.append("--study")
+    if refused:
+        raise InputError(
+            f"{', '.join(refused)} does not go with a calibration run, whose own is used; leave it "
+            f"out, or use the run's flow field alone: --flow {folder / 'flow.nc'}"
+        )
+    found = read_calibrated(folder)
+    base = f"the study of {folder}"
+    chosen = override_study(found.study, overrides, base=base, keys=ASSEMBLY_KEYS)
+    inputs = {**found.files, **({} if flow_file is None else {"flow": flow_file})}
+    warnings = [f"of the calibration: {warning}" for warning in found.warnings]
+    if found.region is None:
+        warnings.append(
+            "the calibration has no joint region (--bootstrap 0): only the parameters that it "
+            "found are simulated"
+        )
+    field = found.flow if flow_file is None else _load_flow(flow_file, chosen)
+    return AssemblyWork(chosen, field, found.region, inputs, threads), warnings
+
+
+def _load_flow(path: Path, study: Study) -> xr.Dataset:
+    from driftwalk.flow import load_flow
+
+    return load_flow(path, arena=study.tank.to_arena(), own_flags="keep")
+
+
+def summary(study: Study, result: AssemblyResult) -> dict[str, Any]:
+    """Return what ``--json`` prints: the answer with units in its keys."""
+    settings, forces, times = study.assembly, study.forces, result.times.attrs
+    return {
+        **_facts(result.distribution),
+        "confidence": settings.confidence,
+        "blocks": settings.blocks,
+        "duration_s": times["duration_s"],
+        "seed": settings.seed,
+        "latching": settings.latching,
+        "hidden_face_drag": settings.hidden_face_drag,
+        "chirality": settings.chirality,
+        "drag_coefficient": forces.drag_coefficient,
+        "force_std_N": forces.force_std_N,
+        "force_interval_s": forces.force_interval_s,
+        "first_contact_median_s": times["first_contact_median_s"],
+        "completion_median_s": times["completion_median_s"],
+        "drawn": None if result.drawn is None else _facts(result.drawn),
+        **_difference(result),
+    }
+
+
+def _facts(distribution: xr.Dataset) -> dict[str, Any]:
+    facts = distribution.attrs
+    names = [str(name) for name in distribution["class"].values]
+    low, high = (distribution[f"interval_{end}"].values for end in ("low", "high"))
+    return {
+        "proportions": dict(zip(names, distribution["proportion"].values, strict=True)),
+        "intervals": {name: [low[index], high[index]] for index, name in enumerate(names)},
+        "complete": facts["complete"],
+        "complete_interval": [facts["complete_low"], facts["complete_high"]],
+        "runs": facts["runs"],
+        "left_out": facts["left_out"],
+    }
+
+
+def _difference(result: AssemblyResult) -> dict[str, float]:
+    """Return how far the two distributions are apart, and how far they would be by chance."""
+    from driftwalk.assemble import l1_distance, l1_noise_floor
+
+    if result.drawn is None:
+        return {}
+    pair = (result.distribution, result.drawn)
+    counts = [dict(zip(d["class"].values, d["count"].values, strict=True)) for d in pair]
+    runs = [int(d.attrs["runs"]) for d in pair]
+    names = dict.fromkeys([*counts[0], *counts[1]])
+    pooled = {
+        str(name): float(sum(count.get(name, 0) for count in counts)) / sum(runs) for name in names
+    }
+    floor = l1_noise_floor(pooled, *runs)
+    return {
+        "l1_distance": l1_distance(*pair),
+        "l1_noise_floor": floor.mean,
+        "l1_noise_floor_95": floor.quantile,
+    }
+
+
+def print_answer(study: Study, result: AssemblyResult, folder: Path) -> None:
+    """Print the distributions for people, side by side, and where the figures are."""
+    settings, forces, facts = study.assembly, study.forces, result.distribution.attrs
+    print(
+        f"{settings.blocks} blocks, {facts['runs']} runs of {settings.duration_s:g} s; "
+        f"C_d = {forces.drag_coefficient:.4g}, σ_F = {1e3 * forces.force_std_N:.4g} mN drawn anew "
+        f"every {1e3 * forces.force_interval_s:g} ms"
+    )
+    columns = [result.distribution, *([] if result.drawn is None else [result.drawn])]
+    interval = f"{settings.confidence:.0%} intervals, all at once"
+    heads = ["class", "share", interval]
+    if result.drawn is not None:
+        heads += ["parameters drawn", interval]
+    rows = [
+        [name, *(cell for column in columns for cell in _cells(column, name))]
+        for name in _seen(columns)
+    ]
+    rows.append(["complete", *(cell for column in columns for cell in _complete_cells(column))])
+    print_table(rows, columns=heads)
+    times = result.times.attrs
+    for event, words in (("first_contact", "first contact"), ("completion", "completion")):
+        median = times[f"{event}_median_s"]
+        reached = f"median {median:.4g} s" if median == median else "not reached in half the runs"
+        print(f"{words}: {reached}")
+    if result.drawn is not None:
+        apart = _difference(result)
+        print(
+            f"l1 distance of the two: {apart['l1_distance']:.4f}; by chance "
+            f"{apart['l1_noise_floor']:.4f} (95 %: {apart['l1_noise_floor_95']:.4f})"
+        )
+    print(f"figures: {folder / 'figures'}")
+
+
+def _seen(distributions: list[xr.Dataset]) -> list[str]:
+    """Return the classes that occurred in any of the distributions, in their order."""
+    names = dict.fromkeys(str(n) for d in distributions for n in d["class"].values)
+    seen = {
+        str(name)
+        for d in distributions
+        for name, count in zip(d["class"].values, d["count"].values, strict=True)
+        if count > 0
+    }
+    return [name for name in names if name in seen]
+
+
+def _cells(distribution: xr.Dataset, name: str) -> tuple[str, str]:
+    if name not in distribution["class"].values:
+        return "", ""
+    row = distribution.sel({"class": name})
+    return _share(row["proportion"]), _range(row["interval_low"], row["interval_high"])
+
+
+def _complete_cells(distribution: xr.Dataset) -> tuple[str, str]:
+    facts = distribution.attrs
+    return _share(facts["complete"]), _range(facts["complete_low"], facts["complete_high"])
+
+
+def _share(value: Any) -> str:
+    return f"{float(value):.4f}"
+
+
+def _range(low: Any, high: Any) -> str:
+    return f"{float(low):.4f} to {float(high):.4f}"
+
+
+def _left_out(result: AssemblyResult) -> list[str]:
+    """Return a warning where runs have no outcome."""
+    pairs = (("", result.distribution), (" with drawn parameters", result.drawn))
+    return [
+        f"{found.attrs['left_out']} runs{what} broke down and are left out; use a smaller time step"
+        for what, found in pairs
+        if found is not None and found.attrs["left_out"]
+    ]

@@ -1,0 +1,198 @@
+"""Self-assembly in a run directory: resumable, with its distributions, figures and manifest."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from driftwalk.cli.calibration_run import dataset_hash, netcdf_bytes
+from driftwalk.cli.progress import ProgressReporter
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.core.rundir import RunDirectory
+    from driftwalk.model import Study
+
+FIXED_TRIAL: Final = 0
+DRAWN_TRIAL: Final = 1
+"""The two kinds of runs have random numbers of their own, so that they can be compared."""
+LABELS: Final = ("parameters found", "parameters drawn")
+PATH_RUNS: Final = 4
+PATH_INTERVAL_S: Final = 0.1
+PATH_SAMPLES: Final = 6000
+"""Most samples of a path that is kept; longer runs are sampled more rarely."""
+
+
+@dataclass(frozen=True)
+class AssemblyWork:
+    """Everything that a run directory of self-assembly needs.
+
+    Attributes
+    ----------
+    study : Study
+        The model, and what is simulated.
+    flow : xarray.Dataset
+        The flow field.
+    calibration : xarray.Dataset or None
+        Draw parameters from its region too.
+    inputs : mapping of str to Path
+        The files that were read, by their role.
+    threads : int or None
+        Threads; the result does not depend on them.
+    """
+
+    study: Study
+    flow: xr.Dataset
+    calibration: xr.Dataset | None
+    inputs: Mapping[str, Path]
+    threads: int | None = None
+
+
+@dataclass(frozen=True)
+class AssemblyResult:
+    """What came out.
+
+    Attributes
+    ----------
+    distribution : xarray.Dataset
+        Kind "outcome_distribution", of runs with the study's parameters.
+    times : xarray.Dataset
+        Kind "class_times", of the same runs.
+    drawn : xarray.Dataset or None
+        Kind "outcome_distribution", of runs with drawn parameters.
+    """
+
+    distribution: xr.Dataset
+    times: xr.Dataset
+    drawn: xr.Dataset | None
+
+
+def run_assembly(work: AssemblyWork, folder: Path, *, overwrite: bool) -> AssemblyResult:
+    """Simulate self-assembly in a run directory and return the distributions of outcomes.
+
+    Writes ``assembly.nc``, ``distribution.nc``, ``class_times.nc``, ``path.nc``, and with drawn
+    parameters ``assembly_drawn.nc``, ``distribution_drawn.nc``; ``figures/`` and, last,
+    ``manifest.json``. Killed at any moment and started again it continues.
+
+    Parameters
+    ----------
+    work : AssemblyWork
+        What to do.
+    folder : Path
+        The run directory.
+    overwrite : bool
+        Whether a finished run there is moved aside; it is refused otherwise.
+
+    Raises
+    ------
+    InputError
+        When the blocks do not fit or the flow does not cover the tank; nothing is written then.
+    RunDirectoryError
+        When the directory is in use, holds another run, or cannot be written.
+    """
+    from driftwalk import _core
+    from driftwalk.core.provenance import manifest
+    from driftwalk.core.rundir import RunDirectory
+
+    _check(work)
+    existing = "overwrite" if overwrite else "resume"
+    with RunDirectory(folder, specification=_specification(work), on_existing=existing) as run:  # type: ignore[arg-type]
+        about = manifest(
+            command=["driftwalk", *sys.argv[1:]],
+            study=work.study.to_dict(),
+            seeds={"assembly": work.study.assembly.seed},
+            inputs=dict(work.inputs),
+            instruction_set=_core.instruction_set(),
+        )
+        with ProgressReporter("assemble") as progress:
+            result = _simulate(work, run, progress)
+        run.finish(about)
+    return result
+
+
+def _check(work: AssemblyWork) -> None:
+    """Refuse what cannot be simulated before anything is written for it."""
+    from driftwalk.assemble import check_assembly
+
+    trials = (FIXED_TRIAL,) if work.calibration is None else (FIXED_TRIAL, DRAWN_TRIAL)
+    for trial in trials:
+        check_assembly(work.study, work.flow, trial=trial, threads=work.threads)
+
+
+def _simulate(work: AssemblyWork, run: RunDirectory, progress: ProgressReporter) -> AssemblyResult:
+    from driftwalk.assemble import (
+        assemble,
+        assemble_drawn,
+        assembly_path,
+        class_times,
+        outcome_distribution,
+    )
+    from driftwalk.report import write_assembly_figures
+
+    confidence = work.study.assembly.confidence
+    drawn = None
+    assembly = assemble(
+        work.study,
+        work.flow,
+        trial=FIXED_TRIAL,
+        store=run.store("fixed"),
+        progress=lambda done, total: progress.update(done, total, "runs"),
+        threads=work.threads,
+    )
+    run.write("assembly.nc", netcdf_bytes(assembly))
+    distribution = outcome_distribution(assembly, confidence=confidence)
+    run.write("distribution.nc", netcdf_bytes(distribution))
+    times = class_times(assembly, confidence=confidence)
+    run.write("class_times.nc", netcdf_bytes(times))
+    if work.calibration is not None:
+        assembly_drawn = assemble_drawn(
+            work.study,
+            work.flow,
+            work.calibration,
+            trial=DRAWN_TRIAL,
+            store=run.store("drawn"),
+            progress=lambda done, total: progress.update(done, total, "runs, drawn parameters"),
+            threads=work.threads,
+        )
+        run.write("assembly_drawn.nc", netcdf_bytes(assembly_drawn))
+        drawn = outcome_distribution(assembly_drawn, confidence=confidence)
+        run.write("distribution_drawn.nc", netcdf_bytes(drawn))
+    settings = work.study.assembly
+    path = assembly_path(
+        work.study,
+        work.flow,
+        runs=range(min(settings.runs, PATH_RUNS)),
+        sample_interval=max(PATH_INTERVAL_S, settings.duration_s / PATH_SAMPLES),
+        trial=FIXED_TRIAL,
+        threads=work.threads,
+    )
+    run.write("path.nc", netcdf_bytes(path))
+    progress.update(1, 1, "figures")
+    write_assembly_figures(
+        run.folder("figures"),
+        distribution=distribution,
+        beside=drawn,
+        labels=LABELS if drawn is not None else ("", ""),
+        times=times,
+        path=path,
+    )
+    return AssemblyResult(distribution, times, drawn)
+
+
+def _specification(work: AssemblyWork) -> dict[str, Any]:
+    """Return what determines the numbers of a run."""
+    found = work.calibration
+    names = ("u", "v", *(f"{part}_standard_error" for part in "uv"))
+    return {
+        "study": work.study.to_dict(),
+        "flow_sha256": dataset_hash(work.flow, tuple(n for n in names if n in work.flow)),
+        "calibration_sha256": None
+        if found is None
+        else dataset_hash(
+            found, ("region_drag_coefficient", "region_force_std", "refined_surface")
+        ),
+    }

@@ -1,0 +1,110 @@
+"""The run directory of a calibration, read as the start of further work."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from driftwalk.core.errors import InputError
+from driftwalk.core.run_layout import state_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """What a finished calibration says.
+
+    Attributes
+    ----------
+    study : Study
+        Its study, with the drag coefficient and the force_std that it found.
+    flow : xarray.Dataset
+        The flow field that it used.
+    calibration : xarray.Dataset
+        The `calibration`.
+    region : xarray.Dataset or None
+        The same where it has a joint region, None where it was made without a bootstrap.
+    files : dict of str to Path
+        The files that were read, by their role.
+    warnings : list of str
+        What the calibration warned of.
+    """
+
+    study: Study
+    flow: xr.Dataset
+    calibration: xr.Dataset
+    region: xr.Dataset | None
+    files: dict[str, Path]
+    warnings: list[str]
+
+
+def read_calibrated(folder: Path) -> Calibrated:
+    """Read the run directory of a finished calibration.
+
+    Parameters
+    ----------
+    folder : Path
+        As `driftwalk calibrate --out` made it.
+
+    Raises
+    ------
+    InputError
+        When it is no run, the calibration has not come to its end, or it is a run of another kind.
+    """
+    from driftwalk.flow import load_flow
+    from driftwalk.model import apply_overrides, parse_study
+
+    files = {"calibration": folder / "calibration.nc", "flow": folder / "flow.nc"}
+    _require_finished(folder, files)
+    found = _read(files["calibration"])
+    facts = found.attrs
+    study = apply_overrides(
+        parse_study(facts["study"], source=f"{files['calibration']}: its study"),
+        {
+            "forces.drag_coefficient": facts["drag_coefficient"],
+            "forces.force_std_N": facts["force_std_N"],
+        },
+    )
+    flow = load_flow(files["flow"], arena=study.tank.to_arena(), own_flags="keep")
+    region = found if "region_level" in facts else None
+    return Calibrated(study, flow, found, region, files, json.loads(facts["warnings"]))
+
+
+def _require_finished(folder: Path, files: dict[str, Path]) -> None:
+    state = state_of(folder)
+    if state == "unfinished":
+        raise InputError(
+            f"{folder} holds a calibration that is not finished: run its command again, which "
+            "continues it"
+        )
+    if state == "new":
+        what = "is no run directory" if folder.is_dir() else "does not exist"
+        raise InputError(
+            f"{folder} {what}: give the directory that 'driftwalk calibrate --out' made, or a flow "
+            "field (--flow)"
+        )
+    for role, path in files.items():
+        if not path.is_file():
+            raise InputError(
+                f"{folder} holds a finished run, but no calibration: its {role} ({path.name}) is "
+                "not there"
+            )
+
+
+def _read(path: Path) -> xr.Dataset:
+    import xarray as xr
+
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as dataset:
+            found = dataset.load()
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(f"{path} cannot be read as NetCDF: {error}") from error
+    if found.attrs.get("kind") != "calibration":
+        raise InputError(f"{path} is no calibration: its kind is {found.attrs.get('kind')!r}")
+    return found
