@@ -1,0 +1,338 @@
+"""Which input matters? Sobol' indices of outputs that are themselves estimates.
+
+An output of the self-assembly stage is a proportion of finitely many runs, so part of its variance
+over the design is sampling noise, and noise looks like an input of its own that acts together with
+every other one. The indices therefore come with the share of noise, and without it.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Floats = npt.NDArray[np.float64]
+
+SCHEMA_VERSION = 1
+RESAMPLES = 200
+MEASURES = {
+    "first_order": "S1",
+    "first_order_half_width": "S1_conf",
+    "total_order": "ST",
+    "total_order_half_width": "ST_conf",
+}
+"""The indices, and what SALib calls them."""
+LONG_NAMES = {
+    "first_order": "first order Sobol' index",
+    "first_order_half_width": "half width of its confidence interval",
+    "total_order": "total order Sobol' index",
+    "total_order_half_width": "half width of its confidence interval",
+    "first_order_corrected": "first order Sobol' index without sampling noise",
+    "total_order_corrected": "total order Sobol' index without sampling noise",
+    "variance": "variance over the design",
+    "noise_share": "share of the variance that is sampling noise",
+}
+
+
+def sobol_design(
+    bounds: Mapping[str, tuple[float, float]], *, samples: int, seed: int
+) -> xr.Dataset:
+    """Return the settings at which a function has to be known for its Sobol' indices.
+
+    Saltelli's extension of a scrambled Sobol' sequence, for first and total order:
+    ``samples * (inputs + 2)`` settings, uniform within the bounds.
+
+    Parameters
+    ----------
+    bounds : mapping of str to (float, float)
+        Lowest and highest value of each input, by name, at least two inputs.
+    samples : int
+        Base samples, a power of two of at least 8; the error of an index goes down as
+        1 / sqrt(samples) or faster.
+    seed : int
+        Seed of the scrambling, 0 <= seed < 2**31.
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind "sobol_design": ``value`` (setting, input), ``low`` and ``high`` (input);
+        ``attrs["samples"]``, ``attrs["seed"]``. The order of the settings matters: evaluate the
+        function for each and keep the order.
+
+    Raises
+    ------
+    InputError
+        When SALib is not installed, or a bound or an option is out of range.
+
+    Examples
+    --------
+    >>> design = sobol_design({"a": (0.0, 1.0), "b": (5.0, 6.0)}, samples=8, seed=1)
+    >>> dict(design["value"].sizes)
+    {'setting': 32, 'input': 2}
+    """
+    import xarray as xr
+
+    low, high = _checked_bounds(bounds)
+    if samples < 8 or samples & (samples - 1):
+        raise InputError(f"samples must be a power of two of at least 8, got {samples}")
+    _check_seed(seed)
+    value = _salib("sample.sobol").sample(
+        _problem(list(bounds), low, high), samples, calc_second_order=False, seed=seed
+    )
+    return xr.Dataset(
+        {
+            "value": (("setting", "input"), value, {"long_name": "value of the input"}),
+            "low": ("input", low, {"long_name": "lowest value"}),
+            "high": ("input", high, {"long_name": "highest value"}),
+        },
+        coords={"input": ("input", np.array(list(bounds), dtype=object))},
+        attrs={
+            "kind": "sobol_design",
+            "schema_version": SCHEMA_VERSION,
+            "samples": samples,
+            "seed": seed,
+        },
+    )
+
+
+def sobol_indices(
+    design: xr.Dataset,
+    outputs: xr.DataArray | npt.ArrayLike,
+    *,
+    noise_variance: npt.ArrayLike = 0.0,
+    confidence: float = 0.9,
+    seed: int = 1,
+) -> xr.Dataset:
+    """Return first and total order Sobol' indices of one or more outputs, and what noise adds.
+
+    Parameters
+    ----------
+    design : xarray.Dataset
+        What `sobol_design` made.
+    outputs : xarray.DataArray or array_like, shape (setting,) or (setting, output)
+        Outputs of the function in the order of the design, all finite. A DataArray keeps its second
+        dimension, ``class`` for example.
+    noise_variance : array_like, shape of `outputs` or one number
+        Sampling variance of each output, independent between settings: `sampling_variance` for
+        proportions. 0 for an exact function.
+    confidence : float
+        Confidence of the half widths, in (0, 1).
+    seed : int
+        Seed of the bootstrap behind the half widths, 0 <= seed < 2**31.
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind "sobol_indices". By output (if there is that dimension) and ``input``:
+        ``first_order``, ``total_order`` with ``_half_width``, as the outputs show them, and
+        ``first_order_corrected``, ``total_order_corrected`` with the noise taken out. By output:
+        ``variance``, and ``noise_share``, the share s of the variance that is sampling noise.
+        ``attrs``: ``samples``, ``confidence``, and what pure noise would show:
+        ``pure_noise_first_order_half_width`` around 0, and ``pure_noise_total_order`` (1). An
+        output that is the same in all settings has no indices: NaN.
+
+    Raises
+    ------
+    InputError
+        When SALib is not installed, the outputs do not fit the design or are not all finite, or an
+        option is out of range.
+
+    Notes
+    -----
+    Y = f(X) + noise, with variance V = V_f + V_noise and s = V_noise / V. The noise is drawn anew
+    at every setting, so it does not favour any input, but two settings that differ in one input
+    differ by their noise too. The expected indices are ``S (1 - s)`` and ``T (1 - s) + s``: an
+    input without any influence shows a total index of s, in pure noise of 1. The corrected indices
+    are ``S / (1 - s)`` and ``(T - s) / (1 - s)``, NaN where s >= 1. Of pure noise the first index
+    has standard deviation ``sqrt(2 / samples)``; what lies within that half width means nothing.
+    Settings that share their random numbers have less noise between them than this assumes, and
+    would be corrected too far.
+
+    Examples
+    --------
+    >>> design = sobol_design({"a": (0.0, 1.0), "b": (0.0, 1.0)}, samples=256, seed=1)
+    >>> found = sobol_indices(design, design["value"].values @ [2.0, 1.0])
+    >>> found["first_order"].values.round(2).tolist(), found["total_order"].values.round(2).tolist()
+    ([0.8, 0.2], [0.8, 0.2])
+    """
+    inputs, problem, samples = _problem_of(design)
+    settings = samples * (len(inputs) + 2)
+    table, other = _checked_outputs(outputs, settings)
+    noise = _checked_noise(noise_variance, np.shape(outputs)).reshape(table.shape)
+    if not 0 < confidence < 1:
+        raise InputError(f"confidence must lie between 0 and 1, got {confidence}")
+    _check_seed(seed)
+    # The first and last of each group of settings are independent draws: Saltelli's A and B.
+    place = np.arange(settings) % (len(inputs) + 2)
+    independent = (place == 0) | (place == len(inputs) + 1)
+    varies = np.ptp(table[independent], axis=0) > 0
+    variance = np.where(varies, table[independent].var(axis=0), 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(varies, noise[independent].mean(axis=0) / variance, np.nan)
+    indices = np.full((len(MEASURES), table.shape[1], len(inputs)), np.nan)
+    for i in np.flatnonzero(varies):
+        indices[:, i] = _analyse(problem, table[:, i], confidence, seed)
+    by_name = dict(zip(MEASURES, indices, strict=True)) | _corrected(indices, share)
+    return _dataset(
+        by_name,
+        {"variance": variance, "noise_share": share},
+        coords={"input": design["input"], **other},
+        attrs={
+            "samples": samples,
+            "confidence": confidence,
+            "seed": seed,
+            "pure_noise_first_order_half_width": _normal_quantile(confidence)
+            * math.sqrt(2 / samples),
+            "pure_noise_total_order": 1.0,
+        },
+        one_output=np.ndim(outputs) == 1,
+    )
+
+
+def _salib(module: str) -> Any:
+    """Return a module of SALib, which is an optional part of the installation."""
+    try:
+        return importlib.import_module(f"SALib.{module}")
+    except ImportError as error:
+        raise InputError(
+            'Sobol indices need SALib, which is not installed: pip install "driftwalk[sobol]"'
+        ) from error
+
+
+def _problem(names: list[str], low: Floats, high: Floats) -> dict[str, Any]:
+    """Return the inputs as SALib wants them."""
+    bounds = [[float(a), float(b)] for a, b in zip(low, high, strict=True)]
+    return {"num_vars": len(names), "names": names, "bounds": bounds}
+
+
+def _problem_of(design: xr.Dataset) -> tuple[list[str], dict[str, Any], int]:
+    if design.attrs.get("kind") != "sobol_design":
+        raise InputError(
+            f"not a Sobol design: its kind is {design.attrs.get('kind')!r}; give what sobol_design "
+            "made"
+        )
+    names = [str(name) for name in design["input"].values]
+    problem = _problem(names, design["low"].values, design["high"].values)
+    return names, problem, int(design.attrs["samples"])
+
+
+def _checked_bounds(bounds: Mapping[str, tuple[float, float]]) -> tuple[Floats, Floats]:
+    if len(bounds) < 2:
+        raise InputError(f"bounds: indices compare at least two inputs, got {len(bounds)}")
+    for name, (low, high) in bounds.items():
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise InputError(
+                f"bounds of '{name}': expected two finite numbers, the lower first, got {low}, "
+                f"{high}"
+            )
+    table = np.array(list(bounds.values()), dtype=np.float64)
+    return table[:, 0], table[:, 1]
+
+
+def _check_seed(seed: int) -> None:
+    if not 0 <= seed < 2**31:
+        raise InputError(f"seed: expected a whole number from 0 to 2**31 - 1, got {seed}")
+
+
+def _checked_outputs(
+    outputs: xr.DataArray | npt.ArrayLike, settings: int
+) -> tuple[Floats, dict[str, Any]]:
+    """Return outputs, shape (setting, output), and the coordinate of the second dimension."""
+    import xarray as xr
+
+    values = np.asarray(outputs, dtype=np.float64)
+    if values.ndim not in (1, 2) or values.shape[0] != settings or not values.size:
+        raise InputError(
+            f"outputs of shape {values.shape} do not fit the design of {settings} settings: "
+            "expected one row per setting, in the order of the design"
+        )
+    wrong = int((~np.isfinite(values.reshape(settings, -1)).all(axis=1)).sum())
+    if wrong:
+        raise InputError(
+            f"outputs: {wrong} of {settings} settings have none that is finite; Sobol indices need "
+            "every setting of the design"
+        )
+    other: dict[str, Any] = {}
+    if values.ndim == 2:
+        name, labels = "output", np.arange(values.shape[1])
+        if isinstance(outputs, xr.DataArray):
+            name = str(outputs.dims[1])
+            labels = outputs[name].values
+        other = {name: (name, labels)}
+    return values.reshape(settings, -1), other
+
+
+def _checked_noise(noise_variance: npt.ArrayLike, shape: tuple[int, ...]) -> Floats:
+    noise = np.asarray(noise_variance, dtype=np.float64)
+    if noise.shape not in ((), shape):
+        raise InputError(
+            f"noise_variance of shape {noise.shape} does not fit outputs of shape {shape}"
+        )
+    if not (np.isfinite(noise) & (noise >= 0)).all():
+        raise InputError("noise_variance: a variance is negative or not finite")
+    return np.broadcast_to(noise, shape)
+
+
+def _analyse(problem: dict[str, Any], output: Floats, confidence: float, seed: int) -> Floats:
+    """Return the indices of one output that varies, in the order of `MEASURES`."""
+    found = _salib("analyze.sobol").analyze(
+        problem,
+        output,
+        calc_second_order=False,
+        num_resamples=RESAMPLES,
+        conf_level=confidence,
+        # SALib takes seed 0 for none.
+        seed=seed + 1,
+    )
+    return np.array([found[name] for name in MEASURES.values()], dtype=np.float64)
+
+
+def _corrected(indices: Floats, noise_share: Floats) -> dict[str, Floats]:
+    """Return the indices that the outputs would show without noise."""
+    measure = dict(zip(MEASURES, indices, strict=True))
+    share = noise_share[:, None]
+    signal = np.where(share < 1, 1 - share, np.nan)
+    return {
+        "first_order_corrected": measure["first_order"] / signal,
+        "total_order_corrected": (measure["total_order"] - share) / signal,
+    }
+
+
+def _normal_quantile(confidence: float) -> float:
+    """Return half the width, in standard deviations, of a normal interval."""
+    from statistics import NormalDist
+
+    return NormalDist().inv_cdf(0.5 + confidence / 2)
+
+
+def _dataset(
+    by_input: dict[str, Floats],
+    by_output: dict[str, Floats],
+    *,
+    coords: dict[str, Any],
+    attrs: dict[str, Any],
+    one_output: bool,
+) -> xr.Dataset:
+    import xarray as xr
+
+    dims = tuple(name for name in coords if name != "input")
+    data: dict[str, Any] = {}
+    for table, axes in ((by_input, (*dims, "input")), (by_output, dims)):
+        for name, values in table.items():
+            about = {"units": "1"} if name != "variance" else {}
+            about["long_name"] = LONG_NAMES[name]
+            data[name] = (axes, values[0] if one_output else values, about)
+    return xr.Dataset(
+        data,
+        coords=coords,
+        attrs={"kind": "sobol_indices", "schema_version": SCHEMA_VERSION, **attrs},
+    )
