@@ -43,9 +43,20 @@ struct DragSums {
   Real conductance;      // sum of s over all strips [m/s]: how strongly drag damps motion
 };
 
-template <class Real, class T>
+// Which faces the water does not reach: none of a block alone.
+struct AllFacesOpen {
+  template <class Real>
+  Real operator()(int, Real closing) const {
+    return closing;
+  }
+};
+
+// `cover(face, closing)` may turn the closing speed of a face's first strip into one so negative
+// that no strip of it is windward.
+template <class Real, class T, class Cover = AllFacesOpen>
 inline DragSums<Real> drag_sums(const BlockShape<T>& block, const FlowView<T>& flow, Real x, Real y,
-                                const Axes<Real>& axes, const Motion<Real>& motion) {
+                                const Axes<Real>& axes, const Motion<Real>& motion,
+                                const Cover& cover = {}) {
   const T h = block.half_side;
   const T w = block.strip_width;
   const int strips = block.strips;
@@ -61,7 +72,7 @@ inline DragSums<Real> drag_sums(const BlockShape<T>& block, const FlowView<T>& f
                             tx * (w * flow.per_spacing_x), ty * (w * flow.per_spacing_y));
     const Real raw_nx = nx * flow.unit, raw_ny = ny * flow.unit;
     const Real spin_step = motion.omega * w;
-    Real closing = (nx * motion.vx + ny * motion.vy) - motion.omega * first_offset;
+    Real closing = cover(face, (nx * motion.vx + ny * motion.vy) - motion.omega * first_offset);
     Real squares{T(0)}, running{T(0)}, sum_u{T(0)}, sum_v{T(0)}, sum_s{T(0)};
     for (int k = 0; k < strips; ++k) {
       Real u, v;

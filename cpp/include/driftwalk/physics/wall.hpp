@@ -125,19 +125,45 @@ inline void resolve_contacts(const Contact<Real>& a, const Contact<Real>& b,
   }
 }
 
-// The two corners that can touch, given the direction (nx, ny) of the wall seen from the centre.
-template <class Real, class T>
-inline void leading_corners(Real nx, Real ny, T h, const Axes<Real>& axes, Contact<Real>& first,
-                            Contact<Real>& second) {
+// A block's centre from the centre of mass of the body that it is part of [m].
+template <class Real>
+struct Arm {
+  Real x, y;
+};
+
+// A block that is a body by itself: its arm is zero, and nothing is added.
+struct NoArm {};
+template <class Real>
+inline Real arm_x(Real x, const NoArm&) {
+  return x;
+}
+template <class Real>
+inline Real arm_y(Real y, const NoArm&) {
+  return y;
+}
+template <class Real>
+inline Real arm_x(Real x, const Arm<Real>& arm) {
+  return x + arm.x;
+}
+template <class Real>
+inline Real arm_y(Real y, const Arm<Real>& arm) {
+  return y + arm.y;
+}
+
+// The two corners that can touch, given the direction (nx, ny) of the wall seen from the block's
+// centre; from the centre of mass.
+template <class Real, class T, class Lever>
+inline void leading_corners(Real nx, Real ny, T h, const Axes<Real>& axes, const Lever& arm,
+                            Contact<Real>& first, Contact<Real>& second) {
   const Real p1 = nx * axes.cosine + ny * axes.sine;
   const Real p2 = ny * axes.cosine - nx * axes.sine;
   const Real s1 = copy_sign(Real(h), p1), s2 = copy_sign(Real(h), p2);
   const auto flip_first = abs(p1) < abs(p2);
   const Real f1 = select(flip_first, -s1, s1), f2 = select(flip_first, s2, -s2);
-  first.rx = s1 * axes.cosine - s2 * axes.sine;
-  first.ry = s1 * axes.sine + s2 * axes.cosine;
-  second.rx = f1 * axes.cosine - f2 * axes.sine;
-  second.ry = f1 * axes.sine + f2 * axes.cosine;
+  first.rx = arm_x(s1 * axes.cosine - s2 * axes.sine, arm);
+  first.ry = arm_y(s1 * axes.sine + s2 * axes.cosine, arm);
+  second.rx = arm_x(f1 * axes.cosine - f2 * axes.sine, arm);
+  second.ry = arm_y(f1 * axes.sine + f2 * axes.cosine, arm);
 }
 
 template <class Real, class T>
@@ -166,17 +192,16 @@ inline void push_out(const Contact<Real>& c, Pose<Real>& pose) {
 
 // Between edges that meet at less than a right angle, leaving one can mean entering the next: go
 // round until all are clear. Lanes that are clear stay as they are, bit for bit.
-template <class Real, class T>
-inline void push_inside(const WallView<T>& wall, T h, Pose<Real>& pose) {
+template <class Real, class T, class Lever>
+inline void push_inside_edges(const WallView<T>& wall, T h, const Axes<Real>& axes,
+                              const Lever& arm, Pose<Real>& pose) {
   constexpr int most_rounds = 16;
   Contact<Real> first, second;
-  Axes<Real> axes;
-  sincos(bounded_angle(pose.theta), axes.sine, axes.cosine);
   for (int round = 0; round < most_rounds; ++round) {
     bool moved = false;
     for (int e = 0; e < wall.edge_count; ++e) {
       const WallEdge<T>& edge = wall.edges[e];
-      leading_corners(Real(edge.normal_x), Real(edge.normal_y), h, axes, first, second);
+      leading_corners(Real(edge.normal_x), Real(edge.normal_y), h, axes, arm, first, second);
       measure_edge(first, edge, pose.x, pose.y);
       moved = moved || any(first.depth > Real(T(0)));
       push_out<Real, T>(first, pose);
@@ -187,23 +212,41 @@ inline void push_inside(const WallView<T>& wall, T h, Pose<Real>& pose) {
   }
 }
 
-// Returns where a wall touched the block.
-template <class Real, class T>
-inline auto meet_wall(const WallView<T>& wall, T h, Real per_inertia, Pose<Real>& pose,
-                      Motion<Real>& motion) -> typename Numbers<Real>::Bool {
+// Of the circle, both corners; returns where one was farther outside than `tolerance`.
+template <class Real, class T, class Lever>
+inline auto push_inside_circle(const WallView<T>& wall, T h, const Axes<Real>& axes,
+                               const Lever& arm, T tolerance, Pose<Real>& pose) ->
+    typename Numbers<Real>::Bool {
+  Contact<Real> first, second;
+  leading_corners(arm_x(pose.x, arm), arm_y(pose.y, arm), h, axes, arm, first, second);
+  measure_circle(first, wall.radius, pose.x, pose.y);
+  const auto outside = first.depth > Real(tolerance);
+  if (any(outside)) {
+    push_out<Real, T>(first, pose);
+    measure_circle(second, wall.radius, pose.x, pose.y);
+    push_out<Real, T>(second, pose);
+  }
+  return outside;
+}
+
+// Returns where a wall touched the block. `pose` and `motion` are those of the body that the block
+// is part of, `per_inertia` its mass / moment of inertia; `axes_of(angle)` gives the block's axes.
+template <class Real, class T, class Lever, class AxesOf>
+inline auto meet_wall(const WallView<T>& wall, T h, Real per_inertia, const Lever& arm,
+                      const AxesOf& axes_of, Pose<Real>& pose, Motion<Real>& motion) ->
+    typename Numbers<Real>::Bool {
   const Real zero{T(0)};
   Contact<Real> first, second;
-  Axes<Real> axes;
   const T reach = h * T(1.41421356237309515);
   if (wall.radius > T(0)) {
     const T inner = max(wall.radius - reach, T(0));
-    const Real squared = pose.x * pose.x + pose.y * pose.y;
-    const auto near = squared > Real(inner * inner);
+    const Real x = arm_x(pose.x, arm), y = arm_y(pose.y, arm);
+    const auto near = x * x + y * y > Real(inner * inner);
     if (!any(near)) {
       return near;
     }
-    sincos(bounded_angle(pose.theta), axes.sine, axes.cosine);
-    leading_corners(pose.x, pose.y, h, axes, first, second);
+    const Axes<Real> axes = axes_of(pose.theta);
+    leading_corners(x, y, h, axes, arm, first, second);
     measure_circle(first, wall.radius, pose.x, pose.y);
     const auto touched = first.depth > zero;
     if (!any(touched)) {
@@ -222,12 +265,12 @@ inline auto meet_wall(const WallView<T>& wall, T h, Real per_inertia, Pose<Real>
   auto touched = zero > zero;
   for (int e = 0; e < wall.edge_count; ++e) {
     const WallEdge<T>& edge = wall.edges[e];
-    const Real along = pose.x * edge.normal_x + pose.y * edge.normal_y;
+    const Real along = arm_x(pose.x, arm) * edge.normal_x + arm_y(pose.y, arm) * edge.normal_y;
     if (!any(along > Real(edge.distance - reach))) {
       continue;
     }
-    sincos(bounded_angle(pose.theta), axes.sine, axes.cosine);
-    leading_corners(Real(edge.normal_x), Real(edge.normal_y), h, axes, first, second);
+    const Axes<Real> axes = axes_of(pose.theta);
+    leading_corners(Real(edge.normal_x), Real(edge.normal_y), h, axes, arm, first, second);
     measure_edge(first, edge, pose.x, pose.y);
     if (!any(first.depth > zero)) {
       continue;
@@ -238,9 +281,24 @@ inline auto meet_wall(const WallView<T>& wall, T h, Real per_inertia, Pose<Real>
     push_out<Real, T>(first, pose);
   }
   if (any(touched)) {
-    push_inside(wall, h, pose);
+    push_inside_edges(wall, h, axes_of(pose.theta), arm, pose);
   }
   return touched;
+}
+
+template <class Real>
+inline Axes<Real> axes_at(Real theta) {
+  Axes<Real> axes;
+  sincos(bounded_angle(theta), axes.sine, axes.cosine);
+  return axes;
+}
+
+// The same for a block alone.
+template <class Real, class T>
+inline auto meet_wall(const WallView<T>& wall, T h, Real per_inertia, Pose<Real>& pose,
+                      Motion<Real>& motion) -> typename Numbers<Real>::Bool {
+  return meet_wall(
+      wall, h, per_inertia, NoArm{}, [](Real theta) { return axes_at(theta); }, pose, motion);
 }
 
 DRIFTWALK_LANES_END

@@ -1,0 +1,218 @@
+// One lane of a pack in and out: a world's start, its scene for settle and back, its results.
+#pragma once
+
+#include "driftwalk/assembly/advance.hpp"
+#include "driftwalk/random/philox.hpp"
+
+DRIFTWALK_LANES_BEGIN
+
+// The memory of a pack, laid out in one piece.
+template <class Real>
+struct PackMemory {
+  static constexpr int lanes = Numbers<Real>::lanes;
+  Member<Real>* members;
+  Sums<Real>* sums;
+  Real* listed_x; // where the blocks were when their lane's list of near pairs was made [m]
+  Real* listed_y;
+  BlockBook* books; // [block][lane]
+  BlockPair* pairs; // [lane][pair_capacity]
+
+  static std::size_t bytes(int blocks) {
+    PackMemory layout;
+    return layout.place(nullptr, blocks);
+  }
+  PackMemory() = default;
+  PackMemory(void* memory, int blocks) { place(static_cast<char*>(memory), blocks); }
+
+  BlockBook& book(int block, int lane) const { return books[block * lanes + lane]; }
+
+private:
+  std::size_t place(char* memory, int blocks) {
+    std::size_t size = 0;
+    const auto take = [&](auto*& pointer, std::size_t count) {
+      using Item = std::remove_reference_t<decltype(*pointer)>;
+      pointer = reinterpret_cast<Item*>(memory + size);
+      size = (size + count * sizeof(Item) + 63) / 64 * 64;
+    };
+    const std::size_t count = static_cast<std::size_t>(blocks);
+    const bool listed = blocks > most_blocks_all_pairs;
+    take(members, count);
+    take(sums, count);
+    take(listed_x, count);
+    take(listed_y, count);
+    take(books, count * lanes);
+    take(pairs, listed ? static_cast<std::size_t>(pair_capacity(blocks)) * lanes : 0);
+    return size;
+  }
+};
+
+template <class Real, class T>
+inline void put_rest(Motion<Real>& motion, int lane) {
+  put(motion.vx, lane, T(0));
+  put(motion.vy, lane, T(0));
+  put(motion.omega, lane, T(0));
+}
+
+template <class Real, class T>
+inline void load_lane(const AssemblyRules& rules, const AssemblyWorlds& worlds, std::int64_t world,
+                      const PackMemory<Real>& pack, int lane) {
+  const double* start = worlds.start + 3 * rules.blocks * world;
+  for (int b = 0; b < rules.blocks; ++b, start += 3) {
+    Member<Real>& m = pack.members[b];
+    put(m.pose.x, lane, start[0]);
+    put(m.pose.y, lane, start[1]);
+    put(m.pose.theta, lane, __builtin_remainder(start[2], 2 * pi_value));
+    put_rest<Real, T>(m.motion, lane);
+    put_rest<Real, T>(m.drag, lane);
+    put(m.root, lane, b);
+    put(m.per_count, lane, T(1));
+    put(m.per_inertia, lane, rules.mass / rules.inertia);
+    put(m.lightness, lane, T(1));
+    put(m.offset_x, lane, T(0));
+    put(m.offset_y, lane, T(0));
+    put(m.arm.x, lane, T(0));
+    put(m.arm.y, lane, T(0));
+    put(m.x, lane, start[0]);
+    put(m.y, lane, start[1]);
+    for (int face = 0; face < 4; ++face) {
+      put(m.covered[face], lane, false);
+    }
+    pack.book(b, lane) = {0, 0, 0, 0};
+  }
+}
+
+// The lane's world in plain numbers.
+template <class Real>
+inline void fill_scene(const AssemblyRules& rules, const PackMemory<Real>& pack, int lane,
+                       int assemblies, Scene& scene) {
+  scene.blocks = rules.blocks;
+  scene.assemblies = assemblies;
+  scene.contact = scene.rebuilt = false;
+  for (int b = 0; b < rules.blocks; ++b) {
+    const Member<Real>& m = pack.members[b];
+    const BlockBook& book = pack.book(b, lane);
+    SceneBlock& block = scene.block[b];
+    SceneAssembly& assembly = scene.assembly[b];
+    block.assembly = get(m.root, lane);
+    block.cell_x = book.cell_x;
+    block.cell_y = book.cell_y;
+    block.quarter = book.quarter;
+    block.joined = book.joined;
+    block.offset_x = get(m.offset_x, lane);
+    block.offset_y = get(m.offset_y, lane);
+    assembly.blocks = 0;
+    assembly.touched = false;
+    if (block.assembly == b) {
+      assembly.x = get(m.pose.x, lane);
+      assembly.y = get(m.pose.y, lane);
+      assembly.theta = get(m.pose.theta, lane);
+      const double cosine = get(m.axes.cosine, lane), sine = get(m.axes.sine, lane);
+      const double length = __builtin_sqrt(cosine * cosine + sine * sine);
+      assembly.cosine = cosine / length;
+      assembly.sine = sine / length;
+      assembly.vx = get(m.motion.vx, lane);
+      assembly.vy = get(m.motion.vy, lane);
+      assembly.omega = get(m.motion.omega, lane);
+      assembly.inertia = rules.inertia / get(m.lightness, lane);
+    }
+    SceneAssembly& body = scene.assembly[block.assembly];
+    (body.blocks == 0 ? body.first : scene.block[body.last].next) = b;
+    body.last = b;
+    block.next = -1;
+    ++body.blocks;
+    block.x = body.x + (body.cosine * block.offset_x - body.sine * block.offset_y);
+    block.y = body.y + (body.sine * block.offset_x + body.cosine * block.offset_y);
+  }
+}
+
+template <class Real, class T>
+inline void read_scene(const AssemblyRules& rules, const Scene& scene, const PackMemory<Real>& pack,
+                       int lane) {
+  for (int b = 0; b < rules.blocks; ++b) {
+    Member<Real>& m = pack.members[b];
+    const SceneBlock& block = scene.block[b];
+    const SceneAssembly& body = scene.assembly[block.assembly];
+    put(m.pose.x, lane, body.x);
+    put(m.pose.y, lane, body.y);
+    put(m.pose.theta, lane, body.theta);
+    put(m.motion.vx, lane, body.vx);
+    put(m.motion.vy, lane, body.vy);
+    put(m.motion.omega, lane, body.omega);
+    if (body.touched) {
+      put_rest<Real, T>(m.drag, lane);
+    }
+    put(m.axes.cosine, lane, body.cosine);
+    put(m.axes.sine, lane, body.sine);
+    put(m.root, lane, block.assembly);
+    put(m.per_count, lane, 1.0 / body.blocks);
+    put(m.per_inertia, lane, rules.mass * body.blocks / body.inertia);
+    put(m.lightness, lane, rules.inertia / body.inertia);
+    put(m.offset_x, lane, block.offset_x);
+    put(m.offset_y, lane, block.offset_y);
+    put(m.arm.x, lane, block.x - body.x);
+    put(m.arm.y, lane, block.y - body.y);
+    put(m.x, lane, block.x);
+    put(m.y, lane, block.y);
+    for (int face = 0; face < 4; ++face) {
+      put(m.covered[face], lane, !rules.hidden_faces_drag && (block.joined >> face & 1u) != 0);
+    }
+    pack.book(b, lane) = {
+        static_cast<std::int16_t>(block.cell_x), static_cast<std::int16_t>(block.cell_y),
+        static_cast<std::uint8_t>(block.quarter), static_cast<std::uint8_t>(block.joined)};
+  }
+}
+
+// The block's own orientation [rad].
+template <class Real, class T>
+inline T own_angle(const PackMemory<Real>& pack, int block, int lane) {
+  const T turned = get(pack.members[block].pose.theta, lane) +
+                   T(pack.book(block, lane).quarter) * static_cast<T>(pi_value / 2);
+  const T turn = static_cast<T>(2 * pi_value), half = static_cast<T>(pi_value);
+  return turned > half ? turned - turn : turned;
+}
+
+template <class Real, class T>
+inline void write_results(const Prepared<T>& run, const AssemblyRules& rules,
+                          const AssemblyOutputs& out, const PackMemory<Real>& pack, int lane,
+                          const LaneBook& book, std::int64_t steps) {
+  const std::int64_t world = book.world;
+  bool finite = true, inside = true;
+  for (int b = 0; b < rules.blocks; ++b) {
+    const Member<Real>& m = pack.members[b];
+    const std::int64_t row = world * rules.blocks + b;
+    const T x = get(m.x, lane), y = get(m.y, lane), theta = own_angle<Real, T>(pack, b, lane);
+    const T speed = get(m.motion.vx, lane) + get(m.motion.vy, lane) + get(m.motion.omega, lane);
+    finite = finite && abs(x + y + theta + speed) < T(1e30);
+    inside = inside && x > run.flow.low_x - run.half_side && x < run.flow.high_x + run.half_side &&
+             y > run.flow.low_y - run.half_side && y < run.flow.high_y + run.half_side;
+    out.pose[3 * row] = x;
+    out.pose[3 * row + 1] = y;
+    out.pose[3 * row + 2] = theta;
+    const BlockBook& block = pack.book(b, lane);
+    out.cell[2 * row] = block.cell_x;
+    out.cell[2 * row + 1] = block.cell_y;
+    out.quarter[row] = block.quarter;
+    out.assembly[row] = get(m.root, lane);
+  }
+  out.status[world] = (finite ? 0u : status_non_finite) | (inside ? 0u : status_escaped);
+  out.event_count[world] = book.event_count;
+  out.first_contact_step[world] = book.first_contact;
+  out.end_step[world] = static_cast<std::int32_t>(steps);
+}
+
+template <class Real, class T>
+inline void write_moment(const AssemblyRules& rules, const AssemblyOutputs& out,
+                         const PackMemory<Real>& pack, int lane, std::int64_t world,
+                         std::int64_t sample) {
+  const std::int64_t first = (world * out.samples + sample) * rules.blocks;
+  for (int b = 0; b < rules.blocks; ++b) {
+    const Member<Real>& m = pack.members[b];
+    float* const pose = out.sample_pose + 3 * (first + b);
+    pose[0] = static_cast<float>(get(m.x, lane));
+    pose[1] = static_cast<float>(get(m.y, lane));
+    pose[2] = static_cast<float>(own_angle<Real, T>(pack, b, lane));
+    out.sample_assembly[first + b] = get(m.root, lane);
+  }
+}
+
+DRIFTWALK_LANES_END

@@ -1,0 +1,105 @@
+// The state of a pack of worlds with several blocks, one world per lane.
+//
+// Every block carries a copy of the motion of the assembly that it is part of. The copies in an
+// assembly see the same numbers in the same order, so they stay equal bit for bit, and nothing has
+// to be looked up at an index that differs from lane to lane.
+#pragma once
+
+#include "driftwalk/assembly/kernel.hpp"
+#include "driftwalk/physics/integrator.hpp"
+
+DRIFTWALK_LANES_BEGIN
+
+template <class Real>
+struct Member {
+  using Int = typename Numbers<Real>::Int;
+  using Bool = typename Numbers<Real>::Bool;
+  // of the assembly
+  Pose<Real> pose;
+  Motion<Real> motion;
+  Motion<Real> drag; // drag acceleration of the previous step
+  Axes<Real> axes;   // of pose.theta
+  Int root;          // lowest block of the assembly
+  Real per_count;    // 1 / number of its blocks
+  Real per_inertia;  // its mass / its moment of inertia [1/m^2]
+  Real lightness;    // a block's moment of inertia / its own
+  // of the block
+  Real offset_x, offset_y; // from the centre of mass, in the assembly's frame [m]
+  Arm<Real> arm;           // the same in the tank's frame
+  Real x, y;               // position [m]
+  Bool covered[4];         // faces that the water does not reach
+  Real normals[4];         // of this force interval and the next
+  // of the step under way
+  Motion<Real> noise; // acceleration of the assembly by the stochastic forces
+  Motion<Real> ahead;
+};
+
+// Sums of a step, of a block and then of its assembly.
+inline constexpr int noise_sums = 3; // force per mass x, y; torque per mass
+inline constexpr int drag_sums_kept = 5;
+template <class Real>
+struct Sums {
+  Real part[drag_sums_kept], total[drag_sums_kept];
+};
+
+// The lattice side of a block, per lane.
+struct BlockBook {
+  std::int16_t cell_x, cell_y;
+  std::uint8_t quarter, joined;
+};
+
+// Where the world of a lane is in its run.
+struct LaneBook {
+  std::int64_t world = -1;
+  std::int64_t first_step = 0; // in steps of the pack
+  std::int32_t event_count = 0, first_contact = -1;
+  std::int32_t assemblies = 0;
+  bool running = false;
+  PairList pairs = {}; // of near pairs, where not all pairs are looked at
+};
+
+// One number of one lane, of a pack or of a single number.
+template <class T, int N>
+inline T get(const Pack<T, N>& a, int lane) {
+  return a.v[lane];
+}
+template <class T>
+  requires std::is_arithmetic_v<T>
+inline T get(const T& a, int) {
+  return a;
+}
+template <class T, int N, class Value>
+inline void put(Pack<T, N>& a, int lane, Value value) {
+  a.v[lane] = static_cast<T>(value);
+}
+template <class T, class Value>
+  requires(std::is_arithmetic_v<T> && !std::is_same_v<T, bool>)
+inline void put(T& a, int, Value value) {
+  a = static_cast<T>(value);
+}
+template <int N>
+inline void put(Mask<N>& a, int lane, bool value) {
+  a.v[lane] = value ? -1 : 0;
+}
+inline void put(bool& a, int, bool value) {
+  a = value;
+}
+
+// The value where the mask holds, else zero.
+template <int N>
+inline FloatPack<N> keep(Mask<N> mask, FloatPack<N> value) {
+  typedef typename IntPack<N>::Vector Bits;
+  return (typename FloatPack<N>::Vector)((Bits)value.v & mask.v);
+}
+inline double keep(bool mask, double value) {
+  return mask ? value : 0.0;
+}
+template <int N>
+inline Mask<N> equal(IntPack<N> a, IntPack<N> b) {
+  return {a.v == b.v};
+}
+inline bool equal(Int32 a, Int32 b) {
+  return a == b;
+}
+
+DRIFTWALK_LANES_END

@@ -1,0 +1,97 @@
+// Which worlds of a pack have blocks that touch or may latch: found for all lanes at once, settled
+// lane by lane (scene.hpp).
+#pragma once
+
+#include "driftwalk/assembly/advance.hpp"
+
+DRIFTWALK_LANES_BEGIN
+
+template <class T>
+struct NearRules {
+  T half_side;
+  T reach;              // no pair farther apart than this touches or latches [m]
+  bool connectors;      // whether faces latch at a distance
+  T connector_distance; // [m]
+  T connector_sine;     // of the largest angle between two faces that latch
+
+  explicit NearRules(const AssemblyRules& rules)
+      : half_side(static_cast<T>(rules.side / 2)),
+        reach(static_cast<T>(rules.side * 1.4142135623730951)),
+        connectors(rules.latching == Latching::connector),
+        connector_distance(static_cast<T>(rules.connector_distance)), connector_sine(0) {
+    if (connectors) {
+      // A little beyond, so that rounding loses no pair: settle decides in double precision.
+      connector_distance += T(1e-6);
+      const double cosine = rules.connector_cosine;
+      const double sine = cosine > 0 ? __builtin_sqrt(1 - cosine * cosine) : 1.0;
+      connector_sine = static_cast<T>(sine + 1e-5);
+      reach = max(reach, static_cast<T>(rules.side) + connector_distance);
+    }
+  }
+};
+
+// Whether two blocks overlap or, with connectors, may have two faces within tolerance of each
+// other. (dx, dy) leads from the first to the second.
+template <class Real, class T>
+inline auto may_meet(const NearRules<T>& rules, Real dx, Real dy, const Axes<Real>& a,
+                     const Axes<Real>& b) -> typename Numbers<Real>::Bool {
+  const T h = rules.half_side;
+  const Real across_a = abs(dx * a.cosine + dy * a.sine);
+  const Real up_a = abs(dy * a.cosine - dx * a.sine);
+  const Real across_b = abs(dx * b.cosine + dy * b.sine);
+  const Real up_b = abs(dy * b.cosine - dx * b.sine);
+  const Real same = abs(a.cosine * b.cosine + a.sine * b.sine);
+  const Real turned = abs(a.cosine * b.sine - a.sine * b.cosine);
+  const Real extent = (same + turned) * h + h;
+  // A nanometre more than touching: rounding must not hide a contact from settle.
+  auto meets = max(max(across_a, up_a), max(across_b, up_b)) < extent + Real(T(1e-9));
+  if (rules.connectors) {
+    const Real along = max(same, turned), askew = min(same, turned);
+    const Real gap = max(across_a, up_a) - (along * h + h);
+    const Real offset = max(min(across_a, up_a) - askew * h, Real(T(0)));
+    const Real limit{rules.connector_distance * rules.connector_distance};
+    meets =
+        meets | ((askew <= Real(rules.connector_sine)) & (gap * gap + offset * offset <= limit));
+  }
+  return meets;
+}
+
+template <class Real, class T>
+inline auto lanes_to_settle(const NearRules<T>& rules, const Member<Real>* members, int blocks) ->
+    typename Numbers<Real>::Bool {
+  auto unsettled = Real(T(0)) > Real(T(0));
+  const Real reach{rules.reach * rules.reach};
+  for (int a = 0; a < blocks; ++a) {
+    for (int b = a + 1; b < blocks; ++b) {
+      const Real dx = members[b].x - members[a].x, dy = members[b].y - members[a].y;
+      const auto near = (dx * dx + dy * dy < reach) & !equal(members[a].root, members[b].root);
+      if (any(near)) {
+        unsettled = unsettled | (near & may_meet(rules, dx, dy, members[a].axes, members[b].axes));
+      }
+    }
+  }
+  return unsettled;
+}
+
+// The same from a lane's list of near pairs.
+template <class Real, class T>
+inline bool lane_to_settle(const NearRules<T>& rules, const Member<Real>* members,
+                           const PairList& pairs, int lane) {
+  for (int k = 0; k < pairs.count; ++k) {
+    const Member<Real>& a = members[pairs.pair[k].first];
+    const Member<Real>& b = members[pairs.pair[k].second];
+    const T dx = get(b.x, lane) - get(a.x, lane), dy = get(b.y, lane) - get(a.y, lane);
+    if (!(dx * dx + dy * dy < rules.reach * rules.reach) ||
+        get(a.root, lane) == get(b.root, lane)) {
+      continue;
+    }
+    const Axes<T> first{get(a.axes.cosine, lane), get(a.axes.sine, lane)};
+    const Axes<T> second{get(b.axes.cosine, lane), get(b.axes.sine, lane)};
+    if (may_meet<T, T>(rules, dx, dy, first, second)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+DRIFTWALK_LANES_END

@@ -1,0 +1,61 @@
+// What a batch of worlds with several blocks is: plain data, no logic.
+#pragma once
+
+#include "driftwalk/simulate/prepared.hpp"
+
+#include <cstdint>
+
+namespace driftwalk {
+
+enum class Latching : int { none = 0, collision = 1, connector = 2 };
+
+// The same for every world of a batch, in double precision. Lengths in m, SI throughout.
+struct AssemblyRules {
+  int blocks = 1;
+  double side = 0, mass = 0, inertia = 0; // of one block
+  // wall, as in BatchModel
+  double radius = 0;
+  const PreparedEdge<double>* edges = nullptr;
+  int edge_count = 0;
+  double low_x = 0, high_x = 0, low_y = 0, high_y = 0; // the arena's bounding box
+  double bounce_speed = 0;
+  // between blocks
+  double restitution = 0, friction = 0;
+  Latching latching = Latching::collision;
+  double connector_distance = 0; // largest distance between the centres of two faces that latch
+  // Cosine of the largest angle between a face's normal and the other's opposite.
+  double connector_cosine = 1;
+  bool hidden_faces_drag = false;
+};
+
+struct AssemblyWorlds {
+  std::int64_t count = 0;
+  std::int64_t steps = 0;        // of every world
+  const double* start = nullptr; // [world][block][x, y, theta]
+  const double* drag_coefficient = nullptr;
+  const double* force_std = nullptr;  // [N]
+  const std::uint64_t* key = nullptr; // hash of (seed, trial, replicate)
+};
+
+// Outputs, one row per world; events beyond event_count stay as they are.
+struct AssemblyOutputs {
+  std::uint32_t* status = nullptr;
+  std::int32_t* event_count = nullptr;
+  std::int32_t* event_step = nullptr;         // [world][event]
+  std::int32_t* event_block = nullptr;        // [world][event][stayed, moved]
+  std::int32_t* event_face = nullptr;         // likewise, in the blocks' own frames
+  std::int32_t* first_contact_step = nullptr; // -1: never
+  std::int32_t* end_step = nullptr;
+  double* pose = nullptr;           // [world][block][x, y, theta] at the end
+  std::int32_t* cell = nullptr;     // [world][block][x, y] on the assembly's lattice
+  std::int32_t* quarter = nullptr;  // [world][block] quarter turns of the block in its assembly
+  std::int32_t* assembly = nullptr; // [world][block] lowest block of the block's assembly
+  int event_rows = 0;
+  // Poses every `sample_every` steps, sample 0 at the start; then no world ends early.
+  int sample_every = 0;
+  std::int64_t samples = 0;
+  float* sample_pose = nullptr;            // [world][sample][block][x, y, theta]
+  std::int32_t* sample_assembly = nullptr; // [world][sample][block]
+};
+
+} // namespace driftwalk

@@ -1,0 +1,83 @@
+// One world with several blocks in plain numbers: what contacts and latching work on.
+//
+// Plain data only: this header is read by code of every instruction set (see config.hpp).
+#pragma once
+
+#include "driftwalk/assembly/rules.hpp"
+
+#include <cstdint>
+
+namespace driftwalk {
+
+struct SceneBlock {
+  int assembly;              // lowest block of its assembly
+  int next;                  // next member of the assembly, -1 after the last
+  int cell_x, cell_y;        // on the assembly's lattice
+  int quarter;               // its own frame is the assembly's turned by this many quarter turns
+  unsigned joined;           // bit f: face f (of the assembly's frame) has a neighbour
+  double offset_x, offset_y; // from the centre of mass, in the assembly's frame [m]
+  double x, y;               // position [m]
+};
+
+// A rigid assembly, kept at the index of its lowest block.
+struct SceneAssembly {
+  int blocks;      // 0: not the lowest block of any
+  int first, last; // members, in the order of `next`
+  double x, y, theta;
+  double cosine, sine; // of theta
+  double vx, vy, omega;
+  double inertia; // about its centre of mass [kg m^2]
+  bool touched;   // an impulse or a merge changed it
+  int moved;      // last round of `separate` in which it was moved
+};
+
+// Two blocks that may be near each other, first < second.
+struct BlockPair {
+  std::int32_t first, second;
+};
+
+// Pairs of blocks that may touch, with room for all pairs that there are.
+struct PairList {
+  BlockPair* pair;
+  int count;
+};
+
+inline constexpr int pair_capacity(int blocks) {
+  return blocks * (blocks - 1) / 2;
+}
+
+struct Scene {
+  int blocks;
+  int assemblies;
+  SceneBlock* block;
+  SceneBlock* blocks_before; // scratch of as many
+  SceneAssembly* assembly;
+  PairList pairs;
+  // scratch of the pair search: first block of every cell, next block in the same cell
+  std::int32_t* cell_head;
+  std::int32_t* cell_next;
+  // what happened, written by settle
+  bool contact; // two blocks of different assemblies overlapped or latched
+  bool rebuilt; // a merge moved blocks: lists of near pairs are out of date
+  int event_rows, event_count;
+  std::int32_t step; // written into events
+  std::int32_t* event_step;
+  std::int32_t* event_block;
+  std::int32_t* event_face;
+};
+
+// Cells of the pair search are this many a side at most.
+inline constexpr int most_cells_per_side = 64;
+// Pairs closer than this many diagonals can touch; lists reach a skin farther.
+inline constexpr double pair_skin_sides = 0.7;
+// Up to this many blocks every pair is looked at; beyond, lists of near pairs.
+inline constexpr int most_blocks_all_pairs = 24;
+
+// Latches, impulses and positions of everything that touches (docs/explanation/assembly.md).
+void settle(const AssemblyRules& rules, Scene& scene);
+
+// Fills the list with the pairs whose centres are closer than a diagonal (or the connectors' reach)
+// and a skin, ordered by first and second block.
+void find_pairs(const AssemblyRules& rules, Scene& scene);
+
+} // namespace driftwalk

@@ -1,0 +1,98 @@
+// The parts of `settle`, each in a file of its own. Doubles throughout: no number here depends on
+// the instruction set, and none comes from a library's sine or cosine.
+#pragma once
+
+#include "driftwalk/assembly/scene.hpp"
+
+namespace driftwalk {
+
+struct Vec2 {
+  double x, y;
+};
+inline double dot(Vec2 a, Vec2 b) {
+  return a.x * b.x + a.y * b.y;
+}
+inline double cross(Vec2 a, Vec2 b) {
+  return a.x * b.y - a.y * b.x;
+}
+inline Vec2 operator+(Vec2 a, Vec2 b) {
+  return {a.x + b.x, a.y + b.y};
+}
+inline Vec2 operator-(Vec2 a, Vec2 b) {
+  return {a.x - b.x, a.y - b.y};
+}
+inline Vec2 operator*(Vec2 a, double s) {
+  return {a.x * s, a.y * s};
+}
+
+inline const SceneAssembly& assembly_of(const Scene& scene, int block) {
+  return scene.assembly[scene.block[block].assembly];
+}
+inline SceneAssembly& assembly_of(Scene& scene, int block) {
+  return scene.assembly[scene.block[block].assembly];
+}
+inline Vec2 centre(const Scene& scene, int block) {
+  return {scene.block[block].x, scene.block[block].y};
+}
+// Outward normal of face 0 .. 3 (+x, +y, -x, -y) of an assembly's frame.
+inline Vec2 face_normal(const SceneAssembly& a, int face) {
+  switch (face & 3) {
+  case 0:
+    return {a.cosine, a.sine};
+  case 1:
+    return {-a.sine, a.cosine};
+  case 2:
+    return {-a.cosine, -a.sine};
+  default:
+    return {a.sine, -a.cosine};
+  }
+}
+
+// Whether two blocks are so far apart that they cannot touch.
+inline bool are_far(const AssemblyRules& rules, const Scene& scene, int first, int second) {
+  const Vec2 between = centre(scene, second) - centre(scene, first);
+  return !(dot(between, between) < 2 * rules.side * rules.side);
+}
+
+// Overlap of two blocks: its depth (negative when clear) and the axis of least penetration, which
+// points from the first to the second. `reference` is the block whose face the axis is normal to.
+struct Overlap {
+  double depth;
+  Vec2 normal;
+  bool reference_is_first;
+};
+Overlap overlap_of(const AssemblyRules& rules, const Scene& scene, int first, int second);
+// The depth alone, of blocks at given places with given axes.
+double overlap_depth(double half_side, Vec2 between, Vec2 axis_first, Vec2 axis_second);
+
+// Links a block to the members of its assembly.
+inline void add_member(Scene& scene, SceneAssembly& assembly, int block) {
+  (assembly.blocks == 0 ? assembly.first : scene.block[assembly.last].next) = block;
+  assembly.last = block;
+  scene.block[block].next = -1;
+  ++assembly.blocks;
+}
+
+// Puts blocks where their assembly is.
+void place_members(Scene& scene, int assembly);
+// Members, offsets, inertia and joined faces of an assembly, from its blocks' cells and labels.
+void measure_assembly(const AssemblyRules& rules, Scene& scene, int assembly);
+
+// How far the corner of an assembly that is farthest outside is beyond the wall [m], and the
+// direction in which it has to go; negative when all are inside.
+struct Beyond {
+  double depth;
+  Vec2 inward;
+};
+Beyond beyond_wall(const AssemblyRules& rules, const Scene& scene, int assembly);
+// Shifts an assembly inward, corner by corner, the farthest first; false when it stays outside.
+bool push_inside(const AssemblyRules& rules, Scene& scene, int assembly, int rounds);
+
+// Merges what latches, one pair of faces after the other.
+void latch(const AssemblyRules& rules, Scene& scene);
+
+// Impulses between blocks that overlap, and positions without overlap.
+void bounce(const AssemblyRules& rules, Scene& scene);
+void separate(const AssemblyRules& rules, Scene& scene);
+
+} // namespace driftwalk

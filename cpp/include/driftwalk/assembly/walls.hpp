@@ -1,0 +1,125 @@
+// The wall and the assemblies of a pack of worlds: every block's corners, on its assembly's motion.
+#pragma once
+
+#include "driftwalk/assembly/advance.hpp"
+
+DRIFTWALK_LANES_BEGIN
+
+// Gives the other members of a block's assembly, in one lane, what the wall did to its copy.
+template <class Real>
+inline void spread(Member<Real>* members, int blocks, int block, int lane) {
+  using T = typename Numbers<Real>::Scalar;
+  Member<Real>& from = members[block];
+  const Int32 root = get(from.root, lane);
+  for (int b = root; b < blocks; ++b) {
+    Member<Real>& to = members[b];
+    if (get(to.root, lane) != root) {
+      continue;
+    }
+    put(to.pose.x, lane, get(from.pose.x, lane));
+    put(to.pose.y, lane, get(from.pose.y, lane));
+    put(to.motion.vx, lane, get(from.motion.vx, lane));
+    put(to.motion.vy, lane, get(from.motion.vy, lane));
+    put(to.motion.omega, lane, get(from.motion.omega, lane));
+    put(to.drag.vx, lane, T(0));
+    put(to.drag.vy, lane, T(0));
+    put(to.drag.omega, lane, T(0));
+  }
+}
+
+template <class Real>
+inline void spread_where(typename Numbers<Real>::Bool lanes, Member<Real>* members, int blocks,
+                         int block) {
+  for (int lane = 0; lane < Numbers<Real>::lanes; ++lane) {
+    if (lane_of(lanes, lane)) {
+      spread(members, blocks, block, lane);
+    }
+  }
+}
+
+// Moves a block's assembly inward by a corner's depth, in the given lanes alone and where it is
+// beyond the tolerance; returns where that was.
+template <class Real, class T>
+inline auto push_corner(const Contact<Real>& corner, typename Numbers<Real>::Bool lanes,
+                        Pose<Real>& pose) -> typename Numbers<Real>::Bool {
+  const auto outside = lanes & (corner.depth > Real(T(1e-6)));
+  const Real shift = keep(outside, corner.depth);
+  pose.x = pose.x - corner.nx * shift;
+  pose.y = pose.y - corner.ny * shift;
+  return outside;
+}
+
+template <class Real, class T>
+inline auto push_member(const WallView<T>& wall, T h, typename Numbers<Real>::Bool lanes,
+                        Member<Real>& m) -> typename Numbers<Real>::Bool {
+  Contact<Real> first, second;
+  if (wall.radius > T(0)) {
+    leading_corners(m.pose.x + m.arm.x, m.pose.y + m.arm.y, h, m.axes, m.arm, first, second);
+    measure_circle(first, wall.radius, m.pose.x, m.pose.y);
+    const auto outside = push_corner<Real, T>(first, lanes, m.pose);
+    measure_circle(second, wall.radius, m.pose.x, m.pose.y);
+    return outside | push_corner<Real, T>(second, lanes, m.pose);
+  }
+  auto outside = Real(T(0)) > Real(T(0));
+  for (int e = 0; e < wall.edge_count; ++e) {
+    const WallEdge<T>& edge = wall.edges[e];
+    leading_corners(Real(edge.normal_x), Real(edge.normal_y), h, m.axes, m.arm, first, second);
+    measure_edge(first, edge, m.pose.x, m.pose.y);
+    outside = outside | push_corner<Real, T>(first, lanes, m.pose);
+  }
+  return outside;
+}
+
+// One corner's way inward can lead another block of the assembly outward: go round until none is
+// outside. Only the given lanes move, so that no lane depends on its neighbours.
+template <class Real, class T>
+inline void push_members_inside(const WallView<T>& wall, T h, typename Numbers<Real>::Bool lanes,
+                                Member<Real>* members, int blocks) {
+  constexpr int most_rounds = 16;
+  for (int round = 0; round < most_rounds; ++round) {
+    bool moved = false;
+    for (int b = 0; b < blocks; ++b) {
+      const auto outside = push_member<Real, T>(wall, h, lanes, members[b]);
+      if (any(outside)) {
+        spread_where(outside, members, blocks, b);
+        moved = true;
+      }
+    }
+    if (!moved) {
+      return;
+    }
+  }
+}
+
+template <class Real, class T>
+inline void meet_walls(const Physics<Real, T>& physics, Member<Real>* members, int blocks) {
+  const WallView<T>& wall = physics.wall;
+  const T h = physics.block.half_side;
+  const Real zero{T(0)};
+  auto in_assemblies = zero > zero;
+  for (int b = 0; b < blocks; ++b) {
+    Member<Real>& m = members[b];
+    const auto touched =
+        meet_wall(wall, h, m.per_inertia, m.arm, [&](Real) { return m.axes; }, m.pose, m.motion);
+    if (!any(touched)) {
+      continue;
+    }
+    m.drag.vx = select(touched, zero, m.drag.vx);
+    m.drag.vy = select(touched, zero, m.drag.vy);
+    m.drag.omega = select(touched, zero, m.drag.omega);
+    const auto joined = touched & (m.per_count < Real(T(0.75)));
+    if (any(joined)) {
+      spread_where(joined, members, blocks, b);
+      in_assemblies = in_assemblies | joined;
+    }
+  }
+  if (any(in_assemblies)) {
+    push_members_inside(wall, h, in_assemblies, members, blocks);
+  }
+  for (int b = 0; b < blocks; ++b) {
+    members[b].x = members[b].pose.x + members[b].arm.x;
+    members[b].y = members[b].pose.y + members[b].arm.y;
+  }
+}
+
+DRIFTWALK_LANES_END

@@ -1,0 +1,108 @@
+#include "driftwalk/assembly/assemble.hpp"
+
+#include "driftwalk/assembly/kernel.hpp"
+#include "driftwalk/dispatch.hpp"
+#include "driftwalk/simulate/threads.hpp"
+
+#include <atomic>
+#include <cstdlib>
+#include <memory>
+#include <new>
+
+namespace driftwalk {
+
+AssemblyKernel chosen_assembly_kernel() {
+#if defined(DRIFTWALK_X86_LANES)
+  switch (chosen_instruction_set()) {
+  case InstructionSet::avx512:
+    return assembly_kernel_avx512();
+  case InstructionSet::avx2:
+    return assembly_kernel_avx2();
+  case InstructionSet::baseline:
+    break;
+  }
+#endif
+  return assembly_kernel_baseline();
+}
+
+namespace {
+// What one thread works in.
+class ThreadMemory {
+public:
+  ThreadMemory(int blocks, std::size_t lane_bytes, std::int64_t flow_size)
+      : blocks_(static_cast<std::size_t>(blocks)), before_(blocks_.size()),
+        assemblies_(blocks_.size()), next_(blocks_.size()),
+        heads_(most_cells_per_side * most_cells_per_side),
+        pairs_(static_cast<std::size_t>(pair_capacity(blocks))),
+        flow_(static_cast<std::size_t>(flow_size)), flow_twice_(flow_.size()),
+        lanes_(static_cast<char*>(std::aligned_alloc(64, (lane_bytes + 63) / 64 * 64)), std::free) {
+    if (!lanes_) {
+      throw std::bad_alloc();
+    }
+    scratch_.lanes = lanes_.get();
+    scratch_.blended_flow = flow_.data();
+    scratch_.blended_flow_twice = flow_twice_.data();
+    Scene& scene = scratch_.scene;
+    scene = {};
+    scene.block = blocks_.data();
+    scene.blocks_before = before_.data();
+    scene.assembly = assemblies_.data();
+    scene.pairs = {pairs_.data(), 0};
+    scene.cell_head = heads_.data();
+    scene.cell_next = next_.data();
+  }
+  AssemblyScratch& scratch() { return scratch_; }
+
+private:
+  std::vector<SceneBlock> blocks_, before_;
+  std::vector<SceneAssembly> assemblies_;
+  std::vector<std::int32_t> next_, heads_;
+  std::vector<BlockPair> pairs_;
+  std::vector<std::int16_t> flow_;
+  std::vector<double> flow_twice_;
+  std::unique_ptr<char, decltype(&std::free)> lanes_;
+  AssemblyScratch scratch_;
+};
+
+std::int64_t take_next(void* self) {
+  return (*static_cast<std::atomic<std::int64_t>*>(self))++;
+}
+
+// Every thread runs packs of its own and takes worlds from one queue.
+template <class Run>
+std::int64_t run_threads(int blocks, std::int64_t worlds, int lanes, int threads,
+                         std::size_t lane_bytes, std::int64_t flow_size, const Run& run) {
+  std::atomic<std::int64_t> next{0}, block_steps{0};
+  const WorldQueue queue{take_next, &next};
+  const std::int64_t packs = (worlds + lanes - 1) / lanes;
+  const std::int64_t tasks = std::min<std::int64_t>(std::max(threads, 1), packs);
+  run_tasks(tasks, threads, [&] {
+    return [&](std::int64_t) {
+      const auto memory = std::make_unique<ThreadMemory>(blocks, lane_bytes, flow_size);
+      block_steps += run(queue, memory->scratch());
+    };
+  });
+  return block_steps;
+}
+} // namespace
+
+std::int64_t assemble_batch(const PreparedRun<float>& run, const AssemblyRules& rules,
+                            const AssemblyWorlds& worlds, int threads, const AssemblyOutputs& out) {
+  const AssemblyKernel kernel = chosen_assembly_kernel();
+  return run_threads(rules.blocks, worlds.count, kernel.lanes, threads,
+                     kernel.scratch_bytes(rules.blocks), run.blended_flow_size(),
+                     [&](const WorldQueue& queue, AssemblyScratch& scratch) {
+                       return kernel.run(run.view(), rules, worlds, out, queue, scratch);
+                     });
+}
+
+std::int64_t assemble_batch(const PreparedRun<double>& run, const AssemblyRules& rules,
+                            const AssemblyWorlds& worlds, int threads, const AssemblyOutputs& out) {
+  return run_threads(rules.blocks, worlds.count, 1, threads, assembly_reference_bytes(rules.blocks),
+                     run.blended_flow_size(),
+                     [&](const WorldQueue& queue, AssemblyScratch& scratch) {
+                       return assemble_reference(run.view(), rules, worlds, out, queue, scratch);
+                     });
+}
+
+} // namespace driftwalk

@@ -1,0 +1,31 @@
+// The self-assembly kernel, compiled once per instruction set.
+#include "driftwalk/assembly/run.hpp"
+
+DRIFTWALK_LANES_BEGIN
+
+#if defined(__AVX512F__)
+inline constexpr int assembly_lanes = 16;
+#elif defined(__AVX2__)
+inline constexpr int assembly_lanes = 8;
+#else
+inline constexpr int assembly_lanes = 4;
+#endif
+
+namespace {
+using Real = FloatPack<assembly_lanes>;
+
+std::int64_t assemble(const Prepared<float>& run, const AssemblyRules& rules,
+                      const AssemblyWorlds& worlds, const AssemblyOutputs& out,
+                      const WorldQueue& queue, AssemblyScratch& scratch) {
+  return AssemblyPack<Real, float>(run, rules, worlds, out, queue, scratch, scratch.blended_flow)
+      .run();
+}
+} // namespace
+
+inline constexpr AssemblyKernel kernel{assemble, assembly_lanes, PackMemory<Real>::bytes};
+
+DRIFTWALK_LANES_END
+
+driftwalk::AssemblyKernel driftwalk::DRIFTWALK_PER_ISA(assembly_kernel_)() {
+  return kernel;
+}

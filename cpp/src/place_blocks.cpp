@@ -1,0 +1,87 @@
+// Random start poses of many blocks, one after the other (random sequential placement).
+#include "driftwalk/assembly/assemble.hpp"
+#include "driftwalk/assembly/settle_parts.hpp"
+#include "driftwalk/math/elementary.hpp"
+#include "driftwalk/random/philox.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace driftwalk {
+
+namespace {
+constexpr int most_attempts = 20;
+constexpr int most_draws = 5000; // per block
+
+struct Placed {
+  Vec2 at, axis;
+};
+
+bool is_inside(const AssemblyRules& rules, const Placed& p) {
+  const Vec2 along = p.axis * (rules.side / 2), across{-along.y, along.x};
+  for (const double sign_x : {-1.0, 1.0}) {
+    for (const double sign_y : {-1.0, 1.0}) {
+      const Vec2 corner = p.at + along * sign_x + across * sign_y;
+      if (rules.radius > 0 && dot(corner, corner) > rules.radius * rules.radius) {
+        return false;
+      }
+      for (int e = 0; e < rules.edge_count; ++e) {
+        const PreparedEdge<double>& edge = rules.edges[e];
+        if (corner.x * edge.normal_x + corner.y * edge.normal_y > edge.distance) {
+          return false;
+        }
+      }
+    }
+  }
+  return true;
+}
+
+bool is_clear(const AssemblyRules& rules, const Placed& p, const double* start, int placed) {
+  for (int b = 0; b < placed; ++b, start += 3) {
+    const Vec2 between = Vec2{start[0], start[1]} - p.at;
+    if (dot(between, between) < 2 * rules.side * rules.side &&
+        overlap_depth(rules.side / 2, between, p.axis, {std::cos(start[2]), std::sin(start[2])}) >=
+            0) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// Word 0 of the address: attempt; 1: block; 2: draw.
+bool place_one(const AssemblyRules& rules, const Philox<UInt32>& stream, int attempt, int block,
+               double* start) {
+  for (int draw = 0; draw < most_draws; ++draw) {
+    UInt32 words[4];
+    stream(static_cast<UInt32>(attempt), static_cast<UInt32>(block), static_cast<UInt32>(draw),
+           static_cast<UInt32>(Purpose::start), words);
+    double* const pose = start + 3 * block;
+    pose[0] = rules.low_x + words[0] * 0x1p-32 * (rules.high_x - rules.low_x);
+    pose[1] = rules.low_y + words[1] * 0x1p-32 * (rules.high_y - rules.low_y);
+    pose[2] = (words[2] * 0x1p-31 - 1.0) * pi_value;
+    const Placed placed{{pose[0], pose[1]}, {std::cos(pose[2]), std::sin(pose[2])}};
+    if (is_inside(rules, placed) && is_clear(rules, placed, start, block)) {
+      return true;
+    }
+  }
+  return false;
+}
+} // namespace
+
+int place_blocks(const AssemblyRules& rules, std::uint64_t key, double* start) {
+  const Philox<UInt32> stream{static_cast<UInt32>(key), static_cast<UInt32>(key >> 32)};
+  int most = 0;
+  for (int attempt = 0; attempt < most_attempts; ++attempt) {
+    int block = 0;
+    while (block < rules.blocks && place_one(rules, stream, attempt, block, start)) {
+      ++block;
+    }
+    most = std::max(most, block);
+    if (most == rules.blocks) {
+      break;
+    }
+  }
+  return most;
+}
+
+} // namespace driftwalk

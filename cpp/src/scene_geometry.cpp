@@ -1,0 +1,157 @@
+// Geometry of a scene: overlaps of squares, members of assemblies, the wall.
+#include "driftwalk/assembly/settle_parts.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace driftwalk {
+
+namespace {
+// Half the extent of a square along an axis of another one, turned by the angle between them.
+double half_extent(double half_side, Vec2 axis_first, Vec2 axis_second) {
+  return half_side *
+         (std::abs(dot(axis_first, axis_second)) + std::abs(cross(axis_first, axis_second)));
+}
+} // namespace
+
+double overlap_depth(double half_side, Vec2 between, Vec2 axis_first, Vec2 axis_second) {
+  const double reach = half_side + half_extent(half_side, axis_first, axis_second);
+  const double apart =
+      std::max({std::abs(dot(between, axis_first)), std::abs(cross(axis_first, between)),
+                std::abs(dot(between, axis_second)), std::abs(cross(axis_second, between))});
+  return reach - apart;
+}
+
+Overlap overlap_of(const AssemblyRules& rules, const Scene& scene, int first, int second) {
+  const Vec2 between = centre(scene, second) - centre(scene, first);
+  const SceneAssembly& a = assembly_of(scene, first);
+  const SceneAssembly& b = assembly_of(scene, second);
+  const Vec2 axes[4] = {face_normal(a, 0), face_normal(a, 1), face_normal(b, 0), face_normal(b, 1)};
+  const double half_side = rules.side / 2;
+  const double reach = half_side + half_extent(half_side, axes[0], axes[2]);
+  Overlap least{HUGE_VAL, {0, 0}, true};
+  for (int k = 0; k < 4; ++k) {
+    const double along = dot(between, axes[k]);
+    const double depth = reach - std::abs(along);
+    if (depth < least.depth) {
+      least = {depth, axes[k] * (along < 0 ? -1.0 : 1.0), k < 2};
+    }
+  }
+  return least;
+}
+
+void place_members(Scene& scene, int assembly) {
+  const SceneAssembly& a = scene.assembly[assembly];
+  for (int b = a.first; b >= 0; b = scene.block[b].next) {
+    SceneBlock& block = scene.block[b];
+    block.x = a.x + (a.cosine * block.offset_x - a.sine * block.offset_y);
+    block.y = a.y + (a.sine * block.offset_x + a.cosine * block.offset_y);
+  }
+}
+
+namespace {
+// Bit of the face that looks at a neighbouring cell; none where it is no neighbour.
+unsigned face_towards(int dx, int dy) {
+  if (std::abs(dx) + std::abs(dy) != 1) {
+    return 0;
+  }
+  return 1u << (dx == 1 ? 0 : (dy == 1 ? 1 : (dx == -1 ? 2 : 3)));
+}
+
+void link_members(Scene& scene, int assembly) {
+  SceneAssembly& a = scene.assembly[assembly];
+  a.blocks = 0;
+  a.first = a.last = -1;
+  for (int b = 0; b < scene.blocks; ++b) {
+    if (scene.block[b].assembly == assembly) {
+      add_member(scene, a, b);
+    }
+  }
+}
+} // namespace
+
+void measure_assembly(const AssemblyRules& rules, Scene& scene, int assembly) {
+  link_members(scene, assembly);
+  SceneAssembly& a = scene.assembly[assembly];
+  int sum_x = 0, sum_y = 0;
+  for (int b = a.first; b >= 0; b = scene.block[b].next) {
+    sum_x += scene.block[b].cell_x;
+    sum_y += scene.block[b].cell_y;
+  }
+  a.inertia = 0;
+  for (int b = a.first; b >= 0; b = scene.block[b].next) {
+    SceneBlock& block = scene.block[b];
+    block.offset_x = rules.side * (static_cast<double>(block.cell_x * a.blocks - sum_x) / a.blocks);
+    block.offset_y = rules.side * (static_cast<double>(block.cell_y * a.blocks - sum_y) / a.blocks);
+    a.inertia += rules.inertia +
+                 rules.mass * (block.offset_x * block.offset_x + block.offset_y * block.offset_y);
+    block.joined = 0;
+    for (int c = a.first; c >= 0; c = scene.block[c].next) {
+      block.joined |=
+          face_towards(scene.block[c].cell_x - block.cell_x, scene.block[c].cell_y - block.cell_y);
+    }
+  }
+}
+
+namespace {
+void extend(Beyond& most, double depth, Vec2 inward) {
+  if (depth > most.depth) {
+    most = {depth, inward};
+  }
+}
+
+// How far a corner is beyond the wall.
+void measure_corner(const AssemblyRules& rules, Vec2 corner, Beyond& most) {
+  if (rules.radius > 0) {
+    const double distance = std::sqrt(dot(corner, corner));
+    extend(most, distance - rules.radius, corner * (-1.0 / std::max(distance, 1e-9)));
+    return;
+  }
+  for (int e = 0; e < rules.edge_count; ++e) {
+    const PreparedEdge<double>& edge = rules.edges[e];
+    extend(most, corner.x * edge.normal_x + corner.y * edge.normal_y - edge.distance,
+           {-edge.normal_x, -edge.normal_y});
+  }
+}
+} // namespace
+
+// Whether a block there is within the wall whatever its angle (asked of circles alone).
+static bool is_clear_of_wall(const AssemblyRules& rules, Vec2 middle) {
+  const double inner = rules.radius - rules.side * std::sqrt(0.5);
+  return inner > 0 && dot(middle, middle) < inner * inner;
+}
+
+Beyond beyond_wall(const AssemblyRules& rules, const Scene& scene, int assembly) {
+  Beyond most{-HUGE_VAL, {0, 0}};
+  const SceneAssembly& a = scene.assembly[assembly];
+  const Vec2 along = face_normal(a, 0) * (rules.side / 2);
+  const Vec2 across = face_normal(a, 1) * (rules.side / 2);
+  for (int b = a.first; b >= 0; b = scene.block[b].next) {
+    const Vec2 middle = centre(scene, b);
+    if (is_clear_of_wall(rules, middle)) {
+      continue;
+    }
+    for (const Vec2& corner : {along + across, along - across, across - along,
+                               Vec2{-along.x - across.x, -along.y - across.y}}) {
+      measure_corner(rules, middle + corner, most);
+    }
+  }
+  return most;
+}
+
+bool push_inside(const AssemblyRules& rules, Scene& scene, int assembly, int rounds) {
+  constexpr double tolerance = 1e-6;
+  for (int round = 0; round < rounds; ++round) {
+    const Beyond beyond = beyond_wall(rules, scene, assembly);
+    if (!(beyond.depth > tolerance)) {
+      return true;
+    }
+    SceneAssembly& a = scene.assembly[assembly];
+    a.x += beyond.inward.x * beyond.depth;
+    a.y += beyond.inward.y * beyond.depth;
+    place_members(scene, assembly);
+  }
+  return !(beyond_wall(rules, scene, assembly).depth > tolerance);
+}
+
+} // namespace driftwalk

@@ -1,0 +1,256 @@
+// Latching: two faces that meet make two assemblies one, on the lattice of the heavier.
+#include "driftwalk/assembly/settle_parts.hpp"
+
+#include <algorithm>
+
+namespace driftwalk {
+
+namespace {
+struct Candidate {
+  int first, face, second, peer; // faces in the frames of their assemblies
+  double squared;                // distance of the face centres [m^2]
+};
+
+bool comes_before(const Candidate& a, const Candidate& b) {
+  if (a.squared != b.squared) {
+    return a.squared < b.squared;
+  }
+  if (a.first != b.first) {
+    return a.first < b.first;
+  }
+  if (a.face != b.face) {
+    return a.face < b.face;
+  }
+  return a.second != b.second ? a.second < b.second : a.peer < b.peer;
+}
+
+bool is_free(const Scene& scene, int block, int face) {
+  return (scene.block[block].joined >> face & 1u) == 0;
+}
+
+// Whether two free faces can latch, by the rule in force.
+bool can_latch(const AssemblyRules& rules, const Scene& scene, Candidate& c) {
+  const Vec2 between = centre(scene, c.second) - centre(scene, c.first);
+  const Vec2 n = face_normal(assembly_of(scene, c.first), c.face);
+  const Vec2 m = face_normal(assembly_of(scene, c.second), c.peer);
+  const Vec2 gap = between + (m - n) * (rules.side / 2);
+  c.squared = dot(gap, gap);
+  if (rules.latching == Latching::collision) {
+    return dot(n, between) > 0 && dot(m, between) < 0 && dot(n, m) < 0;
+  }
+  return c.squared <= rules.connector_distance * rules.connector_distance &&
+         -dot(n, m) >= rules.connector_cosine;
+}
+
+// How the moved assembly's lattice lies on the other's: turned, then shifted.
+struct OntoLattice {
+  int quarters, shift_x, shift_y;
+
+  static void turn(int quarters, int x, int y, int& out_x, int& out_y) {
+    constexpr int cosine[4] = {1, 0, -1, 0}, sine[4] = {0, 1, 0, -1};
+    out_x = cosine[quarters] * x - sine[quarters] * y;
+    out_y = sine[quarters] * x + cosine[quarters] * y;
+  }
+  void apply(SceneBlock& block) const {
+    int x, y;
+    turn(quarters, block.cell_x, block.cell_y, x, y);
+    block.cell_x = x + shift_x;
+    block.cell_y = y + shift_y;
+    block.quarter = (block.quarter + quarters) & 3;
+  }
+};
+
+struct Merge {
+  int anchor, anchor_face; // a block of the assembly that stays
+  int guest, guest_face;   // a block of the one that is moved
+  int stays, moves;
+  OntoLattice onto;
+};
+
+Merge plan(const Scene& scene, const Candidate& c) {
+  const int a = scene.block[c.first].assembly, b = scene.block[c.second].assembly;
+  const int blocks_a = scene.assembly[a].blocks, blocks_b = scene.assembly[b].blocks;
+  const bool first_stays = blocks_a != blocks_b ? blocks_a > blocks_b : a < b;
+  Merge merge = first_stays ? Merge{c.first, c.face, c.second, c.peer, a, b, {}}
+                            : Merge{c.second, c.peer, c.first, c.face, b, a, {}};
+  // The guest's face turns to look against the anchor's.
+  merge.onto.quarters = (merge.anchor_face + 2 - merge.guest_face) & 3;
+  constexpr int step_x[4] = {1, 0, -1, 0}, step_y[4] = {0, 1, 0, -1};
+  const SceneBlock& anchor = scene.block[merge.anchor];
+  const SceneBlock& guest = scene.block[merge.guest];
+  int x, y;
+  OntoLattice::turn(merge.onto.quarters, guest.cell_x, guest.cell_y, x, y);
+  merge.onto.shift_x = anchor.cell_x + step_x[merge.anchor_face] - x;
+  merge.onto.shift_y = anchor.cell_y + step_y[merge.anchor_face] - y;
+  return merge;
+}
+
+bool cells_are_free(const Scene& scene, const Merge& merge) {
+  for (int b = scene.assembly[merge.moves].first; b >= 0; b = scene.block[b].next) {
+    SceneBlock moved = scene.block[b];
+    merge.onto.apply(moved);
+    for (int c = scene.assembly[merge.stays].first; c >= 0; c = scene.block[c].next) {
+      if (scene.block[c].cell_x == moved.cell_x && scene.block[c].cell_y == moved.cell_y) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+bool is_clear_of_others(const AssemblyRules& rules, const Scene& scene, int assembly) {
+  constexpr double tolerance = 1e-4;
+  for (int b = scene.assembly[assembly].first; b >= 0; b = scene.block[b].next) {
+    for (int c = 0; c < scene.blocks; ++c) {
+      if (scene.block[c].assembly != assembly && !are_far(rules, scene, b, c) &&
+          overlap_of(rules, scene, b, c).depth > tolerance) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+// Velocity and spin of the joint body: linear momentum, and angular momentum about the joint centre
+// of mass, of the two before they are aligned. `inertia` is that of the aligned body.
+void conserve_momentum(const SceneAssembly& a, const SceneAssembly& b, double mass,
+                       SceneAssembly& joint) {
+  const double ma = mass * a.blocks, mb = mass * b.blocks, m = ma + mb;
+  const Vec2 middle{(ma * a.x + mb * b.x) / m, (ma * a.y + mb * b.y) / m};
+  const double spin = a.inertia * a.omega + b.inertia * b.omega +
+                      ma * cross(Vec2{a.x, a.y} - middle, {a.vx, a.vy}) +
+                      mb * cross(Vec2{b.x, b.y} - middle, {b.vx, b.vy});
+  joint.vx = (ma * a.vx + mb * b.vx) / m;
+  joint.vy = (ma * a.vy + mb * b.vy) / m;
+  joint.omega = spin / joint.inertia;
+}
+
+// The position of the joint body is given by a block of the assembly that stays where it is.
+void place_by(Scene& scene, int assembly, int block, Vec2 at) {
+  SceneAssembly& a = scene.assembly[assembly];
+  const SceneBlock& b = scene.block[block];
+  a.x = at.x - (a.cosine * b.offset_x - a.sine * b.offset_y);
+  a.y = at.y - (a.sine * b.offset_x + a.cosine * b.offset_y);
+  place_members(scene, assembly);
+}
+
+// One line of the world's list of events; faces in the blocks' own frames.
+void record(Scene& scene, const Merge& merge, const int (&own_faces)[2]) {
+  if (scene.event_count >= scene.event_rows) {
+    return;
+  }
+  const int e = scene.event_count++;
+  scene.event_step[e] = scene.step;
+  scene.event_block[2 * e] = merge.anchor;
+  scene.event_block[2 * e + 1] = merge.guest;
+  scene.event_face[2 * e] = own_faces[0];
+  scene.event_face[2 * e + 1] = own_faces[1];
+}
+
+void align(Scene& scene, const Merge& merge, int joint) {
+  for (int b = 0; b < scene.blocks; ++b) {
+    SceneBlock& block = scene.block[b];
+    if (block.assembly == merge.moves) {
+      merge.onto.apply(block);
+      block.assembly = joint;
+    } else if (block.assembly == merge.stays) {
+      block.assembly = joint;
+    }
+  }
+}
+
+// Moves the guests' assembly onto the other's lattice. False, and nothing changed, when the two
+// would overlap each other or a third, or cannot both be inside the tank.
+bool try_merge(const AssemblyRules& rules, Scene& scene, const Merge& merge) {
+  if (!cells_are_free(scene, merge)) {
+    return false;
+  }
+  constexpr int most_rounds = 64;
+  const SceneAssembly kept = scene.assembly[merge.stays], moved = scene.assembly[merge.moves];
+  const int joint = std::min(merge.stays, merge.moves);
+  const Vec2 anchor = centre(scene, merge.anchor);
+  const int own_faces[2] = {(merge.anchor_face - scene.block[merge.anchor].quarter) & 3,
+                            (merge.guest_face - scene.block[merge.guest].quarter) & 3};
+  std::copy_n(scene.block, scene.blocks, scene.blocks_before);
+  align(scene, merge, joint);
+  scene.assembly[std::max(merge.stays, merge.moves)].blocks = 0;
+  SceneAssembly& body = scene.assembly[joint];
+  body = kept;
+  measure_assembly(rules, scene, joint);
+  conserve_momentum(kept, moved, rules.mass, body);
+  place_by(scene, joint, merge.anchor, anchor);
+  if (!push_inside(rules, scene, joint, most_rounds) || !is_clear_of_others(rules, scene, joint)) {
+    std::copy_n(scene.blocks_before, scene.blocks, scene.block);
+    scene.assembly[merge.stays] = kept;
+    scene.assembly[merge.moves] = moved;
+    return false;
+  }
+  body.touched = true;
+  --scene.assemblies;
+  record(scene, merge, own_faces);
+  return true;
+}
+
+// Whether any faces of two blocks can latch at all.
+bool may_latch(const AssemblyRules& rules, const Scene& scene, BlockPair pair) {
+  if (scene.block[pair.first].assembly == scene.block[pair.second].assembly) {
+    return false;
+  }
+  if (rules.latching == Latching::collision) {
+    return !are_far(rules, scene, pair.first, pair.second) &&
+           overlap_of(rules, scene, pair.first, pair.second).depth > 0;
+  }
+  const Vec2 between = centre(scene, pair.second) - centre(scene, pair.first);
+  const double reach = rules.side + rules.connector_distance;
+  return dot(between, between) <= reach * reach;
+}
+
+// The best candidate that comes after `last`, if any: candidates are tried in their order without a
+// list of them.
+bool next_candidate(const AssemblyRules& rules, const Scene& scene, const Candidate& last,
+                    Candidate& best) {
+  bool found = false;
+  for (int k = 0; k < scene.pairs.count; ++k) {
+    const BlockPair pair = scene.pairs.pair[k];
+    if (!may_latch(rules, scene, pair)) {
+      continue;
+    }
+    for (int face = 0; face < 4; ++face) {
+      for (int peer = 0; peer < 4; ++peer) {
+        Candidate c{pair.first, face, pair.second, peer, 0};
+        if (is_free(scene, pair.first, face) && is_free(scene, pair.second, peer) &&
+            can_latch(rules, scene, c) && comes_before(last, c) &&
+            (!found || comes_before(c, best))) {
+          best = c;
+          found = true;
+        }
+      }
+    }
+  }
+  return found;
+}
+
+bool merge_one(const AssemblyRules& rules, Scene& scene) {
+  Candidate last{-1, -1, -1, -1, -1.0}, best{};
+  while (next_candidate(rules, scene, last, best)) {
+    if (try_merge(rules, scene, plan(scene, best))) {
+      return true;
+    }
+    last = best;
+  }
+  return false;
+}
+} // namespace
+
+void latch(const AssemblyRules& rules, Scene& scene) {
+  if (rules.latching == Latching::none) {
+    return;
+  }
+  while (merge_one(rules, scene)) {
+    scene.contact = true;
+    scene.rebuilt = true;
+    find_pairs(rules, scene);
+  }
+}
+
+} // namespace driftwalk
