@@ -35,8 +35,8 @@ def require_cover(flow: xr.Dataset, tank: Tank) -> None:
     for nodes, cell, begin, end in zip((x, y), cells, low, high, strict=True):
         if nodes[0] - cell > begin + 1e-9 or nodes[-1] + cell < end - 1e-9:
             raise InputError(
-                f"the flow field does not cover the tank: it spans {_range(x, y)}, the tank, a "
-                f"{tank.describe()}, {_range((low[0], high[0]), (low[1], high[1]))}; give the "
+                f"the flow field does not cover the tank, a {tank.describe()} that reaches "
+                f"{_range(*np.stack([low, high], axis=1))}: it spans {_range(x, y)}; give the "
                 "field of this tank, or the tank of this field (--tank-diameter, [tank])"
             )
     if "flag" not in flow:
@@ -47,9 +47,9 @@ def require_cover(flow: xr.Dataset, tank: Tank) -> None:
     lacking = int(np.count_nonzero(outside & inner))
     if lacking:
         raise InputError(
-            f"the flow field does not cover the tank: {lacking} of its {np.count_nonzero(inner)} "
-            f"nodes in the tank, a {tank.describe()}, are flagged as outside of the tank that the "
-            "field was made for; give the field of this tank, or the tank of this field "
+            f"the flow field does not cover the tank, a {tank.describe()}: {lacking} of its "
+            f"{np.count_nonzero(inner)} nodes in there are flagged as outside of the tank that it "
+            "was made for; give the field of this tank, or the tank of this field "
             "(--tank-diameter, [tank])"
         )
 

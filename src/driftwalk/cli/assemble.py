@@ -172,8 +172,8 @@ def _from_calibration(
         refused.append("--study")
     if refused:
         raise InputError(
-            f"{', '.join(refused)} does not go with a calibration run, whose own is used; leave it "
-            f"out, or use the run's flow field alone: --flow {folder / 'flow.nc'}"
+            f"{', '.join(refused)}: not with a calibration run, whose own values are used; to give "
+            f"them, take the run's flow field alone: --flow {folder / 'flow.nc'}"
         )
     found = read_calibrated(folder)
     base = f"the study of {folder}"
@@ -212,7 +212,9 @@ def summary(study: Study, result: AssemblyResult) -> dict[str, Any]:
         "force_interval_s": forces.force_interval_s,
         "first_contact_median_s": times["first_contact_median_s"],
         "completion_median_s": times["completion_median_s"],
-        "drawn": None if result.drawn is None else _facts(result.drawn),
+        "drawn": None
+        if result.drawn is None
+        else {"parameters": _drawn(result.drawn), **_facts(result.drawn)},
         **_difference(result),
     }
 
@@ -229,6 +231,11 @@ def _facts(distribution: xr.Dataset) -> dict[str, Any]:
         "runs": facts["runs"],
         "left_out": facts["left_out"],
     }
+
+
+def _drawn(distribution: xr.Dataset) -> list[str]:
+    """Return what was drawn for each run."""
+    return str(distribution.attrs["drawn"]).split()
 
 
 def _difference(result: AssemblyResult) -> dict[str, float]:
@@ -278,6 +285,7 @@ def print_answer(study: Study, result: AssemblyResult, folder: Path) -> None:
         print(f"{words}: {reached}")
     if result.drawn is not None:
         apart = _difference(result)
+        print(f"drawn for each run: {', '.join(_drawn(result.drawn))}")
         print(
             f"l1 distance of the two: {apart['l1_distance']:.4f}; by chance "
             f"{apart['l1_noise_floor']:.4f} (95 %: {apart['l1_noise_floor_95']:.4f})"

@@ -84,7 +84,7 @@ def _require_finished(folder: Path, files: dict[str, Path]) -> None:
             "continues it"
         )
     if state == "new":
-        what = "is no run directory" if folder.is_dir() else "does not exist"
+        what = "is no run directory" if folder.exists() else "does not exist"
         raise InputError(
             f"{folder} {what}: give the directory that 'driftwalk calibrate --out' made, or a flow "
             "field (--flow)"

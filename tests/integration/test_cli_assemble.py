@@ -1,0 +1,343 @@
+"""`driftwalk assemble` from a calibration and from a flow field: what it prints, writes, refuses.
+
+The recording is the bundled one, which another engine simulated.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import (
+    FLOW,
+    GRID,
+    RECORDING,
+    Done,
+    apart,
+    assert_same_bits,
+    contents,
+    end,
+    here,
+    refusal,
+    start,
+)
+
+CLASSES = ["I", "O", "T", "S", "L", "I3+1", "L3+1", "2+2", "2+1+1", "1+1+1+1"]
+REQUIRED = {"proportions", "intervals", "complete", "runs"}
+SIZE = ["--blocks", "4", "--runs", "60", "--duration", "30s", "--threads", "1"]
+RESULTS = ("assembly.nc", "distribution.nc", "class_times.nc", "path.nc")
+DRAWN = ("assembly_drawn.nc", "distribution_drawn.nc")
+
+
+@pytest.fixture(scope="module")
+def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the run directory of a short calibration, with a flow field of its own."""
+    place = tmp_path_factory.mktemp("calibrated")
+    study = place / "study.toml"
+    study.write_text(GRID, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("driftwalk.report.write_figures", lambda *datasets, **options: [])
+        done = here(
+            *("calibrate", RECORDING, "--to", "60s", "--study", study, "--out", place / "run"),
+            *("--tank-diameter", "30cm", "--threads", "1"),
+        )
+    assert done.code == 0, done.err
+    return place / "run"
+
+
+@pytest.fixture(autouse=True)
+def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out the figures, which take most of the time of a short run in this process."""
+    monkeypatch.setattr("driftwalk.report.write_assembly_figures", lambda *folders, **datasets: [])
+
+
+@pytest.fixture(scope="module")
+def whole(calibrated: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Done]:
+    """Return a run from the calibration, figures and all."""
+    folder = tmp_path_factory.mktemp("whole") / "assembly"
+    return folder, apart("assemble", calibrated, *SIZE, "--json", "-o", folder)
+
+
+def dataset(path: Path) -> xr.Dataset:
+    with xr.open_dataset(path, engine="h5netcdf") as stored:
+        return stored.load()
+
+
+def test_json_holds_both_distributions(whole: tuple[Path, Done]) -> None:
+    done = whole[1]
+    assert done.code == 0, done.err
+    found = json.loads(done.out)
+    assert set(found) >= REQUIRED
+    for part in (found, found["drawn"]):
+        assert list(part["proportions"]) == CLASSES
+        assert sum(part["proportions"].values()) == pytest.approx(1.0)
+        assert part["runs"] == 60
+        for name, (low, high) in part["intervals"].items():
+            assert 0.0 <= low <= part["proportions"][name] <= high <= 1.0
+        whole_ones = sum(part["proportions"][name] for name in "IOTSL")
+        assert part["complete"] == pytest.approx(whole_ones)
+        assert part["complete_interval"][0] <= part["complete"] <= part["complete_interval"][1]
+    both = [np.array(list(part["proportions"].values())) for part in (found, found["drawn"])]
+    assert found["l1_distance"] == pytest.approx(np.abs(both[0] - both[1]).sum())
+    assert 0.0 < found["l1_noise_floor"] < found["l1_noise_floor_95"]
+    assert found["drawn"]["parameters"] == ["drag_coefficient", "force_std", "flow"]
+    assert (found["blocks"], found["duration_s"], found["seed"]) == (4, 30.0, 1)
+
+
+def test_the_parameters_are_the_calibrations(whole: tuple[Path, Done], calibrated: Path) -> None:
+    found, known = json.loads(whole[1].out), dataset(calibrated / "calibration.nc")
+    for name in ("drag_coefficient", "force_std_N", "force_interval_s"):
+        assert found[name] == known.attrs[name]
+    fixed, drawn = (dataset(whole[0] / name) for name in ("assembly.nc", "assembly_drawn.nc"))
+    assert (fixed["drag_coefficient"] == known.attrs["drag_coefficient"]).all()
+    assert (fixed["force_std"] == known.attrs["force_std_N"]).all()
+    for name in ("drag_coefficient", "force_std"):
+        border = known[f"region_{name}"].values
+        assert np.unique(drawn[name]).size == 60
+        assert border.min() <= drawn[name].min()
+        assert drawn[name].max() <= border.max()
+    # The two kinds of runs have random numbers of their own.
+    assert (fixed["x"].values != drawn["x"].values).all()
+
+
+def test_the_run_directory_is_complete(whole: tuple[Path, Done], calibrated: Path) -> None:
+    folder = whole[0]
+    names = {path for path in contents(folder) if not path.startswith("figures/")}
+    assert names == {*RESULTS, *DRAWN, "manifest.json", ".lock", "figures"}
+    figures = {path.name for path in (folder / "figures").iterdir()}
+    assert {"outcomes.png", "class_times.svg", "film_strip.png"} <= figures
+    kinds = {name: dataset(folder / name).attrs["kind"] for name in (*RESULTS, *DRAWN)}
+    assert kinds == {
+        "assembly.nc": "assembly",
+        "distribution.nc": "outcome_distribution",
+        "class_times.nc": "class_times",
+        "path.nc": "assembly_path",
+        "assembly_drawn.nc": "assembly",
+        "distribution_drawn.nc": "outcome_distribution",
+    }
+    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    assert manifest["seeds"] == {"assembly": 1}
+    assert manifest["study"]["assembly"]["runs"] == 60
+    for name in ("calibration.nc", "flow.nc"):
+        assert hashlib.sha256((calibrated / name).read_bytes()).hexdigest() in json.dumps(manifest)
+    listed = {entry["path"]: entry["sha256"] for entry in manifest["files"]}
+    for name in (*RESULTS, *DRAWN):
+        assert listed[name] == hashlib.sha256((folder / name).read_bytes()).hexdigest()
+
+
+def test_the_path_is_that_of_the_first_runs(whole: tuple[Path, Done]) -> None:
+    fixed, path = (dataset(whole[0] / name) for name in ("assembly.nc", "path.nc"))
+    assert path["run"].values.tolist() == [0, 1, 2, 3]
+    assert path["time"].values[[0, -1]].tolist() == pytest.approx([0.0, 30.0])
+    apart = len(set(fixed["assembly"].values[2].tolist()))
+    assert len(set(path["assembly"].values[2, -1].tolist())) == apart
+
+
+def test_from_a_flow_field(tmp_path: Path) -> None:
+    """The form of the issue's second example, and that the result does not depend on threads."""
+    given = ["--flow", FLOW, "--drag-coefficient", "0.45", "--force-std", "0.55mN"]
+    found = []
+    for threads, size in (("1", "--tank-diameter"), ("2", "--study")):
+        study = tmp_path / "study.toml"
+        study.write_text('[tank]\ndiameter_m = "30cm"\n', encoding="utf-8")
+        tank = [size, "0.30" if size == "--tank-diameter" else study]
+        folder = tmp_path / f"run{threads}"
+        words = [*given, *tank, *SIZE, "--threads", threads, "-o", folder]
+        done = here("assemble", *words)
+        assert done.code == 0, done.err
+        assert "60 runs of 30 s; C_d = 0.45, σ_F = 0.55 mN drawn anew every 10 ms" in done.out
+        assert "l1 distance" not in done.out
+        assert not any((folder / name).exists() for name in DRAWN)
+        found.append(dataset(folder / "assembly.nc"))
+    assert_same_bits(*found)
+    again = here("assemble", *given, *SIZE, "--json", "-o", tmp_path / "json")
+    printed = json.loads(again.out)
+    assert set(printed) >= REQUIRED
+    assert printed["drawn"] is None
+
+
+def test_the_answer_for_people_stands_side_by_side(calibrated: Path, tmp_path: Path) -> None:
+    done = here("assemble", calibrated, *SIZE, "-o", tmp_path / "run")
+    assert done.code == 0, done.err
+    lines = done.out.splitlines()
+    head = next(line for line in lines if line.startswith("class"))
+    assert head.count("90% intervals, all at once") == 2
+    row = next(line for line in lines if line.startswith("complete")).split()
+    assert row.count("to") == 2
+    assert any(line.startswith("l1 distance of the two: ") for line in lines)
+    assert "drawn for each run: drag_coefficient, force_std, flow" in lines
+
+
+def test_options_reach_the_simulation(tmp_path: Path) -> None:
+    words = ["assemble", "--flow", FLOW, *SIZE, "--json"]
+    plain = json.loads(here(*words, "-o", tmp_path / "plain").out)
+    none = json.loads(here(*words, "--latching", "none", "-o", tmp_path / "none").out)
+    assert none["proportions"]["1+1+1+1"] == 1.0
+    assert plain["proportions"]["1+1+1+1"] < 1.0
+    mirror = here(*words, "--chirality", "distinct", "-o", tmp_path / "mirror")
+    assert {"Z", "J"} <= set(json.loads(mirror.out)["proportions"])
+    other = here(*words, "--seed", "2", "--confidence", "0.99", "-o", tmp_path / "other")
+    found = json.loads(other.out)
+    assert (found["seed"], found["confidence"]) == (2, 0.99)
+    assert found["proportions"] != plain["proportions"]
+
+
+def test_a_calibration_without_bootstrap_gives_one_distribution(
+    calibrated: Path, tmp_path: Path
+) -> None:
+    bare = tmp_path / "bare"
+    shutil.copytree(calibrated, bare)
+    known = dataset(calibrated / "calibration.nc")
+    del known.attrs["region_level"]
+    known.drop_vars(["region_drag_coefficient", "region_force_std"]).to_netcdf(
+        bare / "calibration.nc", engine="h5netcdf"
+    )
+    done = here("assemble", bare, *SIZE, "--json", "-o", tmp_path / "run")
+    found = json.loads(done.out)
+    assert found["drawn"] is None
+    assert any("no joint region" in warning for warning in found["warnings"])
+    assert not (tmp_path / "run" / "distribution_drawn.nc").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--blocks", "500"], "500 blocks of 0.03 m do not fit into the tank"),
+        (["--blocks", "70"], "of 70 blocks found a place in the tank, a circle of diameter 0.3 m"),
+        (["--blocks", "0"], "'--blocks'"),
+        (["--runs", "0"], "'--runs'"),
+        (["--duration", "0"], "--duration"),
+        (["--duration", "5mm"], "--duration"),
+        (["--tank-diameter", "50cm"], "the flow field does not cover the tank"),
+        (["--latching", "conector"], "did you mean 'connector'?"),
+        (["--chirality", "left"], "--chirality over"),
+        (["--hidden-face-drag", "half"], "--hidden-face-drag over"),
+        (["--confidence", "1"], "--confidence over"),
+        (["--side", "40cm"], "the block does not fit"),
+        (["--seed=-1"], "--seed"),
+    ],
+)
+@pytest.mark.parametrize("source", ["calibration", "flow"])
+def test_a_bad_option(
+    source: str, options: list[str], says: str, calibrated: Path, tmp_path: Path
+) -> None:
+    words = [calibrated] if source == "calibration" else ["--flow", FLOW]
+    line = refusal(here("assemble", *words, "--runs", "5", *options, "-o", tmp_path / "run"))
+    assert says in line
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_calibration_that_cannot_be_used(calibrated: Path, tmp_path: Path) -> None:
+    unfinished, empty, other = (tmp_path / name for name in ("unfinished", "empty", "other"))
+    empty.mkdir()
+    shutil.copytree(calibrated, unfinished)
+    (unfinished / "manifest.json").unlink()
+    (unfinished / ".run.json").write_text("{}", encoding="utf-8")
+    shutil.copytree(calibrated, other)
+    (other / "calibration.nc").unlink()
+    damaged = tmp_path / "damaged"
+    shutil.copytree(calibrated, damaged)
+    (damaged / "calibration.nc").write_bytes(b"\x89HDF\r\n\x1a\n")
+    wrong = tmp_path / "wrong"
+    shutil.copytree(calibrated, wrong)
+    shutil.copy(calibrated / "flow.nc", wrong / "calibration.nc")
+    says = {
+        unfinished: "holds a calibration that is not finished: run its command again",
+        empty: "is no run directory",
+        tmp_path / "nowhere": "does not exist",
+        RECORDING: "is no run directory",
+        other: "no calibration: its calibration (calibration.nc) is not there",
+        damaged: "cannot be read as NetCDF",
+        wrong: "is no calibration: its kind is 'flow_field'",
+    }
+    for folder, words in says.items():
+        line = refusal(here("assemble", folder, "-o", tmp_path / "run"))
+        assert str(folder) in line
+        assert words in line
+    assert not (tmp_path / "run").exists()
+
+
+def test_what_does_not_go_together(calibrated: Path, tmp_path: Path) -> None:
+    for options in (["--study", "x.toml"], ["--force-std", "1mN"], ["--force-interval", "16ms"]):
+        line = refusal(here("assemble", calibrated, *options, "-o", tmp_path / "run"))
+        assert f"{options[0]}: not with a calibration run" in line
+    assert "or a flow field (--flow)" in refusal(here("assemble", "-o", tmp_path / "run"))
+    missing = here("assemble", "--flow", tmp_path / "no.nc", "-o", tmp_path / "run")
+    assert "no such file" in refusal(missing)
+
+
+def test_a_finished_run_is_kept_until_overwrite(calibrated: Path, tmp_path: Path) -> None:
+    words = ["assemble", calibrated, *SIZE, "-o", tmp_path / "run"]
+    assert here(*words).code == 0
+    before = contents(tmp_path / "run")
+    assert "holds a finished run" in refusal(here(*words))
+    assert contents(tmp_path / "run") == before
+    assert here(*words, "--overwrite", "--seed", "2").code == 0
+    moved = list((tmp_path / "run" / "previous").iterdir())
+    assert [len(list(folder.glob("*.nc"))) for folder in moved] == [6]
+
+
+# Small units, and a moment after each, so that a test can see it and act in it.
+SLOW = """
+import time
+import driftwalk.report
+import driftwalk.assemble.run
+from driftwalk.core import shards
+driftwalk.report.write_assembly_figures = lambda *folders, **datasets: []
+driftwalk.assemble.run.BLOCKS_PER_UNIT = 100
+write = shards.ShardStore.write
+def slow(self, unit, arrays):
+    write(self, unit, arrays)
+    time.sleep(0.2)
+shards.ShardStore.write = slow
+"""
+
+
+def shards(folder: Path) -> dict[Path, int]:
+    return {path: path.stat().st_mtime_ns for path in folder.glob(".shards/*/[0-9]*.npz")}
+
+
+def wait_for_shards(folder: Path, count: int, process: subprocess.Popen[str]) -> None:
+    deadline = time.monotonic() + 120
+    while len(shards(folder)) < count:
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < deadline, "the run makes no progress"
+        time.sleep(0.005)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_killed_interrupted_and_continued(
+    whole: tuple[Path, Done], calibrated: Path, tmp_path: Path
+) -> None:
+    """Killed among the fixed runs, interrupted among the drawn ones: the same bits in the end."""
+    folder = tmp_path / "run"
+    words = ["assemble", calibrated, *SIZE, "--json", "-o", folder]
+    process = start(*words, before=SLOW)
+    wait_for_shards(folder, 2, process)
+    process.kill()
+    assert end(process).code == -signal.SIGKILL
+    first = shards(folder)
+    process = start(*words, before=SLOW)
+    wait_for_shards(folder, 4, process)
+    process.send_signal(signal.SIGINT)
+    done = end(process)
+    assert (done.code, done.out, done.err) == (130, "", "driftwalk: interrupted\n")
+    kept = shards(folder)
+    assert {path: kept[path] for path in first} == first
+    other = refusal(here(*words, "--seed", "2"))
+    assert "seed" in other
+    done = apart(*words, before=SLOW)
+    assert done.code == 0, done.err
+    assert json.loads(done.out) == json.loads(whole[1].out)
+    for name in (*RESULTS, *DRAWN):
+        assert_same_bits(dataset(folder / name), dataset(whole[0] / name))
+    assert not (folder / ".shards").exists()
