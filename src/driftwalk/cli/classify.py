@@ -43,29 +43,32 @@ def classify(
     join_distance: Annotated[
         float | None,
         _tolerance(
-            "--join-distance", "m", "Distance of face centres that join; a tenth of a side."
+            "--join-distance", "m", "Distance of face centres that join (default: side / 10)."
         ),
     ] = None,
     join_angle: Annotated[
-        float | None, _tolerance("--join-angle", "rad", "Angle between faces that join; 10deg.")
+        float | None,
+        _tolerance("--join-angle", "rad", "Angle between faces that join (default: 10deg)."),
     ] = None,
     release_distance: Annotated[
         float | None,
-        _tolerance("--release-distance", "m", "Distance that parts them; twice that to join."),
+        _tolerance(
+            "--release-distance", "m", "Distance that parts them (default: twice that to join)."
+        ),
     ] = None,
     release_angle: Annotated[
         float | None,
-        _tolerance("--release-angle", "rad", "Angle that parts them; twice that to join."),
+        _tolerance(
+            "--release-angle", "rad", "Angle that parts them (default: twice that to join)."
+        ),
     ] = None,
     min_duration: Annotated[
         float | None,
-        _tolerance(
-            "--min-duration", "s", "Shortest join, and shortest parting, that counts; 0.5s."
-        ),
+        _tolerance("--min-duration", "s", "Shortest join or parting that counts (default: 0.5s)."),
     ] = None,
     hold: Annotated[
         float | None,
-        _tolerance("--hold", "s", "How long a block that is not seen keeps its joins; 1s."),
+        _tolerance("--hold", "s", "How long an unseen block keeps its joins (default: 1s)."),
     ] = None,
     out: Annotated[
         Path | None,
