@@ -1,0 +1,116 @@
+"""Files of the figures of self-assembly: all written, the same each time, nothing cut off."""
+
+from __future__ import annotations
+
+import matplotlib
+import pytest
+from synthetic_assembly import (
+    assembly_path,
+    class_times,
+    components,
+    distribution,
+    one_axis,
+    realisations,
+    sensitivity,
+)
+
+from driftwalk.core.errors import InputError
+from driftwalk.report import assembly_figures
+from driftwalk.report.assembly_figures import write_assembly_figures, write_sensitivity_figures
+from driftwalk.report.style import print_style
+
+
+@pytest.fixture(scope="module")
+def study():
+    return sensitivity(3, points=(5, 4))
+
+
+def test_every_figure_of_an_experiment_is_written(tmp_path) -> None:
+    folder = tmp_path / "made" / "here"
+    written = write_assembly_figures(
+        folder,
+        distribution=distribution(),
+        beside=distribution(seed=2),
+        labels=("fixed", "drawn"),
+        realisations=realisations(),
+        times=class_times(),
+        path=assembly_path(),
+    )
+    names = ["outcomes", "class_times", "film_strip"]
+    assert [path.name for path in written] == [f"{n}.{s}" for n in names for s in ("png", "svg")]
+    assert all(path.stat().st_size > 10_000 for path in written)
+    assert sorted(folder.iterdir()) == sorted(written)
+
+
+def test_only_what_is_given_is_drawn(tmp_path) -> None:
+    written = write_assembly_figures(tmp_path, distribution=distribution(), formats=["png"])
+    assert [path.name for path in written] == ["outcomes.png"]
+
+
+def test_every_figure_of_a_study_is_written_the_same_each_time(study, tmp_path) -> None:
+    first, again = (
+        write_sensitivity_figures(
+            tmp_path / name, sensitivity=study, components=components(study), formats=["svg"]
+        )
+        for name in ("one", "two")
+    )
+    assert [path.stem for path in first] == ["l1_map", "class_panels", "biplot", "biplot_l1"]
+    for one, other in zip(first, again, strict=True):
+        assert one.read_bytes() == other.read_bytes(), one.name
+
+
+def test_a_study_along_one_axis_is_written(tmp_path) -> None:
+    data = one_axis("latching", ["none", "collision", "connector"])
+    assert len(write_sensitivity_figures(tmp_path, sensitivity=data, formats=["png"])) == 2
+
+
+def test_an_unknown_format_is_refused_before_anything_is_written(tmp_path) -> None:
+    with pytest.raises(InputError, match="as gif: choose from png, svg, pdf"):
+        write_assembly_figures(tmp_path / "x", distribution=distribution(), formats=["gif"])
+    assert not (tmp_path / "x").exists()
+
+
+def two_drags():
+    """Return a study along the diameter of the tank, with both ways to count drag."""
+    return one_axis("tank_diameter", [0.2, 0.3]).expand_dims(hidden_face_drag=["none", "full"])
+
+
+FIGURES = {
+    "map of words": lambda: assembly_figures.l1_map_figure(two_drags()),
+    "panels of words": lambda: assembly_figures.class_panels_figure(two_drags()),
+    "outcomes": lambda: assembly_figures.outcomes_figure(distribution()),
+    "outcomes of 12": lambda: assembly_figures.outcomes_figure(distribution(4, "distinct")),
+    "outcomes of 68": lambda: assembly_figures.outcomes_figure(distribution(6)),
+    "pairs": lambda: assembly_figures.outcomes_figure(
+        distribution(), beside=distribution(seed=2), realisations=realisations()
+    ),
+    "class times": lambda: assembly_figures.class_times_figure(class_times()),
+    "class times of 68": lambda: assembly_figures.class_times_figure(class_times(6)),
+    "map": lambda: assembly_figures.l1_map_figure(sensitivity(points=(8, 7))),
+    "map of 68": lambda: assembly_figures.l1_map_figure(sensitivity(6, points=(5, 5))),
+    "panels": lambda: assembly_figures.class_panels_figure(sensitivity(points=(5, 5))),
+}
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_every_text_lies_inside_its_figure(name) -> None:
+    with print_style():
+        figure = FIGURES[name]()
+        figure.draw_without_rendering()
+        # Labels of ticks beyond the limits are kept, not drawn.
+        ticks = {
+            id(text)
+            for ax in figure.axes
+            for axis in (ax.xaxis, ax.yaxis)
+            for text in axis.get_ticklabels()
+        }
+        for text in figure.findobj(matplotlib.text.Text):
+            if id(text) in ticks or not (text.get_text() and text.get_visible()):
+                continue
+            box = text.get_window_extent()
+            if box.width == 0.0:
+                continue
+            assert box.x0 >= -0.5, text
+            assert box.y0 >= -0.5, text
+            assert box.x1 <= figure.bbox.x1 + 0.5, text
+            assert box.y1 <= figure.bbox.y1 + 0.5, text
