@@ -37,6 +37,9 @@ COMMANDS: Final[dict[str, Command]] = {
         "calibrate", "calibrate", "Find the drag coefficient and the stochastic force."
     ),
     "assemble": Command("assemble", "assemble", "Simulate what many blocks build."),
+    "classify": Command(
+        "classify", "classify", "Say what the blocks of a recording assembled into."
+    ),
     "demo": Command("demo", "demo", "Calibrate a bundled recording, from file to report."),
 }
 
