@@ -20,6 +20,7 @@ from driftwalk.report.plot_l1_map import (
     shown_classes,
 )
 from driftwalk.report.plot_outcomes import plot_outcomes
+from driftwalk.report.polyomino_sketch import figure_of
 from driftwalk.report.style import (
     DOUBLE_COLUMN_MM,
     SINGLE_COLUMN_MM,
@@ -99,7 +100,7 @@ def write_assembly_figures(
     if times is not None:
         makers["class_times"] = lambda: class_times_figure(times)
     if path is not None:
-        makers["film_strip"] = lambda: plot_film_strip(path, run=run)
+        makers["film_strip"] = lambda: figure_of(plot_film_strip(path, run=run)[0])
     return _write(makers, folder, formats)
 
 
@@ -158,12 +159,9 @@ def outcomes_figure(
     realisations: xr.Dataset | None = None,
 ) -> Figure:
     """Return Fig. 9: one column wide for few classes, else two."""
-    wide = beside is not None or distribution.sizes["class"] > 12
-    figure = new_figure(width_mm=DOUBLE_COLUMN_MM if wide else SINGLE_COLUMN_MM, height_mm=78.0)
-    plot_outcomes(
-        distribution, figure.add_subplot(), beside=beside, labels=labels, realisations=realisations
+    return figure_of(
+        plot_outcomes(distribution, beside=beside, labels=labels, realisations=realisations)
     )
-    return figure
 
 
 def class_times_figure(times: xr.Dataset) -> Figure:
@@ -190,10 +188,7 @@ def l1_map_figure(sensitivity: xr.Dataset) -> Figure:
 
 def class_panels_figure(sensitivity: xr.Dataset) -> Figure:
     """Return the proportion of every class over the axes of the study."""
-    figure = plot_class_panels(sensitivity)[0].get_figure(root=True)
-    if figure is None:
-        raise InputError("the panels belong to no figure")
-    return figure
+    return figure_of(plot_class_panels(sensitivity)[0])
 
 
 def biplot_figure(

@@ -16,6 +16,7 @@ from driftwalk.report.polyomino_sketch import (
     axes_points,
     class_cells,
     name_text,
+    settle_layout,
     sketch_box,
     sketch_size,
 )
@@ -24,6 +25,7 @@ from driftwalk.report.style import (
     INK,
     MUTED,
     SCORE_COLORMAP,
+    STYLE,
     add_colorbar,
     axes_or_new,
 )
@@ -47,6 +49,7 @@ ALONG: Final = np.linspace(0.1, 1.0, 19)
 # Free space between tip and label [pt], and what is bad about a place.
 DISTANCES_PT: Final = (2.0, 8.0, 16.0, 26.0, 38.0)
 COST_LABEL, COST_LINE, COST_DOT, MOST_DOTS, COST_PT, COST_BEHIND = 1000.0, 8.0, 1.5, 10, 0.5, 4.0
+TITLE_PT: Final = STYLE["axes.titlesize"]
 COLORS: Final = {
     "complete": ("share of runs with one assembly", SCORE_COLORMAP),
     "l1_distance": (DISTANCE_LABEL, DISTANCE_COLORMAP),
@@ -116,7 +119,7 @@ def plot_biplot(
     factor = _arrow_factor(points, loading)
     ax.set_xlabel(f"component 1 ({share[0]:.3g} % of the variance)")
     ax.set_ylabel(f"component 2 ({share[1]:.3g} % of the variance)")
-    ax.set_title(f"dots: settings; arrows: loadings × {factor:.2g}", loc="left")
+    ax.set_title(f"dots: settings; arrows: loadings × {factor:.2g}", loc="left", size=TITLE_PT)
     tips = factor * loading
     _set_limits(ax, np.vstack([points, tips, np.zeros((1, 2))]))
     _draw_arrows(ax, tips, class_names(components), points)
@@ -149,11 +152,7 @@ def _set_limits(ax: Axes, drawn: Array) -> None:
     """Set limits with room for labels around all that is drawn, one scale for both axes."""
     low, high = np.nanmin(drawn, axis=0), np.nanmax(drawn, axis=0)
     middle, span = (low + high) / 2.0, (high - low) * (1.0 + 2.0 * MARGIN)
-    figure = ax.get_figure(root=True)
-    engine = None if figure is None else figure.get_layout_engine()
-    if figure is not None and engine is not None:
-        # The axes get their final size now, so that places in points stay true.
-        engine.execute(figure)
+    settle_layout(ax)
     size = axes_points(ax)
     per_point = float((span / size).max()) or 1.0
     for axis, center, length in zip("xy", middle, per_point * size, strict=True):

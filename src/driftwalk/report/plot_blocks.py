@@ -78,7 +78,9 @@ def plot_blocks(
     return ax
 
 
-def plot_film_strip(path: xr.Dataset, axes: Any = None, *, run: int = 0, count: int = 6) -> Figure:
+def plot_film_strip(
+    path: xr.Dataset, axes: Any = None, *, run: int = 0, count: int = 6
+) -> list[Axes]:
     """Draw a run as a strip of moments, equally far apart from its start to its end.
 
     Parameters
@@ -94,8 +96,8 @@ def plot_film_strip(path: xr.Dataset, axes: Any = None, *, run: int = 0, count: 
 
     Returns
     -------
-    matplotlib.figure.Figure
-        The figure.
+    list of matplotlib.axes.Axes
+        The axes, one per moment.
 
     Raises
     ------
@@ -104,7 +106,7 @@ def plot_film_strip(path: xr.Dataset, axes: Any = None, *, run: int = 0, count: 
 
     Examples
     --------
-    ``plot_film_strip(path, run=0, count=8).savefig("strip.png")``
+    ``plot_film_strip(path, run=0, count=8)[0].figure.savefig("strip.png")``
     """
     one = _one_run(path, run, kind="assembly_path")
     if count < 2:
@@ -115,10 +117,7 @@ def plot_film_strip(path: xr.Dataset, axes: Any = None, *, run: int = 0, count: 
         plot_blocks(path, ax, run=run, time=float(moment))
         ax.set_axis_off()
     _scale_bar(panels[0])
-    figure = panels[0].get_figure(root=True)
-    if figure is None:
-        raise InputError("the axes of the strip belong to no figure")
-    return figure
+    return panels
 
 
 def write_animation(

@@ -27,6 +27,7 @@ from driftwalk.report.polyomino_sketch import (
     NAME_SIZE_PT,
     axes_points,
     class_cells,
+    figure_of,
     name_text,
     place_sketch,
     sketch_size,
@@ -40,6 +41,7 @@ from driftwalk.report.style import (
     ORANGE,
     PALE,
     SINGLE_COLUMN_MM,
+    STYLE,
     add_colorbar,
     axes_or_new,
     new_figure,
@@ -419,10 +421,9 @@ def _turn_words(ax: Axes, sweep: list[SweepAxis]) -> None:
 
 def _legend_of_figure(ax: Axes) -> None:
     """Put the legend of one panel, which holds for all, above the figure."""
-    figure = ax.get_figure(root=True)
     handles, labels = ax.get_legend_handles_labels()
-    if figure is not None and labels:
-        figure.legend(handles, labels, loc="outside upper center", ncols=4)
+    if labels:
+        figure_of(ax).legend(handles, labels, loc="outside upper center", ncols=4)
 
 
 def _legend_above(ax: Axes) -> None:
@@ -432,4 +433,5 @@ def _legend_above(ax: Axes) -> None:
         ax.legend(
             handles, labels, loc="lower left", bbox_to_anchor=(0.0, 1.0),
             ncols=2 if narrow else 1, borderaxespad=0.2,
+            fontsize=STYLE["legend.fontsize"], frameon=False,
         )  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,8 +17,17 @@ from driftwalk.report.assembly_labels import (
     percent,
     runs_text,
 )
-from driftwalk.report.polyomino_sketch import draw_sketches_below
-from driftwalk.report.style import BLUE, INK, MUTED, ORANGE, axes_or_new
+from driftwalk.report.polyomino_sketch import axes_points, draw_sketches_below, settle_layout
+from driftwalk.report.style import (
+    BLUE,
+    DOUBLE_COLUMN_MM,
+    INK,
+    MUTED,
+    ORANGE,
+    SINGLE_COLUMN_MM,
+    STYLE,
+    new_figure,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,6 +35,9 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 BAR_WIDTH = 0.76
+# So many classes have room in one column of a page; a legend needs so much for two columns [pt].
+NARROW_CLASSES = 12
+WIDE_LEGEND_PT = 380.0
 
 
 class Bars(NamedTuple):
@@ -55,7 +67,8 @@ def plot_outcomes(
     distribution : xarray.Dataset
         An `outcome_distribution`.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure when left out.
+        Where to draw; a new figure when left out, two columns wide for two distributions or more
+        than 12 classes.
     beside : xarray.Dataset, optional
         A second `outcome_distribution`, drawn beside the first. Classes are matched by name.
     labels : tuple of str
@@ -93,7 +106,7 @@ def plot_outcomes(
     drawn = [names[index] for index in shown]
     if len(shown) < len(names):
         drawn.append(OTHER)
-    ax = axes_or_new(ax, height_mm=70.0)
+    ax = _new_axes(wide=len(both) > 1 or len(drawn) > NARROW_CLASSES) if ax is None else ax
     place = np.arange(len(drawn), dtype=np.float64)
     width = BAR_WIDTH / len(both)
     for index, dataset in enumerate(both):
@@ -107,14 +120,19 @@ def plot_outcomes(
         _draw_realisations(ax, at + 0.22 * width, realisations, names, shown)
     ax.set_xlim(-0.6, len(drawn) - 0.4)
     ax.set_ylim(bottom=0.0)
-    height = draw_sketches_below(ax, list(place), drawn)
     rest = f" (other: {len(names) - len(shown)} rarer classes)" if OTHER in drawn else ""
-    ax.set_xlabel(f"outcome class{rest}", labelpad=height)
     ax.set_ylabel("proportion of runs")
     ax.spines[["top", "right"]].set_visible(False)
     _divide(ax, drawn)
-    _legend(ax, both, realisations)
+    _legend(ax, both)
+    settle_layout(ax)
+    ax.set_xlabel(f"outcome class{rest}", labelpad=draw_sketches_below(ax, list(place), drawn))
     return ax
+
+
+def _new_axes(*, wide: bool) -> Axes:
+    figure = new_figure(width_mm=DOUBLE_COLUMN_MM if wide else SINGLE_COLUMN_MM, height_mm=76.0)
+    return figure.add_subplot()
 
 
 def _on_classes(proportion: xr.DataArray, names: list[str]) -> Array:
@@ -195,7 +213,7 @@ def _legend_text(dataset: xr.Dataset, label: str) -> str:
     return text
 
 
-def _legend(ax: Axes, both: list[xr.Dataset], realisations: Any) -> None:
+def _legend(ax: Axes, both: list[xr.Dataset]) -> None:
     from matplotlib.lines import Line2D
 
     handles, texts = ax.get_legend_handles_labels()
@@ -207,5 +225,6 @@ def _legend(ax: Axes, both: list[xr.Dataset], realisations: Any) -> None:
     texts.append(f"{percent(confidence)} {name}" if confidence is not None else name)
     ax.legend(
         handles, texts, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2,
-        ncols=1 if len(both) + (realisations is not None) < 2 else 2,
+        fontsize=STYLE["legend.fontsize"], frameon=False,
+        ncols=2 if len(handles) > 2 and axes_points(ax)[0] > WIDE_LEGEND_PT else 1,
     )  # fmt: skip

@@ -13,6 +13,7 @@ from driftwalk.report.style import BLUE, INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from matplotlib.offsetbox import AnnotationBbox, DrawingArea
 
 Array = npt.NDArray[np.float64]
@@ -270,7 +271,7 @@ def draw_sketches_below(
         name: sketch_size(class_cells(name, orientation="tall")) for name in names if is_class(name)
     }
     largest = np.max([*sizes.values(), np.ones(2)], axis=0)
-    side = min(MAX_CELL_PT, 0.82 * slot_pt / largest[0]) if cell_pt is None else cell_pt
+    side = min(MAX_CELL_PT, 0.72 * slot_pt / largest[0]) if cell_pt is None else cell_pt
     ax.set_xticks(list(positions), labels=[""] * len(positions))
     ax.tick_params(axis="x", length=0.0)
     deepest = 0.0
@@ -364,12 +365,26 @@ def _shelves(sizes: Array, limit: float) -> Array:
     return offsets
 
 
+def figure_of(ax: Axes) -> Figure:
+    """Return the whole figure that axes lie in."""
+    figure = ax.get_figure(root=True)
+    if figure is None:
+        raise InputError("the axes were removed from their figure")
+    return figure
+
+
 def axes_points(ax: Axes) -> Array:
     """Return width and height of axes as they lie now [pt]."""
-    figure = ax.get_figure(root=True)
-    dots_per_inch = figure.dpi if figure is not None else 100.0
-    size: Array = np.array([ax.bbox.width, ax.bbox.height]) / dots_per_inch * 72.0
+    size: Array = np.array([ax.bbox.width, ax.bbox.height]) / figure_of(ax).dpi * 72.0
     return size
+
+
+def settle_layout(ax: Axes) -> None:
+    """Give axes the size that they will have, so that sizes and places in points stay true."""
+    figure = figure_of(ax)
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
 
 
 def _slot_points(ax: Axes, positions: Sequence[float]) -> float:

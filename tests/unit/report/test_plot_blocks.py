@@ -83,11 +83,11 @@ def test_end_of_the_runs_is_drawn_from_an_assembly_dataset(path) -> None:
 
 
 def test_strip_shows_equally_spaced_moments(path) -> None:
-    figure = plot_film_strip(path, run=1, count=7)
-    assert [ax.get_title(loc="left") for ax in figure.axes] == [
+    panels = plot_film_strip(path, run=1, count=7)
+    assert [ax.get_title(loc="left") for ax in panels] == [
         f"t = {time} s" for time in (0, 50, 100, 150, 200, 250, 300)
     ]
-    for ax, sample in zip(figure.axes, range(0, 301, 50), strict=True):
+    for ax, sample in zip(panels, range(0, 301, 50), strict=True):
         expected = 100 * np.column_stack([path[name].values[1, sample] for name in "xy"])
         np.testing.assert_allclose(centers(ax), expected, atol=1e-9)
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from matplotlib.container import BarContainer, ErrorbarContainer
@@ -11,6 +14,7 @@ from synthetic_assembly import distribution, outcome_classes, realisations
 from driftwalk.core.errors import InputError
 from driftwalk.report.assembly_labels import classes_to_show
 from driftwalk.report.plot_outcomes import plot_outcomes
+from driftwalk.report.style import print_style
 
 
 def bars(ax) -> list[BarContainer]:
@@ -137,3 +141,21 @@ def test_what_cannot_be_drawn_is_refused() -> None:
         plot_outcomes(data, realisations=realisations(1))
     with pytest.raises(InputError, match="realisation, class"):
         plot_outcomes(data, realisations=data)
+
+
+@pytest.mark.parametrize("style", ["own", "print"])
+@pytest.mark.parametrize("pair", [False, True])
+def test_sketches_stay_apart_in_any_style(style, pair) -> None:
+    """With the reader's large letters a wide legend once squeezed the bars together."""
+    with print_style() if style == "print" else nullcontext():
+        ax = plot_outcomes(
+            distribution(4, "distinct"),
+            beside=distribution(4, "distinct", seed=2) if pair else None,
+            labels=("fixed parameters", "drawn from the region") if pair else ("", ""),
+        )
+        ax.figure.draw_without_rendering()
+        boxes = [a.get_window_extent() for a in ax.artists if isinstance(a, AnnotationBbox)]
+        legend = ax.get_legend().get_window_extent()
+    assert len(boxes) == 12
+    assert not any(left.overlaps(right) for left, right in pairwise(boxes))
+    assert legend.x1 <= ax.figure.bbox.x1
