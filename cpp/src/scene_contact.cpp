@@ -146,12 +146,59 @@ bool may_touch(const AssemblyRules& rules, const Scene& scene, BlockPair pair) {
          !are_far(rules, scene, pair.first, pair.second);
 }
 
-void shift(const AssemblyRules& rules, Scene& scene, int assembly, Vec2 by, int round) {
-  constexpr int wall_rounds = 4;
+// Rounds in which blocks that overlap are shifted; beyond, they are turned too.
+constexpr int shift_rounds = 10;
+
+void shift(Scene& scene, int assembly, Vec2 by, int round) {
   SceneAssembly& a = scene.assembly[assembly];
   a.x += by.x;
   a.y += by.y;
   a.moved = round;
+}
+
+// Turns an assembly by a small angle; no library's sine or cosine.
+void turn(Scene& scene, int assembly, double angle) {
+  constexpr double largest = 0.02;
+  angle = std::clamp(angle, -largest, largest);
+  SceneAssembly& a = scene.assembly[assembly];
+  const double cosine = a.cosine - angle * a.sine, sine = a.sine + angle * a.cosine;
+  const double length = std::sqrt(cosine * cosine + sine * sine);
+  a.cosine = cosine / length;
+  a.sine = sine / length;
+  a.theta += angle;
+}
+
+// Moves two blocks apart along the axis of least penetration, in inverse proportion to the masses.
+void shift_apart(Scene& scene, BlockPair pair, const Overlap& overlap, int round) {
+  const int first = scene.block[pair.first].assembly, second = scene.block[pair.second].assembly;
+  const int a = scene.assembly[first].blocks, b = scene.assembly[second].blocks;
+  const Vec2 share = overlap.normal * (overlap.depth / (a + b));
+  shift(scene, first, share * -b, round);
+  shift(scene, second, share * a, round);
+}
+
+// The same by impulses of position at the contact points, which turn the assemblies as well: what
+// is wedged between others has no other way out.
+void turn_apart(const AssemblyRules& rules, Scene& scene, BlockPair pair, const Overlap& overlap,
+                int round) {
+  const int first = scene.block[pair.first].assembly, second = scene.block[pair.second].assembly;
+  SceneAssembly &a = scene.assembly[first], &b = scene.assembly[second];
+  const Manifold manifold = manifold_of(rules, scene, pair, overlap);
+  const Bodies bodies{a, b, rules.mass * a.blocks, rules.mass * b.blocks};
+  for (int k = 0; k < manifold.count; ++k) {
+    const Touch& touch = manifold.touch[k];
+    const Vec2 n = manifold.normal;
+    const double push =
+        touch.depth / bodies.response(touch, touch, n) / static_cast<double>(manifold.count);
+    shift(scene, first, n * (-push / bodies.mass_first), round);
+    shift(scene, second, n * (push / bodies.mass_second), round);
+    turn(scene, first, -cross(touch.on_first, n) * push / a.inertia);
+    turn(scene, second, cross(touch.on_second, n) * push / b.inertia);
+  }
+}
+
+void keep_inside(const AssemblyRules& rules, Scene& scene, int assembly) {
+  constexpr int wall_rounds = 4;
   place_members(scene, assembly);
   push_inside(rules, scene, assembly, wall_rounds);
 }
@@ -179,8 +226,42 @@ void bounce(const AssemblyRules& rules, Scene& scene) {
   }
 }
 
+namespace {
+// Back to where an assembly was before the step, at rest.
+void take_back(Scene& scene, int assembly) {
+  SceneAssembly& a = scene.assembly[assembly];
+  a.x = a.before.x;
+  a.y = a.before.y;
+  a.theta = a.before.theta;
+  a.cosine = a.before.cosine;
+  a.sine = a.before.sine;
+  a.vx = a.vy = a.omega = 0;
+  a.touched = true;
+  place_members(scene, assembly);
+}
+
+// What nothing could part, assemblies hooked into each other for one, has not moved in this step.
+// Before it all were apart, so in the end they are again.
+void undo_jam(const AssemblyRules& rules, Scene& scene) {
+  constexpr double tolerance = 1e-4;
+  bool jammed = true;
+  for (int round = 0; jammed && round < scene.blocks; ++round) {
+    jammed = false;
+    for (int k = 0; k < scene.pairs.count; ++k) {
+      const BlockPair pair = scene.pairs.pair[k];
+      if (may_touch(rules, scene, pair) &&
+          overlap_of(rules, scene, pair.first, pair.second).depth > tolerance) {
+        jammed = true;
+        take_back(scene, scene.block[pair.first].assembly);
+        take_back(scene, scene.block[pair.second].assembly);
+      }
+    }
+  }
+}
+} // namespace
+
 void separate(const AssemblyRules& rules, Scene& scene) {
-  constexpr int most_rounds = 100;
+  constexpr int most_rounds = 40;
   constexpr double tolerance = 1e-5;
   for (int a = 0; a < scene.blocks; ++a) {
     scene.assembly[a].moved = 0;
@@ -192,9 +273,9 @@ void separate(const AssemblyRules& rules, Scene& scene) {
       const BlockPair pair = scene.pairs.pair[k];
       const int first = scene.block[pair.first].assembly,
                 second = scene.block[pair.second].assembly;
-      SceneAssembly &a = scene.assembly[first], &b = scene.assembly[second];
       // What has not moved since the last round is as it was then.
-      if (std::max(a.moved, b.moved) < round - 1 || !may_touch(rules, scene, pair)) {
+      if (std::max(scene.assembly[first].moved, scene.assembly[second].moved) < round - 1 ||
+          !may_touch(rules, scene, pair)) {
         continue;
       }
       const Overlap overlap = overlap_of(rules, scene, pair.first, pair.second);
@@ -202,10 +283,17 @@ void separate(const AssemblyRules& rules, Scene& scene) {
         continue;
       }
       moved = true;
-      const Vec2 share = overlap.normal * (overlap.depth / (a.blocks + b.blocks));
-      shift(rules, scene, first, share * -b.blocks, round);
-      shift(rules, scene, second, share * a.blocks, round);
+      if (round <= shift_rounds) {
+        shift_apart(scene, pair, overlap, round);
+      } else {
+        turn_apart(rules, scene, pair, overlap, round);
+      }
+      keep_inside(rules, scene, first);
+      keep_inside(rules, scene, second);
     }
+  }
+  if (moved) {
+    undo_jam(rules, scene);
   }
 }
 

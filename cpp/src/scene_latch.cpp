@@ -185,6 +185,7 @@ bool try_merge(const AssemblyRules& rules, Scene& scene, const Merge& merge) {
     scene.assembly[merge.moves] = moved;
     return false;
   }
+  body.before = {body.x, body.y, body.theta, body.cosine, body.sine};
   body.touched = true;
   --scene.assemblies;
   record(scene, merge, own_faces);

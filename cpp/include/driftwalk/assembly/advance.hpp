@@ -151,6 +151,8 @@ inline void finish_step(const Physics<Real, T>& physics, const Real* total, Memb
   mean.vy = m.ahead.vy + (total[1] * per_mass * m.per_count - m.drag.vy) * damping * half;
   mean.omega =
       m.ahead.omega + (total[2] * per_inertia * m.lightness - m.drag.omega) * spin_damping * half;
+  m.before = m.pose;
+  m.axes_before = m.axes;
   m.pose.x = m.pose.x + mean.vx * dt;
   m.pose.y = m.pose.y + mean.vy * dt;
   m.pose.theta = wrap_angle(m.pose.theta + mean.omega * dt);

@@ -64,6 +64,14 @@ inline void load_lane(const AssemblyRules& rules, const AssemblyWorlds& worlds, 
     put(m.pose.theta, lane, __builtin_remainder(start[2], 2 * pi_value));
     put_rest<Real, T>(m.motion, lane);
     put_rest<Real, T>(m.drag, lane);
+    // Found anew in the first step; until then any axes will do for a block alone.
+    put(m.axes.cosine, lane, T(1));
+    put(m.axes.sine, lane, T(0));
+    put(m.axes_before.cosine, lane, T(1));
+    put(m.axes_before.sine, lane, T(0));
+    put(m.before.x, lane, start[0]);
+    put(m.before.y, lane, start[1]);
+    put(m.before.theta, lane, T(0));
     put(m.root, lane, b);
     put(m.per_count, lane, T(1));
     put(m.per_inertia, lane, rules.mass / rules.inertia);
@@ -79,6 +87,14 @@ inline void load_lane(const AssemblyRules& rules, const AssemblyWorlds& worlds, 
     }
     pack.book(b, lane) = {0, 0, 0, 0};
   }
+}
+
+template <class Real>
+inline void unit_axes(const Axes<Real>& axes, int lane, double& cosine, double& sine) {
+  const double c = get(axes.cosine, lane), s = get(axes.sine, lane);
+  const double length = __builtin_sqrt(c * c + s * s);
+  cosine = c / length;
+  sine = s / length;
 }
 
 // The lane's world in plain numbers.
@@ -106,10 +122,11 @@ inline void fill_scene(const AssemblyRules& rules, const PackMemory<Real>& pack,
       assembly.x = get(m.pose.x, lane);
       assembly.y = get(m.pose.y, lane);
       assembly.theta = get(m.pose.theta, lane);
-      const double cosine = get(m.axes.cosine, lane), sine = get(m.axes.sine, lane);
-      const double length = __builtin_sqrt(cosine * cosine + sine * sine);
-      assembly.cosine = cosine / length;
-      assembly.sine = sine / length;
+      unit_axes(m.axes, lane, assembly.cosine, assembly.sine);
+      assembly.before.x = get(m.before.x, lane);
+      assembly.before.y = get(m.before.y, lane);
+      assembly.before.theta = get(m.before.theta, lane);
+      unit_axes(m.axes_before, lane, assembly.before.cosine, assembly.before.sine);
       assembly.vx = get(m.motion.vx, lane);
       assembly.vy = get(m.motion.vy, lane);
       assembly.omega = get(m.motion.omega, lane);

@@ -19,10 +19,12 @@ struct Member {
   Motion<Real> motion;
   Motion<Real> drag; // drag acceleration of the previous step
   Axes<Real> axes;   // of pose.theta
-  Int root;          // lowest block of the assembly
-  Real per_count;    // 1 / number of its blocks
-  Real per_inertia;  // its mass / its moment of inertia [1/m^2]
-  Real lightness;    // a block's moment of inertia / its own
+  Pose<Real> before; // at the start of the step
+  Axes<Real> axes_before;
+  Int root;         // lowest block of the assembly
+  Real per_count;   // 1 / number of its blocks
+  Real per_inertia; // its mass / its moment of inertia [1/m^2]
+  Real lightness;   // a block's moment of inertia / its own
   // of the block
   Real offset_x, offset_y; // from the centre of mass, in the assembly's frame [m]
   Arm<Real> arm;           // the same in the tank's frame

@@ -19,6 +19,11 @@ struct SceneBlock {
   double x, y;               // position [m]
 };
 
+struct ScenePose {
+  double x, y, theta;
+  double cosine, sine; // of theta
+};
+
 // A rigid assembly, kept at the index of its lowest block.
 struct SceneAssembly {
   int blocks;      // 0: not the lowest block of any
@@ -26,9 +31,10 @@ struct SceneAssembly {
   double x, y, theta;
   double cosine, sine; // of theta
   double vx, vy, omega;
-  double inertia; // about its centre of mass [kg m^2]
-  bool touched;   // an impulse or a merge changed it
-  int moved;      // last round of `separate` in which it was moved
+  double inertia;   // about its centre of mass [kg m^2]
+  ScenePose before; // at the start of the step
+  bool touched;     // an impulse or a merge changed it
+  int moved;        // last round of `separate` in which it was moved
 };
 
 // Two blocks that may be near each other, first < second.
