@@ -20,6 +20,7 @@ STAGES = (
     "compare",
     "sweep",
     "calibrate",
+    "assemble",
     "datasets",
     "report",
 )
