@@ -1,9 +1,15 @@
 """Figures of stored datasets: functions that take axes and return them, and a writer of files."""
 
+from driftwalk.report.assembly_figures import write_assembly_figures, write_sensitivity_figures
 from driftwalk.report.figures import write_figures
+from driftwalk.report.plot_biplot import plot_biplot
+from driftwalk.report.plot_blocks import plot_blocks, plot_film_strip, write_animation
+from driftwalk.report.plot_class_times import plot_class_times, plot_survival
 from driftwalk.report.plot_density_panels import plot_density_panels
 from driftwalk.report.plot_flow import plot_flow
 from driftwalk.report.plot_ks_map import plot_ks_map, plot_refined_map
+from driftwalk.report.plot_l1_map import plot_class_key, plot_class_panels, plot_l1_map
+from driftwalk.report.plot_outcomes import plot_outcomes
 from driftwalk.report.plot_steps import plot_step_density, plot_steps
 from driftwalk.report.plot_trajectory import plot_trajectory
 from driftwalk.report.plot_validation import (
@@ -13,15 +19,27 @@ from driftwalk.report.plot_validation import (
 )
 
 __all__ = [
+    "plot_biplot",
+    "plot_blocks",
     "plot_bootstrap",
+    "plot_class_key",
+    "plot_class_panels",
+    "plot_class_times",
     "plot_density_panels",
     "plot_distance_profile",
+    "plot_film_strip",
     "plot_flow",
     "plot_ks_map",
+    "plot_l1_map",
+    "plot_outcomes",
     "plot_refined_map",
     "plot_step_density",
     "plot_steps",
+    "plot_survival",
     "plot_trajectory",
     "plot_validation",
+    "write_animation",
+    "write_assembly_figures",
     "write_figures",
+    "write_sensitivity_figures",
 ]
