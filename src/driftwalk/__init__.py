@@ -14,7 +14,17 @@ __version__ = "0.1.0"
 
 # The stages whose public names are also names of the package; a stage's `__all__` is the only list
 # of its names.
-_STAGES = ("record", "flow", "model", "simulate", "compare", "calibrate", "assemble", "datasets", "report")
+_STAGES = (
+    "record",
+    "flow",
+    "model",
+    "simulate",
+    "compare",
+    "calibrate",
+    "assemble",
+    "datasets",
+    "report",
+)
 
 
 class _Stage(ModuleType):

@@ -58,6 +58,7 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the figures, which take most of the time of a short run in this process."""
     monkeypatch.setattr("driftwalk.report.write_assembly_figures", lambda *folders, **datasets: [])
+    monkeypatch.setattr("driftwalk.report.write_animation", lambda *words: None)
 
 
 @pytest.fixture(scope="module")

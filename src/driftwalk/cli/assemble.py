@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -90,6 +91,9 @@ def assemble(
     block_friction: BlockFriction = None,
     confidence: Confidence = None,
     seed: Seed = None,
+    film: Annotated[
+        str, typer.Option("--film", metavar="gif|mp4|none", help="Film of the first run.")
+    ] = "gif",
     threads: Threads = None,
     overwrite: Overwrite = False,
     json: Json = False,
@@ -103,6 +107,7 @@ def assemble(
     """
     from driftwalk.cli.assembly_run import run_assembly
 
+    _check_film(film)
     overrides = study_overrides(
         keys=ASSEMBLY_KEYS,
         blocks=blocks,
@@ -132,7 +137,7 @@ def assemble(
         work, warnings = _from_flow(study, flow, overrides, threads)
     else:
         work, warnings = _from_calibration(run, study, flow, overrides, threads)
-    result = run_assembly(work, out, overwrite=overwrite)
+    result = run_assembly(work, out, film=film, overwrite=overwrite)
     warnings = [*warnings, *_left_out(result)]
     if json:
         print_json({**summary(work.study, result), "warnings": warnings})
@@ -140,6 +145,16 @@ def assemble(
     print_answer(work.study, result, out)
     for warning in warnings:
         print_note(f"warning: {warning}")
+
+
+def _check_film(film: str) -> None:
+    """Refuse a film that cannot be made before anything is simulated for it."""
+    if film not in ("gif", "mp4", "none"):
+        raise InputError(f"--film takes gif, mp4 or none, got '{film}'")
+    if film == "mp4" and shutil.which("ffmpeg") is None:
+        raise InputError(
+            "--film mp4 needs the program ffmpeg, which is not installed: install it or take gif"
+        )
 
 
 def _from_flow(

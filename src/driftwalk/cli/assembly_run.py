@@ -71,7 +71,9 @@ class AssemblyResult:
     drawn: xr.Dataset | None
 
 
-def run_assembly(work: AssemblyWork, folder: Path, *, overwrite: bool) -> AssemblyResult:
+def run_assembly(
+    work: AssemblyWork, folder: Path, *, film: str = "none", overwrite: bool
+) -> AssemblyResult:
     """Simulate self-assembly in a run directory and return the distributions of outcomes.
 
     Writes ``assembly.nc``, ``distribution.nc``, ``class_times.nc``, ``path.nc``, and with drawn
@@ -84,6 +86,8 @@ def run_assembly(work: AssemblyWork, folder: Path, *, overwrite: bool) -> Assemb
         What to do.
     folder : Path
         The run directory.
+    film : {"gif", "mp4", "none"}
+        Whether the first run is filmed too.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
 
@@ -110,6 +114,8 @@ def run_assembly(work: AssemblyWork, folder: Path, *, overwrite: bool) -> Assemb
         )
         with ProgressReporter("assemble") as progress:
             result = _simulate(work, run, progress)
+            if film != "none":
+                _write_film(run, film, progress)
         run.finish(about)
     return result
 
@@ -181,6 +187,17 @@ def _simulate(work: AssemblyWork, run: RunDirectory, progress: ProgressReporter)
         path=path,
     )
     return AssemblyResult(distribution, times, drawn)
+
+
+def _write_film(run: RunDirectory, film: str, progress: ProgressReporter) -> None:
+    """Film the first run from what is stored of it."""
+    import xarray as xr
+
+    from driftwalk.report import write_animation
+
+    progress.update(1, 1, "film")
+    with xr.open_dataset(run.path / "path.nc", engine="h5netcdf") as path:
+        write_animation(path, run.folder("figures") / f"run.{film}")
 
 
 def _specification(work: AssemblyWork) -> dict[str, Any]:
