@@ -1,0 +1,34 @@
+"""Draw outcomes with and without drag on hidden faces: python picture.py FIGURE.png [LATCHING].
+
+1000 runs of each; LATCHING is that of the study, by default "connector".
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from model import simulate
+
+import driftwalk as dw
+from driftwalk.report.style import new_figure, print_style
+
+RUNS = 1000
+DPI = 110
+
+
+def main(file: str, latching: str = "connector") -> None:
+    """Simulate both and write the figure."""
+    without, full = (
+        simulate(faces, runs=RUNS, changes={"assembly.latching": latching})
+        for faces in ("none", "full")
+    )
+    labels = ("hidden faces without drag", "with the drag of free faces")
+    with print_style():
+        figure = new_figure(width_mm=160.0, height_mm=76.0)
+        dw.plot_outcomes(without, figure.add_subplot(), beside=full, labels=labels)
+        figure.savefig(Path(file), dpi=DPI, metadata={"Software": None})
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
