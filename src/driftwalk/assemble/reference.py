@@ -15,13 +15,18 @@ What the rules leave open is decided so:
 * Steps of events, of the first contact and of the end count completed steps: time = step * dt.
 * A world is complete by a merge. A world of one block has none and runs to its last step; so does
   every world that is sampled, and `end_step` is then the last step.
-* The first pose, sample 0, is the start after the blocks have been put inside the wall, as in the
-  one-block kernel. Blocks that overlap at the start are settled in the first step.
-* A round of push-out moves out every corner that is outside at all; whether another round follows
-  is decided by the tolerance, before the round. The same holds for pairs in the separation.
-* An overlapping pair counts as touched whether or not an impulse was needed, as at the wall.
+* The start is taken as it is: what overlaps or stands beyond the wall is settled in the first step.
+* An overlapping pair counts as touched whether or not an impulse was needed, as at the wall. What
+  the separation alone moves keeps its drag memory: no impulse changed its motion.
 * Pairs collide one after another, each with both its passes of impulses, as a block at the wall.
-  Of two contact points the deeper comes first. A body moved by the separation alone is touched too.
+  Of two contact points the later one, counter-clockwise on its block, comes first.
+* Further rounds at the wall, and rounds of the separation, move what is beyond their tolerance and
+  leave the rest.
+* A merged assembly is shifted inward by its outermost corner, one at a time; so are, four corners
+  at most, two assemblies that the separation has just pushed apart.
+* The separation only shifts for 10 rounds; for 30 more it turns as well, by impulses of position at
+  the contact points. What overlaps by more than 0.1 mm even then is taken back to where it was
+  before the step, at rest, and so is what overlaps with that.
 * Where two axes of overlap are equally deep the first of (first block's x, y, second block's x, y)
   is the normal; the face of its owner is the reference face.
 * The lattice of a merged assembly is the staying one's, cells not renumbered.
@@ -255,11 +260,8 @@ def make_rules(
 
 
 def start_world(rules: Rules, start: Floats) -> World:
-    """Return blocks at rest at poses (blocks, 3) [m, m, rad], put inside the wall."""
-    world = World(rules, [single_block(rules.square, k, pose) for k, pose in enumerate(start)])
-    for body in world.assemblies:
-        meet_wall(rules.wall, body)
-    return world
+    """Return blocks at rest at poses (blocks, 3) [m, m, rad]."""
+    return World(rules, [single_block(rules.square, k, pose) for k, pose in enumerate(start)])
 
 
 def block_normals(key: int, interval: int, blocks: int) -> Floats:
@@ -292,6 +294,7 @@ def integrate(world: World, force: Floats) -> None:
     ):
         mean = ahead + dt / 2 * (acceleration - body.drag) / (1 + dt / 2 * stiffness)
         after = 2 * mean - body.motion
+        body.before = body.pose
         body.pose = body.pose + dt * mean
         body.pose[2] = wrapped(body.pose[2])
         body.drag = (after - body.motion) / dt - noise
@@ -367,7 +370,7 @@ def settle(world: World) -> None:
             bounce_speed=rules.wall.bounce_speed,
         )
         touched += pair.bodies
-    touched += separate(rules.wall, world.assemblies)
+    separate(rules.wall, world.assemblies)
     for body in touched:
         body.drag = np.zeros(3)
 

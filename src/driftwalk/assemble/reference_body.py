@@ -56,8 +56,9 @@ class Assembly:
 
     Member k is block ``blocks[k]``; it sits in cell ``cells[k]`` and its own frame is the
     assembly's, turned by ``quarters[k]`` quarter turns. Pose and motion are the centre of mass's;
-    `drag` is the last step's drag acceleration. All three are (x, y, angle) in SI units and change;
-    members and cells stay: a merge makes a new assembly.
+    `drag` is the last step's drag acceleration, `before` the pose at the start of the step. All
+    four are (x, y, angle) in SI units and change; members and cells stay: a merge makes a new
+    assembly.
     """
 
     square: Square
@@ -67,6 +68,10 @@ class Assembly:
     pose: Floats
     motion: Floats = field(default_factory=lambda: np.zeros(3))
     drag: Floats = field(default_factory=lambda: np.zeros(3))
+    before: Floats = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.before = self.pose.copy()
 
     @property
     def size(self) -> int:

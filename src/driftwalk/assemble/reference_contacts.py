@@ -9,11 +9,15 @@ from typing import NamedTuple
 import numpy as np
 
 from driftwalk.assemble.reference_body import Assembly, Floats, cross
-from driftwalk.assemble.reference_wall import Wall, push_out_once, wall_depth
+from driftwalk.assemble.reference_wall import Wall, push_inside
 from driftwalk.simulate.reference import resolve_contacts
 
-SEPARATION_ROUNDS = 100
+SHIFT_ROUNDS = 10
+SEPARATION_ROUNDS = 40
 SEPARATION_TOLERANCE = 1e-5
+LARGEST_TURN = 0.02
+CORNERS_PER_PUSH = 4
+JAM_TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -78,12 +82,12 @@ def overlap(pair: Pair) -> Overlap:
 
 
 def contact_points(pair: Pair) -> list[tuple[Floats, float]]:
-    """Return one or two contact points of overlapping blocks with their depths [m].
+    """Return the contact points of overlapping blocks, one or two, with their depths [m].
 
     The owner of the normal has the reference face. The incident face is the other block's most
     opposed one (of equal ones the first); it is clipped to the width of the reference face, and its
-    ends below that face are the points, the deeper first. If there is none, the incident face's end
-    that reaches farthest is the one.
+    ends below that face are the points, counter-clockwise the later one first. An overlap of
+    rounding errors can have none.
     """
     _, normal, owner = overlap(pair)
     half = pair.bodies[0].square.half
@@ -92,15 +96,11 @@ def contact_points(pair: Pair) -> list[tuple[Floats, float]]:
     normals = [pair.bodies[1 - owner].face_normal(face) for face in range(4)]
     facing = min(normals, key=lambda direction: float(direction @ outward))
     along = np.array([-facing[1], facing[0]])
-    face = (other + half * (facing - along), other + half * (facing + along))
-
-    def by_depth(points: list[Floats]) -> list[tuple[Floats, float]]:
-        measured = [(point, half - float((point - centre) @ outward)) for point in points]
-        return sorted(measured, key=lambda entry: -entry[1])
-
+    face = (other + half * (facing + along), other + half * (facing - along))
     beside = np.array([-outward[1], outward[0]])
-    clipped = by_depth(_clip(*face, centre, beside, half))
-    return [entry for entry in clipped if entry[1] > 0] or by_depth(list(face))[:1]
+    ends = _clip(*face, centre, beside, half)
+    measured = [(point, half - float((point - centre) @ outward)) for point in ends]
+    return [(point, depth) for point, depth in measured if depth > 0]
 
 
 def _clip(start: Floats, end: Floats, centre: Floats, along: Floats, half: float) -> list[Floats]:
@@ -122,6 +122,8 @@ def _clip(start: Floats, end: Floats, centre: Floats, along: Floats, half: float
 def collide(pair: Pair, *, restitution: float, friction: float, bounce_speed: float) -> None:
     """Give the impulses of one collision to both assemblies, by the rules of a wall contact."""
     normal, points = overlap(pair).normal, contact_points(pair)
+    if not points:
+        return
     tangent = np.array([-normal[1], normal[0]])
     first, second = pair.bodies
     motion = resolve_contacts(
@@ -143,32 +145,65 @@ def _row(pair: Pair, direction: Floats, point: Floats) -> Floats:
     return np.array([*direction, first, *-direction, -second])
 
 
-def separate(wall: Wall, assemblies: list[Assembly]) -> list[Assembly]:
-    """Push assemblies apart and inward until nothing is deeper than the tolerance; say which moved.
+def separate(wall: Wall, assemblies: list[Assembly]) -> None:
+    """Push assemblies apart until none overlap by more than the tolerance, and keep them inside.
 
-    A round takes the overlapping pairs in order, each as the last one left it, then the wall.
+    A round takes the pairs in order, each as the last one left it; what was pushed is put back
+    inside the wall at once, by its outermost corners. Later rounds turn what they push: a wedged
+    block has no other way out. What is jammed in the end has not moved in this step.
     """
-    moved: list[Assembly] = []
-    for _ in range(SEPARATION_ROUNDS):
-        depths = [overlap(pair).depth for pair in overlapping_pairs(assemblies)]
-        outside = [wall_depth(wall, body) for body in assemblies]
-        if max(depths + outside) <= SEPARATION_TOLERANCE:
-            break
-        for pair in close_pairs(assemblies, 2 * assemblies[0].square.side):
-            moved += _push_apart(pair)
-        for body in assemblies:
-            if wall_depth(wall, body) > 0:
-                push_out_once(wall, body)
-                moved.append(body)
-    return moved
+    pairs = close_pairs(assemblies, np.inf)
+    for done in range(SEPARATION_ROUNDS):
+        moved = False
+        for pair in pairs:
+            depth, normal, _ = overlap(pair)
+            if depth > SEPARATION_TOLERANCE:
+                if done < SHIFT_ROUNDS:
+                    _shift_apart(pair, depth * normal)
+                else:
+                    _turn_apart(pair)
+                for body in pair.bodies:
+                    push_inside(wall, body, corners=CORNERS_PER_PUSH)
+                moved = True
+        if not moved:
+            return
+    _undo_jams(pairs, rounds=sum(body.size for body in assemblies))
 
 
-def _push_apart(pair: Pair) -> tuple[Assembly, ...]:
-    depth, normal, _ = overlap(pair)
-    if not depth > 0:
-        return ()
+def _shift_apart(pair: Pair, way: Floats) -> None:
+    """Move two assemblies apart, the lighter one farther."""
     first, second = pair.bodies
     share = second.mass / (first.mass + second.mass)
-    first.pose[:2] -= share * depth * normal
-    second.pose[:2] += (1 - share) * depth * normal
-    return pair.bodies
+    first.pose[:2] -= share * way
+    second.pose[:2] += (1 - share) * way
+
+
+def _turn_apart(pair: Pair) -> None:
+    """Move two assemblies apart by impulses of position at their contact points, which turn too."""
+    first, second = pair.bodies
+    normal, points = overlap(pair).normal, contact_points(pair)
+    rows = [_row(pair, normal, point) for point, _ in points]
+    inverse_mass = np.concatenate([first.inverse_mass, second.inverse_mass])
+    for row, (_, depth) in zip(rows, points, strict=True):
+        push = depth / float(row @ (inverse_mass * row)) / len(points)
+        way = -inverse_mass * row * push
+        way[[2, 5]] = np.clip(way[[2, 5]], -LARGEST_TURN, LARGEST_TURN)
+        first.pose += way[:3]
+        second.pose += way[3:]
+
+
+def _undo_jams(pairs: list[Pair], *, rounds: int) -> None:
+    """Take what still overlaps back to where it was before the step, at rest."""
+    for _ in range(rounds):
+        jammed = [pair for pair in pairs if _take_back_jammed(pair)]
+        if not jammed:
+            return
+
+
+def _take_back_jammed(pair: Pair) -> bool:
+    if not overlap(pair).depth > JAM_TOLERANCE:
+        return False
+    for body in pair.bodies:
+        body.pose = body.before.copy()
+        body.motion, body.drag = np.zeros(3), np.zeros(3)
+    return True

@@ -14,7 +14,7 @@ from driftwalk.assemble.reference_wall import Wall, push_inside
 
 Latching = Literal["none", "collision", "connector"]
 
-MERGE_ROUNDS = 64
+MERGE_CORNERS = 64
 MERGE_OVERLAP = 1e-4
 
 
@@ -64,18 +64,22 @@ def latch_once(latch: Latch, wall: Wall, assemblies: list[Assembly]) -> Joined |
         # More blocks stay; of equal ones the one with the lowest block.
         stayed, moved = sorted(ends, key=lambda end: (-end[0].size, end[0].blocks[0]))
         made = merged(stayed, moved)
-        if made is None or not push_inside(wall, made, rounds=MERGE_ROUNDS):
+        if made is None or not push_inside(wall, made, corners=MERGE_CORNERS):
             continue
-        third = [body for body in assemblies if body not in (stayed[0], moved[0])]
-        if any(overlap(pair).depth > MERGE_OVERLAP for pair in overlapping_pairs([made, *third])):
-            continue
-        return Joined(
-            (stayed[1], moved[1]),
-            (_own_face(*stayed), _own_face(*moved)),
-            (stayed[0], moved[0]),
-            made,
-        )
+        others = [body for body in assemblies if body not in (stayed[0], moved[0])]
+        if not any(_overlap_deeply(made, other) for other in others):
+            made.before = made.pose.copy()
+            return Joined(
+                (stayed[1], moved[1]),
+                (_own_face(*stayed), _own_face(*moved)),
+                (stayed[0], moved[0]),
+                made,
+            )
     return None
+
+
+def _overlap_deeply(made: Assembly, other: Assembly) -> bool:
+    return any(overlap(pair).depth > MERGE_OVERLAP for pair in overlapping_pairs([made, other]))
 
 
 def candidates(latch: Latch, assemblies: list[Assembly]) -> Iterator[Candidate]:

@@ -39,39 +39,46 @@ def meet_wall(wall: Wall, body: Assembly) -> bool:
         else:
             touched = _meet_edges(wall, body, member) or touched
     if body.size > 1:
-        push_inside(wall, body, rounds=ROUNDS_AFTER_STEP)
+        for _ in range(ROUNDS_AFTER_STEP):
+            if not _push_members(wall, body):
+                break
     return touched
 
 
-def push_inside(wall: Wall, body: Assembly, *, rounds: int) -> bool:
-    """Shift an assembly until no corner is outside by more than the tolerance, or rounds are spent.
+def push_inside(wall: Wall, body: Assembly, *, corners: int) -> bool:
+    """Shift an assembly inward by the corner that is farthest outside, and again, so many times.
 
-    Returns whether it is inside.
+    Returns whether it is inside, to the tolerance.
     """
-    for _ in range(rounds):
-        if wall_depth(wall, body) <= INSIDE_TOLERANCE:
+    for _ in range(corners):
+        normal, depth = outermost_corner(wall, body)
+        if depth <= INSIDE_TOLERANCE:
             return True
-        push_out_once(wall, body)
-    return wall_depth(wall, body) <= INSIDE_TOLERANCE
+        body.pose[:2] -= normal * depth
+    return outermost_corner(wall, body)[1] <= INSIDE_TOLERANCE
 
 
-def push_out_once(wall: Wall, body: Assembly) -> None:
-    """Shift an assembly inward by every block's deepest corners in turn."""
+def outermost_corner(wall: Wall, body: Assembly) -> tuple[Floats, float]:
+    """Return the outward normal at the corner farthest outside, and its depth [m]."""
+    measured = [
+        _measure(wall, body, direction, _leading_corners(body, member, direction)[0])
+        for member in range(body.size)
+        for direction in _directions(wall, body, member)
+    ]
+    return max(measured, key=lambda entry: entry[1])
+
+
+def _push_members(wall: Wall, body: Assembly) -> bool:
+    """Shift an assembly inward by every block's corners in turn; say whether any was outside."""
+    moved = False
     for member in range(body.size):
         for direction in _directions(wall, body, member):
             corners = _leading_corners(body, member, direction)
             for corner in corners if wall.radius > 0 else corners[:1]:
-                _push_out(wall, body, direction, corner)
-
-
-def wall_depth(wall: Wall, body: Assembly) -> float:
-    """Return how far the outermost corner is outside [m], negative when all are inside."""
-    deepest = -np.inf
-    for member in range(body.size):
-        for direction in _directions(wall, body, member):
-            corner = _leading_corners(body, member, direction)[0]
-            deepest = max(deepest, _measure(wall, body, direction, corner)[1])
-    return float(deepest)
+                if _measure(wall, body, direction, corner)[1] > INSIDE_TOLERANCE:
+                    _push_out(wall, body, direction, corner)
+                    moved = True
+    return moved
 
 
 def _meet_circle(wall: Wall, body: Assembly, member: int) -> bool:

@@ -259,7 +259,6 @@ def test_contact_points_lie_in_both_blocks() -> None:
         points = contact_points(pair)
         counts.add(len(points))
         depth = overlap(pair).depth
-        assert points[0][1] == max(found for _, found in points)
         for point, found in points:
             assert 0 < found <= depth + 1e-12
             for side in (0, 1):
@@ -366,8 +365,7 @@ def test_crowded_blocks_stay_apart_and_inside() -> None:
 def test_separation_moves_by_inverse_mass() -> None:
     heavy = rigid(0, LINE, [-3 * HALF, 0, 0])
     light = rigid(3, [[0, 0]], [HALF - 4e-4, 0, 0])
-    moved = separate(rules().wall, [heavy, light])
-    assert len(moved) == 2
+    separate(rules().wall, [heavy, light])
     np.testing.assert_allclose(heavy.pose, [-3 * HALF - 1e-4, 0, 0], atol=1e-12)
     np.testing.assert_allclose(light.pose, [HALF - 1e-4, 0, 0], atol=1e-12)
 
