@@ -29,6 +29,12 @@ from driftwalk.assemble.outcome import (
 from driftwalk.assemble.parameters import draw_parameters
 from driftwalk.assemble.polyomino import polyomino_cells, polyomino_name, polyominoes
 from driftwalk.assemble.run import assemble, assemble_drawn, assembly_path, check_assembly
+from driftwalk.assemble.sensitivity import (
+    check_sensitivity,
+    sensitivity_map,
+    sensitivity_reference,
+)
+from driftwalk.assemble.sensitivity_indices import check_indices, sensitivity_indices
 from driftwalk.assemble.sobol import sobol_design, sobol_indices
 from driftwalk.assemble.survival import SurvivalCurve, class_times, survival_curve
 
@@ -42,6 +48,8 @@ __all__ = [
     "assemble_drawn",
     "assembly_path",
     "check_assembly",
+    "check_indices",
+    "check_sensitivity",
     "class_at",
     "class_cells",
     "class_name",
@@ -65,6 +73,9 @@ __all__ = [
     "proportion_interval",
     "replay_events",
     "sampling_variance",
+    "sensitivity_indices",
+    "sensitivity_map",
+    "sensitivity_reference",
     "sobol_design",
     "sobol_indices",
     "sort_classes",

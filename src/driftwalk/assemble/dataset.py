@@ -148,6 +148,22 @@ def assembly_attrs(plan: Plan) -> dict[str, Any]:
     }
 
 
+def completion_step(arrays: Arrays) -> npt.NDArray[Any]:
+    """Return the step at which all blocks had become one assembly, -1 in runs where they did not.
+
+    Parameters
+    ----------
+    arrays : dict of ndarray
+        As in `build_assembly`.
+    """
+    count = arrays["event_count"]
+    complete = count == arrays["assembly"].shape[1] - 1
+    # The last joining made one assembly of all; a single block is complete from the start.
+    last = np.maximum(count.astype(np.int64) - 1, 0)[:, None]
+    joined = np.take_along_axis(arrays["event_step"], last, axis=1)[:, 0]
+    return np.where(complete, np.where(count > 0, joined, 0), -1)
+
+
 def times_of(step: npt.NDArray[Any], *, time_step: float) -> Floats:
     """Return the times [s] of the ends of steps, NaN where there is none (-1).
 
@@ -204,12 +220,7 @@ def _events(arrays: Arrays, replayed: ReplayedEvents, step: float) -> dict[str, 
 
 
 def _times(arrays: Arrays, step: float) -> dict[str, Any]:
-    count = arrays["event_count"]
-    complete = count == arrays["assembly"].shape[1] - 1
-    # The last joining made one assembly of all; a single block is complete from the start.
-    last = np.maximum(count.astype(np.int64) - 1, 0)[:, None]
-    joined = np.take_along_axis(arrays["event_step"], last, axis=1)[:, 0]
-    completion = np.where(complete, np.where(count > 0, joined, 0), -1)
+    completion = completion_step(arrays)
     known = {
         "first_contact_time": (arrays["first_contact_step"], "time of the first contact of blocks"),
         "completion_time": (completion, "time at which all blocks had become one assembly"),

@@ -1,7 +1,8 @@
-"""What a sensitivity analysis varies: the map over C_d and σ_F, and further axes."""
+"""What a sensitivity analysis varies: the map over C_d and σ_F, or other axes."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Final, Self
 
@@ -12,16 +13,31 @@ from driftwalk.model.assembly import MOST_BLOCKS, HiddenFaceDrag, Latching
 from driftwalk.model.calibration import MOST_SETTINGS, check_axis, grid_values
 from driftwalk.model.section import Quantity, Section
 
-LISTS: Final = ("tank_diameter_m", "blocks", "flow", "latching", "hidden_face_drag")
+AXES: Final[dict[str, str]] = {
+    "tank_diameter": "tank_diameter_m",
+    "blocks": "blocks",
+    "flow": "flow",
+    "latching": "latching",
+    "hidden_face_drag": "hidden_face_drag",
+    "drag_coefficient": "drag_coefficient",
+    "force_std": "force_std_N",
+}
+"""From the name of an axis to the key of its list; the order is that of the dimensions."""
+LISTS: Final = tuple(AXES.values())
 
 
 class Sensitivity(Section):
     """The settings whose outcomes are compared with those of a reference.
 
+    Without lists the map over the ranges of C_d and σ_F. As soon as a list is given, the lists are
+    the axes, and what has none is as in the reference.
+
     Examples
     --------
     >>> len(Sensitivity().drag_coefficients), len(Sensitivity().force_stds_N)
     (31, 31)
+    >>> Sensitivity(blocks=[3, 4], latching=["collision"]).axes
+    {'blocks': (3, 4), 'latching': ('collision',)}
     """
 
     section_name: ClassVar[str] = "sensitivity"
@@ -81,6 +97,16 @@ class Sensitivity(Section):
         description="Rules for the drag on joined faces to compare, an axis of the map.",
         examples=['["none", "full"]'],
     )
+    drag_coefficient: tuple[Annotated[float, Quantity("1", ge=0, le=100)], ...] | None = Field(
+        default=None,
+        description="Drag coefficients to compare, an axis of the map, in place of the range.",
+        examples=["[0.2, 0.45, 1.0]"],
+    )
+    force_std_N: tuple[Annotated[float, Quantity("N", ge=0, le=10)], ...] | None = Field(
+        default=None,
+        description="Values of force_std to compare, an axis of the map, in place of the range.",
+        examples=['["0.2mN", "0.55mN"]'],
+    )
 
     @field_validator(*LISTS)
     @classmethod
@@ -95,24 +121,33 @@ class Sensitivity(Section):
     def _grid_has_settings(self) -> Self:
         for name, low, high, step in self._grids():
             check_axis(name, low, high, step)
-        settings = len(self.drag_coefficients) * len(self.force_stds_N)
+        lengths = [len(values) for values in self.axes.values()]
+        settings = math.prod(lengths)
         if settings > MOST_SETTINGS:
             raise ConfigurationError(
-                f"the map has {len(self.drag_coefficients)} x {len(self.force_stds_N)} = "
-                f"{settings} settings, more than {MOST_SETTINGS}: enlarge a step"
+                f"the map has {' x '.join(map(str, lengths))} = {settings} settings, more than "
+                f"{MOST_SETTINGS}: enlarge a step or name fewer values"
             )
         return self
 
     @property
+    def axes(self) -> dict[str, tuple[Any, ...]]:
+        """Values of each axis of the map, SI, in the order of the dimensions."""
+        lists = {name: getattr(self, key) for name, key in AXES.items()}
+        given = {name: values for name, values in lists.items() if values is not None}
+        ranges = {"drag_coefficient": self.drag_coefficients, "force_std": self.force_stds_N}
+        return given or ranges
+
+    @property
     def drag_coefficients(self) -> tuple[float, ...]:
-        """Drag coefficients of the map."""
+        """Drag coefficients of the range."""
         return grid_values(
             self.drag_coefficient_min, self.drag_coefficient_max, self.drag_coefficient_step
         )
 
     @property
     def force_stds_N(self) -> tuple[float, ...]:
-        """Values of force_std of the map [N]."""
+        """Values of force_std of the range [N]."""
         return grid_values(self.force_std_min_N, self.force_std_max_N, self.force_std_step_N)
 
     def _grids(self) -> Iterator[tuple[str, float, float, float]]:
