@@ -8,6 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from driftwalk.cli.assembly_source import (
+    refuse_found,
+    source_from_calibration,
+    source_from_flow,
+)
 from driftwalk.cli.calibrate import Overwrite, Threads
 from driftwalk.cli.options import (
     ASSEMBLY_KEYS,
@@ -36,9 +41,6 @@ from driftwalk.cli.options import (
     TimeStep,
     WallFriction,
     WallRestitution,
-    option_name,
-    override_study,
-    resolve_study,
     study_overrides,
 )
 from driftwalk.cli.output import print_json, print_note, print_table
@@ -47,14 +49,8 @@ from driftwalk.core.errors import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.cli.assembly_run import AssemblyResult, AssemblyWork
+    from driftwalk.cli.assembly_run import AssemblyResult
     from driftwalk.model import Study
-
-FOUND_BY_CALIBRATION = (
-    "forces.drag_coefficient",
-    "forces.force_std_N",
-    "forces.force_interval_s",
-)
 
 
 def assemble(
@@ -105,7 +101,7 @@ def assemble(
     calibration leaves open. Or with the parameters of a study and a flow field (--flow). Killed and
     started again, it continues.
     """
-    from driftwalk.cli.assembly_run import run_assembly
+    from driftwalk.cli.assembly_run import AssemblyWork, run_assembly
 
     _check_film(film)
     overrides = study_overrides(
@@ -134,9 +130,17 @@ def assemble(
         seed=seed,
     )
     if run is None:
-        work, warnings = _from_flow(study, flow, overrides, threads)
+        source = source_from_flow(study, flow, overrides, keys=ASSEMBLY_KEYS)
     else:
-        work, warnings = _from_calibration(run, study, flow, overrides, threads)
+        refuse_found(run, overrides, also=[] if study is None else ["--study"])
+        source = source_from_calibration(run, flow, overrides, keys=ASSEMBLY_KEYS)
+    warnings = list(source.warnings)
+    if run is not None and source.region is None:
+        warnings.append(
+            "the calibration has no joint region (--bootstrap 0): only the parameters that it "
+            "found are simulated"
+        )
+    work = AssemblyWork(source.study, source.flow, source.region, source.inputs, threads)
     result = run_assembly(work, out, film=film, overwrite=overwrite)
     warnings = [*warnings, *_left_out(result)]
     if json:
@@ -155,59 +159,6 @@ def _check_film(film: str) -> None:
         raise InputError(
             "--film mp4 needs the program ffmpeg, which is not installed: install it or take gif"
         )
-
-
-def _from_flow(
-    study_file: Path | None, flow_file: Path | None, overrides: dict[str, Any], threads: int | None
-) -> tuple[AssemblyWork, list[str]]:
-    from driftwalk.cli.assembly_run import AssemblyWork
-
-    if flow_file is None:
-        raise InputError(
-            "nothing says how the water moves: give the run directory of a calibration, or a flow "
-            "field (--flow)"
-        )
-    chosen = resolve_study(study_file, overrides, keys=ASSEMBLY_KEYS)
-    inputs = {"flow": flow_file, **({} if study_file is None else {"study": study_file})}
-    return AssemblyWork(chosen, _load_flow(flow_file, chosen), None, inputs, threads), []
-
-
-def _from_calibration(
-    folder: Path,
-    study_file: Path | None,
-    flow_file: Path | None,
-    overrides: dict[str, Any],
-    threads: int | None,
-) -> tuple[AssemblyWork, list[str]]:
-    from driftwalk.cli.assembly_run import AssemblyWork
-    from driftwalk.cli.calibrated import read_calibrated
-
-    refused = [option_name(key) for key in FOUND_BY_CALIBRATION if key in overrides]
-    if study_file is not None:
-        refused.append("--study")
-    if refused:
-        raise InputError(
-            f"{', '.join(refused)}: not with a calibration run, whose own values are used; to give "
-            f"them, take the run's flow field alone: --flow {folder / 'flow.nc'}"
-        )
-    found = read_calibrated(folder)
-    base = f"the study of {folder}"
-    chosen = override_study(found.study, overrides, base=base, keys=ASSEMBLY_KEYS)
-    inputs = {**found.files, **({} if flow_file is None else {"flow": flow_file})}
-    warnings = [f"of the calibration: {warning}" for warning in found.warnings]
-    if found.region is None:
-        warnings.append(
-            "the calibration has no joint region (--bootstrap 0): only the parameters that it "
-            "found are simulated"
-        )
-    field = found.flow if flow_file is None else _load_flow(flow_file, chosen)
-    return AssemblyWork(chosen, field, found.region, inputs, threads), warnings
-
-
-def _load_flow(path: Path, study: Study) -> xr.Dataset:
-    from driftwalk.flow import load_flow
-
-    return load_flow(path, arena=study.tank.to_arena(), own_flags="keep")
 
 
 def summary(study: Study, result: AssemblyResult) -> dict[str, Any]:
