@@ -17,89 +17,21 @@ Skipped with a reason where the headers of ODE (Debian: libode-dev) or a C++ com
 from __future__ import annotations
 
 import argparse
-import json
-import os
-import shutil
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from cases import RADIUS_M, SAMPLE_RATE_HZ, STEP_S, STEPS, Case, contact_heavy
+from cases import SAMPLE_RATE_HZ, STEP_S, STEPS, Case, contact_heavy
+from peer import WALLS, PeerMissing, build_peer, run_peer, write_case
 from timing import Times, machine, spread
 
 from driftwalk import _core
 
-SOURCE = Path(__file__).parent / "ode" / "ode_peer.cpp"
 SKIPPED = 77
-WALLS = ("impulse", "boxes")
 TOLERANCE = {"impulse": 0.02, "boxes": 0.03}
-
-
-def skip(reason: str) -> None:
-    print(f"skipped: {reason}")
-    sys.exit(SKIPPED)
-
-
-def compiler() -> str:
-    """A C++ compiler that finds ODE."""
-    found = shutil.which(os.environ.get("CXX", "")) or shutil.which("c++") or shutil.which("g++")
-    if found is None:
-        skip("no C++ compiler")
-    probe = subprocess.run(
-        [str(found), "-x", "c++", "-fsyntax-only", "-"],
-        input="#include <ode/ode.h>\n",
-        text=True,
-        capture_output=True,
-        check=False,
-    )
-    if probe.returncode != 0:
-        skip("the headers of ODE are not installed (Debian: libode-dev)")
-    return str(found)
-
-
-def build(folder: Path) -> Path:
-    program = folder / "ode_peer"
-    command = [compiler(), "-std=c++20", "-O3", "-march=native", str(SOURCE), "-o", str(program)]
-    begin = time.perf_counter()
-    subprocess.run([*command, "-lode"], check=True)
-    print(f"compiled the peer in {time.perf_counter() - begin:.1f} s")
-    return program
-
-
-def write_case(case: Case, path: Path) -> None:
-    study = case.study
-    numbers = [
-        study.block.side_m,
-        study.block.mass_kg,
-        study.wetted_depth_m,
-        study.water.density_kg_m3,
-        RADIUS_M,
-        study.tank.wall_restitution,
-        study.tank.wall_friction,
-        study.tank.bounce_speed_m_s,
-        STEP_S,
-        round(1 / (SAMPLE_RATE_HZ * STEP_S)),
-        case.axis.size,
-        case.axis[0],
-        case.axis[1] - case.axis[0],
-        *case.u.ravel(),
-        *case.v.ravel(),
-        len(case.worlds),
-        *case.worlds.ravel(),
-    ]
-    path.write_text("\n".join(f"{number:.17g}" for number in numbers))
-
-
-def run_peer(program: Path, case: Path, wall: str) -> dict[str, Any]:
-    done = subprocess.run(
-        [program, case, wall, str(STEPS)], check=True, capture_output=True, text=True
-    )
-    return dict(json.loads(done.stdout))
 
 
 def run_ours(model: _core.Model, case: Case) -> tuple[float, float, float]:
@@ -117,12 +49,24 @@ def main() -> None:
     options = parser.parse_args()
     print(machine())
     with tempfile.TemporaryDirectory() as folder:
-        program = build(Path(folder))
+        try:
+            program = build_peer(Path(folder))
+        except PeerMissing as reason:
+            print(f"skipped: {reason}")
+            sys.exit(SKIPPED)
         begin = time.perf_counter()
         case = contact_heavy(worlds=options.worlds)
         model = case.model()
         path = Path(folder) / "case.txt"
-        write_case(case, path)
+        write_case(
+            path,
+            case.study,
+            axis=case.axis,
+            u=case.u,
+            v=case.v,
+            worlds=case.worlds[:, None],
+            steps_per_sample=round(1 / (SAMPLE_RATE_HZ * STEP_S)),
+        )
         print(f"setup: {time.perf_counter() - begin:.2f} s")
         ours = f"driftwalk, {_core.instruction_set()}"
         times = {name: Times() for name in (ours, *WALLS)}
@@ -132,7 +76,7 @@ def main() -> None:
             times[ours].wall.append(wall)
             times[ours].processor.append(processor)
             for name in WALLS:
-                answer = run_peer(program, path, name)
+                answer = run_peer(program, path, name, steps=STEPS)
                 times[name].wall.append(answer["run_s"])
                 times[name].processor.append(answer["processor_s"])
                 length[name] = answer["mean_step_length_m"]

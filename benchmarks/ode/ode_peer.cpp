@@ -1,16 +1,19 @@
-// One floating block in a stirred tank on the Open Dynamics Engine: the peer of bench_ode.py.
+// Floating blocks in a stirred tank on the Open Dynamics Engine: the peer of bench_ode.py and
+// bench_assemble.py.
 //
 //     ode_peer CASE impulse|boxes STEPS
 //
-// The same physics as driftwalk's single-block worlds, written the usual way for an engine: force and
-// torque of the strips are summed by hand and handed to the body, then the world makes one step.
-// Worlds run one after another. The wall is either an impulse computed by hand at the corners
-// ("impulse": ODE only integrates), or 64 static boxes in a ring that ODE collides the block with.
+// The same physics as driftwalk's worlds without latching, written the usual way for an engine:
+// force and torque of the strips are summed by hand and handed to each body, then the world makes
+// one step. Worlds run one after another. The wall is either an impulse computed by hand at the
+// corners
+// ("impulse": ODE only integrates), or 64 static boxes in a ring that ODE collides the blocks with.
+// Blocks collide with each other as ODE's boxes, with the restitution of the wall and no friction.
 //
 // CASE holds numbers divided by white space: side, mass, depth, water density, radius, restitution,
 // friction, bounce speed, time step, steps per sample; nodes per axis, first node, spacing, all
-// u row by row, all v; worlds, and for each x, y, theta, vx, vy, omega, C_d, sigma_F. Printed: one
-// line of JSON.
+// u row by row, all v; worlds, blocks in each, and for each block x, y, theta, vx, vy, omega, C_d,
+// sigma_F. Printed: one line of JSON.
 #include <ode/ode.h>
 
 #include <algorithm>
@@ -40,7 +43,8 @@ struct Case {
   int nodes;
   double origin, spacing;
   std::vector<double> u, v;
-  std::vector<Start> starts;
+  std::size_t worlds, blocks;
+  std::vector<Start> starts; // block by block, world by world
 };
 
 Case read_case(const char* path) {
@@ -56,9 +60,8 @@ Case read_case(const char* path) {
   for (double& value : c.v) {
     in >> value;
   }
-  std::size_t worlds = 0;
-  in >> worlds;
-  c.starts.resize(worlds);
+  in >> c.worlds >> c.blocks;
+  c.starts.resize(c.worlds * c.blocks);
   for (Start& s : c.starts) {
     in >> s.x >> s.y >> s.theta >> s.vx >> s.vy >> s.omega >> s.drag_coefficient >> s.force_std;
   }
@@ -91,7 +94,7 @@ struct State {
 
 State state_of(dBodyID body) {
   const dReal* p = dBodyGetPosition(body);
-  const dReal* r = dBodyGetRotation(body);  // rows of four
+  const dReal* r = dBodyGetRotation(body); // rows of four
   const dReal* v = dBodyGetLinearVel(body);
   return {p[0], p[1], r[0], r[4], v[0], v[1], dBodyGetAngularVel(body)[2]};
 }
@@ -134,7 +137,7 @@ void meet_circle(const Case& c, dBodyID body) {
   if (s.x * s.x + s.y * s.y < inner * inner) {
     return;
   }
-  const double per_inertia = 6 / (c.side * c.side);  // mass / inertia
+  const double per_inertia = 6 / (c.side * c.side); // mass / inertia
   bool touched = false;
   for (int corner = 0; corner < 4; ++corner) {
     const double a = corner & 1 ? half : -half, b = corner & 2 ? half : -half;
@@ -172,60 +175,78 @@ void meet_circle(const Case& c, dBodyID body) {
 
 class Tank {
 public:
-  Tank(const Case& c, bool boxes) : c_(c), boxes_(boxes), world_(dWorldCreate()) {
+  Tank(const Case& c, bool boxes)
+      : c_(c), boxes_(boxes), collides_(boxes || c.blocks > 1), world_(dWorldCreate()),
+        contacts_(dJointGroupCreate(0)), blocks_(dSimpleSpaceCreate(nullptr)) {
     dWorldSetGravity(world_, 0, 0, 0);
-    body_ = dBodyCreate(world_);
     dMass mass;
     dMassSetBoxTotal(&mass, c.mass, c.side, c.side, c.side);
-    dBodySetMass(body_, &mass);
+    for (std::size_t b = 0; b < c.blocks; ++b) {
+      const dBodyID body = dBodyCreate(world_);
+      dBodySetMass(body, &mass);
+      bodies_.push_back(body);
+      if (collides_) {
+        dGeomSetBody(dCreateBox(blocks_, c.side, c.side, c.side), body);
+        dJointAttach(dJointCreatePlane2D(world_, nullptr), body, nullptr);
+      }
+    }
     if (boxes_) {
       build_wall();
     }
   }
   ~Tank() {
     if (boxes_) {
-      dGeomDestroy(block_);
       dSpaceDestroy(wall_);
-      dJointGroupDestroy(contacts_);
     }
+    dSpaceDestroy(blocks_);
+    dJointGroupDestroy(contacts_);
     dWorldDestroy(world_);
   }
   Tank(const Tank&) = delete;
   Tank& operator=(const Tank&) = delete;
 
-  void place(const Start& start) {
-    dMatrix3 rotation;
-    dRFromAxisAndAngle(rotation, 0, 0, 1, start.theta);
-    dBodySetPosition(body_, start.x, start.y, 0);
-    dBodySetRotation(body_, rotation);
-    dBodySetLinearVel(body_, start.vx, start.vy, 0);
-    dBodySetAngularVel(body_, 0, 0, start.omega);
+  void place(const Start* start) {
+    for (const dBodyID body : bodies_) {
+      dMatrix3 rotation;
+      dRFromAxisAndAngle(rotation, 0, 0, 1, start->theta);
+      dBodySetPosition(body, start->x, start->y, 0);
+      dBodySetRotation(body, rotation);
+      dBodySetLinearVel(body, start->vx, start->vy, 0);
+      dBodySetAngularVel(body, 0, 0, start->omega);
+      ++start;
+    }
   }
 
-  void step(const Start& start, double noise_x, double noise_y) {
-    const Wrench w = drag(c_, start.drag_coefficient, state_of(body_));
-    dBodyAddForce(body_, w.x + noise_x, w.y + noise_y, 0);
-    dBodyAddTorque(body_, 0, 0, w.torque);
+  template <class Noise>
+  void step(const Start* start, Noise& noise) {
+    for (const dBodyID body : bodies_) {
+      const Wrench w = drag(c_, start->drag_coefficient, state_of(body));
+      const double noise_x = noise() * start->force_std, noise_y = noise() * start->force_std;
+      dBodyAddForce(body, w.x + noise_x, w.y + noise_y, 0);
+      dBodyAddTorque(body, 0, 0, w.torque);
+      ++start;
+    }
     if (boxes_) {
-      dSpaceCollide2(block_, reinterpret_cast<dGeomID>(wall_), this, &Tank::near);
+      dSpaceCollide2(reinterpret_cast<dGeomID>(blocks_), reinterpret_cast<dGeomID>(wall_), this,
+                     &Tank::near);
+    }
+    if (bodies_.size() > 1) {
+      dSpaceCollide(blocks_, this, &Tank::near);
     }
     dWorldQuickStep(world_, c_.dt);
-    if (boxes_) {
-      dJointGroupEmpty(contacts_);
-    } else {
-      meet_circle(c_, body_);
+    dJointGroupEmpty(contacts_);
+    if (!boxes_) {
+      for (const dBodyID body : bodies_) {
+        meet_circle(c_, body);
+      }
     }
   }
 
-  State state() const { return state_of(body_); }
+  State state(std::size_t block) const { return state_of(bodies_[block]); }
 
 private:
   void build_wall() {
-    block_ = dCreateBox(nullptr, c_.side, c_.side, c_.side);
-    dGeomSetBody(block_, body_);
     wall_ = dHashSpaceCreate(nullptr);
-    contacts_ = dJointGroupCreate(0);
-    dJointAttach(dJointCreatePlane2D(world_, nullptr), body_, nullptr);
     const double thick = c_.radius / 4;
     const double length = 2 * (c_.radius + thick) * std::tan(pi / wall_boxes);
     for (int k = 0; k < wall_boxes; ++k) {
@@ -240,12 +261,13 @@ private:
 
   static void near(void* data, dGeomID a, dGeomID b) {
     auto& tank = *static_cast<Tank*>(data);
+    const bool at_wall = dGeomGetBody(a) == nullptr || dGeomGetBody(b) == nullptr;
     dContact contact[most_contacts];
     const int found = dCollide(a, b, most_contacts, &contact[0].geom, sizeof(dContact));
     for (int k = 0; k < found; ++k) {
       contact[k].surface = {};
       contact[k].surface.mode = dContactBounce | dContactApprox1;
-      contact[k].surface.mu = tank.c_.friction;
+      contact[k].surface.mu = at_wall ? tank.c_.friction : 0;
       contact[k].surface.bounce = tank.c_.restitution;
       contact[k].surface.bounce_vel = tank.c_.bounce_speed;
       dJointAttach(dJointCreateContact(tank.world_, tank.contacts_, &contact[k]),
@@ -254,19 +276,18 @@ private:
   }
 
   const Case& c_;
-  bool boxes_;
+  bool boxes_, collides_;
   dWorldID world_;
-  dBodyID body_;
-  dGeomID block_ = nullptr;
-  dSpaceID wall_ = nullptr;
-  dJointGroupID contacts_ = nullptr;
+  dJointGroupID contacts_;
+  dSpaceID blocks_, wall_ = nullptr;
+  std::vector<dBodyID> bodies_;
 };
 
 double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
-}  // namespace
+} // namespace
 
 int main(int argc, char** argv) {
   const std::string wall = argc == 4 ? argv[2] : "";
@@ -285,20 +306,23 @@ int main(int argc, char** argv) {
     setup_s = seconds_since(setup);
     std::mt19937_64 random(7);
     std::normal_distribution<double> normal;
+    const auto noise = [&] { return normal(random); };
+    std::vector<State> last(c.blocks);
     const auto run = std::chrono::steady_clock::now();
     const std::clock_t processor = std::clock();
-    for (const Start& start : c.starts) {
+    for (std::size_t world = 0; world < c.worlds; ++world) {
+      const Start* const start = &c.starts[world * c.blocks];
       tank.place(start);
-      State last = tank.state();
+      for (std::size_t b = 0; b < c.blocks; ++b) {
+        last[b] = tank.state(b);
+      }
       for (int step = 1; step <= steps; ++step) {
-        const double noise_x = normal(random) * start.force_std;
-        const double noise_y = normal(random) * start.force_std;
-        tank.step(start, noise_x, noise_y);
-        if (step % c.period == 0) {
-          const State now = tank.state();
-          lengths.push_back(std::hypot(now.x - last.x, now.y - last.y));
+        tank.step(start, noise);
+        for (std::size_t b = 0; step % c.period == 0 && b < c.blocks; ++b) {
+          const State now = tank.state(b);
+          lengths.push_back(std::hypot(now.x - last[b].x, now.y - last[b].y));
           largest.push_back(std::hypot(now.x, now.y));
-          last = now;
+          last[b] = now;
         }
       }
     }
@@ -313,8 +337,9 @@ int main(int argc, char** argv) {
   std::cout.precision(9);
   std::cout << "{\"block_steps\": " << static_cast<double>(steps) * c.starts.size()
             << ", \"setup_s\": " << setup_s << ", \"run_s\": " << run_s
-            << ", \"processor_s\": " << processor_s << ", \"mean_step_length_m\": "
-            << sum / static_cast<double>(lengths.size()) << ", \"largest_distance_m\": "
-            << *std::max_element(largest.begin(), largest.end()) << "}\n";
+            << ", \"processor_s\": " << processor_s
+            << ", \"mean_step_length_m\": " << sum / static_cast<double>(lengths.size())
+            << ", \"largest_distance_m\": " << *std::max_element(largest.begin(), largest.end())
+            << "}\n";
   return 0;
 }
