@@ -32,7 +32,9 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     | {"record", "flow", "model", "compare", "sweep", "simulate", "calibrate", "assemble"}
     | {"datasets", "report", "viewer"},
 }
-HEAVY = frozenset({"xarray", "scipy", "pandas", "cv2", "matplotlib", "dask", "optuna", "h5netcdf"})
+HEAVY = frozenset(
+    {"xarray", "scipy", "pandas", "cv2", "matplotlib", "dask", "optuna", "h5netcdf", "SALib"}
+)
 # `driftwalk.core` and `driftwalk.schema` are used by module; a stage by the names in its `__all__`.
 BY_MODULE = GROUND
 

@@ -37,6 +37,9 @@ COMMANDS: Final[dict[str, Command]] = {
         "calibrate", "calibrate", "Find the drag coefficient and the stochastic force."
     ),
     "assemble": Command("assemble", "assemble", "Simulate what many blocks build."),
+    "sensitivity": Command(
+        "sensitivity", "sensitivity", "Say how much what blocks build depends on the model."
+    ),
     "classify": Command(
         "classify", "classify", "Say what the blocks of a recording assembled into."
     ),

@@ -209,6 +209,27 @@ Confidence = Annotated[
     quantity_option("--confidence", "1", "Simultaneous confidence of the intervals."),
 ]
 
+Realisations = Annotated[
+    int | None,
+    typer.Option(
+        "--realisations",
+        min=2,
+        help="Realisations of the reference, each of as many runs.",
+        rich_help_panel=PANEL,
+        show_default=False,
+    ),
+]
+Vary = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--vary",
+        metavar="NAME=VALUES",
+        help="Compare these values: blocks=2,3,4 or drag-coefficient=0:1.5:0.05. Repeatable.",
+        rich_help_panel=PANEL,
+        show_default=False,
+    ),
+]
+
 STUDY_KEYS: Final[dict[str, str]] = {
     "tank_diameter": "tank.diameter_m",
     "wall_friction": "tank.wall_friction",
@@ -255,6 +276,14 @@ ASSEMBLY_KEYS: Final[dict[str, str]] = {
     "confidence": "assembly.confidence",
 }
 """The same for self-assembly, where seed, duration and confidence are those of its runs."""
+
+SENSITIVITY_KEYS: Final[dict[str, str]] = {
+    **ASSEMBLY_KEYS,
+    "runs": "sensitivity.runs",
+    "realisations": "sensitivity.reference_realisations",
+    "seed": "sensitivity.seed",
+}
+"""The same for a sensitivity analysis, where runs are those of a setting."""
 
 
 def study_overrides(*, keys: Mapping[str, str] = STUDY_KEYS, **options: Any) -> dict[str, Any]:

@@ -1,0 +1,245 @@
+"""A sensitivity analysis in a run directory: resumable, with its figures and manifest."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from driftwalk.cli.calibration_run import dataset_hash, netcdf_bytes
+from driftwalk.cli.progress import ProgressReporter
+from driftwalk.core.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.core.rundir import RunDirectory
+    from driftwalk.model import Study
+
+DRAWN_AXES: Final = 2
+"""Axes that a figure has; a study of more has a folder of figures for each value of the others."""
+
+
+@dataclass(frozen=True)
+class SensitivityWork:
+    """Everything that a run directory of a sensitivity analysis needs.
+
+    Attributes
+    ----------
+    study : Study
+        The reference, and what varies.
+    flow : xarray.Dataset
+        The flow field of the reference.
+    flows : dict of str to xarray.Dataset
+        Flow fields to compare, by name.
+    samples : int or None
+        Base samples for Sobol' indices.
+    inputs : mapping of str to Path
+        The files that were read, by their role.
+    threads : int or None
+        Threads; the result does not depend on them.
+    """
+
+    study: Study
+    flow: xr.Dataset
+    flows: dict[str, xr.Dataset]
+    samples: int | None
+    inputs: Mapping[str, Path]
+    threads: int | None = None
+
+    @property
+    def axes(self) -> dict[str, Any]:
+        """The axes of the map, with the flow fields themselves."""
+        axes: dict[str, Any] = dict(self.study.sensitivity.axes)
+        return axes | ({"flow": self.flows} if "flow" in axes else {})
+
+
+@dataclass(frozen=True)
+class SensitivityResult:
+    """What came out.
+
+    Attributes
+    ----------
+    reference : xarray.Dataset
+        Kind "outcome_distribution", with its realisations.
+    sensitivity : xarray.Dataset
+        Kind "sensitivity".
+    components : xarray.Dataset or None
+        Kind "components", None where nothing varies.
+    indices : xarray.Dataset or None
+        Kind "sobol_indices", where they were asked for.
+    """
+
+    reference: xr.Dataset
+    sensitivity: xr.Dataset
+    components: xr.Dataset | None
+    indices: xr.Dataset | None
+
+
+def run_sensitivity(work: SensitivityWork, folder: Path, *, overwrite: bool) -> SensitivityResult:
+    """Analyse the sensitivity of self-assembly in a run directory.
+
+    Writes ``reference.nc``, ``sensitivity.nc``, ``components.nc``, with Sobol' indices
+    ``sobol.nc``; ``figures/`` and, last, ``manifest.json``. Killed at any moment and started again
+    it continues.
+
+    Parameters
+    ----------
+    work : SensitivityWork
+        What to do.
+    folder : Path
+        The run directory.
+    overwrite : bool
+        Whether a finished run there is moved aside; it is refused otherwise.
+
+    Raises
+    ------
+    InputError
+        When blocks do not fit or a flow does not cover a tank; nothing is written then.
+    RunDirectoryError
+        When the directory is in use, holds another run, or cannot be written.
+    """
+    from driftwalk import _core
+    from driftwalk.core.provenance import manifest
+    from driftwalk.core.rundir import RunDirectory
+
+    sizes = _checked_sizes(work)
+    existing = "overwrite" if overwrite else "resume"
+    with RunDirectory(folder, specification=_specification(work), on_existing=existing) as run:  # type: ignore[arg-type]
+        about = manifest(
+            command=["driftwalk", *sys.argv[1:]],
+            study=work.study.to_dict(),
+            seeds={"sensitivity": work.study.sensitivity.seed},
+            inputs=dict(work.inputs),
+            instruction_set=_core.instruction_set(),
+        )
+        with ProgressReporter("sensitivity") as progress:
+            result = _simulate(work, run, _Overall(progress, sizes))
+            progress.update(1, 1, "figures")
+            _draw(result, run)
+        run.finish(about)
+    return result
+
+
+class _Overall:
+    """Tells the progress of all stages as one: a setting costs the same in each."""
+
+    def __init__(self, reporter: ProgressReporter, sizes: dict[str, int]) -> None:
+        self._reporter = reporter
+        self._total = sum(sizes.values())
+        names = list(sizes)
+        self._before = {
+            name: sum(sizes[earlier] for earlier in names[:index])
+            for index, name in enumerate(names)
+        }
+
+    def stage(self, name: str) -> Any:
+        """Return what a stage takes as ``progress``."""
+        return lambda done, _: self._reporter.update(
+            self._before[name] + done, self._total, f"settings, {name}"
+        )
+
+
+def _checked_sizes(work: SensitivityWork) -> dict[str, int]:
+    """Return the settings of each stage, after refusing what cannot be simulated."""
+    from driftwalk.assemble import check_indices, check_sensitivity
+
+    options: dict[str, Any] = {"threads": work.threads}
+    sizes = {
+        "reference": work.study.sensitivity.reference_realisations,
+        "map": check_sensitivity(work.study, work.flow, axes=work.axes, **options),
+    }
+    if work.samples is not None:
+        sizes["Sobol"] = check_indices(work.study, work.flow, samples=work.samples, **options)
+    return sizes
+
+
+def _simulate(work: SensitivityWork, run: RunDirectory, overall: _Overall) -> SensitivityResult:
+    from driftwalk.assemble import sensitivity_indices, sensitivity_map, sensitivity_reference
+
+    reference = sensitivity_reference(
+        work.study,
+        work.flow,
+        store=run.store("reference"),
+        progress=overall.stage("reference"),
+        threads=work.threads,
+    )
+    run.write("reference.nc", netcdf_bytes(reference))
+    sensitivity = sensitivity_map(
+        work.study,
+        work.flow,
+        axes=work.axes,
+        reference=reference,
+        store=run.store("map"),
+        progress=overall.stage("map"),
+        threads=work.threads,
+    )
+    run.write("sensitivity.nc", netcdf_bytes(sensitivity))
+    components = _components(sensitivity)
+    if components is not None:
+        run.write("components.nc", netcdf_bytes(components))
+    indices = None
+    if work.samples is not None:
+        indices = sensitivity_indices(
+            work.study,
+            work.flow,
+            samples=work.samples,
+            store=run.store("sobol"),
+            progress=overall.stage("Sobol"),
+            threads=work.threads,
+        )
+        run.write("sobol.nc", netcdf_bytes(indices))
+    return SensitivityResult(reference, sensitivity, components, indices)
+
+
+def _components(sensitivity: xr.Dataset) -> xr.Dataset | None:
+    """Return the principal components; None where there is one setting or all are alike."""
+    from driftwalk.assemble import principal_components
+
+    try:
+        return principal_components(sensitivity)
+    except InputError:
+        return None
+
+
+def _draw(result: SensitivityResult, run: RunDirectory) -> None:
+    import xarray as xr
+
+    from driftwalk.report import write_assembly_figures, write_sensitivity_figures
+
+    folder = run.folder("figures")
+    repeated = result.reference["realisation_proportion"]
+    write_assembly_figures(
+        folder,
+        distribution=result.reference,
+        realisations=xr.Dataset({"proportion": repeated}),
+    )
+    for name, chosen in _slices(result.sensitivity):
+        part, components = result.sensitivity.sel(chosen), result.components
+        if components is not None:
+            components = components.sel(chosen) if components.sizes["component"] > 1 else None
+        write_sensitivity_figures(folder / name, sensitivity=part, components=components)
+
+
+def _slices(sensitivity: xr.Dataset) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Give the parts of a study that can be drawn: name of the folder, and what to select."""
+    axes = [str(name) for name in sensitivity["l1_distance"].dims]
+    fixed = axes[: max(len(axes) - DRAWN_AXES, 0)]
+    for values in product(*(sensitivity[name].values.tolist() for name in fixed)):
+        chosen = dict(zip(fixed, values, strict=True))
+        parts = [f"{name}_{value}" for name, value in chosen.items()]
+        yield re.sub(r"[^A-Za-z0-9._-]+", "-", "_".join(parts)), chosen
+
+
+def _specification(work: SensitivityWork) -> dict[str, Any]:
+    """Return what determines the numbers of a run."""
+    return {
+        "study": work.study.to_dict(),
+        "flow_sha256": dataset_hash(work.flow, ("u", "v")),
+        "flows_sha256": {name: dataset_hash(flow, ("u", "v")) for name, flow in work.flows.items()},
+        "sobol_samples": work.samples,
+    }
