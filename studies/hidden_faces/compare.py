@@ -41,6 +41,7 @@ VARIATIONS: dict[str, dict[str, Any]] = {
     "600 s": {"assembly.duration_s": 600.0},
 }
 START_DIAMETER_M = 0.16
+FLOW_FACTORS = (0.8, 1.25)
 
 
 def shares(distribution: xr.Dataset) -> dict[str, float]:
@@ -86,6 +87,7 @@ def print_variations(runs: int) -> None:
     ]
     middle = f"start within {100 * START_DIAMETER_M / 2:g} cm of the middle"
     rows.append((middle, {"start": starts_within(START_DIAMETER_M, runs=runs)}))
+    rows += [(f"flow times {factor:g}", {"flow_factor": factor}) for factor in FLOW_FACTORS]
     for words, options in rows:
         for faces in ("full", "none"):
             found = shares(simulate(faces, runs=runs, **options))

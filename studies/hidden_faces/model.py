@@ -24,6 +24,12 @@ OVERRIDES = {
 }
 
 
+def study_of(hidden_face_drag: str, changes: Mapping[str, Any] | None = None) -> dw.Study:
+    """Return the study, with some of its values changed."""
+    chosen = {**OVERRIDES, "assembly.hidden_face_drag": hidden_face_drag, **(changes or {})}
+    return dw.apply_overrides(dw.Study(), chosen)
+
+
 def simulate(
     hidden_face_drag: str,
     *,
@@ -31,12 +37,13 @@ def simulate(
     parameters: tuple[float, float] = CALIBRATED,
     changes: Mapping[str, Any] | None = None,
     start: npt.ArrayLike | None = None,
+    flow_factor: float = 1.0,
 ) -> xr.Dataset:
     """Return the distribution of outcomes, with some of the study's values changed."""
-    chosen = {**OVERRIDES, "assembly.hidden_face_drag": hidden_face_drag, **(changes or {})}
+    flow = dw.tank30_flow()
     assembly = dw.assemble(
-        dw.apply_overrides(dw.Study(), chosen),
-        dw.tank30_flow(),
+        study_of(hidden_face_drag, changes),
+        flow.assign({name: flow_factor * flow[name] for name in "uv"}),
         runs=runs,
         start=start,
         drag_coefficient=parameters[0],
@@ -47,7 +54,7 @@ def simulate(
 
 def starts_within(diameter: float, *, runs: int) -> npt.NDArray[np.float64]:
     """Return start poses of whole blocks in a circle [m] in the middle of the tank."""
-    small = dw.apply_overrides(dw.Study(), {**OVERRIDES, "tank.diameter_m": diameter})
+    small = study_of("none", {"tank.diameter_m": diameter})
     path = dw.assembly_path(small, dw.tank30_flow(), runs=range(runs), duration=small.time_step_s)
     first = path.isel(time=0)
     return np.stack([first[name].values for name in ("x", "y", "theta")], axis=-1).astype(float)
