@@ -25,8 +25,10 @@ What the rules leave open is decided so:
 * A merged assembly is shifted inward by its outermost corner, one at a time; so are, four corners
   at most, two assemblies that the separation has just pushed apart.
 * The separation only shifts for 10 rounds; for 30 more it turns as well, by impulses of position at
-  the contact points. What overlaps by more than 0.1 mm even then is taken back to where it was
-  before the step, at rest, and so is what overlaps with that.
+  the contact points.
+* What overlaps or stands outside by more than 0.1 mm even then, or after the rounds at the wall, is
+  jammed: it is taken back to where it was before the step, at rest, and so is what overlaps with
+  that. No merge may therefore overlap a third assembly where it was before the step.
 * Where two axes of overlap are equally deep the first of (first block's x, y, second block's x, y)
   is the normal; the face of its owner is the reference face.
 * The lattice of a merged assembly is the staying one's, cells not renumbered.

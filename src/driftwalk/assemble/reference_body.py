@@ -110,6 +110,11 @@ class Assembly:
             ]
         )
 
+    def take_back(self) -> None:
+        """Put it back to where it was at the start of the step, at rest."""
+        self.pose = self.before.copy()
+        self.motion, self.drag = np.zeros(3), np.zeros(3)
+
     def arms(self, angle: float | None = None) -> Floats:
         """Return the members from the centre of mass [m], shape (n, 2), at an angle or its own."""
         return turned(self.offsets, self.pose[2] if angle is None else angle)

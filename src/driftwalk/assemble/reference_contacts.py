@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from driftwalk.assemble.reference_body import Assembly, Floats, cross
-from driftwalk.assemble.reference_wall import Wall, push_inside
+from driftwalk.assemble.reference_wall import JAM_TOLERANCE, Wall, push_inside, take_back_outside
 from driftwalk.simulate.reference import resolve_contacts
 
 SHIFT_ROUNDS = 10
@@ -17,7 +17,6 @@ SEPARATION_ROUNDS = 40
 SEPARATION_TOLERANCE = 1e-5
 LARGEST_TURN = 0.02
 CORNERS_PER_PUSH = 4
-JAM_TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -153,6 +152,8 @@ def separate(wall: Wall, assemblies: list[Assembly]) -> None:
     block has no other way out. What is jammed in the end has not moved in this step.
     """
     pairs = close_pairs(assemblies, np.inf)
+    pushed: list[Assembly] = []
+    inside = True
     for done in range(SEPARATION_ROUNDS):
         moved = False
         for pair in pairs:
@@ -163,11 +164,14 @@ def separate(wall: Wall, assemblies: list[Assembly]) -> None:
                 else:
                     _turn_apart(pair)
                 for body in pair.bodies:
-                    push_inside(wall, body, corners=CORNERS_PER_PUSH)
+                    inside = push_inside(wall, body, corners=CORNERS_PER_PUSH) and inside
+                pushed += pair.bodies
                 moved = True
         if not moved:
-            return
-    _undo_jams(pairs, rounds=sum(body.size for body in assemblies))
+            break
+    if moved or not inside:
+        pushed = [body for body in assemblies if body in pushed]
+        _undo_jams(wall, assemblies, pushed, pairs)
 
 
 def _shift_apart(pair: Pair, way: Floats) -> None:
@@ -192,18 +196,16 @@ def _turn_apart(pair: Pair) -> None:
         second.pose += way[3:]
 
 
-def _undo_jams(pairs: list[Pair], *, rounds: int) -> None:
-    """Take what still overlaps back to where it was before the step, at rest."""
-    for _ in range(rounds):
-        jammed = [pair for pair in pairs if _take_back_jammed(pair)]
-        if not jammed:
+def _undo_jams(
+    wall: Wall, assemblies: list[Assembly], pushed: list[Assembly], pairs: list[Pair]
+) -> None:
+    """Take back what still overlaps or stands outside, and then what overlaps with that."""
+    for _ in range(sum(body.size for body in assemblies)):
+        taken = [take_back_outside(wall, body) for body in pushed]
+        for pair in pairs:
+            if overlap(pair).depth > JAM_TOLERANCE:
+                taken.append(True)
+                for body in pair.bodies:
+                    body.take_back()
+        if not any(taken):
             return
-
-
-def _take_back_jammed(pair: Pair) -> bool:
-    if not overlap(pair).depth > JAM_TOLERANCE:
-        return False
-    for body in pair.bodies:
-        body.pose = body.before.copy()
-        body.motion, body.drag = np.zeros(3), np.zeros(3)
-    return True

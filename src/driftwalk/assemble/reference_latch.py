@@ -67,7 +67,7 @@ def latch_once(latch: Latch, wall: Wall, assemblies: list[Assembly]) -> Joined |
         if made is None or not push_inside(wall, made, corners=MERGE_CORNERS):
             continue
         others = [body for body in assemblies if body not in (stayed[0], moved[0])]
-        if not any(_overlap_deeply(made, other) for other in others):
+        if not any(_overlap_deeply(made, place) for other in others for place in _places(other)):
             made.before = made.pose.copy()
             return Joined(
                 (stayed[1], moved[1]),
@@ -76,6 +76,11 @@ def latch_once(latch: Latch, wall: Wall, assemblies: list[Assembly]) -> Joined |
                 made,
             )
     return None
+
+
+def _places(body: Assembly) -> tuple[Assembly, Assembly]:
+    """Return an assembly where it is and where it was: a jam takes it back there."""
+    return body, Assembly(body.square, body.blocks, body.cells, body.quarters, body.before)
 
 
 def _overlap_deeply(made: Assembly, other: Assembly) -> bool:

@@ -15,6 +15,7 @@ from driftwalk.assemble.reference_body import Assembly, Floats, cross, turned
 from driftwalk.simulate.reference import resolve_contacts
 
 INSIDE_TOLERANCE = 1e-6
+JAM_TOLERANCE = 1e-4
 ROUNDS_AFTER_STEP = 16
 ROUNDS_OF_POLYGON = 16
 
@@ -42,6 +43,7 @@ def meet_wall(wall: Wall, body: Assembly) -> bool:
         for _ in range(ROUNDS_AFTER_STEP):
             if not _push_members(wall, body):
                 break
+        take_back_outside(wall, body)
     return touched
 
 
@@ -56,6 +58,17 @@ def push_inside(wall: Wall, body: Assembly, *, corners: int) -> bool:
             return True
         body.pose[:2] -= normal * depth
     return outermost_corner(wall, body)[1] <= INSIDE_TOLERANCE
+
+
+def take_back_outside(wall: Wall, body: Assembly) -> bool:
+    """Take an assembly back that nothing could push inside; say whether it was one.
+
+    It is longer than the tank is wide where it stands: it cannot have turned so far.
+    """
+    jammed = outermost_corner(wall, body)[1] > JAM_TOLERANCE
+    if jammed:
+        body.take_back()
+    return jammed
 
 
 def outermost_corner(wall: Wall, body: Assembly) -> tuple[Floats, float]:

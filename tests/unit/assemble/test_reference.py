@@ -36,6 +36,7 @@ from driftwalk.assemble.reference_body import Assembly
 from driftwalk.assemble.reference_body import single_block as one_block
 from driftwalk.assemble.reference_contacts import Pair, collide, contact_points, overlap, separate
 from driftwalk.assemble.reference_latch import Latch, candidates, latch_once, merged
+from driftwalk.assemble.reference_wall import meet_wall
 from driftwalk.core.errors import InputError
 from driftwalk.simulate.reference import TwinModel, flow_at, simulate_reference
 
@@ -370,6 +371,47 @@ def test_separation_moves_by_inverse_mass() -> None:
     np.testing.assert_allclose(light.pose, [HALF - 1e-4, 0, 0], atol=1e-12)
 
 
+def channel(width: float) -> Any:
+    return rules(dw.Study(tank={"shape": "rectangle", "width_m": width, "height_m": 0.3}))
+
+
+def test_a_wedged_block_is_turned_until_both_fit() -> None:
+    # Two blocks abreast with 0.2 mm to spare; the tilt of one needs 0.45 mm, half the tilt half that.
+    walls = channel(2 * SIDE + 2e-4).wall
+    straight = rigid(0, [[0, 0]], [-HALF - 1e-4, 0, 0])
+    tilted = rigid(1, [[0, 0]], [HALF - 2e-4, 0.002, 0.015])
+    straight.before, tilted.before = np.array([0, 0.1, 0.0]), np.array([0, -0.1, 0.0])
+    separate(walls, [straight, tilted])
+    assert overlap(pair_of(straight, tilted)).depth < 1e-4
+    assert np.abs(np.concatenate([corners_of(straight), corners_of(tilted)])[:, 0]).max() < 0.0302
+    assert tilted.pose[2] == pytest.approx(straight.pose[2], abs=1e-3)
+    assert 0.004 < tilted.pose[2] < 0.011
+    assert abs(tilted.pose[1]) < 0.01, "taken back instead"
+
+
+def test_what_is_jammed_stays_where_it_was() -> None:
+    # Three abreast where there is no room for three.
+    walls = channel(3 * SIDE - 2e-3).wall
+    bodies = [rigid(k, [[0, 0]], [(k - 1) * 0.0292, 0, 0], [0.1, 0.2, 0.3]) for k in range(3)]
+    far = rigid(3, [[0, 0]], [0, -0.1, 0], [0.1, 0, 0])
+    for k, body in enumerate(bodies):
+        body.before = np.array([0.0, 0.05 * k, 0.1])
+    separate(walls, [*bodies, far])
+    for k, body in enumerate(bodies):
+        np.testing.assert_array_equal(body.pose, [0, 0.05 * k, 0.1])
+        np.testing.assert_array_equal(body.motion, np.zeros(3))
+    np.testing.assert_array_equal(far.motion, [0.1, 0, 0])
+
+
+def test_a_row_as_long_as_the_tank_is_wide_cannot_turn() -> None:
+    walls = channel(3 * SIDE + 5e-4).wall
+    row = rigid(0, LINE, [0, 0, 0.1], [0, 0, 10.0])
+    row.before = np.array([0.0, 0.001, 0.05])
+    assert meet_wall(walls, row)
+    np.testing.assert_array_equal(row.pose, [0, 0.001, 0.05])
+    np.testing.assert_array_equal(row.motion, np.zeros(3))
+
+
 # --- latching -------------------------------------------------------------------------------------
 
 
@@ -445,6 +487,15 @@ def test_the_nearest_faces_that_look_at_each_other_join() -> None:
     assert space.gather("cell").tolist() == [[0, 0], [1, 0]]
     assert space.gather("assembly").tolist() == [0, 0]
     assert space.complete
+
+
+def test_pairs_far_apart_join_in_one_step() -> None:
+    setup = rules(latching="collision")
+    poses = [[0, 0, 0], [1, 0, 0], [0, SIDE - 1e-3, 0], [1, SIDE - 1e-3, 0]]
+    space = world(setup, poses, np.zeros((4, 3)))
+    advance(space, np.zeros((4, 2)))
+    assert sorted(event.blocks for event in space.events) == [(0, 2), (1, 3)]
+    assert space.gather("assembly").tolist() == [0, 1, 0, 1]
 
 
 def test_occupied_cells_are_not_joined() -> None:
