@@ -47,6 +47,13 @@ driftwalk::Latching latching_of(const std::string& word) {
   throw std::invalid_argument("latching must be none, collision or connector");
 }
 
+bool is_first(const std::string& word, const char* first, const char* second) {
+  if (word != first && word != second) {
+    throw std::invalid_argument(word + " must be " + first + " or " + second);
+  }
+  return word == first;
+}
+
 constexpr std::size_t most_blocks = 256;
 
 void require_blocks(std::size_t blocks) {
@@ -95,7 +102,7 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
   rules.latching = latching_of(latching);
   rules.connector_distance = connector_distance;
   rules.connector_cosine = std::cos(connector_axis);
-  rules.hidden_faces_drag = hidden_face_drag == "full";
+  rules.hidden_faces_drag = is_first(hidden_face_drag, "full", "none");
   rules.restitution = block_restitution;
   rules.friction = block_friction;
   const driftwalk::AssemblyWorlds batch{static_cast<std::int64_t>(worlds),
@@ -132,11 +139,11 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
   out.sample_pose = sample_pose.data();
   out.sample_assembly = sample_assembly.data();
   std::int64_t block_steps = 0;
+  const bool twice = is_first(precision, "double", "single");
   if (worlds > 0) {
     nb::gil_scoped_release release;
-    block_steps = precision == "double"
-                      ? driftwalk::assemble_batch(model.twice(), rules, batch, threads, out)
-                      : driftwalk::assemble_batch(model.single(), rules, batch, threads, out);
+    block_steps = twice ? driftwalk::assemble_batch(model.twice(), rules, batch, threads, out)
+                        : driftwalk::assemble_batch(model.single(), rules, batch, threads, out);
   }
   nb::dict result;
   result["status"] = hand_out(std::move(status), {worlds});

@@ -158,7 +158,7 @@ void shift(Scene& scene, int assembly, Vec2 by, int round) {
 
 // Turns an assembly by a small angle; no library's sine or cosine.
 void turn(Scene& scene, int assembly, double angle) {
-  constexpr double largest = 0.02;
+  constexpr double largest = 0.02, pi = 3.141592653589793;
   angle = std::clamp(angle, -largest, largest);
   SceneAssembly& a = scene.assembly[assembly];
   const double cosine = a.cosine - angle * a.sine, sine = a.sine + angle * a.cosine;
@@ -166,6 +166,7 @@ void turn(Scene& scene, int assembly, double angle) {
   a.cosine = cosine / length;
   a.sine = sine / length;
   a.theta += angle;
+  a.theta -= a.theta > pi ? 2 * pi : (a.theta < -pi ? -2 * pi : 0.0);
 }
 
 // Moves two blocks apart along the axis of least penetration, in inverse proportion to the masses.
@@ -197,10 +198,11 @@ void turn_apart(const AssemblyRules& rules, Scene& scene, BlockPair pair, const 
   }
 }
 
-void keep_inside(const AssemblyRules& rules, Scene& scene, int assembly) {
+// False when it stays outside.
+bool keep_inside(const AssemblyRules& rules, Scene& scene, int assembly) {
   constexpr int wall_rounds = 4;
   place_members(scene, assembly);
-  push_inside(rules, scene, assembly, wall_rounds);
+  return push_inside(rules, scene, assembly, wall_rounds);
 }
 } // namespace
 
@@ -240,13 +242,19 @@ void take_back(Scene& scene, int assembly) {
   place_members(scene, assembly);
 }
 
-// What nothing could part, assemblies hooked into each other for one, has not moved in this step.
-// Before it all were apart, so in the end they are again.
+// What nothing could part or keep inside, assemblies hooked into each other or wedged between walls
+// for one, has not moved in this step. Before it all were apart, so in the end they are again.
 void undo_jam(const AssemblyRules& rules, Scene& scene) {
   constexpr double tolerance = 1e-4;
   bool jammed = true;
   for (int round = 0; jammed && round < scene.blocks; ++round) {
     jammed = false;
+    for (int a = 0; a < scene.blocks; ++a) {
+      if (scene.assembly[a].moved > 0 && beyond_wall(rules, scene, a).depth > tolerance) {
+        jammed = true;
+        take_back(scene, a);
+      }
+    }
     for (int k = 0; k < scene.pairs.count; ++k) {
       const BlockPair pair = scene.pairs.pair[k];
       if (may_touch(rules, scene, pair) &&
@@ -266,7 +274,7 @@ void separate(const AssemblyRules& rules, Scene& scene) {
   for (int a = 0; a < scene.blocks; ++a) {
     scene.assembly[a].moved = 0;
   }
-  bool moved = true;
+  bool moved = true, inside = true;
   for (int round = 1; moved && round <= most_rounds; ++round) {
     moved = false;
     for (int k = 0; k < scene.pairs.count; ++k) {
@@ -288,11 +296,11 @@ void separate(const AssemblyRules& rules, Scene& scene) {
       } else {
         turn_apart(rules, scene, pair, overlap, round);
       }
-      keep_inside(rules, scene, first);
-      keep_inside(rules, scene, second);
+      inside = keep_inside(rules, scene, first) && inside;
+      inside = keep_inside(rules, scene, second) && inside;
     }
   }
-  if (moved) {
+  if (moved || !inside) {
     undo_jam(rules, scene);
   }
 }

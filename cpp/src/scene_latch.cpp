@@ -98,12 +98,24 @@ bool cells_are_free(const Scene& scene, const Merge& merge) {
   return true;
 }
 
+// How deep a block is in one of another assembly, that being where it was before the step.
+double overlap_before(const AssemblyRules& rules, const Scene& scene, int block, int other) {
+  const ScenePose& before = assembly_of(scene, other).before;
+  const Vec2 axis{before.cosine, before.sine}, across{-before.sine, before.cosine};
+  const SceneBlock& o = scene.block[other];
+  const Vec2 at = Vec2{before.x, before.y} + axis * o.offset_x + across * o.offset_y;
+  return overlap_depth(rules.side / 2, at - centre(scene, block),
+                       face_normal(assembly_of(scene, block), 0), axis);
+}
+
+// Of the others where they are, and where they were: a jam takes them back there.
 bool is_clear_of_others(const AssemblyRules& rules, const Scene& scene, int assembly) {
   constexpr double tolerance = 1e-4;
   for (int b = scene.assembly[assembly].first; b >= 0; b = scene.block[b].next) {
     for (int c = 0; c < scene.blocks; ++c) {
-      if (scene.block[c].assembly != assembly && !are_far(rules, scene, b, c) &&
-          overlap_of(rules, scene, b, c).depth > tolerance) {
+      if (scene.block[c].assembly != assembly &&
+          (overlap_of(rules, scene, b, c).depth > tolerance ||
+           overlap_before(rules, scene, b, c) > tolerance)) {
         return false;
       }
     }

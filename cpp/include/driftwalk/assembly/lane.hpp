@@ -31,7 +31,7 @@ private:
     std::size_t size = 0;
     const auto take = [&](auto*& pointer, std::size_t count) {
       using Item = std::remove_reference_t<decltype(*pointer)>;
-      pointer = reinterpret_cast<Item*>(memory + size);
+      pointer = memory == nullptr ? nullptr : reinterpret_cast<Item*>(memory + size);
       size = (size + count * sizeof(Item) + 63) / 64 * 64;
     };
     const std::size_t count = static_cast<std::size_t>(blocks);
@@ -47,13 +47,6 @@ private:
 };
 
 template <class Real, class T>
-inline void put_rest(Motion<Real>& motion, int lane) {
-  put(motion.vx, lane, T(0));
-  put(motion.vy, lane, T(0));
-  put(motion.omega, lane, T(0));
-}
-
-template <class Real, class T>
 inline void load_lane(const AssemblyRules& rules, const AssemblyWorlds& worlds, std::int64_t world,
                       const PackMemory<Real>& pack, int lane) {
   const double* start = worlds.start + 3 * rules.blocks * world;
@@ -62,8 +55,8 @@ inline void load_lane(const AssemblyRules& rules, const AssemblyWorlds& worlds, 
     put(m.pose.x, lane, start[0]);
     put(m.pose.y, lane, start[1]);
     put(m.pose.theta, lane, __builtin_remainder(start[2], 2 * pi_value));
-    put_rest<Real, T>(m.motion, lane);
-    put_rest<Real, T>(m.drag, lane);
+    put_rest(m.motion, lane);
+    put_rest(m.drag, lane);
     // Found anew in the first step; until then any axes will do for a block alone.
     put(m.axes.cosine, lane, T(1));
     put(m.axes.sine, lane, T(0));
@@ -156,7 +149,7 @@ inline void read_scene(const AssemblyRules& rules, const Scene& scene, const Pac
     put(m.motion.vy, lane, body.vy);
     put(m.motion.omega, lane, body.omega);
     if (body.touched) {
-      put_rest<Real, T>(m.drag, lane);
+      put_rest(m.drag, lane);
     }
     put(m.axes.cosine, lane, body.cosine);
     put(m.axes.sine, lane, body.sine);

@@ -87,6 +87,13 @@ inline void put(bool& a, int, bool value) {
   a = value;
 }
 
+template <class Real>
+inline void put_rest(Motion<Real>& motion, int lane) {
+  put(motion.vx, lane, 0);
+  put(motion.vy, lane, 0);
+  put(motion.omega, lane, 0);
+}
+
 // The value where the mask holds, else zero.
 template <int N>
 inline FloatPack<N> keep(Mask<N> mask, FloatPack<N> value) {

@@ -9,23 +9,26 @@ DRIFTWALK_LANES_BEGIN
 template <class T>
 struct NearRules {
   T half_side;
-  T reach;              // no pair farther apart than this touches or latches [m]
-  bool connectors;      // whether faces latch at a distance
-  T connector_distance; // [m]
-  T connector_sine;     // of the largest angle between two faces that latch
+  T reach;          // no pair farther apart than this touches or latches [m]
+  bool connectors;  // whether faces latch at a distance
+  T connector_sine; // of the largest angle between two faces that latch
+  T connector_gap;  // square of the largest distance between their centres [m^2]
 
   explicit NearRules(const AssemblyRules& rules)
       : half_side(static_cast<T>(rules.side / 2)),
         reach(static_cast<T>(rules.side * 1.4142135623730951)),
-        connectors(rules.latching == Latching::connector),
-        connector_distance(static_cast<T>(rules.connector_distance)), connector_sine(0) {
-    if (connectors) {
-      // A little beyond, so that rounding loses no pair: settle decides in double precision.
-      connector_distance += T(1e-6);
-      const double cosine = rules.connector_cosine;
-      const double sine = cosine > 0 ? __builtin_sqrt(1 - cosine * cosine) : 1.0;
-      connector_sine = static_cast<T>(sine + 1e-5);
-      reach = max(reach, static_cast<T>(rules.side) + connector_distance);
+        connectors(rules.latching == Latching::connector), connector_sine(1), connector_gap(0) {
+    if (!connectors) {
+      return;
+    }
+    // A little beyond, so that rounding loses no pair: settle decides in double precision.
+    const T distance = static_cast<T>(rules.connector_distance + 1e-6);
+    reach = max(reach, static_cast<T>(rules.side) + distance);
+    const double cosine = rules.connector_cosine;
+    const bool faces_each_other = cosine > 0.71; // else a face can latch with any of the other's
+    connector_gap = faces_each_other ? distance * distance : T(1e30);
+    if (faces_each_other) {
+      connector_sine = static_cast<T>(__builtin_sqrt(1 - cosine * cosine) + 1e-5);
     }
   }
 };
@@ -43,15 +46,14 @@ inline auto may_meet(const NearRules<T>& rules, Real dx, Real dy, const Axes<Rea
   const Real same = abs(a.cosine * b.cosine + a.sine * b.sine);
   const Real turned = abs(a.cosine * b.sine - a.sine * b.cosine);
   const Real extent = (same + turned) * h + h;
-  // A nanometre more than touching: rounding must not hide a contact from settle.
-  auto meets = max(max(across_a, up_a), max(across_b, up_b)) < extent + Real(T(1e-9));
+  // A little more than touching, so that rounding hides no contact from settle.
+  auto meets = max(max(across_a, up_a), max(across_b, up_b)) < extent + Real(T(1e-7));
   if (rules.connectors) {
     const Real along = max(same, turned), askew = min(same, turned);
     const Real gap = max(across_a, up_a) - (along * h + h);
     const Real offset = max(min(across_a, up_a) - askew * h, Real(T(0)));
-    const Real limit{rules.connector_distance * rules.connector_distance};
-    meets =
-        meets | ((askew <= Real(rules.connector_sine)) & (gap * gap + offset * offset <= limit));
+    meets = meets | ((askew <= Real(rules.connector_sine)) &
+                     (gap * gap + offset * offset <= Real(rules.connector_gap)));
   }
   return meets;
 }

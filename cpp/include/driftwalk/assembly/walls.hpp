@@ -8,7 +8,6 @@ DRIFTWALK_LANES_BEGIN
 // Gives the other members of a block's assembly, in one lane, what the wall did to its copy.
 template <class Real>
 inline void spread(Member<Real>* members, int blocks, int block, int lane) {
-  using T = typename Numbers<Real>::Scalar;
   Member<Real>& from = members[block];
   const Int32 root = get(from.root, lane);
   for (int b = root; b < blocks; ++b) {
@@ -21,9 +20,7 @@ inline void spread(Member<Real>* members, int blocks, int block, int lane) {
     put(to.motion.vx, lane, get(from.motion.vx, lane));
     put(to.motion.vy, lane, get(from.motion.vy, lane));
     put(to.motion.omega, lane, get(from.motion.omega, lane));
-    put(to.drag.vx, lane, T(0));
-    put(to.drag.vy, lane, T(0));
-    put(to.drag.omega, lane, T(0));
+    put_rest(to.drag, lane);
   }
 }
 
@@ -37,37 +34,82 @@ inline void spread_where(typename Numbers<Real>::Bool lanes, Member<Real>* membe
   }
 }
 
-// Moves a block's assembly inward by a corner's depth, in the given lanes alone and where it is
-// beyond the tolerance; returns where that was.
+// Moves an assembly inward by a corner's depth, in the given lanes alone and where it is beyond the
+// tolerance; returns where that was.
 template <class Real, class T>
-inline auto push_corner(const Contact<Real>& corner, typename Numbers<Real>::Bool lanes,
-                        Pose<Real>& pose) -> typename Numbers<Real>::Bool {
-  const auto outside = lanes & (corner.depth > Real(T(1e-6)));
+inline auto push_corner(const Contact<Real>& corner, T tolerance,
+                        typename Numbers<Real>::Bool lanes, Pose<Real>& pose) ->
+    typename Numbers<Real>::Bool {
+  const auto outside = lanes & (corner.depth > Real(tolerance));
   const Real shift = keep(outside, corner.depth);
   pose.x = pose.x - corner.nx * shift;
   pose.y = pose.y - corner.ny * shift;
   return outside;
 }
 
+// The same for the corners of one of its blocks, each seen from where the last one has led.
 template <class Real, class T>
-inline auto push_member(const WallView<T>& wall, T h, typename Numbers<Real>::Bool lanes,
-                        Member<Real>& m) -> typename Numbers<Real>::Bool {
+inline auto push_member(const WallView<T>& wall, T h, T tolerance,
+                        typename Numbers<Real>::Bool lanes, const Axes<Real>& axes,
+                        const Arm<Real>& arm, Pose<Real>& pose) -> typename Numbers<Real>::Bool {
   Contact<Real> first, second;
   if (wall.radius > T(0)) {
-    leading_corners(m.pose.x + m.arm.x, m.pose.y + m.arm.y, h, m.axes, m.arm, first, second);
-    measure_circle(first, wall.radius, m.pose.x, m.pose.y);
-    const auto outside = push_corner<Real, T>(first, lanes, m.pose);
-    measure_circle(second, wall.radius, m.pose.x, m.pose.y);
-    return outside | push_corner<Real, T>(second, lanes, m.pose);
+    leading_corners(pose.x + arm.x, pose.y + arm.y, h, axes, arm, first, second);
+    measure_circle(first, wall.radius, pose.x, pose.y);
+    const auto outside = push_corner(first, tolerance, lanes, pose);
+    measure_circle(second, wall.radius, pose.x, pose.y);
+    return outside | push_corner(second, tolerance, lanes, pose);
   }
   auto outside = Real(T(0)) > Real(T(0));
   for (int e = 0; e < wall.edge_count; ++e) {
     const WallEdge<T>& edge = wall.edges[e];
-    leading_corners(Real(edge.normal_x), Real(edge.normal_y), h, m.axes, m.arm, first, second);
-    measure_edge(first, edge, m.pose.x, m.pose.y);
-    outside = outside | push_corner<Real, T>(first, lanes, m.pose);
+    leading_corners(Real(edge.normal_x), Real(edge.normal_y), h, axes, arm, first, second);
+    measure_edge(first, edge, pose.x, pose.y);
+    outside = outside | push_corner(first, tolerance, lanes, pose);
   }
   return outside;
+}
+
+// Puts a block's assembly, in one lane, back to where it was before the step, at rest.
+template <class Real>
+inline void take_back(Member<Real>* members, int blocks, int block, int lane) {
+  using T = typename Numbers<Real>::Scalar;
+  const Int32 root = get(members[block].root, lane);
+  for (int b = root; b < blocks; ++b) {
+    Member<Real>& m = members[b];
+    if (get(m.root, lane) != root) {
+      continue;
+    }
+    const T cosine = get(m.axes_before.cosine, lane), sine = get(m.axes_before.sine, lane);
+    const T offset_x = get(m.offset_x, lane), offset_y = get(m.offset_y, lane);
+    put(m.pose.x, lane, get(m.before.x, lane));
+    put(m.pose.y, lane, get(m.before.y, lane));
+    put(m.pose.theta, lane, get(m.before.theta, lane));
+    put(m.axes.cosine, lane, cosine);
+    put(m.axes.sine, lane, sine);
+    put(m.arm.x, lane, offset_x * cosine - offset_y * sine);
+    put(m.arm.y, lane, offset_x * sine + offset_y * cosine);
+    put_rest(m.motion, lane);
+    put_rest(m.drag, lane);
+  }
+}
+
+// What spans the tank and has turned into its walls cannot be pushed inside: it has not moved in
+// this step.
+template <class Real, class T>
+inline void take_back_jammed(const WallView<T>& wall, T h, typename Numbers<Real>::Bool lanes,
+                             Member<Real>* members, int blocks) {
+  constexpr T tolerance = T(1e-4);
+  for (int b = 0; b < blocks; ++b) {
+    Pose<Real> pushed = members[b].pose;
+    const auto outside =
+        push_member<Real, T>(wall, h, tolerance, lanes, members[b].axes, members[b].arm, pushed);
+    for (int lane = 0; lane < Numbers<Real>::lanes && any(outside); ++lane) {
+      if (lane_of(outside, lane)) {
+        take_back(members, blocks, b, lane);
+      }
+    }
+  }
 }
 
 // One corner's way inward can lead another block of the assembly outward: go round until none is
@@ -76,19 +118,23 @@ template <class Real, class T>
 inline void push_members_inside(const WallView<T>& wall, T h, typename Numbers<Real>::Bool lanes,
                                 Member<Real>* members, int blocks) {
   constexpr int most_rounds = 16;
+  constexpr T tolerance = T(1e-6);
   for (int round = 0; round < most_rounds; ++round) {
-    bool moved = false;
+    auto moved = Real(T(0)) > Real(T(0));
     for (int b = 0; b < blocks; ++b) {
-      const auto outside = push_member<Real, T>(wall, h, lanes, members[b]);
+      Member<Real>& m = members[b];
+      const auto outside = push_member<Real, T>(wall, h, tolerance, lanes, m.axes, m.arm, m.pose);
       if (any(outside)) {
         spread_where(outside, members, blocks, b);
-        moved = true;
+        moved = moved | outside;
       }
     }
-    if (!moved) {
+    if (!any(moved)) {
       return;
     }
+    lanes = moved;
   }
+  take_back_jammed(wall, h, lanes, members, blocks);
 }
 
 template <class Real, class T>
