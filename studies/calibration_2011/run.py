@@ -4,8 +4,9 @@
 
 Runs ``driftwalk sensitivity`` with `study.toml` into the folder OUT, in the flow of the bundled
 recording unless OPTIONS say another (``--flow FILE``) or begin with the run directory of a
-calibration. Other options are the command's, such as ``--hidden-face-drag full``; killed, it continues, and a
-finished run is only read. Then it prints a table: what the paper found, and what came out here.
+calibration. Other options are the command's, such as ``--hidden-face-drag full``; killed, it
+continues, and a finished run is only read. Then it prints a table: what the paper found, and what
+came out here.
 """
 
 from __future__ import annotations
