@@ -237,7 +237,7 @@ def strips_one_by_one(
 def test_overlap_is_the_depth_of_the_minkowski_difference() -> None:
     rng = np.random.default_rng(1)
     signs = set()
-    for _ in range(120):
+    for _ in range(80):
         angles, apart = rng.uniform(-7, 7, 2), rng.uniform(-1.2, 1.2, 2) * SIDE
         first = one_block(SQUARE, 0, np.array([0.1, 0.2, angles[0]]))
         second = one_block(SQUARE, 1, np.array([0.1 + apart[0], 0.2 + apart[1], angles[1]]))
@@ -255,7 +255,7 @@ def test_overlap_is_the_depth_of_the_minkowski_difference() -> None:
 def test_contact_points_lie_in_both_blocks() -> None:
     rng = np.random.default_rng(2)
     counts = set()
-    for _ in range(120):
+    for _ in range(80):
         pair = pair_of(*random_overlap(rng))
         points = contact_points(pair)
         counts.add(len(points))
@@ -274,7 +274,7 @@ def test_contact_points_lie_in_both_blocks() -> None:
 def test_collisions_keep_momentum_and_never_gain_energy(friction: float) -> None:
     rng = np.random.default_rng(3)
     changed = 0
-    for _ in range(120):
+    for _ in range(80):
         bodies = random_overlap(rng)
         before, had = momentum(bodies), energy(bodies)
         restitution = rng.uniform()
@@ -282,7 +282,7 @@ def test_collisions_keep_momentum_and_never_gain_energy(friction: float) -> None
         np.testing.assert_allclose(momentum(bodies), before, rtol=0, atol=1e-15)
         assert energy(bodies) <= had * (1 + 1e-12)
         changed += energy(bodies) < had * (1 - 1e-6)
-    assert changed > 25, "too few of the pairs were closing"
+    assert changed > 15, "too few of the pairs were closing"
 
 
 def test_after_a_collision_no_contact_point_closes() -> None:
@@ -376,7 +376,7 @@ def channel(width: float) -> Any:
 
 
 def test_a_wedged_block_is_turned_until_both_fit() -> None:
-    # Two blocks abreast with 0.2 mm to spare; the tilt of one needs 0.45 mm, half the tilt half that.
+    # Two blocks abreast, 0.2 mm to spare: one tilt alone needs 0.45 mm, two of half the size less.
     walls = channel(2 * SIDE + 2e-4).wall
     straight = rigid(0, [[0, 0]], [-HALF - 1e-4, 0, 0])
     tilted = rigid(1, [[0, 0]], [HALF - 2e-4, 0.002, 0.015])
@@ -580,6 +580,12 @@ def test_no_merge_into_a_third_block() -> None:
     close = latch_once(latch, wall, [first, second, touching])
     assert close is not None
     assert close.faces[0] == 1
+    # A third block that has only just left the place may have to go back there.
+    leaving = rigid(2, [[0, 0]], [-0.5, 0, 0])
+    leaving.before = third.pose
+    held = latch_once(latch, wall, [first, second, leaving])
+    assert held is not None
+    assert held.faces[0] == 0
 
 
 # --- worlds ---------------------------------------------------------------------------------------
