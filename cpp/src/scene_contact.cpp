@@ -301,6 +301,9 @@ void separate(const AssemblyRules& rules, Scene& scene) {
     }
   }
   if (moved || !inside) {
+    // What was moved far may have come near blocks that are not in the list.
+    find_pairs(rules, scene);
+    scene.rebuilt = true;
     undo_jam(rules, scene);
   }
 }

@@ -46,6 +46,15 @@ private:
   }
 };
 
+template <class Real>
+inline void put_before(Member<Real>& m, int lane) {
+  put(m.before.x, lane, get(m.pose.x, lane));
+  put(m.before.y, lane, get(m.pose.y, lane));
+  put(m.before.theta, lane, get(m.pose.theta, lane));
+  put(m.axes_before.cosine, lane, get(m.axes.cosine, lane));
+  put(m.axes_before.sine, lane, get(m.axes.sine, lane));
+}
+
 template <class Real, class T>
 inline void load_lane(const AssemblyRules& rules, const AssemblyWorlds& worlds, std::int64_t world,
                       const PackMemory<Real>& pack, int lane) {
@@ -57,14 +66,10 @@ inline void load_lane(const AssemblyRules& rules, const AssemblyWorlds& worlds, 
     put(m.pose.theta, lane, __builtin_remainder(start[2], 2 * pi_value));
     put_rest(m.motion, lane);
     put_rest(m.drag, lane);
-    // Found anew in the first step; until then any axes will do for a block alone.
-    put(m.axes.cosine, lane, T(1));
-    put(m.axes.sine, lane, T(0));
-    put(m.axes_before.cosine, lane, T(1));
-    put(m.axes_before.sine, lane, T(0));
-    put(m.before.x, lane, start[0]);
-    put(m.before.y, lane, start[1]);
-    put(m.before.theta, lane, T(0));
+    const Axes<Real> axes = axes_at(m.pose.theta);
+    put(m.axes.cosine, lane, get(axes.cosine, lane));
+    put(m.axes.sine, lane, get(axes.sine, lane));
+    put_before(m, lane);
     put(m.root, lane, b);
     put(m.per_count, lane, T(1));
     put(m.per_inertia, lane, rules.mass / rules.inertia);
