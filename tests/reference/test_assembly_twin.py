@@ -147,7 +147,7 @@ TANKS: tuple[dict[str, Any], ...] = (
 )
 
 
-@pytest.mark.parametrize("seed", [0, 2, 4, 7, 13, 17])
+@pytest.mark.parametrize("seed", [0, 2, 3, 4, 7, 13, 17])
 def test_heaps_agree(seed: int) -> None:
     """Blocks on top of each other, some through the wall: every rule of settling in a few steps."""
     rng = np.random.default_rng(seed)
