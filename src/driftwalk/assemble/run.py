@@ -34,6 +34,8 @@ Progress = Callable[[int, int], None]
 
 BLOCKS_PER_UNIT: Final = 2000
 """Blocks of a work unit: a few seconds' work, so that a kill or Ctrl-C loses no more."""
+FEWEST_RUNS_PER_UNIT: Final = 100
+"""With fewer the lanes of two threads would be empty for much of a unit's time."""
 
 
 def assemble(
@@ -317,7 +319,8 @@ def _run(
 
 def runs_per_unit(blocks: int) -> int:
     """Return the runs of a work unit: a whole number of drawn flows."""
-    return max(BLOCKS_PER_UNIT // blocks // RUNS_PER_FLOW, 1) * RUNS_PER_FLOW
+    runs = max(BLOCKS_PER_UNIT // blocks, FEWEST_RUNS_PER_UNIT)
+    return runs // RUNS_PER_FLOW * RUNS_PER_FLOW
 
 
 def _by_flow(plan: Plan, first: int, last: int) -> Sequence[tuple[slice, xr.Dataset]]:

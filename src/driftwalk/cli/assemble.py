@@ -52,6 +52,9 @@ if TYPE_CHECKING:
     from driftwalk.cli.assembly_run import AssemblyResult
     from driftwalk.model import Study
 
+MOST_ROWS = 16
+"""Classes in the printed table: all 12 of four blocks, and the frequent ones of more."""
+
 
 def assemble(
     out: Annotated[
@@ -238,10 +241,16 @@ def print_answer(study: Study, result: AssemblyResult, folder: Path) -> None:
     heads = ["class", "share", interval]
     if result.drawn is not None:
         heads += ["parameters drawn", interval]
+    seen = _seen(columns)
+    shown = _most_frequent(columns, seen)
     rows = [
-        [name, *(cell for column in columns for cell in _cells(column, name))]
-        for name in _seen(columns)
+        [name, *(cell for column in columns for cell in _cells(column, name))] for name in shown
     ]
+    if len(seen) > len(shown):
+        rest = [name for name in seen if name not in shown]
+        rows.append(
+            [f"{len(rest)} others", *(cell for c in columns for cell in (_share_of(c, rest), ""))]
+        )
     rows.append(["complete", *(cell for column in columns for cell in _complete_cells(column))])
     print_table(rows, columns=heads)
     times = result.times.attrs
@@ -269,6 +278,23 @@ def _seen(distributions: list[xr.Dataset]) -> list[str]:
         if count > 0
     }
     return [name for name in names if name in seen]
+
+
+def _most_frequent(distributions: list[xr.Dataset], seen: list[str]) -> list[str]:
+    """Return the classes that a table has room for, in their order; --json has all of them."""
+    largest = {name: max(_share_in(d, name) for d in distributions) for name in seen}
+    frequent = sorted(seen, key=lambda name: -largest[name])[:MOST_ROWS]
+    return [name for name in seen if name in frequent]
+
+
+def _share_in(distribution: xr.Dataset, name: str) -> float:
+    if name not in distribution["class"].values:
+        return 0.0
+    return float(distribution["proportion"].sel({"class": name}))
+
+
+def _share_of(distribution: xr.Dataset, names: list[str]) -> str:
+    return _share(sum(_share_in(distribution, name) for name in names))
 
 
 def _cells(distribution: xr.Dataset, name: str) -> tuple[str, str]:

@@ -8,7 +8,8 @@ from pydantic import Field
 
 from driftwalk.model.section import Quantity, Section
 
-MOST_BLOCKS: Final = 1000
+MOST_BLOCKS: Final = 256
+"""The most that the native core takes."""
 
 Latching = Literal["collision", "connector", "none"]
 HiddenFaceDrag = Literal["none", "full"]
