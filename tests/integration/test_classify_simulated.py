@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from command_line import here, refusal
 
 from driftwalk.assemble.classify import classify
 from driftwalk.assemble.events import class_at
+from driftwalk.assemble.path_recording import path_recording
 from driftwalk.assemble.run import assemble, assembly_path
+from driftwalk.core.errors import InputError
 from driftwalk.datasets import tank30_flow
 from driftwalk.model import Study
 from driftwalk.schema import build_trajectory
@@ -88,3 +93,40 @@ def test_with_a_camera_the_classes_agree_but_for_moments(
         near = ((clock - 1.0 <= time[:, None]) & (time[:, None] <= clock)).any(axis=1)
         unexplained.append(differs & ~near & (time < time[-1] - 0.5))
     assert np.mean(unexplained) < 0.005
+
+
+def test_path_as_a_recording_holds_the_same_poses(
+    simulated: tuple[xr.Dataset, xr.Dataset],
+) -> None:
+    path = simulated[1]
+    for run in (0, RUNS - 1):
+        recording = path_recording(path, run=run)
+        expected = recording_of(path, run)
+        for name in ("x", "y", "theta"):
+            np.testing.assert_allclose(recording[name], expected[name], rtol=0, atol=1e-12)
+        assert recording.attrs["sample_rate_Hz"] == pytest.approx(1 / INTERVAL)
+    with pytest.raises(InputError, match="there is no run 20: the path holds 0, 1"):
+        path_recording(path, run=RUNS)
+    with pytest.raises(InputError, match="expected a dataset of kind 'assembly_path'"):
+        path_recording(path.drop_attrs())
+
+
+def test_command_reads_a_simulated_path(
+    simulated: tuple[xr.Dataset, xr.Dataset], tmp_path: Path
+) -> None:
+    told, path = simulated
+    file = tmp_path / "path.nc"
+    path.to_netcdf(file, engine="h5netcdf")
+    run = int(np.argmax(told["event_count"].values))
+    tight = ["--join-distance", "0.1mm", "--join-angle", "0.1deg", "--min-duration", "0s"]
+    done = here("classify", file, "--run", str(run), *tight, "--json")
+    assert done.code == 0, done.err
+    events = json.loads(done.out)["events"]
+    count = int(told["event_count"][run])
+    assert [event["kind"] for event in events] == ["join"] * count
+    times = told["event_time"].values[run, :count]
+    assert [event["time_s"] for event in events] == pytest.approx(times, abs=INTERVAL)
+    assert "there is no run 99" in refusal(here("classify", file, "--run", "99"))
+    table = tmp_path / "table.csv"
+    table.write_text("t_s,x_m,y_m,theta_rad\n0,0,0,0\n1,0,0,0\n", encoding="utf-8")
+    assert "--run is for a simulated path.nc" in refusal(here("classify", table, "--run", "0"))

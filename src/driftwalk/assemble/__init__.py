@@ -27,6 +27,7 @@ from driftwalk.assemble.outcome import (
     world_class,
 )
 from driftwalk.assemble.parameters import draw_parameters
+from driftwalk.assemble.path_recording import path_recording
 from driftwalk.assemble.polyomino import polyomino_cells, polyomino_name, polyominoes
 from driftwalk.assemble.run import assemble, assemble_drawn, assembly_path, check_assembly
 from driftwalk.assemble.sensitivity import (
@@ -66,6 +67,7 @@ __all__ = [
     "outcome_distribution",
     "outcomes_at",
     "pairwise_l1",
+    "path_recording",
     "polyomino_cells",
     "polyomino_name",
     "polyominoes",

@@ -70,6 +70,12 @@ def classify(
         float | None,
         _tolerance("--hold", "s", "How long an unseen block keeps its joins (default: 1s)."),
     ] = None,
+    run: Annotated[
+        int | None,
+        typer.Option(
+            "--run", min=0, help="Run of a simulated path.nc (default: 0).", show_default=False
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -92,7 +98,7 @@ def classify(
 
     if out is not None:
         require_target(out, existing="replace" if overwrite else "error", endings=(".nc",))
-    recording, block_side = _load(poses, how, study, side)
+    recording, block_side = _load(poses, how, study, side, run)
     tolerances = {
         "join_distance": join_distance,
         "join_angle": join_angle,
@@ -146,17 +152,37 @@ def summarise(found: xr.Dataset) -> dict[str, Any]:
 
 
 def _load(
-    path: Path, how: RecordingOptions, study: Path | None, side: float | None
+    path: Path, how: RecordingOptions, study: Path | None, side: float | None, run: int | None
 ) -> tuple[xr.Dataset, float]:
-    """Return the recording and the side of its blocks [m]."""
+    """Return the recording, or the simulated run, and the side of its blocks [m]."""
+    from driftwalk.assemble import path_recording
     from driftwalk.model import Study
 
+    simulated = _simulated_path(path)
+    if simulated is not None:
+        return path_recording(simulated, run=run or 0), float(simulated.attrs["block_side_m"])
+    if run is not None:
+        raise InputError(f"{path}: --run is for a simulated path.nc of driftwalk assemble")
     if study is None:
         # Without a study nobody has said how large the tank is: the blocks need not fit into it.
         own = Study().block.side_m if side is None else side
         return how.load(path, side=own), own
     resolved = resolve_study(study, {} if side is None else {"block.side_m": side})
     return load_with_study(path, resolved, how), resolved.block.side_m
+
+
+def _simulated_path(path: Path) -> xr.Dataset | None:
+    """Return the dataset of a file that `driftwalk assemble` wrote; None for a recording."""
+    import xarray as xr
+
+    if path.suffix != ".nc" or not path.is_file():
+        return None
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as stored:
+            return stored.load() if stored.attrs.get("kind") == "assembly_path" else None
+    except (OSError, ValueError):
+        # Whatever else it is, the loaders say what is wrong with it.
+        return None
 
 
 def _name(names: list[str], index: int) -> str:
