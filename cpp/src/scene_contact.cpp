@@ -161,7 +161,10 @@ void turn(Scene& scene, int assembly, double angle) {
   constexpr double largest = 0.02, pi = 3.141592653589793;
   angle = std::clamp(angle, -largest, largest);
   SceneAssembly& a = scene.assembly[assembly];
-  const double cosine = a.cosine - angle * a.sine, sine = a.sine + angle * a.cosine;
+  // Series that end below the rounding of a pose, for an angle this small.
+  const double square = angle * angle;
+  const double c = 1 - square / 2, s = angle * (1 - square / 6 * (1 - square / 20));
+  const double cosine = c * a.cosine - s * a.sine, sine = c * a.sine + s * a.cosine;
   const double length = std::sqrt(cosine * cosine + sine * sine);
   a.cosine = cosine / length;
   a.sine = sine / length;

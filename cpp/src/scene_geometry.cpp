@@ -113,13 +113,13 @@ void measure_corner(const AssemblyRules& rules, Vec2 corner, Beyond& most) {
            {-edge.normal_x, -edge.normal_y});
   }
 }
-} // namespace
 
-// Whether a block there is within the wall whatever its angle (asked of circles alone).
-static bool is_clear_of_wall(const AssemblyRules& rules, Vec2 middle) {
+// Whether a block there is within a circular wall whatever its angle; of a polygon it says no.
+bool is_clear_of_wall(const AssemblyRules& rules, Vec2 middle) {
   const double inner = rules.radius - rules.side * std::sqrt(0.5);
   return inner > 0 && dot(middle, middle) < inner * inner;
 }
+} // namespace
 
 Beyond beyond_wall(const AssemblyRules& rules, const Scene& scene, int assembly) {
   Beyond most{-HUGE_VAL, {0, 0}};

@@ -39,6 +39,9 @@ public:
       put(stream_.key1, lane, 0);
       put(draw_, lane, 0);
     }
+    for (int b = 0; b < blocks_; ++b) {
+      memory_.listed_x[b] = memory_.listed_y[b] = Real(T(0));
+    }
   }
 
   // Returns the number of block-steps of the worlds that were run.

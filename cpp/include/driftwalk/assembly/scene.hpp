@@ -74,7 +74,7 @@ struct Scene {
 
 // Cells of the pair search are this many a side at most.
 inline constexpr int most_cells_per_side = 64;
-// Pairs closer than this many diagonals can touch; lists reach a skin farther.
+// Lists of near pairs reach this many sides farther than what touches or latches.
 inline constexpr double pair_skin_sides = 0.7;
 // Up to this many blocks every pair is looked at; beyond, lists of near pairs.
 inline constexpr int most_blocks_all_pairs = 24;
