@@ -175,8 +175,7 @@ void check_sampling(int blocks) {
   CHECK(complete > 0 && complete < 30);
 }
 
-// --- one block
-// ------------------------------------------------------------------------------------
+// --- one block ---
 
 template <class T>
 void check_one_block_in(Tank& tank) {
@@ -218,8 +217,7 @@ void check_one_block() {
   check_one_block_in<float>(three);
 }
 
-// --- jams and extremes
-// ----------------------------------------------------------------------------
+// --- jams and extremes ---
 
 struct Worst {
   double overlap = -1, outside = -1;
@@ -275,8 +273,33 @@ void check_jams() {
   check_jam(Tank(), "circle", 26, Latching::connector, false);
 }
 
-// --- events
-// ---------------------------------------------------------------------------------------
+// Five blocks in line between walls that leave 2.4 mm: pushes alone cannot keep them inside.
+void check_line_across() {
+  Tank channel;
+  channel.model.radius = 0;
+  channel.edges = {0, -1, 0.0762, 1, 0, 0.2, 0, 1, 0.0762, -1, 0, 0.2};
+  channel.set_flow(swirl);
+  const driftwalk::PreparedRun<double> prepared(channel.finished());
+  const AssemblyRules rules = synthetic::rules_in(prepared, 5);
+  Crowd crowd(5);
+  for (std::uint64_t k = 1; k <= 10; ++k) {
+    crowd.add({0, -0.06, 0, 0, -0.03, 0, 0, 0, 0, 0, 0.03, 0, 0, 0.06, 0}, k, 1.0, 4e-3);
+  }
+  const CrowdResults found = synthetic::assemble<float>(channel, rules, crowd, 1000, 5);
+  const Worst worst = worst_of(channel, found);
+  double turned = 0;
+  for (std::size_t w = 0; w < 10; ++w) {
+    CHECK(found.event_count[w] == 4);
+    for (std::size_t s = 1; s < found.samples; ++s) {
+      turned = std::max(turned, std::fabs(found.sampled(w, s, 0, side).theta));
+    }
+  }
+  std::printf("line across: outside %.2g m, turned by %.2g\n", worst.outside, turned);
+  CHECK(worst.outside < 1.001e-4);
+  CHECK(turned > 0.05 && turned < 0.12); // the corners of its ends stop it at 0.11
+}
+
+// --- events ---
 
 // Plays the events back: two faces become neighbours on the lattice, every face joins once, and in
 // the end the cells are those of the kernel.
@@ -352,8 +375,7 @@ void check_events() {
   CHECK(events > 60);
 }
 
-// --- connectors at rest
-// ---------------------------------------------------------------------------
+// --- connectors at rest ---
 
 // Whether two faces of two squares are within tolerance: 1 yes, 0 no, -1 too close to tell.
 int faces_meet(const Square& a, const Square& b, double distance, double axis) {
@@ -384,7 +406,7 @@ void check_connectors_at_rest() {
       synthetic::Uniform draw;
       Crowd crowd(2);
       std::vector<int> expected;
-      while (expected.size() < 400) {
+      while (expected.size() < 200) {
         const Square a{0.03 * draw(), 0.03 * draw(), pi * draw(), side};
         const double away = 0.03 + 0.03 * (draw() + 1), heading = pi * draw();
         const double turned = a.theta + axis * 1.2 * draw() + pi / 2 * std::round(2 * draw());
@@ -403,13 +425,12 @@ void check_connectors_at_rest() {
         CHECK(found.event_count[w] == expected[w]);
         latched += found.event_count[w];
       }
-      CHECK(latched > 10 || distance < 0.01);
+      CHECK(latched > 5 || distance < 0.01);
     }
   }
 }
 
-// --- the energy of hard bodies
-// --------------------------------------------------------------------
+// --- the energy of hard bodies ---
 
 // A world in free motion, driven step by step: the kernel starts blocks at rest, so it gives the
 // parts and the test the motion.
@@ -417,7 +438,8 @@ class FreeWorld {
 public:
   using Member = driftwalk::Member<double>;
 
-  FreeWorld(Tank& tank, const AssemblyRules& rules, const Crowd& crowd)
+  FreeWorld(Tank& tank, const AssemblyRules& rules, const Crowd& crowd, double drag = 0,
+            double noise_scale = 0)
       : rules_(rules), memory_(driftwalk::PackMemory<double>::bytes(rules.blocks) + 64),
         pack_(aligned(), rules.blocks), blocks_(std::size_t(rules.blocks)), before_(blocks_.size()),
         assemblies_(blocks_.size()), pairs_(std::size_t(driftwalk::pair_capacity(rules.blocks))),
@@ -429,8 +451,8 @@ public:
         run.flow,
         {run.radius, run.edges, run.edge_count, run.restitution, run.friction, run.bounce_speed},
         {run.dt, run.per_dt, run.per_inertia},
-        {0, 0},
-        0};
+        {drag * run.drag_scale / run.mass, drag * run.drag_scale / run.inertia},
+        noise_scale};
     driftwalk::AssemblyWorlds worlds;
     worlds.start = crowd.start.data();
     driftwalk::load_lane<double, double>(rules, worlds, 0, pack_, 0);
@@ -448,10 +470,11 @@ public:
   void step() {
     driftwalk::advance(physics_, 0, pack_.members, pack_.sums, rules_.blocks);
     driftwalk::meet_walls(physics_, pack_.members, rules_.blocks);
-    driftwalk::fill_scene(rules_, pack_, 0, rules_.blocks, scene_);
+    driftwalk::fill_scene(rules_, pack_, 0, assemblies_left_, scene_);
     driftwalk::find_pairs(rules_, scene_);
     driftwalk::settle(rules_, scene_);
     driftwalk::read_scene<double, double>(rules_, scene_, pack_, 0);
+    assemblies_left_ = scene_.assemblies;
   }
   double energy() {
     double sum = 0;
@@ -469,6 +492,7 @@ private:
     return std::align(64, space - 63, at, space);
   }
   const AssemblyRules& rules_;
+  int assemblies_left_ = rules_.blocks;
   std::vector<char> memory_;
   driftwalk::PackMemory<double> pack_;
   std::vector<driftwalk::SceneBlock> blocks_, before_;
@@ -498,7 +522,7 @@ void check_energy(Tank tank, const char* name, double restitution, double fricti
   }
   const double first = world.energy();
   double before = first, gained = 0;
-  for (int k = 0; k < 6000; ++k) {
+  for (int k = 0; k < 4000; ++k) {
     world.step();
     const double after = world.energy();
     gained = std::max(gained, after - before);
@@ -508,6 +532,119 @@ void check_energy(Tank tank, const char* name, double restitution, double fricti
               friction, before / first, gained / first);
   CHECK(gained < 1e-13 * first);
   CHECK(restitution == 1 && friction == 0 ? before > 0.95 * first : before < 0.2 * first);
+}
+
+// --- a step of an assembly in motion ---
+
+struct Load {
+  double x = 0, y = 0, torque = 0;   // [N, N m] about the centre of mass
+  double slip = 0, turning_slip = 0; // sums of s, and of s (4/3 h^2 + r^2)
+};
+
+// Drag on an assembly by its definition: strip after strip in the water (-turning y, turning x).
+Load drag_by_strips(FreeWorld& world, int blocks, bool hidden, double drag, double turning,
+                    const driftwalk::Pose<double>& pose, const driftwalk::Motion<double>& v) {
+  const double h = side / 2, per_strip = 0.5 * 1000 * drag * (side / 8) * side;
+  const double c = std::cos(pose.theta), s = std::sin(pose.theta);
+  Load load;
+  for (int b = 0; b < blocks; ++b) {
+    const double ox = world.member(b).offset_x, oy = world.member(b).offset_y;
+    for (int face = 0; face < 4; ++face) {
+      bool open = true;
+      const double ax = std::cos(face * pi / 2), ay = std::sin(face * pi / 2);
+      for (int other = 0; other < blocks && !hidden; ++other) {
+        open = open && std::hypot(ox + side * ax - world.member(other).offset_x,
+                                  oy + side * ay - world.member(other).offset_y) > 1e-6;
+      }
+      for (int k = 0; k < 8 && open; ++k) {
+        const double along = side * ((k + 0.5) / 8 - 0.5);
+        const double fx = ox + h * ax - along * ay, fy = oy + h * ay + along * ax;
+        const double rx = c * fx - s * fy, ry = s * fx + c * fy;
+        const double wx = -turning * (pose.y + ry) - (v.vx - v.omega * ry);
+        const double wy = turning * (pose.x + rx) - (v.vy + v.omega * rx);
+        const double nx = c * ax - s * ay, ny = s * ax + c * ay;
+        const double slip = std::max(0.0, -(nx * wx + ny * wy));
+        load.x += per_strip * slip * wx;
+        load.y += per_strip * slip * wy;
+        load.torque += per_strip * slip * (rx * wy - ry * wx);
+        load.slip += per_strip * slip;
+        load.turning_slip += per_strip * slip * (4.0 / 3 * h * h + ox * ox + oy * oy);
+      }
+    }
+  }
+  return load;
+}
+
+// One step of random motion, drag and force against the scheme on paper.
+void check_step_of_an_assembly() {
+  const double shapes[][8] = {{0, 0, side, 0}, {0, 0, side, 0, 0, side}, {0, 0, 0, side, 0, -side}};
+  const int sizes[] = {2, 3, 3};
+  const double turning = 0.7, drag = 1.3, noise_scale = 0.05, dt = 0.01, mass = 0.0116;
+  Tank tank;
+  tank.model.radius = 0.3;
+  tank.set_flow([&](double x, double y, double& u, double& v) {
+    u = -turning * y;
+    v = turning * x;
+  });
+  const driftwalk::PreparedRun<double> prepared(tank.finished());
+  synthetic::Uniform draw;
+  double worst = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    const int n = sizes[trial % 3];
+    const bool hidden = trial % 2 == 1;
+    AssemblyRules rules = synthetic::rules_in(prepared, n);
+    rules.hidden_faces_drag = hidden;
+    Crowd crowd(n);
+    std::vector<double> start;
+    const double heading = pi * draw(), at_x = 0.05 * draw(), at_y = 0.05 * draw();
+    for (int b = 0; b < n; ++b) {
+      const double x = shapes[trial % 3][2 * b], y = shapes[trial % 3][2 * b + 1];
+      start.push_back(at_x + x * std::cos(heading) - y * std::sin(heading));
+      start.push_back(at_y + x * std::sin(heading) + y * std::cos(heading));
+      start.push_back(heading);
+    }
+    crowd.add(start, 1, 0, 0);
+    FreeWorld world(tank, rules, crowd, drag, noise_scale);
+    world.step(); // they latch
+    const driftwalk::Motion<double> v{0.2 * draw(), 0.2 * draw(), 4 * draw()};
+    const driftwalk::Pose<double> from = world.member(0).pose;
+    double ex = 0, ey = 0, torque = 0, inertia = 0;
+    for (int b = 0; b < n; ++b) {
+      FreeWorld::Member& m = world.member(b);
+      CHECK(m.root == 0);
+      m.motion = v;
+      m.drag = {0, 0, 0};
+      m.normals[0] = draw();
+      m.normals[1] = draw();
+      const double c = std::cos(from.theta), s = std::sin(from.theta);
+      const double rx = c * m.offset_x - s * m.offset_y, ry = s * m.offset_x + c * m.offset_y;
+      ex += noise_scale * m.normals[0] / n;
+      ey += noise_scale * m.normals[1] / n;
+      torque += mass * noise_scale * (rx * m.normals[1] - ry * m.normals[0]);
+      inertia += mass * (side * side / 6 + rx * rx + ry * ry);
+    }
+    const double spin = torque / inertia, whole = n * mass;
+    const driftwalk::Motion<double> ahead{v.vx + dt / 2 * ex, v.vy + dt / 2 * ey,
+                                          v.omega + dt / 2 * spin};
+    const Load load =
+        drag_by_strips(world, n, hidden, drag, turning,
+                       {from.x + dt / 4 * (v.vx + ahead.vx), from.y + dt / 4 * (v.vy + ahead.vy),
+                        from.theta + dt / 4 * (v.omega + ahead.omega)},
+                       ahead);
+    const double damping = 1 + dt / 2 * load.slip / whole;
+    const driftwalk::Motion<double> mean{
+        ahead.vx + dt / 2 * load.x / whole / damping, ahead.vy + dt / 2 * load.y / whole / damping,
+        ahead.omega + dt / 2 * load.torque / inertia / (1 + dt / 2 * load.turning_slip / inertia)};
+    world.step();
+    const FreeWorld::Member& m = world.member(n - 1);
+    worst = std::max({worst, std::fabs(m.pose.x - from.x - dt * mean.vx) / dt,
+                      std::fabs(m.pose.y - from.y - dt * mean.vy) / dt,
+                      std::fabs(std::sin(m.pose.theta - from.theta - dt * mean.omega)) / dt * side,
+                      std::fabs(m.motion.vx - (2 * mean.vx - v.vx)),
+                      std::fabs(m.motion.omega - (2 * mean.omega - v.omega)) * side});
+  }
+  std::printf("a step of an assembly: off by %.2g m/s\n", worst);
+  CHECK(worst < 1e-12);
 }
 
 // Two blocks alone, far from any wall: the momentum stays through impact after impact.
@@ -547,6 +684,7 @@ int main() {
   check_sampling(8);
   check_one_block();
   check_jams();
+  check_line_across();
   check_events();
   check_connectors_at_rest();
   for (const double restitution : {1.0, 0.5}) {
@@ -556,5 +694,6 @@ int main() {
     }
   }
   check_isolated_pair();
+  check_step_of_an_assembly();
   return check::result();
 }

@@ -306,8 +306,7 @@ void check_connectors() {
   }
 }
 
-// --- collisions
-// -----------------------------------------------------------------------------------
+// --- collisions ---
 
 // Face on, in line with both centres: both speeds from e and the masses.
 void check_head_on() {
@@ -494,6 +493,95 @@ void check_heaps() {
   CHECK(outside < 1.01e-4);
 }
 
+// What cannot be parted, or cannot be put inside, is back where it was, at rest.
+void check_taken_back() {
+  // Two blocks side by side in a channel a millimetre too narrow for both.
+  synthetic::Tank channel;
+  channel.model.radius = 0;
+  channel.edges = {0, -1, 0.5, 1, 0, 0.0295, 0, 1, 0.5, -1, 0, 0.0295};
+  Place narrow(channel, 2);
+  narrow.rules.latching = Latching::none;
+  HandScene pair(narrow.rules);
+  pair.add({0}, shapes[0], -0.0145, 0, 0, 0, 0.1);
+  pair.add({1}, shapes[0], 0.0145, 0.002, 0, 0, -0.1);
+  pair.assembly[1].before.y = 0.0301;
+  pair.settle();
+  CHECK(pair.square(0).y == 0 && pair.square(1).y == 0.0301);
+  CHECK(pair.of(0).vy == 0 && pair.of(1).vy == 0 && pair.of(1).touched);
+
+  // Five blocks in line across a channel, turned into both its walls, against a sixth.
+  synthetic::Tank wide;
+  wide.model.radius = 0;
+  wide.edges = {0, -1, 0.5, 1, 0, 0.0752, 0, 1, 0.5, -1, 0, 0.0752};
+  Place place(wide, 6);
+  place.rules.latching = Latching::none;
+  HandScene line(place.rules);
+  line.add(range(0, 5), {{0, 0}, {1, 0}, {2, 0}, {3, 0}, {4, 0}}, 0, 0, 0.15, 0, 0.02, 1);
+  line.add({5}, shapes[0], 0, 0.0298, 0.15);
+  line.assembly[0].before = {0, 0, 0, 1, 0};
+  line.assembly[5].before = {0, 0.0301, 0, 1, 0};
+  line.settle();
+  CHECK(line.of(0).theta == 0 && line.of(0).omega == 0 && line.of(0).vy == 0);
+  CHECK(line.deepest() < 1e-4);
+  for (int b = 0; b < 6; ++b) {
+    CHECK(squares::outside(wide, line.square(b)) < 1e-4);
+  }
+}
+
+// A block askew between another and the wall of a narrow channel has to turn, past half a turn.
+void check_turned_apart() {
+  const double tilt = 0.05, c = std::cos(tilt), s = std::sin(tilt);
+  synthetic::Tank channel;
+  channel.model.radius = 0;
+  channel.edges = {s, -c, 0.5, c, s, 0.0306, -s, c, 0.5, -c, -s, 0.0306};
+  Place place(channel, 2);
+  place.rules.latching = Latching::none;
+  HandScene hand(place.rules);
+  hand.add({0}, shapes[0], -0.0156 * c, -0.0156 * s, tilt);
+  hand.add({1}, shapes[0], 0.0147 * c, 0.0147 * s, pi - 0.01);
+  hand.settle();
+  CHECK(hand.deepest() < 1e-4);
+  CHECK(squares::outside(channel, hand.square(0)) < 1e-4);
+  CHECK(squares::outside(channel, hand.square(1)) < 1e-4);
+  CHECK(hand.of(1).theta < 0 && hand.of(1).theta > -pi);
+  CHECK_NEAR(std::cos(hand.of(1).theta), hand.of(1).cosine, 1e-8);
+  CHECK_NEAR(std::sin(hand.of(1).theta), hand.of(1).sine, 1e-8);
+}
+
+// --- the search for near pairs ---
+
+// In order, and all that are nearer than a diagonal and the skin: with few blocks and with many,
+// also of blocks outside the tank and at no place at all.
+void check_pair_search() {
+  Uniform draw;
+  for (const int blocks : {5, driftwalk::most_blocks_all_pairs + 1, 90}) {
+    for (const double spread : {0.1, 0.5, 9.0}) {
+      Place place(Place::wide(), blocks);
+      place.rules.low_x = place.rules.low_y = -0.4 * spread;
+      place.rules.high_x = place.rules.high_y = 0.7 * spread;
+      HandScene hand(place.rules);
+      for (int b = 0; b < blocks; ++b) {
+        hand.add({b}, shapes[0], spread * draw(), spread * draw(), 0);
+      }
+      hand.block[1].x = NAN;
+      driftwalk::find_pairs(place.rules, hand.scene);
+      int k = 0;
+      const double reach = side * (std::sqrt(2.0) + driftwalk::pair_skin_sides);
+      for (int a = 0; a < blocks; ++a) {
+        for (int b = a + 1; b < blocks; ++b) {
+          if (std::hypot(hand.square(a).x - hand.square(b).x, hand.square(a).y - hand.square(b).y) <
+              reach) {
+            const driftwalk::BlockPair found = hand.pairs[std::size_t(k++)];
+            CHECK(found.first == a && found.second == b);
+          }
+        }
+      }
+      CHECK(hand.scene.pairs.count == k);
+      CHECK(k > 0 || spread > 0.1);
+    }
+  }
+}
+
 } // namespace
 
 int main() {
@@ -510,5 +598,8 @@ int main() {
   check_random_collisions();
   check_spin_is_kept();
   check_heaps();
+  check_taken_back();
+  check_turned_apart();
+  check_pair_search();
   return check::result();
 }
