@@ -96,9 +96,10 @@ def map_dataset(
     runs = count.sum(axis=1)
     with np.errstate(invalid="ignore"):
         share = count / runs[:, None]
+        # Whole numbers first: shares that are rounded one by one do not add up to 1.
+        complete = count[:, is_complete(list(names))].sum(axis=1) / runs
     known = reference.reindex({"class": list(names)}, fill_value=0.0)["proportion"].values
     distance, in_floors = _distances(settings, share, runs, known, reference)
-    complete = share[:, is_complete(list(names))].sum(axis=1)
     dims = tuple(axes.values)
     of_setting: dict[str, tuple[npt.NDArray[Any], str, str]] = {
         "runs": (runs, "1", "runs with an outcome"),
