@@ -212,7 +212,7 @@ def test_a_calibration_without_bootstrap_gives_one_distribution(
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (["--blocks", "500"], "500 blocks of 0.03 m do not fit into the tank"),
+        (["--blocks", "200"], "200 blocks of 0.03 m do not fit into the tank"),
         (["--blocks", "70"], "of 70 blocks found a place in the tank, a circle of diameter 0.3 m"),
         (["--blocks", "0"], "'--blocks'"),
         (["--runs", "0"], "'--runs'"),
@@ -295,6 +295,7 @@ import driftwalk.assemble.run
 from driftwalk.core import shards
 driftwalk.report.write_assembly_figures = lambda *folders, **datasets: []
 driftwalk.assemble.run.BLOCKS_PER_UNIT = 100
+driftwalk.assemble.run.FEWEST_RUNS_PER_UNIT = 1
 write = shards.ShardStore.write
 def slow(self, unit, arrays):
     write(self, unit, arrays)

@@ -216,7 +216,7 @@ def test_figures_of_three_axes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         (["--vary", "latching=glue"], '"collision" or "connector" or "none"'),
         (["--vary", "flow=nowhere.nc"], "nowhere.nc: there is no such file"),
         (["--vary", "tank-diameter=30cm,50cm"], "at tank_diameter = 0.5: the flow field does not"),
-        (["--vary", "blocks=2,500"], "at blocks = 500: 500 blocks of 0.03 m do not fit"),
+        (["--vary", "blocks=2,200"], "at blocks = 200: 200 blocks of 0.03 m do not fit"),
         (["--blocks", "70"], "of 70 blocks found a place in the tank"),
         (["--runs", "0"], "'--runs'"),
         (["--realisations", "1"], "'--realisations'"),

@@ -320,7 +320,7 @@ def _run(
 def runs_per_unit(blocks: int) -> int:
     """Return the runs of a work unit: a whole number of drawn flows."""
     runs = max(BLOCKS_PER_UNIT // blocks, FEWEST_RUNS_PER_UNIT)
-    return runs // RUNS_PER_FLOW * RUNS_PER_FLOW
+    return max(runs // RUNS_PER_FLOW, 1) * RUNS_PER_FLOW
 
 
 def _by_flow(plan: Plan, first: int, last: int) -> Sequence[tuple[slice, xr.Dataset]]:
