@@ -55,12 +55,12 @@ struct StripMoments {
   Eight square;        // E[s+^2]
   Eight closing_slip;  // E[s+ w_t]
   Eight windward_slip; // E[w_t; s > 0]
-  EightWords takes_part;
+  Eight::Mask takes_part;
 };
 
 inline StripMoments strip_moments(Eight mean, Eight slip, Eight variance, Eight cross) {
   // A block that is known exactly has tau = 0; the floor stands for it, at 10 nm/s.
-  const Eight tau = square_root(at_least(variance, eight(1e-16)));
+  const Eight tau = square_root(at_least(variance, 1e-16));
   const Eight z = mean / tau;
   const NormalLaw law = normal_law(z);
   StripMoments m;
@@ -78,10 +78,10 @@ struct DragSumsOfEight {
   Eight by_velocity[2][2];
 };
 
-inline void keep_shares(const StripsOnGrid& grid, const Eight response[2][2], EightWords part,
+inline void keep_shares(const StripsOnGrid& grid, const Eight response[2][2], Eight::Mask part,
                         StripShare* shares, int& count) {
   for (int lane = 0; lane < 8; ++lane) {
-    if (part[lane] == 0) {
+    if (!part[lane]) {
       continue;
     }
     StripShare& share = shares[count++];
@@ -94,14 +94,16 @@ inline void keep_shares(const StripsOnGrid& grid, const Eight response[2][2], Ei
   }
 }
 
+inline constexpr double lane_numbers[8] = {0, 1, 2, 3, 4, 5, 6, 7};
+
 // Strips `first` .. `first + 7` of a side; `shares` may be null.
 inline void add_strips(const SplineView& flow, const StripBlock& block, const UncertainBlock& state,
                        Side side, int first, double scale, DragSumsOfEight& sums,
                        StripShare* shares, int& count) {
   const double nx = side.nx, ny = side.ny, tx = -ny, ty = nx, h = block.half_side;
-  const Eight strip = Eight{0, 1, 2, 3, 4, 5, 6, 7} + double(first);
-  const EightWords real = strip < double(block.strips);
-  const Eight offset = (real ? strip + 0.5 : eight(0.5)) * block.strip_width - h;
+  const Eight strip = Eight::load(lane_numbers) + first;
+  const Eight::Mask real = strip < block.strips;
+  const Eight offset = (select(real, strip, Eight(0)) + 0.5) * block.strip_width - h;
   const Eight arm_x = nx * h + tx * offset, arm_y = ny * h + ty * offset;
   StripsOnGrid grid;
   const FlowAtStrips at = flow_at_strips(flow, state.x + arm_x, state.y + arm_y, grid);
@@ -117,11 +119,11 @@ inline void add_strips(const SplineView& flow, const StripBlock& block, const Un
                         (gnx * c.x_tangent + gny * c.y_tangent) + c.cross);
   const Eight slip = tx * wx + ty * wy;
   const StripMoments m = strip_moments(-(nx * wx + ny * wy), slip, variance, cross);
-  const EightWords part = m.takes_part & real;
+  const Eight::Mask part = m.takes_part & real;
   if (!any(part)) {
     return;
   }
-  const Eight K = part ? eight(scale) : eight(0);
+  const Eight K = select(part, Eight(scale), Eight(0));
   const Eight along_normal = K * m.square, along_tangent = K * m.closing_slip;
   sums.acceleration[0] += tx * along_tangent - nx * along_normal;
   sums.acceleration[1] += ty * along_tangent - ny * along_normal;
@@ -161,7 +163,7 @@ inline void add_orientation(const SplineView& flow, const StripBlock& block,
 inline DragResponse expected_drag(const SplineView& flow, const StripBlock& block,
                                   const Orientations& orientations, double theta,
                                   const UncertainBlock& state, StripShare* shares) {
-  DragSumsOfEight sums{};
+  DragSumsOfEight sums{{0, 0}, {{0, 0}, {0, 0}}, {{0, 0}, {0, 0}}};
   DragResponse response;
   response.shares = 0;
   if (orientations.count == 0) {

@@ -5,7 +5,7 @@
 // cpp/tests/test_infer.cpp).
 #pragma once
 
-#include "driftwalk/infer/eight.hpp"
+#include "driftwalk/infer/doubles.hpp"
 
 DRIFTWALK_LANES_BEGIN
 
@@ -28,8 +28,9 @@ inline Eight exponential(Eight x) {
   const Eight odd =
       1.0 + z * (1.0 / 6 +
                  z * (1.0 / 120 + z * (1.0 / 5040 + z * (1.0 / 362880 + z * (1.0 / 39916800)))));
-  const EightWords power = ((EightWords)shifted + 1023) << 52;
-  return (even + r * odd) * (Eight)power;
+  const Eight power = Eight::each(
+      [&](int k) { return (Eight::Vector)(((Eight::Words)shifted.part[k] + 1023) << 52); });
+  return (even + r * odd) * power;
 }
 
 // (1 - Phi(x)) / phi(x) for 0 <= x <= 8.
@@ -62,16 +63,16 @@ struct NormalLaw {
 };
 
 inline NormalLaw normal_law(Eight z) {
-  const Eight zero{};
-  const EightWords above = z >= normal_reach, below = z <= -normal_reach;
-  NormalLaw law{zero, above ? eight(1) : zero};
-  const EightWords between = ~(above | below);
+  const Eight::Mask above = z > normal_reach, below = z < -normal_reach;
+  const Eight::Mask between = !(above | below);
+  NormalLaw law{0.0, select(above, Eight(1), Eight(0))};
   if (any(between)) {
-    const Eight size = at_most(z < zero ? -z : z, eight(normal_reach));
+    const Eight::Mask negative = z < 0;
+    const Eight size = at_most(select(negative, -z, z), normal_reach);
     const Eight density = 0.3989422804014327 * exponential(-0.5 * (size * size));
     const Eight tail = density * mills_ratio(size);
-    law.density = between ? density : zero;
-    law.probability = between ? (z < zero ? tail : 1.0 - tail) : law.probability;
+    law.density = select(between, density, Eight(0));
+    law.probability = select(between, select(negative, tail, 1 - tail), law.probability);
   }
   return law;
 }

@@ -5,14 +5,14 @@
 // Each operation is one pass over rows that stay in the first-level cache.
 #pragma once
 
-#include "driftwalk/infer/eight.hpp"
+#include "driftwalk/infer/doubles.hpp"
 #include "driftwalk/infer/kalman.hpp"
 #include "driftwalk/infer/spline_flow.hpp"
 
 DRIFTWALK_LANES_BEGIN
 
 inline void add_four(double* to, Four value) {
-  store(to, load_four(to) + value);
+  (Four::load(to) + value).store(to);
 }
 
 // Adds a strip to the derivatives by the coefficients, of u first and `nodes` further those of v:
@@ -20,7 +20,7 @@ inline void add_four(double* to, Four value) {
 // scale -1 the strip's response to the velocity gives its response to the flow.
 inline void add_share(const StripShare& share, int columns, std::int64_t nodes,
                       const double response[4], double scale, double* row_x, double* row_y) {
-  const Four by_x = scale * four_weights(share.along_x);
+  const Four by_x = scale * row_weights.value(share.along_x);
   for (int row = 0; row < 4; ++row) {
     const Four weights = share.weight_y[row] * by_x;
     const std::int64_t u = share.node + std::int64_t(row) * columns, v = u + nodes;
@@ -48,12 +48,12 @@ public:
   void drift_and_kick(double dt, const Kick& kick) {
     const Matrix2 &X = kick.by_position, &V = kick.by_velocity;
     for (std::int64_t p = 0; p < stride_; p += 8) {
-      const Eight vx = load_eight(rows_[2] + p), vy = load_eight(rows_[3] + p);
-      const Eight x = load_eight(rows_[0] + p) + dt * vx, y = load_eight(rows_[1] + p) + dt * vy;
-      store(rows_[0] + p, x);
-      store(rows_[1] + p, y);
-      store(rows_[2] + p, X[0][0] * x + X[0][1] * y + V[0][0] * vx + V[0][1] * vy);
-      store(rows_[3] + p, X[1][0] * x + X[1][1] * y + V[1][0] * vx + V[1][1] * vy);
+      const Eight vx = Eight::load(rows_[2] + p), vy = Eight::load(rows_[3] + p);
+      const Eight x = Eight::load(rows_[0] + p) + dt * vx, y = Eight::load(rows_[1] + p) + dt * vy;
+      x.store(rows_[0] + p);
+      y.store(rows_[1] + p);
+      (X[0][0] * x + X[0][1] * y + V[0][0] * vx + V[0][1] * vy).store(rows_[2] + p);
+      (X[1][0] * x + X[1][1] * y + V[1][0] * vx + V[1][1] * vy).store(rows_[3] + p);
     }
   }
 
@@ -74,17 +74,17 @@ public:
 
   void drift(double dt) {
     for (std::int64_t p = 0; p < stride_; p += 8) {
-      store(rows_[0] + p, load_eight(rows_[0] + p) + dt * load_eight(rows_[2] + p));
-      store(rows_[1] + p, load_eight(rows_[1] + p) + dt * load_eight(rows_[3] + p));
+      (Eight::load(rows_[0] + p) + dt * Eight::load(rows_[2] + p)).store(rows_[0] + p);
+      (Eight::load(rows_[1] + p) + dt * Eight::load(rows_[3] + p)).store(rows_[1] + p);
     }
   }
 
   void write_whitened(const Whitening& whiten, double* row_x, double* row_y) const {
     std::int64_t p = 0;
     for (; p + 8 <= parameters_; p += 8) {
-      const Eight x = load_eight(rows_[0] + p) * whiten.per_xx;
-      store(row_x + p, x);
-      store(row_y + p, (load_eight(rows_[1] + p) - whiten.yx * x) * whiten.per_yy);
+      const Eight x = Eight::load(rows_[0] + p) * whiten.per_xx;
+      x.store(row_x + p);
+      ((Eight::load(rows_[1] + p) - whiten.yx * x) * whiten.per_yy).store(row_y + p);
     }
     for (; p < parameters_; ++p) {
       row_x[p] = rows_[0][p] * whiten.per_xx;
@@ -94,9 +94,9 @@ public:
 
   void update(const Gain& gain) {
     for (std::int64_t p = 0; p < stride_; p += 8) {
-      const Eight x = load_eight(rows_[0] + p), y = load_eight(rows_[1] + p);
+      const Eight x = Eight::load(rows_[0] + p), y = Eight::load(rows_[1] + p);
       for (int a = 0; a < 4; ++a) {
-        store(rows_[a] + p, load_eight(rows_[a] + p) - (gain.by_x[a] * x + gain.by_y[a] * y));
+        (Eight::load(rows_[a] + p) - (gain.by_x[a] * x + gain.by_y[a] * y)).store(rows_[a] + p);
       }
     }
   }
