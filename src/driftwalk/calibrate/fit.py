@@ -1,11 +1,10 @@
-"""The likelihood fit: flow, drag, stochastic force and tracking noise from a recording, together."""
+"""The likelihood fit: flow, drag, stochastic force and tracking noise, together."""
 
 from __future__ import annotations
 
 import json
 import math
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -27,7 +26,6 @@ from driftwalk.calibrate.fit_wall import wall_intervals
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.schema import Track, body_track
-from driftwalk.simulate.backend import default_threads
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,7 +49,6 @@ def fit_motion(
     *,
     angle: AngleUse | None = None,
     body: str | None = None,
-    threads: int | None = None,
     tell: Tell | None = None,
 ) -> xr.Dataset:
     """Fit flow, drag coefficient, stochastic force and tracking noise to a recording, together.
@@ -71,8 +68,6 @@ def fit_motion(
         Whether the recorded orientation is used; default: what the study says.
     body : str, optional
         The body, where a recording has several.
-    threads : int, optional
-        Threads of the filters; default: all processors. The result does not depend on it.
     tell : callable, optional
         Told how many steps are done, how many there are at most, and what is done.
 
@@ -81,8 +76,8 @@ def fit_motion(
     xarray.Dataset
         A `fit`; `fitted_flow` makes a flow field of it. The answer stands in its attributes:
         ``drag_coefficient``, ``force_std_N``, ``force_noise_intensity_N2_s``, ``tracking_noise_m``,
-        each with ``_interval``, ``force_interval_s``, ``wall_share``, ``warnings``, and the check of
-        the innovations (``chi_squared_per_dof``, ``autocorrelation``).
+        each with ``_interval``, ``force_interval_s``, ``wall_share``, ``warnings``, and the check
+        of the innovations (``chi_squared_per_dof``, ``autocorrelation``).
 
     Raises
     ------
@@ -116,10 +111,9 @@ def fit_motion(
             side_m=chosen.block.side_m, widest_m=max(chosen.tank.extent_m)
         ),
     )
-    with ThreadPoolExecutor(threads or default_threads()) as executor:
-        passes = Passes(series, _body(chosen, oriented), spline, executor)
-        mode, restricted = _search(passes, tracks, chosen, tell or _silent)
-        whiteness = whiteness_of(passes.innovations(restricted.point))
+    passes = Passes(series, _body(chosen, oriented), spline)
+    mode, restricted = _search(passes, tracks, chosen, tell or _silent)
+    whiteness = whiteness_of(passes.innovations(restricted.point))
     attrs: dict[str, Any] = {
         **parameter_attrs(restricted.point, parameter_covariance(mode, restricted), chosen),
         "maximum_likelihood_drag_coefficient": math.exp(mode.point.log_drag),
@@ -205,7 +199,9 @@ def _series(
         usable += int(np.count_nonzero(~excluded[1:] & (np.diff(time) <= LONGEST_GAP_S)))
         found.append(
             Series(
-                *(np.ascontiguousarray(part) for part in (time, track.x, track.y)),
+                time,
+                np.ascontiguousarray(track.x),
+                np.ascontiguousarray(track.y),
                 smooth.theta,
                 smooth.omega,
                 excluded.astype(np.uint8),

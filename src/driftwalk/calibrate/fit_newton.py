@@ -1,9 +1,9 @@
 """The maximum of the penalised likelihood, by Gauss-Newton, and the smoothness of the flow.
 
 Prior of the flow's coefficients: ``exp(-(lam_r c' R c + lam_s c' S c) / 2)`` per component, R and S
-the roughness and the size of `driftwalk.calibrate.fit_spline.penalties`. The two weights follow from
-the data: each step sets a weight to the degrees of freedom that the data leave nothing of to it,
-over c' B c (MacKay's fixed point of the evidence).
+the roughness and the size of `driftwalk.calibrate.fit_spline.penalties`. The two weights follow
+from the data: each step sets a weight to the degrees of freedom that the data have taken from its
+prior, over ``c' R c`` or ``c' S c`` (MacKay's fixed point of the evidence).
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ PRIOR_DRAG = 0.5
 """Centre of the weak prior of C_d, and where the search begins."""
 PRIOR_LOG_DRAG_STD = 0.7
 HELD = ((-3, -1), (-3,))
-"""Parameters (from the end) that the first steps leave as they are: flow and q have to settle before
-a step of C_d or r means anything."""
+"""Parameters (from the end) that the first steps leave as they are: flow and q have to settle
+before a step of C_d or r means anything."""
 MOST_LOG_DRAG_STEP = 0.5
 MOST_FACTOR = 10.0
 """By which q, r^2 or the weight of a penalty may change in a step."""

@@ -2,9 +2,9 @@
 
 The filter predicts each position from the past. Its innovations e_k are independent normals with
 covariances S_k if the parameters are right, so twice the negative log likelihood is the sum of
-``ln det S_k + e_k' S_k^-1 e_k``. The parameters are, in this order, the flow's coefficients, ln C_d,
-ln q (intensity of the stochastic acceleration) and ln r (tracking noise). For the first two the
-filter itself gives the derivatives of its predictions; for the other two it is run again with
+``ln det S_k + e_k' S_k^-1 e_k``. The parameters are, in this order, the flow's coefficients,
+ln C_d, ln q (intensity of the stochastic acceleration) and ln r (tracking noise). For the first two
+the filter itself gives the derivatives of its predictions; for the other two it is run again with
 slightly larger values, and the derivatives of S_k enter as well.
 """
 
@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -108,14 +107,11 @@ class Passes:
         The block.
     spline : Spline
         Knots of the flow.
-    executor : Executor
-        Runs the filters of one sample range side by side.
     """
 
     series: Sequence[Series]
     body: Body
     spline: Spline
-    executor: Executor
 
     def sums(self, point: Point, *, noise: str = "with") -> Sums:
         """Return likelihood, score and information at a point.
@@ -140,7 +136,7 @@ class Passes:
                 filters.append(self._filter(series, more))
             for start in range(0, series.time.size, SAMPLES_AT_ONCE):
                 count = min(SAMPLES_AT_ONCE, series.time.size - start)
-                found = list(self.executor.map(lambda one, n=count: one.run(n), filters))
+                found = [one.run(count) for one in filters]
                 part = _part(found)
                 deviance += part.deviance
                 score += part.score

@@ -1,11 +1,11 @@
 """C_d from the restricted likelihood, which allows for the flow being estimated along with it.
 
 The maximum of the likelihood over C_d and hundreds of flow coefficients together gives too large a
-C_d: the fitted flow takes up part of the scatter of the velocity, and what is left seems to be pulled
-back to it more strongly (as a mean-reversion rate is biased upwards when means are estimated).
-The restricted likelihood integrates the coefficients out instead. To first order (Laplace) that adds
-``ln det(J' J + Lambda) / 2`` of the coefficients' block of the information to the profile of the
-negative log likelihood; its minimum over ln C_d is the estimate.
+C_d: the fitted flow takes up part of the scatter of the velocity, and what is left seems to be
+pulled back to it more strongly (as a mean-reversion rate is biased upwards when means are
+estimated). The restricted likelihood integrates the coefficients out instead. To first order
+(Laplace) that adds ``ln det(J' J + Lambda) / 2`` of the coefficients' block of the information to
+the profile of the negative log likelihood; its minimum over ln C_d is the estimate.
 """
 
 from __future__ import annotations

@@ -152,13 +152,14 @@ def penalties(spline: Spline) -> tuple[Floats, Floats]:
     --------
     >>> roughness, size = penalties(Spline(0.0, 0.0, 0.5, 5, 5))
     >>> constant = np.ones(25)
-    >>> bool(abs(constant @ roughness @ constant) < 1e-9), round(float(constant @ size @ constant), 9)
-    (True, 1.0)
+    >>> form = [float(constant @ matrix @ constant) for matrix in (roughness, size)]
+    >>> np.round(form, 9) + 0.0
+    array([0., 1.])
     """
     x = [_gram(spline.columns, spline.spacing, order) for order in range(3)]
     y = [_gram(spline.rows, spline.spacing, order) for order in range(3)]
     roughness = np.kron(y[0], x[2]) + 2.0 * np.kron(y[1], x[1]) + np.kron(y[2], x[0])
-    return roughness, np.kron(y[0], x[0])
+    return np.asarray(roughness, np.float64), np.asarray(np.kron(y[0], x[0]), np.float64)
 
 
 def _gram(count: int, spacing: float, order: int) -> Floats:

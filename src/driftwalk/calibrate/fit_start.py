@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 SMOOTHING = 1e-3
 """Weight of the roughness, against the data, in the spline through the first flow field."""
 UNREST = 0.1
-"""Share of U^3 / a (speed U, block side a) that the first q is: rather too large than too small, as a
-small one makes the filter lose the track."""
+"""Share of U^3 / a (speed U, block side a) that the first q is: rather too large than too small, as
+a small one makes the filter lose the track."""
 SMALLEST_NOISE = 1e-3
 """Least tracking noise at the start, of the step between samples."""
 

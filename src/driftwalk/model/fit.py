@@ -28,15 +28,16 @@ class Fit(Section):
     ] = Field(
         default="auto",
         description=(
-            'Distance between the knots of the flow. "auto" is two thirds of the block\'s side (2 cm for '
-            "3 cm), or a 24th of the tank where that is more."
+            'Distance between the knots of the flow. "auto" is two thirds of the side of the block '
+            "(2 cm for 3 cm), or a 24th of the tank where that is more."
         ),
     )
     angle: Literal["auto", "given", "none"] = Field(
         default="auto",
         description=(
-            'Whether the recorded orientation turns the faces of the block: "given", or "none" for '
-            'the drag averaged over all orientations; "auto" is "given" where most samples have one.'
+            'Whether the recorded orientation turns the faces of the block: "given", or "none" '
+            'for the drag averaged over all orientations; "auto" is "given" where most samples '
+            "have one."
         ),
     )
     iterations: Annotated[int, Quantity("1", ge=4, le=1000, whole=True)] = Field(
