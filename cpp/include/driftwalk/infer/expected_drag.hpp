@@ -158,8 +158,8 @@ inline void add_orientation(const SplineView& flow, const StripBlock& block,
   }
 }
 
-// The drag at angle `theta`, or averaged over the orientations if there are any. `shares`, if not
-// null, takes what each strip contributes to the derivative by the coefficients.
+// The drag at angle `theta`, or averaged over the orientations, without turning, if there are any.
+// `shares`, if not null, takes what each strip contributes to the derivative by the coefficients.
 inline DragResponse expected_drag(const SplineView& flow, const StripBlock& block,
                                   const Orientations& orientations, double theta,
                                   const UncertainBlock& state, StripShare* shares) {
@@ -170,8 +170,10 @@ inline DragResponse expected_drag(const SplineView& flow, const StripBlock& bloc
     add_orientation(flow, block, state, __builtin_cos(theta), __builtin_sin(theta),
                     block.drag_scale, sums, shares, response.shares);
   }
+  UncertainBlock still = state;
+  still.omega = 0;
   for (int k = 0; k < orientations.count; ++k) {
-    add_orientation(flow, block, state, orientations.cosine[k], orientations.sine[k],
+    add_orientation(flow, block, still, orientations.cosine[k], orientations.sine[k],
                     block.drag_scale / orientations.count, sums, shares, response.shares);
   }
   for (int a = 0; a < 2; ++a) {

@@ -113,9 +113,8 @@ private:
     __builtin_memcpy(covariance, state_.covariance, sizeof covariance);
     covariance[2][2] += problem_.noise_intensity * h / 2;
     covariance[3][3] += problem_.noise_intensity * h / 2;
-    const bool turning = problem_.orientations.count == 0;
-    const UncertainBlock block{state_.mean[0], state_.mean[1],        state_.mean[2],
-                               state_.mean[3], turning ? omega : 0.0, covariance};
+    const UncertainBlock block{state_.mean[0], state_.mean[1], state_.mean[2],
+                               state_.mean[3], omega,          covariance};
     return expected_drag(problem_.flow, problem_.block, problem_.orientations, theta, block,
                          scratch_.shares);
   }

@@ -28,7 +28,7 @@ public:
             double drag_coefficient, bool angle_known);
 
   // Orientations between 0 and a quarter turn that stand for an unknown angle. With eight the drag
-  // is within 1e-3 of that of many (cpp/tests/test_infer.cpp).
+  // is within 1 % of that of many, mostly 0.1 % (cpp/tests/test_infer.cpp).
   static constexpr int orientations = 8;
 
   // Flow, block and orientations, with pointers into this object.
