@@ -6,9 +6,9 @@
 #include <nanobind/stl/string.h>
 
 #include <algorithm>
-#include <memory>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 using namespace nb::literals;
 using driftwalk::DragModel;

@@ -5,9 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <stdexcept>
-#include <string>
+#include <utility>
 
 namespace driftwalk {
 
@@ -116,6 +117,8 @@ InnovationsFilter::InnovationsFilter(const Track& track, DragModel model,
   require(positive(settings.position_noise), "the position noise must be positive");
   require(positive(settings.largest_step), "the largest step must be positive");
   require(settings.longest_gap > 0, "the longest gap must be positive");
+  require(settings.longest_gap / settings.largest_step <= 1e6,
+          "the longest gap must not be above a million of the largest steps");
   check(track, problem_.orientations.count == 0);
   copy(track);
   problem_.noise_intensity = settings.noise_intensity;

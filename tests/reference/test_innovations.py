@@ -476,6 +476,7 @@ def test_whitened_innovations_of_a_linear_world_are_standard_normal():
         ("noise_intensity", -1.0, "must not be negative"),
         ("position_noise", 0.0, "position noise must be positive"),
         ("largest_step", 0.0, "largest step must be positive"),
+        ("longest_gap", np.inf, "longest gap must not be above"),
         ("strips", 0, "at least one strip"),
         ("mass", np.nan, "must be positive"),
         ("orientation", "some", "'given' or 'none'"),

@@ -139,7 +139,7 @@ inline bool any(Eight::Mask mask) {
 inline Eight square_root(Eight value) {
 #if defined(DRIFTWALK_USE_X86) && defined(__AVX512F__)
   value.part[0] = (Eight::Vector)_mm512_sqrt_pd((__m512d)value.part[0]);
-#elif defined(DRIFTWALK_USE_X86) && defined(__AVX__)
+#elif defined(DRIFTWALK_USE_X86) && defined(__AVX2__)
   for (Eight::Vector& vector : value.part) {
     vector = (Eight::Vector)_mm256_sqrt_pd((__m256d)vector);
   }

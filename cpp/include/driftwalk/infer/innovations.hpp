@@ -5,7 +5,6 @@
 #include "driftwalk/infer/problem.hpp"
 
 #include <array>
-#include <memory>
 #include <vector>
 
 namespace driftwalk {
