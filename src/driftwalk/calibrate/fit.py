@@ -92,18 +92,12 @@ def fit_motion(
     >>> round(fit.attrs["drag_coefficient"], 2)  # doctest: +SKIP
     0.37
     """
-    import xarray as xr
-
     from driftwalk.model import Study
 
     chosen = study if study is not None else Study()
-    many = [recordings] if isinstance(recordings, xr.Dataset) else list(recordings)
-    if not many:
-        raise InputError("no recording given: fit_motion needs one at least")
-    tracks = [_checked_track(recording, body) for recording in many]
-    oriented = _use_angle(tracks, chosen.fit.angle if angle is None else angle)
+    many = _as_list(recordings)
+    tracks, series, oriented, wall_share = _prepare(many, chosen, angle, body)
     outline = outline_of(chosen.tank.to_arena())
-    series, wall_share = _series(tracks, chosen, outline, oriented)
     spline = lay_spline(
         outline,
         side=chosen.block.side_m,
@@ -120,6 +114,7 @@ def fit_motion(
         "wetted_depth_m": chosen.wetted_depth_m,
         "wall_share": wall_share,
         "angle": "given" if oriented else "none",
+        "restricted": "yes" if restricted.has_minimum else "no",
         "samples": sum(one.time.size for one in series),
         "samples_used": mode.used,
         "duration_s": sum(float(one.time[-1] - one.time[0]) for one in series),
@@ -135,6 +130,55 @@ def fit_motion(
     }
     attrs["warnings"] = json.dumps(_warnings(attrs, whiteness))
     return build_fit(spline, mode, restricted, series, study=chosen, oriented=oriented, attrs=attrs)
+
+
+def check_fit(
+    recordings: xr.Dataset | Sequence[xr.Dataset],
+    study: Study | None = None,
+    *,
+    angle: AngleUse | None = None,
+    body: str | None = None,
+) -> None:
+    """Refuse recordings that `fit_motion` would refuse; takes no time worth speaking of.
+
+    Parameters
+    ----------
+    recordings, study, angle, body
+        As of `fit_motion`.
+
+    Raises
+    ------
+    InputError
+        When they cannot be fitted.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> dw.check_fit(dw.tank30_recording())
+    """
+    from driftwalk.model import Study
+
+    _prepare(_as_list(recordings), study if study is not None else Study(), angle, body)
+
+
+def _as_list(recordings: xr.Dataset | Sequence[xr.Dataset]) -> list[xr.Dataset]:
+    import xarray as xr
+
+    many = [recordings] if isinstance(recordings, xr.Dataset) else list(recordings)
+    if not many:
+        raise InputError("no recording given: fit_motion needs one at least")
+    return many
+
+
+def _prepare(
+    many: Sequence[xr.Dataset], study: Study, angle: AngleUse | None, body: str | None
+) -> tuple[list[Track], list[Series], bool, float]:
+    """Return tracks, what the filter takes of them, whether angles are used, and the wall share."""
+    tracks = [_checked_track(recording, body) for recording in many]
+    oriented = _use_angle(tracks, study.fit.angle if angle is None else angle)
+    outline = outline_of(study.tank.to_arena())
+    series, wall_share = _series(tracks, study, outline, oriented)
+    return tracks, series, oriented, wall_share
 
 
 def _silent(done: int, total: int, what: str) -> None:
@@ -257,6 +301,11 @@ def _warnings(facts: dict[str, Any], whiteness: Whiteness) -> list[str]:
     if facts["converged"] == "no":
         found.append(
             f"the search has not come to its end in {facts['iterations']} steps ([fit] iterations)"
+        )
+    if facts["restricted"] == "no":
+        found.append(
+            "the restricted likelihood has no minimum: C_d is that of the plain one, likely too "
+            "large, and the motion tells little of it or does not follow the model"
         )
     if facts["angle"] == "none":
         found.append(

@@ -27,7 +27,8 @@ MOST_LOG_DRAG_STEP = 0.5
 MOST_FACTOR = 10.0
 """By which q, r^2 or the weight of a penalty may change in a step."""
 CLOSE = 0.1
-"""Converged when no step is longer than this part of the parameter's standard deviation."""
+"""Converged when the steps of C_d, q and r, and in the mean those of the coefficients, are below
+this part of their standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -131,10 +132,10 @@ def find_mode(
         covariance = inverse(sums.information)
         step = limited(newton_step(sums, covariance, held=held))
         point = point.moved(step)
-        previous, weights = weights, prior.updated(weights, point, covariance)
-        sd = np.sqrt(np.diag(covariance)[-3:])
-        settled = abs(math.log(weights.roughness / previous.roughness)) < 0.1
-        if len(held) == 0 and settled and (np.abs(step[-3:]) < CLOSE * sd).all():
+        weights = prior.updated(weights, point, covariance)
+        moves = np.abs(step) / np.sqrt(np.diag(covariance))
+        near = max(float(moves[-3:].max()), float(np.sqrt((moves[:-3] ** 2).mean())))
+        if len(held) == 0 and near < CLOSE:
             converged = True
             break
     return Mode(point, weights, covariance, used, index + 1, converged)

@@ -23,6 +23,9 @@ from driftwalk.calibrate.fit_spline import Floats
 SPAN = 2.0
 """The profile is looked at this many standard deviations around the first guess of its minimum."""
 LATTICE = 2001
+MOST_STD_RATIO = 4.0
+"""A criterion that is so much flatter or sharper than the likelihood has no minimum worth the name:
+the motion does not follow the model, or tells nothing of C_d."""
 
 
 class Profile(NamedTuple):
@@ -47,6 +50,8 @@ class Restricted(NamedTuple):
     """From the curvature of the criterion."""
     profiles: list[Profile]
     """Where it was computed, in the order of C_d."""
+    has_minimum: bool
+    """Whether the criterion has a minimum; if not, point and std are the likelihood's."""
 
 
 def profile_at(
@@ -107,6 +112,8 @@ def restricted_drag(passes: Passes, mode: Mode, prior: Prior) -> Restricted:
     look(guess - SPAN * sd)
     found.sort(key=lambda one: one.log_drag)
     log_drag, std = _minimum(found)
+    if not sd / MOST_STD_RATIO <= std <= sd * MOST_STD_RATIO:
+        return Restricted(start, sd, found, has_minimum=False)
     nearest = min(found, key=lambda one: abs(one.log_drag - log_drag))
     coefficients = _coefficients_at(found, nearest, log_drag)
     slopes = mode.covariance[-2:, -3] / mode.covariance[-3, -3] * (log_drag - start.log_drag)
@@ -116,11 +123,13 @@ def restricted_drag(passes: Passes, mode: Mode, prior: Prior) -> Restricted:
         start.log_intensity + float(slopes[0]),
         start.log_noise + float(slopes[1]),
     )
-    return Restricted(point, std, found)
+    return Restricted(point, std, found, has_minimum=True)
 
 
 def _minimum(found: list[Profile]) -> tuple[float, float]:
     """Return the minimum of the criterion through some points, and its standard deviation.
+
+    The standard deviation is infinite where there is no minimum near the points.
 
     Values and slopes of the likelihood and values of the determinant determine a polynomial each.
     """
@@ -140,9 +149,12 @@ def _minimum(found: list[Profile]) -> tuple[float, float]:
     determinant = np.polynomial.polynomial.polyfit(at, determinants, min(2, len(found) - 1))
     criterion = np.polynomial.Polynomial(likelihood) + np.polynomial.Polynomial(determinant)
     lattice = np.linspace(at.min() - 0.5, at.max() + 0.5, LATTICE)
-    best = float(lattice[np.argmin(criterion(lattice))])
-    curvature = max(float(criterion.deriv(2)(best)), 1e-12)
-    return centre + scale * best, scale / math.sqrt(curvature)
+    best = int(np.argmin(criterion(lattice)))
+    curvature = float(criterion.deriv(2)(lattice[best]))
+    lowest = centre + scale * float(lattice[best])
+    if best in (0, LATTICE - 1) or curvature <= 0.0:
+        return lowest, math.inf
+    return lowest, scale / math.sqrt(curvature)
 
 
 def _coefficients_at(found: list[Profile], nearest: Profile, log_drag: float) -> Floats:

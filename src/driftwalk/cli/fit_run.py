@@ -61,16 +61,17 @@ def run_fit(work: FitWork, folder: Path, *, overwrite: bool) -> xr.Dataset:
     Raises
     ------
     InputError
-        When a recording cannot be fitted.
+        When a recording cannot be fitted; nothing is written then.
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
     """
     from driftwalk import _core
-    from driftwalk.calibrate import fit_motion, fitted_flow
+    from driftwalk.calibrate import check_fit, fit_motion, fitted_flow
     from driftwalk.core.provenance import manifest
     from driftwalk.core.rundir import RunDirectory
     from driftwalk.report import write_fit_figures
 
+    check_fit(work.recordings, work.study, body=work.body)
     existing = "overwrite" if overwrite else "resume"
     with RunDirectory(folder, specification=_specification(work), on_existing=existing) as run:  # type: ignore[arg-type]
         about = manifest(
