@@ -148,3 +148,74 @@ def assemble(
     threads: int,
     precision: str,
 ) -> dict[str, npt.NDArray[Any] | int]: ...
+
+# --- the likelihood fit -------------------------------------------------------------------------
+class InnovationsFilter:
+    # Time [s] increasing; x and y [m], NaN where a sample is missing; theta [rad] without jumps by
+    # 2 pi and omega [rad/s], finite everywhere. excluded: 1 where the interval that ends at the
+    # sample says nothing about the water. Coefficients of u and v (2, rows, columns) [m/s].
+    # noise_intensity: sigma_F^2 * force_interval / mass^2 [m^2/s^3]. orientation: "given", or
+    # "none" for the drag averaged over the angle.
+    def __init__(
+        self,
+        time: _Floats,
+        x: _Floats,
+        y: _Floats,
+        theta: _Floats,
+        omega: _Floats,
+        excluded: npt.NDArray[np.uint8],
+        *,
+        side: float,
+        mass: float,
+        depth: float,
+        strips: int,
+        water_density: float,
+        origin_x: float,
+        origin_y: float,
+        spacing: float,
+        columns: int,
+        rows: int,
+        coefficients: _Floats,
+        drag_coefficient: float,
+        noise_intensity: float,
+        position_noise: float,
+        largest_step: float = 0.05,
+        longest_gap: float = 1.0,
+        orientation: str = "given",
+        sensitivities: bool = False,
+    ) -> None: ...
+    @property
+    def samples(self) -> int: ...
+    @property
+    def remaining(self) -> int: ...
+    @property
+    def parameters(self) -> int: ...
+
+    # The next k = min(count, remaining) samples: innovation (k, 2) and covariance (k, 3) as xx, xy,
+    # yy, NaN where a sample has none; used (k,) uint8; state (k, 4) after the sample, NaN while
+    # there is none. With sensitivities whitened (2k,) and jacobian (2k, parameters) of the
+    # prediction in the same units, x and y of a sample in turn, zero where not used.
+    def run(self, count: int) -> dict[str, npt.NDArray[Any]]: ...
+
+# The mean acceleration (2,) [m/s^2] of a block whose (x, y, vx, vy) has this mean and covariance,
+# by_position and by_velocity (2, 2), by_coefficients (2, 2, rows, columns).
+def expected_drag(
+    *,
+    side: float,
+    mass: float,
+    depth: float,
+    strips: int,
+    water_density: float,
+    origin_x: float,
+    origin_y: float,
+    spacing: float,
+    columns: int,
+    rows: int,
+    coefficients: _Floats,
+    drag_coefficient: float,
+    orientation: str,
+    mean: _Floats,
+    theta: float,
+    omega: float,
+    covariance: _Floats,
+) -> dict[str, _Floats]: ...

@@ -1,7 +1,16 @@
 """Which parameters fit a recording, and how well they are known."""
 
 from driftwalk.calibrate.check import check_recording
+from driftwalk.calibrate.fit import check_fit, fit_motion
+from driftwalk.calibrate.fit_result import fitted_flow
 from driftwalk.calibrate.own_flow import recording_flow
 from driftwalk.calibrate.run import calibrate
 
-__all__ = ["calibrate", "check_recording", "recording_flow"]
+__all__ = [
+    "calibrate",
+    "check_fit",
+    "check_recording",
+    "fit_motion",
+    "fitted_flow",
+    "recording_flow",
+]

@@ -36,6 +36,7 @@ COMMANDS: Final[dict[str, Command]] = {
     "calibrate": Command(
         "calibrate", "calibrate", "Find the drag coefficient and the stochastic force."
     ),
+    "fit": Command("fit", "fit", "Fit flow, drag, stochastic force and tracking noise together."),
     "assemble": Command("assemble", "assemble", "Simulate what many blocks build."),
     "sensitivity": Command(
         "sensitivity", "sensitivity", "Say how much what blocks build depends on the model."

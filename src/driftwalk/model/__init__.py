@@ -3,6 +3,7 @@
 from driftwalk.model.assembly import Assembly
 from driftwalk.model.block import Block
 from driftwalk.model.calibration import Calibration
+from driftwalk.model.fit import Fit
 from driftwalk.model.flow import Flow
 from driftwalk.model.forces import Forces
 from driftwalk.model.observation import Observation
@@ -21,6 +22,7 @@ __all__ = [
     "Calibration",
     "Columns",
     "FieldOfView",
+    "Fit",
     "Flow",
     "Forces",
     "Observation",

@@ -14,6 +14,7 @@ from driftwalk.core.errors import ConfigurationError
 from driftwalk.model.assembly import Assembly
 from driftwalk.model.block import Block
 from driftwalk.model.calibration import Calibration
+from driftwalk.model.fit import Fit
 from driftwalk.model.flow import Flow
 from driftwalk.model.forces import Forces
 from driftwalk.model.observation import Observation
@@ -62,6 +63,10 @@ class Study(Section):
     steps: Steps = Field(default_factory=Steps, description="How steps are formed.")
     calibration: Calibration = Field(
         default_factory=Calibration, description="What a calibration searches."
+    )
+    fit: Fit = Field(
+        default_factory=Fit,
+        description="How flow, drag, force and tracking noise are fitted together.",
     )
     assembly: Assembly = Field(
         default_factory=Assembly, description="How blocks assemble, and how often it is simulated."

@@ -2,6 +2,7 @@
 
 from driftwalk.report.assembly_figures import write_assembly_figures, write_sensitivity_figures
 from driftwalk.report.figures import write_figures
+from driftwalk.report.fit_figures import plot_flow_error, write_fit_figures
 from driftwalk.report.plot_biplot import plot_biplot
 from driftwalk.report.plot_blocks import plot_blocks, plot_film_strip, write_animation
 from driftwalk.report.plot_class_times import plot_class_times, plot_survival
@@ -29,6 +30,7 @@ __all__ = [
     "plot_distance_profile",
     "plot_film_strip",
     "plot_flow",
+    "plot_flow_error",
     "plot_ks_map",
     "plot_l1_map",
     "plot_outcomes",
@@ -41,5 +43,6 @@ __all__ = [
     "write_animation",
     "write_assembly_figures",
     "write_figures",
+    "write_fit_figures",
     "write_sensitivity_figures",
 ]

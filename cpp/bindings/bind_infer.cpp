@@ -1,0 +1,150 @@
+// Bindings of the innovations filter: arrays in, arrays out, the GIL released around the work.
+#include "model.hpp"
+
+#include "driftwalk/infer/innovations.hpp"
+
+#include <nanobind/stl/string.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+using namespace nb::literals;
+using driftwalk::DragModel;
+using driftwalk::InnovationsFilter;
+
+namespace {
+
+bool angle_known(const std::string& orientation) {
+  if (orientation != "given" && orientation != "none") {
+    throw std::invalid_argument("orientation must be 'given' or 'none'");
+  }
+  return orientation == "given";
+}
+
+DragModel drag_model(double side, double mass, double depth, int strips, double water_density,
+                     double origin_x, double origin_y, double spacing, int columns, int rows,
+                     const In<double, 3>& coefficients, double drag_coefficient,
+                     const std::string& orientation) {
+  if (coefficients.shape(0) != 2 || coefficients.shape(1) != std::size_t(rows) ||
+      coefficients.shape(2) != std::size_t(columns)) {
+    throw std::invalid_argument("coefficients must have shape (2, rows, columns)");
+  }
+  return DragModel({side, mass, depth, strips, water_density},
+                   {nullptr, origin_x, origin_y, spacing, columns, rows}, coefficients.data(),
+                   drag_coefficient, angle_known(orientation));
+}
+
+// Left as it comes: the filter writes every number of it, and the Jacobian is large.
+template <class T>
+Out<T> uninitialised(std::vector<std::size_t> shape) {
+  std::size_t size = 1;
+  for (const std::size_t extent : shape) {
+    size *= extent;
+  }
+  T* const values = new T[size];
+  nb::capsule owner(values, [](void* p) noexcept { delete[] static_cast<T*>(p); });
+  return Out<T>(values, shape.size(), shape.data(), owner);
+}
+
+nb::dict run(InnovationsFilter& filter, std::int64_t wanted) {
+  if (wanted < 0) {
+    throw std::invalid_argument("count must not be negative");
+  }
+  const std::int64_t count = std::min(wanted, filter.remaining());
+  const auto n = static_cast<std::size_t>(count);
+  const auto parameters = static_cast<std::size_t>(filter.parameters());
+  const bool sensitivities = filter.sensitivities();
+  Out<double> innovation = uninitialised<double>({n, 2}),
+              covariance = uninitialised<double>({n, 3});
+  Out<double> state = uninitialised<double>({n, 4});
+  Out<std::uint8_t> used = uninitialised<std::uint8_t>({n});
+  Out<double> whitened = uninitialised<double>({sensitivities ? 2 * n : 0});
+  Out<double> jacobian = uninitialised<double>({sensitivities ? 2 * n : 0, parameters});
+  {
+    const nb::gil_scoped_release released;
+    filter.run(count, {innovation.data(), covariance.data(), used.data(), state.data(),
+                       whitened.data(), jacobian.data()});
+  }
+  nb::dict out;
+  out["innovation"] = innovation;
+  out["covariance"] = covariance;
+  out["used"] = used;
+  out["state"] = state;
+  if (sensitivities) {
+    out["whitened"] = whitened;
+    out["jacobian"] = jacobian;
+  }
+  return out;
+}
+
+nb::dict expected_drag(double side, double mass, double depth, int strips, double water_density,
+                       double origin_x, double origin_y, double spacing, int columns, int rows,
+                       const In<double, 3>& coefficients, double drag_coefficient,
+                       const std::string& orientation, const In<double, 1>& mean, double theta,
+                       double omega, const In<double, 2>& covariance) {
+  const DragModel model =
+      drag_model(side, mass, depth, strips, water_density, origin_x, origin_y, spacing, columns,
+                 rows, coefficients, drag_coefficient, orientation);
+  if (mean.shape(0) != 4 || covariance.shape(0) != 4 || covariance.shape(1) != 4) {
+    throw std::invalid_argument("mean must have shape (4,) and covariance (4, 4)");
+  }
+  double P[4][4];
+  std::copy_n(covariance.data(), 16, &P[0][0]);
+  std::vector<double> by_coefficients(2 * coefficients.size(), 0.0);
+  const driftwalk::DragResponse drag =
+      model.drag(theta, omega, mean.data(), P, by_coefficients.data());
+  const auto matrix = [](const double (&values)[2][2]) {
+    return hand_out(std::vector<double>(&values[0][0], &values[0][0] + 4), {2, 2});
+  };
+  nb::dict out;
+  out["acceleration"] =
+      hand_out(std::vector<double>(drag.acceleration, drag.acceleration + 2), {2});
+  out["by_position"] = matrix(drag.by_position);
+  out["by_velocity"] = matrix(drag.by_velocity);
+  out["by_coefficients"] =
+      hand_out(std::move(by_coefficients), {2, 2, coefficients.shape(1), coefficients.shape(2)});
+  return out;
+}
+
+} // namespace
+
+void register_infer(nb::module_& module);
+void register_infer(nb::module_& module) {
+  nb::class_<InnovationsFilter>(module, "InnovationsFilter")
+      .def(
+          "__init__",
+          [](InnovationsFilter* self, In<double, 1> time, In<double, 1> x, In<double, 1> y,
+             In<double, 1> theta, In<double, 1> omega, In<std::uint8_t, 1> excluded, double side,
+             double mass, double depth, int strips, double water_density, double origin_x,
+             double origin_y, double spacing, int columns, int rows, In<double, 3> coefficients,
+             double drag_coefficient, double noise_intensity, double position_noise,
+             double largest_step, double longest_gap, const std::string& orientation,
+             bool sensitivities) {
+            const std::size_t n = time.size();
+            if (x.size() != n || y.size() != n || theta.size() != n || omega.size() != n ||
+                excluded.size() != n) {
+              throw std::invalid_argument("time, x, y, theta, omega and excluded differ in length");
+            }
+            new (self) InnovationsFilter(
+                {time.data(), x.data(), y.data(), theta.data(), omega.data(), excluded.data(),
+                 static_cast<std::int64_t>(n)},
+                drag_model(side, mass, depth, strips, water_density, origin_x, origin_y, spacing,
+                           columns, rows, coefficients, drag_coefficient, orientation),
+                {noise_intensity, position_noise, largest_step, longest_gap}, sensitivities);
+          },
+          "time"_a, "x"_a, "y"_a, "theta"_a, "omega"_a, "excluded"_a, nb::kw_only(), "side"_a,
+          "mass"_a, "depth"_a, "strips"_a, "water_density"_a, "origin_x"_a, "origin_y"_a,
+          "spacing"_a, "columns"_a, "rows"_a, "coefficients"_a, "drag_coefficient"_a,
+          "noise_intensity"_a, "position_noise"_a, "largest_step"_a = 0.05, "longest_gap"_a = 1.0,
+          "orientation"_a = "given", "sensitivities"_a = false)
+      .def_prop_ro("samples", &InnovationsFilter::samples)
+      .def_prop_ro("remaining", &InnovationsFilter::remaining)
+      .def_prop_ro("parameters", &InnovationsFilter::parameters)
+      .def("run", &run, "count"_a);
+  module.def("expected_drag", &expected_drag, nb::kw_only(), "side"_a, "mass"_a, "depth"_a,
+             "strips"_a, "water_density"_a, "origin_x"_a, "origin_y"_a, "spacing"_a, "columns"_a,
+             "rows"_a, "coefficients"_a, "drag_coefficient"_a, "orientation"_a, "mean"_a, "theta"_a,
+             "omega"_a, "covariance"_a);
+}

@@ -1,0 +1,337 @@
+// The innovations filter: the normal law, the spline flow by definition, edges of the grid, and
+// that a run writes all that it hands out.
+#include "check.hpp"
+#include "driftwalk/infer/expected_drag.hpp"
+#include "driftwalk/infer/innovations.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace {
+
+using driftwalk::DragModel;
+using driftwalk::Eight;
+using driftwalk::InnovationsFilter;
+
+const double missing = std::numeric_limits<double>::quiet_NaN();
+
+// --- the normal law
+// -------------------------------------------------------------------------------
+void check_normal_law() {
+  double density = 0, tail = 0, mills = 0;
+  for (int k = -8000; k < 8000; k += 8) {
+    double z[8];
+    for (int lane = 0; lane < 8; ++lane) {
+      z[lane] = (k + lane + 0.5) / 1000;
+    }
+    const driftwalk::NormalLaw law = driftwalk::normal_law(Eight::load(z));
+    for (int lane = 0; lane < 8; ++lane) {
+      const double wanted = std::exp(-0.5 * z[lane] * z[lane]) / std::sqrt(2 * std::acos(-1.0));
+      const double below = 0.5 * std::erfc(-z[lane] / std::sqrt(2.0));
+      density = std::max(density, std::fabs(law.density[lane] / wanted - 1));
+      tail = std::max(tail, std::fabs(law.probability[lane] / below - 1));
+      if (z[lane] > 0) {
+        const double above = 0.5 * std::erfc(z[lane] / std::sqrt(2.0));
+        mills = std::max(mills,
+                         std::fabs(driftwalk::mills_ratio(Eight(z[lane]))[0] * wanted / above - 1));
+      }
+    }
+  }
+  std::printf("normal law: density %.1e, probability %.1e, Mills' ratio %.1e (relative)\n", density,
+              tail, mills);
+  CHECK(density < 2e-15);
+  CHECK(tail < 2e-14);
+  CHECK(mills < 2e-14);
+  // Beyond the reach; the other lanes are not disturbed.
+  const double far[8] = {-1e300, 1e300, -9, 9, -8.5, 8.5, 0, missing};
+  const driftwalk::NormalLaw law = driftwalk::normal_law(Eight::load(far));
+  for (int lane = 0; lane < 6; ++lane) {
+    CHECK(law.density[lane] == 0 && law.probability[lane] == lane % 2);
+  }
+  CHECK_NEAR(law.probability[6], 0.5, 1e-15);
+}
+
+// --- the flow
+// ------------------------------------------------------------------------------------- Cubic
+// B-spline with knots 0, 1, 2, 3, 4 by the recursion of de Boor.
+double b_spline(double t, int degree = 3, int first = 0) {
+  if (degree == 0) {
+    return first <= t && t < first + 1 ? 1 : 0;
+  }
+  return (t - first) / degree * b_spline(t, degree - 1, first) +
+         (first + degree + 1 - t) / degree * b_spline(t, degree - 1, first + 1);
+}
+
+struct Flow {
+  driftwalk::SplineView view{nullptr, -0.07, -0.05, 0.02, 11, 9};
+  std::vector<double> coefficients, nodes;
+
+  Flow() {
+    std::mt19937 random(5);
+    std::normal_distribution<double> draw(0, 0.05);
+    const std::size_t n = std::size_t(view.columns) * std::size_t(view.rows);
+    coefficients.resize(2 * n);
+    nodes.resize(2 * n);
+    for (std::size_t k = 0; k < n; ++k) {
+      nodes[2 * k] = coefficients[k] = draw(random);
+      nodes[2 * k + 1] = coefficients[n + k] = draw(random);
+    }
+    view.nodes = nodes.data();
+  }
+  // By definition, over all nodes: component 0 is u, 1 is v.
+  double at(int component, double x, double y) const {
+    double sum = 0;
+    for (int j = 0; j < view.rows; ++j) {
+      for (int i = 0; i < view.columns; ++i) {
+        const double c = nodes[2 * (std::size_t(j) * std::size_t(view.columns) + std::size_t(i)) +
+                               std::size_t(component)];
+        sum += c * b_spline((x - view.origin_x) / view.spacing - i + 3) *
+               b_spline((y - view.origin_y) / view.spacing - j + 3);
+      }
+    }
+    return sum;
+  }
+};
+
+void check_flow() {
+  const Flow flow;
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> in_x(-0.0699, 0.0899), in_y(-0.0499, 0.0699);
+  double worst = 0, worst_slope = 0;
+  for (int k = 0; k < 200; ++k) {
+    double x[8], y[8];
+    for (int lane = 0; lane < 8; ++lane) {
+      x[lane] = in_x(random);
+      y[lane] = in_y(random);
+    }
+    x[0] = flow.view.origin_x + flow.view.spacing * (k % 8); // on the edge of a cell
+    driftwalk::StripsOnGrid grid;
+    const driftwalk::FlowAtStrips at =
+        driftwalk::flow_at_strips(flow.view, Eight::load(x), Eight::load(y), grid);
+    const double h = 1e-6;
+    for (int lane = 0; lane < 8; ++lane) {
+      const auto by_x = [&](int c) {
+        return (flow.at(c, x[lane] + h, y[lane]) - flow.at(c, x[lane] - h, y[lane])) / (2 * h);
+      };
+      const auto by_y = [&](int c) {
+        return (flow.at(c, x[lane], y[lane] + h) - flow.at(c, x[lane], y[lane] - h)) / (2 * h);
+      };
+      worst = std::max({worst, std::fabs(at.u[lane] - flow.at(0, x[lane], y[lane])),
+                        std::fabs(at.v[lane] - flow.at(1, x[lane], y[lane]))});
+      if (lane > 0) { // the differences at the very edge of the grid would leave it
+        worst_slope = std::max(
+            {worst_slope, std::fabs(at.u_x[lane] - by_x(0)), std::fabs(at.v_x[lane] - by_x(1)),
+             std::fabs(at.u_y[lane] - by_y(0)), std::fabs(at.v_y[lane] - by_y(1))});
+      }
+    }
+  }
+  std::printf("spline flow: value %.1e m/s, gradient %.1e 1/s\n", worst, worst_slope);
+  CHECK(worst < 1e-15);
+  CHECK(worst_slope < 1e-7); // the differences themselves are good to 1e-8
+}
+
+void check_beyond_the_grid() {
+  const Flow flow;
+  const double x[8] = {-1, -0.07, 1, 0.09, 1e300, 0.0, 0.0, missing};
+  const double y[8] = {0, 0, 0, 0, 0.07, 0.07, 2, 0};
+  driftwalk::StripsOnGrid grid;
+  const driftwalk::FlowAtStrips at =
+      driftwalk::flow_at_strips(flow.view, Eight::load(x), Eight::load(y), grid);
+  CHECK(at.u[0] == at.u[1] && at.v[0] == at.v[1]);
+  CHECK(std::fabs(at.u[2] - at.u[3]) < 1e-15 && std::fabs(at.v[5] - at.v[6]) < 1e-15);
+  CHECK(at.u_x[0] == 0 && at.u_y[0] != 0 && at.v_x[2] == 0 && at.v_y[6] == 0);
+  CHECK(std::isfinite(at.u[4]) && std::isfinite(at.u[7]));
+}
+
+// --- the filter
+// -----------------------------------------------------------------------------------
+struct Circle {
+  std::vector<double> time, x, y, theta, omega;
+  std::vector<std::uint8_t> excluded;
+
+  explicit Circle(int samples) {
+    std::mt19937 random(9);
+    std::normal_distribution<double> noise(0, 3e-4);
+    for (int k = 0; k < samples; ++k) {
+      const double t = 0.1 * k;
+      time.push_back(t);
+      x.push_back(0.03 * std::cos(0.7 * t) + noise(random));
+      y.push_back(0.02 * std::sin(0.7 * t) + noise(random));
+      theta.push_back(0.3 * t);
+      omega.push_back(0.3);
+      excluded.push_back(k % 11 == 10);
+    }
+  }
+  driftwalk::Track view() const {
+    return {time.data(),
+            x.data(),
+            y.data(),
+            theta.data(),
+            omega.data(),
+            excluded.data(),
+            std::int64_t(time.size())};
+  }
+};
+
+DragModel drag_model(const Flow& flow, int strips = 8, bool angle_known = true,
+                     double drag_coefficient = 0.5) {
+  return DragModel({0.03, 0.0116, 0.03, strips, 1000}, flow.view, flow.coefficients.data(),
+                   drag_coefficient, angle_known);
+}
+
+constexpr driftwalk::FilterSettings settings{4.5e-5, 3e-4, 0.05, 1.0};
+constexpr double untouched = 12345;
+
+struct Outputs {
+  std::vector<double> innovation, covariance, state, whitened, jacobian;
+  std::vector<std::uint8_t> used;
+
+  Outputs(std::int64_t samples, std::int64_t parameters)
+      : innovation(std::size_t(2 * samples), untouched),
+        covariance(std::size_t(3 * samples), untouched), state(std::size_t(4 * samples), untouched),
+        whitened(std::size_t(2 * samples), untouched),
+        jacobian(std::size_t(2 * samples * parameters), untouched), used(std::size_t(samples), 77) {
+  }
+
+  driftwalk::FilterOutputs view() {
+    return {innovation.data(), covariance.data(), used.data(),
+            state.data(),      whitened.data(),   jacobian.data()};
+  }
+  bool complete() const {
+    const auto holds_none = [](const std::vector<double>& values) {
+      return std::find(values.begin(), values.end(), untouched) == values.end();
+    };
+    return holds_none(innovation) && holds_none(covariance) && holds_none(state) &&
+           holds_none(whitened) && holds_none(jacobian) &&
+           std::find(used.begin(), used.end(), 77) == used.end();
+  }
+};
+
+Outputs run(const Circle& track, DragModel model) {
+  InnovationsFilter filter(track.view(), std::move(model), settings, true);
+  Outputs out(filter.samples(), filter.parameters());
+  filter.run(filter.samples() + 5, out.view());
+  CHECK(filter.remaining() == 0);
+  return out;
+}
+
+void check_that_all_is_written() {
+  const Flow flow;
+  for (const int strips : {1, 7, 8, 9, 64}) {
+    for (const bool angle_known : {true, false}) {
+      Circle track(40);
+      track.x[0] = track.y[17] = missing;
+      track.x[30] = 1e200; // far beyond the grid
+      const Outputs out = run(track, drag_model(flow, strips, angle_known));
+      CHECK(out.complete());
+      CHECK(std::count(out.used.begin(), out.used.end(), 1) > 25);
+      CHECK(std::all_of(out.jacobian.begin(), out.jacobian.end(),
+                        [](double value) { return std::isfinite(value); }));
+    }
+  }
+}
+
+// A block larger than the whole grid, and one outside it: no strip may read or write past its end.
+void check_small_grid() {
+  Flow flow;
+  flow.view.columns = flow.view.rows = 4;
+  flow.view.origin_x = flow.view.origin_y = 0;
+  const Circle track(40);
+  CHECK(run(track, drag_model(flow)).complete());
+}
+
+bool same(const std::vector<double>& a, const std::vector<double>& b) {
+  return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), [](double x, double y) {
+           return x == y || (std::isnan(x) && std::isnan(y));
+         });
+}
+
+void check_pieces() {
+  const Flow flow;
+  const Circle track(50);
+  const Outputs whole = run(track, drag_model(flow));
+  InnovationsFilter filter(track.view(), drag_model(flow), settings, true);
+  std::int64_t from = 0;
+  for (const std::int64_t count : {1, 13, 0, 36}) {
+    Outputs part(count, filter.parameters());
+    filter.run(count, part.view());
+    const auto slice = [&](const std::vector<double>& values, std::int64_t width) {
+      return std::vector<double>(values.begin() + from * width,
+                                 values.begin() + (from + count) * width);
+    };
+    CHECK(same(part.innovation, slice(whole.innovation, 2)));
+    CHECK(same(part.state, slice(whole.state, 4)));
+    CHECK(same(part.jacobian, slice(whole.jacobian, 2 * filter.parameters())));
+    from += count;
+  }
+  CHECK(filter.remaining() == 0);
+}
+
+// Eight orientations against 720, in random flows.
+void check_orientations() {
+  double worst = 0;
+  const Flow flow;
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> draw(-1, 1);
+  const double known[4][4] = {{1e-8, 0, 0, 0}, {0, 1e-8, 0, 0}, {0, 0, 1e-5, 0}, {0, 0, 0, 1e-5}};
+  const DragModel turned = drag_model(flow), averaged = drag_model(flow, 8, false);
+  for (int k = 0; k < 50; ++k) {
+    const double mean[4] = {0.03 * draw(random), 0.02 * draw(random), 0.1 * draw(random),
+                            0.1 * draw(random)};
+    double x = 0, y = 0;
+    for (int i = 0; i < 720; ++i) {
+      const driftwalk::DragResponse one =
+          turned.drag(i * std::acos(-1.0) / 1440, 0, mean, known, nullptr);
+      x += one.acceleration[0] / 720;
+      y += one.acceleration[1] / 720;
+    }
+    const driftwalk::DragResponse all = averaged.drag(0.7, 3, mean, known, nullptr);
+    worst = std::max(worst, std::hypot(all.acceleration[0] - x, all.acceleration[1] - y) /
+                                std::hypot(x, y));
+  }
+  std::printf("eight orientations: %.1e\n", worst);
+  CHECK(worst < 1e-2);
+}
+
+template <class Make>
+bool refuses(const Make& make) {
+  try {
+    make();
+  } catch (const std::invalid_argument&) {
+    return true;
+  }
+  return false;
+}
+
+void check_refusals() {
+  const Flow flow;
+  CHECK(refuses([&] { drag_model(flow, 0); }));
+  CHECK(refuses([&] { drag_model(flow, 8, true, -1); }));
+  Flow narrow;
+  narrow.view.columns = 3;
+  CHECK(refuses([&] { drag_model(narrow); }));
+  Circle track(5);
+  track.time[3] = track.time[2];
+  CHECK(refuses([&] { InnovationsFilter(track.view(), drag_model(flow), settings, true); }));
+}
+
+} // namespace
+
+int main() {
+  check_normal_law();
+  check_flow();
+  check_beyond_the_grid();
+  check_that_all_is_written();
+  check_small_grid();
+  check_pieces();
+  check_orientations();
+  check_refusals();
+  return check::result();
+}

@@ -1,0 +1,165 @@
+"""C_d from the restricted likelihood, which allows for the flow being estimated along with it.
+
+The maximum of the likelihood over C_d and hundreds of flow coefficients together gives too large a
+C_d: the fitted flow takes up part of the scatter of the velocity, and what is left seems to be
+pulled back to it more strongly (as a mean-reversion rate is biased upwards when means are
+estimated). The restricted likelihood integrates the coefficients out instead. To first order
+(Laplace) that adds ``ln det(J' J + Lambda) / 2`` of the coefficients' block of the information to
+the profile of the negative log likelihood; its minimum over ln C_d is the estimate.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from driftwalk.calibrate.fit_newton import Mode, Prior
+from driftwalk.calibrate.fit_pass import Passes, Point
+from driftwalk.calibrate.fit_spline import Floats
+
+SPAN = 2.0
+"""The profile is looked at this many standard deviations around the first guess of its minimum."""
+LATTICE = 2001
+MOST_STD_RATIO = 4.0
+"""A criterion that is so much flatter or sharper than the likelihood has no minimum worth the name:
+the motion does not follow the model, or tells nothing of C_d."""
+
+
+class Profile(NamedTuple):
+    """The profile of the likelihood at one C_d."""
+
+    log_drag: float
+    deviance: float
+    """Negative log likelihood, with the priors, at the best coefficients."""
+    slope: float
+    """Its derivative by ln C_d."""
+    half_log_determinant: float
+    """Of the coefficients' block of the information."""
+    coefficients: Floats
+    """The best coefficients, flat."""
+
+
+class Restricted(NamedTuple):
+    """The minimum of the restricted criterion."""
+
+    point: Point
+    log_drag_std: float
+    """From the curvature of the criterion."""
+    profiles: list[Profile]
+    """Where it was computed, in the order of C_d."""
+    has_minimum: bool
+    """Whether the criterion has a minimum; if not, point and std are the likelihood's."""
+
+
+def profile_at(
+    passes: Passes, mode: Mode, prior: Prior, log_drag: float, coefficients: Floats
+) -> Profile:
+    """Return the profile at a C_d, from one pass at coefficients that are nearly the best."""
+    from scipy.linalg import cho_factor, cho_solve
+
+    point = replace(
+        mode.point,
+        log_drag=log_drag,
+        coefficients=coefficients.reshape(mode.point.coefficients.shape),
+    )
+    sums = prior.add(passes.sums(point, noise="without"), point, mode.weights)
+    factor = cho_factor(sums.information[:-1, :-1])
+    step = cho_solve(factor, sums.score[:-1])
+    return Profile(
+        log_drag,
+        sums.deviance - 0.5 * float(step @ sums.score[:-1]),
+        -float(sums.score[-1] - sums.information[-1, :-1] @ step),
+        float(np.log(np.diag(factor[0])).sum()),
+        coefficients.ravel() + step,
+    )
+
+
+def restricted_drag(passes: Passes, mode: Mode, prior: Prior) -> Restricted:
+    """Minimise the restricted criterion over ln C_d.
+
+    Parameters
+    ----------
+    passes : Passes
+        The filter.
+    mode : Mode
+        The maximum of the likelihood; noises and smoothness stay as they are there.
+    prior : Prior
+        The penalties.
+
+    Returns
+    -------
+    Restricted
+        With the coefficients that belong to the C_d found.
+    """
+    start = mode.point
+    sd = math.sqrt(float(mode.covariance[-3, -3]))
+    along = mode.covariance[:-3, -3] / mode.covariance[-3, -3]
+    found = [profile_at(passes, mode, prior, start.log_drag, start.coefficients.ravel())]
+
+    def look(log_drag: float) -> None:
+        near = min(found, key=lambda one: abs(one.log_drag - log_drag))
+        guess = near.coefficients + along * (log_drag - near.log_drag)
+        found.append(profile_at(passes, mode, prior, log_drag, guess))
+
+    look(start.log_drag - SPAN * sd)
+    # Two points give the slope of the determinant and with it a first guess of the minimum.
+    guess, _ = _minimum(found)
+    guess = float(np.clip(guess, start.log_drag - 2 * SPAN * sd, start.log_drag + SPAN * sd))
+    look(guess)
+    look(guess - SPAN * sd)
+    found.sort(key=lambda one: one.log_drag)
+    log_drag, std = _minimum(found)
+    if not sd / MOST_STD_RATIO <= std <= sd * MOST_STD_RATIO:
+        return Restricted(start, sd, found, has_minimum=False)
+    nearest = min(found, key=lambda one: abs(one.log_drag - log_drag))
+    coefficients = _coefficients_at(found, nearest, log_drag)
+    slopes = mode.covariance[-2:, -3] / mode.covariance[-3, -3] * (log_drag - start.log_drag)
+    point = Point(
+        coefficients.reshape(start.coefficients.shape),
+        log_drag,
+        start.log_intensity + float(slopes[0]),
+        start.log_noise + float(slopes[1]),
+    )
+    return Restricted(point, std, found, has_minimum=True)
+
+
+def _minimum(found: list[Profile]) -> tuple[float, float]:
+    """Return the minimum of the criterion through some points, and its standard deviation.
+
+    The standard deviation is infinite where there is no minimum near the points.
+
+    Values and slopes of the likelihood and values of the determinant determine a polynomial each.
+    """
+    centre = found[0].log_drag
+    scale = max(abs(one.log_drag - other.log_drag) for one in found for other in found)
+    at = (np.array([one.log_drag for one in found]) - centre) / scale
+    values = np.array([one.deviance for one in found])
+    slopes = np.array([one.slope for one in found]) * scale
+    origin = values.min()
+    degree = min(3 if len(found) == 2 else 4, 2 * len(found) - 1)
+    powers = np.arange(degree + 1)
+    rows = np.concatenate(
+        [at[:, None] ** powers, powers * at[:, None] ** np.maximum(powers - 1, 0)]
+    )
+    likelihood = np.linalg.lstsq(rows, np.concatenate([values - origin, slopes]), rcond=None)[0]
+    determinants = np.array([one.half_log_determinant for one in found])
+    determinant = np.polynomial.polynomial.polyfit(at, determinants, min(2, len(found) - 1))
+    criterion = np.polynomial.Polynomial(likelihood) + np.polynomial.Polynomial(determinant)
+    lattice = np.linspace(at.min() - 0.5, at.max() + 0.5, LATTICE)
+    best = int(np.argmin(criterion(lattice)))
+    curvature = float(criterion.deriv(2)(lattice[best]))
+    lowest = centre + scale * float(lattice[best])
+    if best in (0, LATTICE - 1) or curvature <= 0.0:
+        return lowest, math.inf
+    return lowest, scale / math.sqrt(curvature)
+
+
+def _coefficients_at(found: list[Profile], nearest: Profile, log_drag: float) -> Floats:
+    """Return the best coefficients at a C_d on the line through the two nearest profiles."""
+    others = [one for one in found if one is not nearest]
+    second = min(others, key=lambda one: abs(one.log_drag - log_drag))
+    share = (log_drag - nearest.log_drag) / (second.log_drag - nearest.log_drag)
+    return nearest.coefficients + share * (second.coefficients - nearest.coefficients)

@@ -1,0 +1,255 @@
+"""The `fit` dataset: the flow with its errors, and in its attributes the parameters.
+
+On (y, x), the nodes of a flow field: ``u``, ``v`` and their standard errors [m/s] at every node,
+``flag`` and ``count`` (samples with the block over the node); on (component, knot_y, knot_x) the
+coefficients of the spline; ``covariance`` of (ln C_d, ln q, ln r); the profile of the likelihood
+along C_d.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.calibrate.fit_newton import Mode
+from driftwalk.calibrate.fit_pass import Series
+from driftwalk.calibrate.fit_reml import Restricted
+from driftwalk.calibrate.fit_spline import Floats, Spline
+from driftwalk.core.errors import InputError
+from driftwalk.flow.arena import Outline, outline_of
+from driftwalk.flow.grid import Grid, make_grid
+from driftwalk.schema import FLAGS, build_flow_field
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+SCHEMA_VERSION: Final = 1
+LEAST_COUNT: Final = 3
+"""Samples with the block over a node that make the node a measured one."""
+PARAMETERS: Final = ("ln_drag_coefficient", "ln_noise_intensity", "ln_tracking_noise")
+
+
+class Whiteness(NamedTuple):
+    """How far the innovations are what the model says: independent, of the stated covariance."""
+
+    chi_squared_per_dof: float
+    """Mean square of the whitened innovations; 1 if the model is right."""
+    autocorrelation: float
+    """Correlation of whitened innovations one sample apart; 0 if the model is right."""
+    autocorrelation_std: float
+    """Its standard deviation if the model is right."""
+
+
+def whiteness_of(innovations: list[tuple[Floats, npt.NDArray[np.bool_]]]) -> Whiteness:
+    """Return the check of whitened innovations, given with which of them were used.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(1).normal(size=(10000, 2))
+    >>> found = whiteness_of([(noise, np.ones(10000, dtype=bool))])
+    >>> abs(found.autocorrelation) < 3 * found.autocorrelation_std
+    True
+    """
+    squares, products, samples, pairs = 0.0, 0.0, 0, 0
+    for white, used in innovations:
+        squares += float((white[used] ** 2).sum())
+        samples += 2 * int(used.sum())
+        both = used[1:] & used[:-1]
+        products += float((white[1:][both] * white[:-1][both]).sum())
+        pairs += 2 * int(both.sum())
+    variance = squares / max(samples, 1)
+    count = max(pairs, 1)
+    return Whiteness(variance, products / count / max(variance, 1e-300), 1.0 / math.sqrt(count))
+
+
+def parameter_covariance(mode: Mode, restricted: Restricted) -> Floats:
+    """Return the covariance of (ln C_d, ln q, ln r), with C_d's variance from its own criterion."""
+    covariance = mode.covariance[-3:, -3:].copy()
+    scale = np.array([restricted.log_drag_std / math.sqrt(covariance[0, 0]), 1.0, 1.0])
+    return np.asarray(covariance * np.outer(scale, scale))
+
+
+def parameter_attrs(point: Any, covariance: Floats, study: Study) -> dict[str, Any]:
+    """Return the parameters with their intervals, units in the keys."""
+    from scipy.special import ndtri
+
+    confidence = study.fit.confidence
+    interval = study.forces.force_interval_s
+    mass = study.block.mass_kg
+    intensity = mass**2 * math.exp(point.log_intensity)
+    reach = float(ndtri(0.5 + 0.5 * confidence)) * np.sqrt(np.diag(covariance))
+    values = {
+        "drag_coefficient": (math.exp(point.log_drag), reach[0]),
+        "force_std_N": (math.sqrt(intensity / interval), 0.5 * reach[1]),
+        "force_noise_intensity_N2_s": (intensity, reach[1]),
+        "tracking_noise_m": (math.exp(point.log_noise), reach[2]),
+    }
+    attrs: dict[str, Any] = {"force_interval_s": interval, "confidence": confidence}
+    for name, (value, width) in values.items():
+        attrs[name] = value
+        attrs[f"{name}_interval"] = [value * math.exp(-width), value * math.exp(width)]
+    return attrs
+
+
+def build_fit(
+    spline: Spline,
+    mode: Mode,
+    restricted: Restricted,
+    series: list[Series],
+    *,
+    study: Study,
+    oriented: bool,
+    attrs: dict[str, Any],
+) -> xr.Dataset:
+    """Assemble the dataset of a fit."""
+    import xarray as xr
+
+    outline = outline_of(study.tank.to_arena())
+    grid = make_grid(outline, cells=study.flow.cells, cell_size=study.flow.cell_size_m)
+    coefficients = restricted.point.coefficients
+    count = footprint_count(grid, series, side=study.block.side_m, oriented=oriented)
+    speed = {"units": "m s-1"}
+    values = spline.values(coefficients, grid.x, grid.y)
+    errors = spline.standard_errors(
+        mode.covariance[: 2 * spline.size, : 2 * spline.size], grid.x, grid.y
+    )
+    profiles = restricted.profiles
+    least = min(one.deviance for one in profiles)
+    flat = profiles[0].half_log_determinant
+    plane, knots = ("y", "x"), ("component", "knot_y", "knot_x")
+    data: dict[str, Any] = {
+        "u": (plane, values[0], speed),
+        "v": (plane, values[1], speed),
+        "u_standard_error": (plane, errors[0], speed),
+        "v_standard_error": (plane, errors[1], speed),
+        "count": (
+            plane,
+            count,
+            {"units": "1", "long_name": "samples with the block over the node"},
+        ),
+        "flag": (plane, _flags(grid, outline, count), {"long_name": "origin of the node's value"}),
+        "coefficient": (knots, coefficients, speed),
+        "covariance": (
+            ("parameter", "other_parameter"),
+            parameter_covariance(mode, restricted),
+            {"units": "1"},
+        ),
+        "profile_deviance": ("profile", [one.deviance - least for one in profiles], {"units": "1"}),
+        "profile_half_log_determinant": (
+            "profile",
+            [one.half_log_determinant - flat for one in profiles],
+            {"units": "1"},
+        ),
+    }
+    coords: dict[str, Any] = {
+        "y": ("y", grid.y, {"units": "m"}),
+        "x": ("x", grid.x, {"units": "m"}),
+        "component": ("component", np.array(["u", "v"], dtype=object)),
+        "parameter": ("parameter", np.array(PARAMETERS, dtype=object)),
+        "other_parameter": ("other_parameter", np.array(PARAMETERS, dtype=object)),
+        "profile": ("profile", [math.exp(one.log_drag) for one in profiles], {"units": "1"}),
+    }
+    facts = {
+        "kind": "fit",
+        "schema_version": SCHEMA_VERSION,
+        "spline_origin_m": [spline.origin_x, spline.origin_y],
+        "spline_spacing_m": spline.spacing,
+        "cell_size_m": grid.cell_size,
+        "arena": json.dumps(study.tank.to_arena()),
+        **attrs,
+    }
+    return xr.Dataset(data, coords=coords, attrs=facts)
+
+
+def fitted_flow(fit: xr.Dataset) -> xr.Dataset:
+    """Return the flow of a fit as a flow field, for everything that takes one.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        What `fit_motion` returns.
+
+    Returns
+    -------
+    xarray.Dataset
+        A `flow_field`. Nodes that the block has been over are *measured*, the others of the tank
+        *filled*: there the spline is continued smoothly. Standard errors stand at measured nodes
+        (those of all nodes are in the fit); they are correlated over about the distance of knots.
+
+    Raises
+    ------
+    InputError
+        When the dataset is no fit.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> flow = dw.fitted_flow(dw.fit_motion(dw.tank30_recording()))  # doctest: +SKIP
+    """
+    if fit.attrs.get("kind") != "fit":
+        raise InputError(f"not a fit: its kind is {fit.attrs.get('kind')!r}; fit_motion makes one")
+    measured = fit["flag"].values == FLAGS["measured"]
+    errors = {
+        f"{name}_standard_error": np.where(measured, fit[f"{name}_standard_error"].values, np.nan)
+        for name in ("u", "v")
+    }
+    kept = ("cell_size_m", "arena", "source")
+    return build_flow_field(
+        fit["x"].values,
+        fit["y"].values,
+        u=fit["u"].values,
+        v=fit["v"].values,
+        flag=fit["flag"].values,
+        count=fit["count"].values,
+        attrs={
+            "method": "bicubic spline, fitted with drag and noise by the innovations' likelihood",
+            **{key: fit.attrs[key] for key in kept},
+        },
+        **errors,
+    )
+
+
+def footprint_count(
+    grid: Grid, series: list[Series], *, side: float, oriented: bool
+) -> npt.NDArray[np.float64]:
+    """Return for each node how many samples have the block over it.
+
+    Without orientations the circle inside the block stands for it.
+    """
+    half = 0.5 * side
+    reach = math.ceil(half * (math.sqrt(2.0) if oriented else 1.0) / grid.cell_size)
+    offsets = np.arange(-reach, reach + 1)
+    total = np.zeros(grid.size)
+    for one in series:
+        kept = (one.excluded == 0) & np.isfinite(one.x)
+        x, y, theta = one.x[kept], one.y[kept], one.theta[kept]
+        column = np.round((x - grid.x[0]) / grid.cell_size).astype(np.intp)
+        row = np.round((y - grid.y[0]) / grid.cell_size).astype(np.intp)
+        cosine, sine = np.cos(theta), np.sin(theta)
+        for dj in offsets:
+            for di in offsets:
+                i, j = column + di, row + dj
+                inside = (i >= 0) & (i < grid.x.size) & (j >= 0) & (j < grid.y.size)
+                away_x = grid.x[np.where(inside, i, 0)] - x
+                away_y = grid.y[np.where(inside, j, 0)] - y
+                if oriented:
+                    along, across = cosine * away_x + sine * away_y, cosine * away_y - sine * away_x
+                    inside &= np.maximum(np.abs(along), np.abs(across)) <= half
+                else:
+                    inside &= np.hypot(away_x, away_y) <= half
+                total += np.bincount((j * grid.x.size + i)[inside], minlength=grid.size)
+    return total.reshape(grid.shape)
+
+
+def _flags(grid: Grid, outline: Outline, count: Floats) -> npt.NDArray[np.int8]:
+    x, y = (part.ravel() for part in grid.nodes())
+    flag = np.full(grid.shape, FLAGS["filled"], dtype=np.int8)
+    flag[(outline.depth(x, y) < 0.0).reshape(grid.shape)] = FLAGS["outside"]
+    flag[count >= LEAST_COUNT] = FLAGS["measured"]
+    return flag

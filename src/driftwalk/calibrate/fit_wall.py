@@ -1,0 +1,86 @@
+"""Which intervals of a track may hold a contact with the wall: they are left out of the fit.
+
+The rule looks at the past only. To leave out an interval because of where the body is at its end
+would select among the forces that brought it there, and bias what is estimated.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from driftwalk.flow.arena import Outline
+
+Floats = npt.NDArray[np.float64]
+
+MARGIN = 0.002
+"""A corner nearer to the wall than this [m] may touch it within a sampling interval."""
+
+
+def wall_intervals(
+    time: Floats,
+    x: Floats,
+    y: Floats,
+    theta: Floats | None,
+    *,
+    outline: Outline,
+    side: float,
+    longest_gap: float,
+) -> npt.NDArray[np.bool_]:
+    """Find the intervals in which the block may touch the wall.
+
+    Parameters
+    ----------
+    time, x, y : ndarray, shape (n,)
+        The track [s], [m].
+    theta : ndarray or None
+        Orientations [rad]; without them the circle around the block stands for its corners.
+    outline : Outline
+        The tank.
+    side : float
+        Side of the block [m].
+    longest_gap : float
+        A pose is not continued from one that is older than this [s].
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+        True at sample k where the interval from k - 1 to k counts as one at the wall: a corner at
+        k - 1, or where the motion from k - 3 to k - 1 leads by k, comes within 2 mm of the wall.
+    """
+    gap_x, gap_y = _onward(time, x, longest_gap), _onward(time, y, longest_gap)
+    here = _least_depth(x[:-1], y[:-1], _but_last(theta), outline, side)
+    there = _least_depth(x[:-1] + gap_x, y[:-1] + gap_y, _but_last(theta), outline, side)
+    near = np.zeros(time.size, dtype=bool)
+    near[1:] = np.minimum(here, there) < MARGIN
+    return near
+
+
+def _but_last(values: Floats | None) -> Floats | None:
+    return None if values is None else values[:-1]
+
+
+def _onward(time: Floats, position: Floats, longest_gap: float) -> Floats:
+    """Return how far the motion of the last two intervals leads in the next, shape (n - 1,)."""
+    onward = np.zeros(time.size - 1)
+    past = time[2:-1] - time[:-3]
+    speed = (position[2:-1] - position[:-3]) / past
+    onward[2:] = np.where(past <= longest_gap, speed * (time[3:] - time[2:-1]), 0.0)
+    return np.where(np.diff(time) <= longest_gap, onward, 0.0)
+
+
+def _least_depth(
+    x: Floats, y: Floats, theta: Floats | None, outline: Outline, side: float
+) -> Floats:
+    """Return the distance of the nearest corner to the wall [m], negative beyond it."""
+    reach = side / math.sqrt(2.0)
+    if theta is None:
+        return outline.depth(x, y) - reach
+    quarters = theta + math.pi * (0.25 + 0.5 * np.arange(4))[:, None]
+    corners_x, corners_y = x + reach * np.cos(quarters), y + reach * np.sin(quarters)
+    depths = [outline.depth(*corner) for corner in zip(corners_x, corners_y, strict=True)]
+    return np.asarray(np.min(depths, axis=0))

@@ -1,0 +1,180 @@
+"""`driftwalk fit`: flow, drag, stochastic force and tracking noise from recordings, in seconds."""
+
+from __future__ import annotations
+
+import json as json_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+
+from driftwalk.cli.options import (
+    PANEL,
+    STUDY_KEYS,
+    Depth,
+    ForceInterval,
+    Json,
+    Mass,
+    Side,
+    StudyFile,
+    TankDiameter,
+    quantity_option,
+    resolve_study,
+    study_overrides,
+)
+from driftwalk.cli.output import print_json, print_note
+from driftwalk.cli.recording_options import RecordingOptions, with_recording_options
+from driftwalk.cli.require_motion import require_motion
+from driftwalk.cli.study_recording import load_for_run
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FIT_KEYS: Final[dict[str, str]] = {
+    **STUDY_KEYS,
+    "angle": "fit.angle",
+    "spline_spacing": "fit.spline_spacing_m",
+    "confidence": "fit.confidence",
+}
+RecordingFiles = Annotated[
+    list[Path],
+    typer.Argument(metavar="RECORDING...", help="Recordings of one block in one tank, read alike."),
+]
+
+
+@with_recording_options
+def fit(
+    recordings: RecordingFiles,
+    how: RecordingOptions,
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Run directory to make.")],
+    study: StudyFile = None,
+    tank_diameter: TankDiameter = None,
+    side: Side = None,
+    mass: Mass = None,
+    depth: Depth = None,
+    force_interval: ForceInterval = None,
+    angle: Annotated[
+        str | None,
+        typer.Option(
+            "--angle",
+            metavar="auto|given|none",
+            help="Whether the recorded orientation is used.",
+            rich_help_panel=PANEL,
+            show_default=False,
+        ),
+    ] = None,
+    spline_spacing: Annotated[
+        Any,
+        quantity_option("--spline-spacing", "m", "Distance between the knots of the flow.", "auto"),
+    ] = None,
+    confidence: Annotated[
+        float | None, quantity_option("--confidence", "1", "Confidence of the intervals.")
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Move a finished run aside and start anew.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Fit flow, drag, stochastic force and tracking noise to recordings, together.
+
+    A filter predicts each position from the earlier ones; the parameters are those that make its
+    errors likely. Gaps and uneven clocks are no matter. The run directory holds the fit (fit.nc),
+    the flow (flow.nc) for every command that takes one, the recording, figures and manifest.json.
+    """
+    from driftwalk.cli.fit_run import FitWork, run_fit
+    from driftwalk.cli.tank import require_inside, study_in_arena
+    from driftwalk.model import Tank
+
+    overrides = study_overrides(
+        keys=FIT_KEYS,
+        tank_diameter=tank_diameter,
+        side=side,
+        mass=mass,
+        depth=depth,
+        force_interval=force_interval,
+        angle=angle,
+        spline_spacing=spline_spacing,
+        confidence=confidence,
+    )
+    chosen = resolve_study(study, overrides, keys=FIT_KEYS)
+    unsaid = study is None and tank_diameter is None and how.arena is None
+    trajectories = []
+    for path in recordings:
+        one = load_for_run(path, chosen, how, tank="unsaid" if unsaid else "stated")
+        require_motion(one, path, body=how.body)
+        trajectories.append(one)
+    chosen = study_in_arena(chosen, trajectories[0])
+    for one in trajectories:
+        require_inside(chosen, one, how.body)
+    remark = None
+    if unsaid and chosen.tank == Tank():
+        remark = f"the tank is the default study's, a {chosen.tank.describe()}"
+    inputs = {"recording" if n == 0 else f"recording-{n + 1}": p for n, p in enumerate(recordings)}
+    inputs.update({"study": study} if study is not None else {})
+    found = run_fit(
+        FitWork(trajectories, chosen, how.body, inputs, remark), out, overwrite=overwrite
+    )
+    if json:
+        print_json(summary(found))
+    else:
+        print_answer(found, out)
+
+
+_KEYS = (
+    "drag_coefficient",
+    "drag_coefficient_interval",
+    "force_std_N",
+    "force_std_N_interval",
+    "force_interval_s",
+    "force_noise_intensity_N2_s",
+    "force_noise_intensity_N2_s_interval",
+    "tracking_noise_m",
+    "tracking_noise_m_interval",
+    "confidence",
+    "maximum_likelihood_drag_coefficient",
+    "wetted_depth_m",
+    "wall_share",
+    "angle",
+    "chi_squared_per_dof",
+    "autocorrelation",
+    "autocorrelation_std",
+    "samples",
+    "samples_used",
+    "duration_s",
+    "recordings",
+    "iterations",
+    "converged",
+)
+
+
+def summary(found: xr.Dataset) -> dict[str, Any]:
+    """Return what ``--json`` prints: the answer with units in its keys."""
+    return {
+        **{key: found.attrs[key] for key in _KEYS},
+        "recording": found.attrs["source"],
+        "warnings": json_module.loads(found.attrs["warnings"]),
+    }
+
+
+def print_answer(found: xr.Dataset, folder: Path) -> None:
+    """Print the answer for people, and where the flow is."""
+    facts = found.attrs
+    if facts["simulated_recording"] == "yes":
+        print("This recording was simulated by another engine (ODE).")
+    every = f", drawn anew every {1e3 * facts['force_interval_s']:g} ms"
+    rows = (
+        ("drag coefficient C_d   ", "drag_coefficient", 1.0, "", ""),
+        ("stochastic force σ_F   ", "force_std_N", 1e3, " mN", every),
+        ("tracking noise         ", "tracking_noise_m", 1e3, " mm", ""),
+    )
+    for name, key, scale, unit, more in rows:
+        low, high = (scale * end for end in facts[f"{key}_interval"])
+        print(
+            f"{name}{scale * facts[key]:.4f}{unit}{more}   "
+            f"{facts['confidence']:.0%} interval {low:.4f} to {high:.4f}"
+        )
+    print(f"noise intensity σ_F²·τ {facts['force_noise_intensity_N2_s']:.4g} N² s")
+    print(f"intervals at the wall  {facts['wall_share']:.1%}, left out")
+    for warning in json_module.loads(facts["warnings"]):
+        print_note(f"warning: {warning}")
+    print(f"flow                   {folder / 'flow.nc'}")

@@ -1,0 +1,112 @@
+"""A likelihood fit in a run directory, with its flow, figures and manifest."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from driftwalk.cli.calibration_run import dataset_hash, netcdf_bytes
+from driftwalk.cli.output import print_note
+from driftwalk.cli.progress import ProgressReporter
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+
+@dataclass(frozen=True)
+class FitWork:
+    """Everything that a fit needs.
+
+    Attributes
+    ----------
+    recordings : sequence of xarray.Dataset
+        The `trajectory` datasets.
+    study : Study
+        Block, tank and the section [fit].
+    body : str or None
+        The body.
+    inputs : mapping of str to Path
+        The files that were read, by their role.
+    remark : str or None
+        What the user should know when the run begins.
+    """
+
+    recordings: Sequence[xr.Dataset]
+    study: Study
+    body: str | None
+    inputs: Mapping[str, Path]
+    remark: str | None = None
+
+
+def run_fit(work: FitWork, folder: Path, *, overwrite: bool) -> xr.Dataset:
+    """Fit in a run directory and return the fit.
+
+    Writes ``fit.nc``, ``flow.nc``, ``recording.nc`` (``recording-2.nc``, ...), ``figures/`` and,
+    last, ``manifest.json``.
+
+    Parameters
+    ----------
+    work : FitWork
+        What to do.
+    folder : Path
+        The run directory.
+    overwrite : bool
+        Whether a finished run there is moved aside; it is refused otherwise.
+
+    Raises
+    ------
+    InputError
+        When a recording cannot be fitted; nothing is written then.
+    RunDirectoryError
+        When the directory is in use, holds another run, or cannot be written.
+    """
+    from driftwalk import _core
+    from driftwalk.calibrate import check_fit, fit_motion, fitted_flow
+    from driftwalk.core.provenance import manifest
+    from driftwalk.core.rundir import RunDirectory
+    from driftwalk.report import write_fit_figures
+
+    check_fit(work.recordings, work.study, body=work.body)
+    existing = "overwrite" if overwrite else "resume"
+    with RunDirectory(folder, specification=_specification(work), on_existing=existing) as run:  # type: ignore[arg-type]
+        about = manifest(
+            command=["driftwalk", *sys.argv[1:]],
+            study=work.study.to_dict(),
+            seeds={},
+            inputs=dict(work.inputs),
+            instruction_set=_core.instruction_set(),
+        )
+        if work.remark is not None:
+            print_note(work.remark)
+        with ProgressReporter("fit") as progress:
+            found = fit_motion(work.recordings, work.study, body=work.body, tell=progress.update)
+            flow = fitted_flow(found)
+            run.write("fit.nc", netcdf_bytes(found))
+            run.write("flow.nc", netcdf_bytes(flow))
+            for number, recording in enumerate(work.recordings, start=1):
+                name = "recording.nc" if number == 1 else f"recording-{number}.nc"
+                run.write(name, netcdf_bytes(recording))
+            write_fit_figures(
+                run.folder("figures"),
+                flow=flow,
+                trajectory=work.recordings[0],
+                body=work.body,
+                simulated=found.attrs["simulated_recording"] == "yes",
+            )
+        run.finish(about)
+    return found
+
+
+def _specification(work: FitWork) -> dict[str, Any]:
+    """Return what determines the numbers of a run."""
+    return {
+        "kind": "fit",
+        "study": work.study.to_dict(),
+        "body": work.body,
+        "recordings_sha256": [dataset_hash(one, ("x", "y", "theta")) for one in work.recordings],
+    }

@@ -1,0 +1,70 @@
+"""How good the likelihood fit has to be on the bundled recordings, made by another engine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import here
+from fit_worlds import DRAG, FORCE_N, NOISE_M, TRUTH
+
+import driftwalk as dw
+from driftwalk.flow import bilinear
+
+STUDIES = Path(__file__).resolve().parents[2] / "studies" / "real"
+
+
+def block_mean(flow: xr.Dataset, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return the flow averaged over a block of 3 cm, at four angles, at some places."""
+    offsets = (np.arange(6) + 0.5) / 6 * 0.03 - 0.015
+    along, across = (part.ravel() for part in np.meshgrid(offsets, offsets))
+    angles = np.arange(4)[:, None] * np.pi / 8
+    dx = (np.cos(angles) * along - np.sin(angles) * across).ravel()
+    dy = (np.sin(angles) * along + np.cos(angles) * across).ravel()
+    found = bilinear(flow, (x[:, None] + dx).ravel(), (y[:, None] + dy).ravel())
+    return np.asarray(found).reshape(x.size, dx.size, 2).mean(axis=1)
+
+
+def visited(recording: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Return the 6-mm cells with three samples or more that no corner could have at the wall."""
+    x, y = (recording[name].values[:, 0] for name in ("x", "y"))
+    free = np.hypot(x, y) < TRUTH["tank_radius_m"] - 0.03 / np.sqrt(2.0) - 0.002
+    edges = np.linspace(-0.15, 0.15, 51)
+    count, _, _ = np.histogram2d(y[free], x[free], bins=(edges, edges))
+    rows, columns = np.nonzero(count >= 3)
+    centres = (edges[1:] + edges[:-1]) / 2
+    return centres[columns], centres[rows]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("realisation", ["first", "second"])
+def test_half_an_hour_of_the_bundled_recording(realisation: str) -> None:
+    """Measured: flow 2.8 and 2.4 %, C_d -3 and -2 % (sd 4.2 %), sigma_F +0.5 and +1 % (0.8 %)."""
+    recording = dw.tank30_recording(realisation)
+    study = dw.apply_overrides(dw.Study(), {"forces.force_interval_s": TRUTH["force_interval_s"]})
+    fit = dw.fit_motion(recording, study)
+    assert fit.attrs["drag_coefficient"] == pytest.approx(DRAG, rel=0.10)
+    assert fit.attrs["force_std_N"] == pytest.approx(FORCE_N, rel=0.03)
+    assert fit.attrs["tracking_noise_m"] == pytest.approx(NOISE_M, rel=0.03)
+    assert fit.attrs["iterations"] <= 10
+    x, y = visited(recording)
+    assert x.size > 300
+    flow, truth = (block_mean(one, x, y) for one in (dw.fitted_flow(fit), dw.tank30_flow()))
+    error = np.sqrt(((flow - truth) ** 2).sum() / (truth**2).sum())
+    assert error <= 0.04
+
+
+def test_a_real_recording_comes_to_an_end(
+    shared_data: Callable[[str], Path], tmp_path: Path
+) -> None:
+    """A body that drives itself: no truth, but an answer and its flow."""
+    name = "destab_driveA_100pc_0_noisevar_10_randdur_600.csv"
+    recording = shared_data("smarticles-rattling") / name
+    study = STUDIES / "smarticles.toml"
+    done = here("fit", recording, "--study", study, "-o", tmp_path / "run", "--to", "100")
+    assert done.code == 0, done.err
+    assert "drag coefficient C_d" in done.out
+    assert np.isfinite(dw.load_flow(tmp_path / "run" / "flow.nc")["u"].values).all()

@@ -1,0 +1,197 @@
+"""The likelihood fit as a whole, on parts of the bundled recording, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from fit_worlds import DRAG, FORCE_N, NOISE_M, coarse_study, recording
+
+import driftwalk as dw
+from driftwalk.calibrate.fit_pass import Series
+from driftwalk.calibrate.fit_result import footprint_count, whiteness_of
+from driftwalk.core.errors import InputError
+from driftwalk.flow.grid import Grid
+from driftwalk.model import apply_overrides
+from driftwalk.schema import FLAGS, build_trajectory
+
+
+@pytest.fixture(scope="module")
+def track() -> xr.Dataset:
+    return recording(600.0)
+
+
+@pytest.fixture(scope="module")
+def fit(track: xr.Dataset) -> xr.Dataset:
+    return dw.fit_motion(track, coarse_study())
+
+
+def deviations(fit: xr.Dataset) -> np.ndarray:
+    """Return how far the three parameters are from the truth, in their standard deviations."""
+    truth = np.array([DRAG, FORCE_N, NOISE_M])
+    names = ("drag_coefficient", "force_std_N", "tracking_noise_m")
+    sd = np.sqrt(np.diag(fit["covariance"].values)) * (1.0, 0.5, 1.0)
+    return np.log(np.array([fit.attrs[name] for name in names]) / truth) / sd
+
+
+def test_the_truth_is_within_the_errors(fit: xr.Dataset) -> None:
+    """4 sd for each of three: once in 5000 runs, if the errors are right."""
+    assert np.abs(deviations(fit)).max() < 4.0
+    assert fit.attrs["converged"] == "yes"
+    for name in ("drag_coefficient", "force_std_N", "force_noise_intensity_N2_s"):
+        low, high = fit.attrs[f"{name}_interval"]
+        assert low < fit.attrs[name] < high
+    assert fit.attrs["force_noise_intensity_N2_s"] == pytest.approx(
+        fit.attrs["force_std_N"] ** 2 * fit.attrs["force_interval_s"]
+    )
+    # 90 % of a normal: 1.645 sd on either side, in logarithms.
+    low, high = np.log(fit.attrs["drag_coefficient_interval"])
+    assert high - low == pytest.approx(2 * 1.644854 * np.sqrt(fit["covariance"].values[0, 0]))
+
+
+def test_restricted_likelihood_lowers_the_drag(fit: xr.Dataset) -> None:
+    assert fit.attrs["drag_coefficient"] < fit.attrs["maximum_likelihood_drag_coefficient"]
+
+
+def test_innovations_are_white(fit: xr.Dataset) -> None:
+    """Some 12,000 numbers: 4 sd of the mean square are 5 %, and the fit takes less than 1 %."""
+    assert fit.attrs["chi_squared_per_dof"] == pytest.approx(1.0, abs=0.06)
+    assert abs(fit.attrs["autocorrelation"]) < 4.0 * fit.attrs["autocorrelation_std"]
+    assert json.loads(fit.attrs["warnings"]) == []
+
+
+def test_the_flow_is_within_its_standard_errors(fit: xr.Dataset) -> None:
+    flow = dw.fitted_flow(fit)
+    truth = dw.tank30_flow()
+    assert flow["x"].values == pytest.approx(truth["x"].values)
+    true = {name: truth[name].values for name in ("u", "v")}
+    measured = flow["flag"].values == FLAGS["measured"]
+    assert measured.sum() > 500
+    for name, value in true.items():
+        error = (flow[name].values - value)[measured]
+        assert np.sqrt((error**2).mean()) < 0.15 * np.sqrt((value[measured] ** 2).mean())
+        ratio = error / flow[f"{name}_standard_error"].values[measured]
+        assert 0.2 < np.sqrt((ratio**2).mean()) < 2.5
+    assert np.isnan(flow["u_standard_error"].values[~measured]).all()
+    assert np.isfinite(fit["u_standard_error"].values).all()
+
+
+def test_the_flow_is_taken_by_the_others(fit: xr.Dataset) -> None:
+    run = dw.simulate(
+        coarse_study(), dw.fitted_flow(fit), sample_time=np.arange(0.0, 5.0, 0.1), replicates=1
+    )
+    assert int(run["status"].values[0]) == 0
+    assert np.isfinite(run["x"].values).all()
+
+
+def test_a_recording_with_holes_gives_the_same_within_errors(track: xr.Dataset) -> None:
+    """A fifth of the samples and 100 s are missing; the rest are the same noise, so 3 sd."""
+    generator = np.random.default_rng(7)
+    time = track["time"].values
+    lost = (generator.random(time.size) < 0.2) | ((time > 200.0) & (time < 300.0))
+    holes = track.copy(deep=True)
+    for name in ("x", "y"):
+        holes[name].values[lost] = np.nan
+    holes["theta"].values[generator.random(time.size) < 0.1] = np.nan
+    found = dw.fit_motion(holes, coarse_study())
+    assert np.abs(deviations(found)).max() < 4.0
+    assert found.attrs["samples"] == np.count_nonzero(~lost)
+
+
+def test_two_recordings_are_better_than_one(track: xr.Dataset, fit: xr.Dataset) -> None:
+    both = dw.fit_motion([track, recording(600.0, "second")], coarse_study())
+    ratio = np.sqrt(np.diag(both["covariance"].values) / np.diag(fit["covariance"].values))
+    # Twice the data: 1 / sqrt(2), as far as the information does not vary from one to the other.
+    assert ratio == pytest.approx(np.full(3, np.sqrt(0.5)), rel=0.25)
+    assert both.attrs["recordings"] == 2
+    assert np.abs(deviations(both)).max() < 4.0
+
+
+def test_without_angles_the_drag_is_averaged(track: xr.Dataset) -> None:
+    blind = track.copy(deep=True)
+    blind["theta"].values[:] = np.nan
+    found = dw.fit_motion(blind, coarse_study())
+    assert found.attrs["angle"] == "none"
+    assert "no orientation" in found.attrs["warnings"]
+    # A face across the water or a diagonal: the law of a square differs by some tens of percent.
+    assert 0.5 < found.attrs["drag_coefficient"] / DRAG < 2.0
+    same = dw.fit_motion(track, coarse_study(), angle="none")
+    assert same.attrs["drag_coefficient"] == pytest.approx(found.attrs["drag_coefficient"])
+
+
+def test_force_std_follows_its_interval(track: xr.Dataset, fit: xr.Dataset) -> None:
+    other = apply_overrides(coarse_study(), {"forces.force_interval_s": 0.064})
+    found = dw.fit_motion(track, other)
+    assert found.attrs["force_noise_intensity_N2_s"] == pytest.approx(
+        fit.attrs["force_noise_intensity_N2_s"]
+    )
+    assert found.attrs["force_std_N"] == pytest.approx(fit.attrs["force_std_N"] / 2.0)
+
+
+def still(count: int, **changed: np.ndarray) -> xr.Dataset:
+    time = 0.1 * np.arange(count)
+    values = {"x": 0.02 * np.cos(time), "y": 0.02 * np.sin(time), "theta": time} | changed
+    return build_trajectory(time, **values, attrs={"source": "made.csv"})
+
+
+@pytest.mark.parametrize(
+    ("tracks", "options", "message"),
+    [
+        ([still(50)], {}, "has 50 positions of this body; the fit needs 100"),
+        ([still(200, x=np.zeros(200), y=np.zeros(200))], {}, "never moves"),
+        ([still(200, theta=np.full(200, np.nan))], {"angle": "given"}, "has no orientations"),
+        ([still(200)], {"angle": "maybe"}, "must be 'auto', 'given' or 'none'"),
+        ([still(200)], {"body": "7"}, "no body '7'"),
+        ([still(200, x=np.linspace(0.13, 0.14, 200))], {}, "are at the wall of the tank"),
+        ([], {}, "no recording"),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused(
+    tracks: list[xr.Dataset], options: dict[str, str], message: str
+) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        dw.fit_motion(tracks, coarse_study(), **options)
+    assert "\n" not in str(caught.value)
+
+
+def test_two_bodies_are_refused_with_their_names() -> None:
+    x = np.random.default_rng(1).normal(size=(200, 2))
+    pair = build_trajectory(0.1 * np.arange(200), x, x, body=["left", "right"])
+    with pytest.raises(InputError, match="2 bodies \\(left, right\\)"):
+        dw.fit_motion(pair, coarse_study())
+
+
+def test_a_flow_is_not_made_of_something_else() -> None:
+    with pytest.raises(InputError, match="not a fit"):
+        dw.fitted_flow(dw.tank30_flow())
+
+
+def test_footprint_by_brute_force() -> None:
+    grid = Grid(np.linspace(-0.05, 0.05, 21), np.linspace(-0.04, 0.04, 17), 0.005)
+    generator = np.random.default_rng(6)
+    x, y, theta = generator.uniform(-0.06, 0.06, (3, 40)) * [[1.0], [1.0], [50.0]]
+    excluded = (generator.random(40) < 0.3).astype(np.uint8)
+    series = Series(np.arange(40.0), x, y, theta, 0.0 * x, excluded)
+    for oriented in (True, False):
+        count = footprint_count(grid, [series], side=0.03, oriented=oriented)
+        for j, node_y in enumerate(grid.y):
+            for i, node_x in enumerate(grid.x):
+                ahead = (node_x - x) + 1j * (node_y - y)
+                own = ahead * np.exp(-1j * theta)
+                over = np.maximum(abs(own.real), abs(own.imag)) <= 0.015
+                over = over if oriented else abs(ahead) <= 0.015
+                assert count[j, i] == np.count_nonzero(over & (excluded == 0))
+
+
+def test_whiteness_sees_correlated_errors() -> None:
+    """A moving average (1, 1/2) has the autocorrelation 0.4."""
+    noise = np.random.default_rng(2).normal(size=(20_001, 2))
+    errors = noise[1:] + 0.5 * noise[:-1]
+    used = np.ones(20_000, dtype=bool)
+    used[::50] = False
+    found = whiteness_of([(errors, used)])
+    assert found.autocorrelation == pytest.approx(0.4, abs=0.03)
+    assert found.chi_squared_per_dof == pytest.approx(1.25, abs=0.05)
+    assert found.autocorrelation_std == pytest.approx(1 / np.sqrt(2 * 20_000 * 0.96), rel=0.01)

@@ -1,0 +1,109 @@
+"""Sums over a pass: derivatives against differences, and against what chance gives."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fit_worlds import coarse_study, recording
+
+from driftwalk.calibrate.fit import _body, _series
+from driftwalk.calibrate.fit_newton import Prior, Weights, inverse, limited, newton_step
+from driftwalk.calibrate.fit_pass import Passes, Point
+from driftwalk.calibrate.fit_spline import lay_spline
+from driftwalk.flow.arena import outline_of
+from driftwalk.schema import body_track
+
+
+@pytest.fixture(scope="module")
+def passes() -> Passes:
+    study = coarse_study()
+    outline = outline_of(study.tank.to_arena())
+    tracks = [body_track(recording(60.0, name)) for name in ("first", "second")]
+    series, _ = _series(tracks, study, outline, True)
+    spline = lay_spline(outline, side=0.03, spacing=0.03)
+    return Passes(series, _body(study, True), spline)
+
+
+@pytest.fixture(scope="module")
+def point(passes: Passes) -> Point:
+    shape = (2, passes.spline.rows, passes.spline.columns)
+    noise = np.random.default_rng(1).normal(0.0, 0.01, shape)
+    # So much unrest that no innovation is an outlier, which a small step could make or unmake.
+    return Point(noise, math.log(0.5), math.log(2e-3), math.log(2.5e-4))
+
+
+def test_the_score_is_the_slope_of_the_likelihood(passes: Passes, point: Point) -> None:
+    """Central differences of the likelihood along single parameters and random directions.
+
+    The filter's own derivatives hold its gains fixed, which is what makes the information one of
+    predictions; along the coefficients and C_d they differ from the slope by what the gains change.
+    """
+    score = passes.sums(point).score
+    size = score.size
+    for direction in (np.eye(size)[-2], np.eye(size)[-1]):
+        step = 1e-3
+        change = [passes.sums(point.moved(sign * step * direction)).deviance for sign in (1, -1)]
+        slope = -(change[0] - change[1]) / (2.0 * step)
+        assert score @ direction == pytest.approx(slope, rel=5e-3, abs=0.5)
+
+
+def test_two_recordings_add_up(passes: Passes, point: Point) -> None:
+    both = passes.sums(point)
+    parts = [replace(passes, series=[one]).sums(point) for one in passes.series]
+    assert both.deviance == pytest.approx(sum(one.deviance for one in parts))
+    assert both.score == pytest.approx(sum(one.score for one in parts))
+    assert both.information == pytest.approx(sum(one.information for one in parts))
+    assert both.used == sum(one.used for one in parts)
+
+
+def test_without_noise_derivatives_the_rest_is_the_same(passes: Passes, point: Point) -> None:
+    whole, part = passes.sums(point), passes.sums(point, noise="without")
+    assert part.score == pytest.approx(whole.score[:-2])
+    assert part.information == pytest.approx(whole.information[:-2, :-2])
+    assert np.linalg.eigvalsh(whole.information)[-3:].min() > 0.0
+
+
+def test_the_ranges_of_a_pass_do_not_matter(
+    passes: Passes, point: Point, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = passes.sums(point)
+    monkeypatch.setattr("driftwalk.calibrate.fit_pass.SAMPLES_AT_ONCE", 97)
+    parts = passes.sums(point)
+    assert parts.deviance == pytest.approx(whole.deviance, rel=1e-12)
+    assert parts.information == pytest.approx(whole.information, rel=1e-9, abs=1e-6)
+
+
+def test_a_held_parameter_stays_and_the_others_are_the_best(passes: Passes, point: Point) -> None:
+    prior = Prior(passes)
+    sums = prior.add(passes.sums(point), point, Weights(1.0, 1e4))
+    step = newton_step(sums, inverse(sums.information), held=(-3, -1))
+    free = np.ones(step.size, dtype=bool)
+    free[[-3, -1]] = False
+    assert step[[-3, -1]] == pytest.approx([0.0, 0.0], abs=1e-9)
+    expected = np.linalg.solve(sums.information[np.ix_(free, free)], sums.score[free])
+    assert step[free] == pytest.approx(expected, rel=1e-6, abs=1e-9)
+
+
+def test_the_prior_is_the_gradient_of_its_own_deviance(passes: Passes, point: Point) -> None:
+    prior, weights = Prior(passes), Weights(0.7, 2e4)
+    sums = passes.sums(point)
+    inside = prior.add(sums, point, weights)
+    direction = np.random.default_rng(4).normal(size=sums.score.size)
+    direction[-2:] = 0.0
+    moved = [point.moved(sign * 1e-4 * direction) for sign in (1, -1)]
+    up, down = (prior.add(sums, at, weights).deviance for at in moved)
+    slope = (down - up) / 2e-4
+    assert (inside.score - sums.score) @ direction == pytest.approx(slope, rel=1e-6)
+    bend = (up - 2.0 * inside.deviance + down) / 1e-8
+    added = inside.information - sums.information
+    assert direction @ added @ direction == pytest.approx(bend, rel=1e-3)
+
+
+def test_a_wrong_variance_is_found_in_one_step() -> None:
+    """n draws of a variance v, tried at v0: the step in ln v is n/2 (v/v0 - 1) over n/2."""
+    for ratio in (0.2, 1.0, 7.0):
+        step = limited(np.array([0.0, ratio - 1.0, 0.5 * (ratio - 1.0)]))
+        assert step[1:] == pytest.approx([math.log(ratio), 0.5 * math.log(ratio)])

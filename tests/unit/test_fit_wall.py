@@ -1,0 +1,75 @@
+"""The wall rule: what it leaves out, and that it looks at the past only."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from driftwalk.calibrate.fit_wall import wall_intervals
+from driftwalk.flow.arena import Circle, outline_of
+
+TANK = Circle(0.15)
+SIDE = 0.03
+
+
+def intervals(x: np.ndarray, theta: np.ndarray | None, time: np.ndarray | None = None) -> list[int]:
+    time = 0.1 * np.arange(x.size) if time is None else time
+    found = wall_intervals(
+        time, x, np.zeros(x.size), theta, outline=TANK, side=SIDE, longest_gap=1.0
+    )
+    return np.flatnonzero(found).tolist()
+
+
+def test_an_interval_begins_near_the_wall() -> None:
+    """With a face towards the wall the corners are at x + 0.015, y = 0.015: 0.1493 m out.
+
+    The margin is reached at a distance of 0.148 m: x = sqrt(0.148^2 - 0.015^2) - 0.015 = 0.13224.
+    """
+    x = np.full(6, 0.1322)
+    x[3] = 0.1323
+    # At 5 the motion from 2 to 4 is none, at 4 that from 1 to 3 leads on to 0.13235.
+    assert intervals(x, np.zeros(6)) == [4]
+
+
+def test_an_interval_leads_to_the_wall() -> None:
+    x = 0.12 + 0.005 * np.arange(6)
+    # Outward at 5 mm a sample: 0.13 leads to 0.135, beyond 0.13224.
+    assert intervals(x, np.zeros(6)) == [3, 4, 5]
+
+
+def test_a_corner_reaches_farther_than_a_face() -> None:
+    """Turned by 45 degrees the corner is at x + 0.0212: the margin is at x = 0.12679."""
+    for place, near in ((0.1267, []), (0.1269, [1, 2, 3])):
+        assert intervals(np.full(4, place), np.full(4, np.pi / 4)) == near
+        assert intervals(np.full(4, place), None) == near
+
+
+def test_the_motion_is_not_continued_over_a_gap() -> None:
+    x = 0.11 + 0.004 * np.arange(6)
+    time = np.array([0.0, 0.1, 0.2, 5.0, 5.1, 5.2])
+    # The last pose is at 0.13; without the gap the third of them, 0.126 + 0.004, would be followed.
+    assert intervals(x, np.zeros(6), time) == []
+    assert intervals(x, np.zeros(6)) == []
+    assert intervals(x + 0.004, np.zeros(6)) == [5]
+    assert intervals(x + 0.004, np.zeros(6), time) == []
+
+
+def test_the_future_does_not_matter() -> None:
+    generator = np.random.default_rng(5)
+    time = np.cumsum(generator.uniform(0.05, 0.2, 400))
+    x, y = 0.1 * np.cos(time) + 0.04, 0.1 * np.sin(1.3 * time)
+    theta = 0.7 * time
+    arena = outline_of({"shape": "rectangle", "width_m": 0.3, "height_m": 0.24})
+    options = {"outline": arena, "side": SIDE, "longest_gap": 1.0}
+    whole = wall_intervals(time, x, y, theta, **options)
+    assert 0.05 < whole.mean() < 0.95
+    for last in (50, 177, 300):
+        moved_x = np.concatenate([x[:last], generator.uniform(-0.2, 0.2, 400 - last)])
+        changed = wall_intervals(time, moved_x, y, theta, **options)
+        # The flag of sample `last` itself depends on the samples before it.
+        assert (changed[: last + 1] == whole[: last + 1]).all()
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_very_short_tracks(count: int) -> None:
+    assert intervals(np.zeros(count), np.zeros(count)) == []
