@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.cli.calibration_run import dataset_hash, netcdf_bytes
 from driftwalk.cli.progress import ProgressReporter
+from driftwalk.cli.run_folder import open_run
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -98,25 +98,21 @@ def run_assembly(
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
     """
-    from driftwalk import _core
-    from driftwalk.core.provenance import manifest
-    from driftwalk.core.rundir import RunDirectory
-
     _check(work)
-    existing = "overwrite" if overwrite else "resume"
-    with RunDirectory(folder, specification=_specification(work), on_existing=existing) as run:  # type: ignore[arg-type]
-        about = manifest(
-            command=["driftwalk", *sys.argv[1:]],
-            study=work.study.to_dict(),
+    with (
+        open_run(
+            folder,
+            specification=_specification(work),
+            study=work.study,
             seeds={"assembly": work.study.assembly.seed},
-            inputs=dict(work.inputs),
-            instruction_set=_core.instruction_set(),
-        )
-        with ProgressReporter("assemble") as progress:
-            result = _simulate(work, run, progress)
-            if film != "none":
-                _write_film(run, film, progress)
-        run.finish(about)
+            inputs=work.inputs,
+            overwrite=overwrite,
+        ) as run,
+        ProgressReporter("assemble") as progress,
+    ):
+        result = _simulate(work, run, progress)
+        if film != "none":
+            _write_film(run, film, progress)
     return result
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from driftwalk.cli.output import print_note
 from driftwalk.cli.progress import ProgressReporter
+from driftwalk.cli.run_folder import open_run
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -82,22 +82,18 @@ def run_calibration(work: Work, folder: Path, *, overwrite: bool) -> xr.Dataset:
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
     """
-    from driftwalk import _core
     from driftwalk.calibrate import calibrate
-    from driftwalk.core.provenance import manifest
-    from driftwalk.core.rundir import RunDirectory
     from driftwalk.report import write_figures
 
     flow = _checked_flow(work)
-    existing = "overwrite" if overwrite else "resume"
-    with RunDirectory(folder, specification=_specification(work), on_existing=existing) as run:  # type: ignore[arg-type]
-        about = manifest(
-            command=["driftwalk", *sys.argv[1:]],
-            study=work.study.to_dict(),
-            seeds={"calibration": work.study.calibration.seed},
-            inputs=dict(work.inputs),
-            instruction_set=_core.instruction_set(),
-        )
+    with open_run(
+        folder,
+        specification=_specification(work),
+        study=work.study,
+        seeds={"calibration": work.study.calibration.seed},
+        inputs=work.inputs,
+        overwrite=overwrite,
+    ) as run:
         if work.remark is not None:
             print_note(work.remark)
         run.write("flow.nc", netcdf_bytes(flow))
@@ -123,7 +119,6 @@ def run_calibration(work: Work, folder: Path, *, overwrite: bool) -> xr.Dataset:
                 folder=run.folder("figures"),
                 body=work.body,
             )
-        run.finish(about)
     return found
 
 

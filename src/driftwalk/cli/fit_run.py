@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from driftwalk.cli.calibration_run import dataset_hash, netcdf_bytes
 from driftwalk.cli.output import print_note
 from driftwalk.cli.progress import ProgressReporter
+from driftwalk.cli.run_folder import open_run
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -65,22 +65,18 @@ def run_fit(work: FitWork, folder: Path, *, overwrite: bool) -> xr.Dataset:
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
     """
-    from driftwalk import _core
     from driftwalk.calibrate import check_fit, fit_motion, fitted_flow
-    from driftwalk.core.provenance import manifest
-    from driftwalk.core.rundir import RunDirectory
     from driftwalk.report import write_fit_figures
 
     check_fit(work.recordings, work.study, body=work.body)
-    existing = "overwrite" if overwrite else "resume"
-    with RunDirectory(folder, specification=_specification(work), on_existing=existing) as run:  # type: ignore[arg-type]
-        about = manifest(
-            command=["driftwalk", *sys.argv[1:]],
-            study=work.study.to_dict(),
-            seeds={},
-            inputs=dict(work.inputs),
-            instruction_set=_core.instruction_set(),
-        )
+    with open_run(
+        folder,
+        specification=_specification(work),
+        study=work.study,
+        seeds={},
+        inputs=work.inputs,
+        overwrite=overwrite,
+    ) as run:
         if work.remark is not None:
             print_note(work.remark)
         with ProgressReporter("fit") as progress:
@@ -98,7 +94,6 @@ def run_fit(work: FitWork, folder: Path, *, overwrite: bool) -> xr.Dataset:
                 body=work.body,
                 simulated=found.attrs["simulated_recording"] == "yes",
             )
-        run.finish(about)
     return found
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.cli.calibration_run import dataset_hash, netcdf_bytes
 from driftwalk.cli.progress import ProgressReporter
+from driftwalk.cli.run_folder import open_run
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -103,25 +103,21 @@ def run_sensitivity(work: SensitivityWork, folder: Path, *, overwrite: bool) -> 
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
     """
-    from driftwalk import _core
-    from driftwalk.core.provenance import manifest
-    from driftwalk.core.rundir import RunDirectory
-
     sizes = _checked_sizes(work)
-    existing = "overwrite" if overwrite else "resume"
-    with RunDirectory(folder, specification=_specification(work), on_existing=existing) as run:  # type: ignore[arg-type]
-        about = manifest(
-            command=["driftwalk", *sys.argv[1:]],
-            study=work.study.to_dict(),
+    with (
+        open_run(
+            folder,
+            specification=_specification(work),
+            study=work.study,
             seeds={"sensitivity": work.study.sensitivity.seed},
-            inputs=dict(work.inputs),
-            instruction_set=_core.instruction_set(),
-        )
-        with ProgressReporter("sensitivity") as progress:
-            result = _simulate(work, run, _Overall(progress, sizes))
-            progress.update(1, 1, "figures")
-            _draw(result, run)
-        run.finish(about)
+            inputs=work.inputs,
+            overwrite=overwrite,
+        ) as run,
+        ProgressReporter("sensitivity") as progress,
+    ):
+        result = _simulate(work, run, _Overall(progress, sizes))
+        progress.update(1, 1, "figures")
+        _draw(result, run)
     return result
 
 

@@ -1,0 +1,63 @@
+"""The run directory of a command: made or continued, and finished with its manifest."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from driftwalk.core.rundir import RunDirectory
+    from driftwalk.model import Study
+
+
+@contextmanager
+def open_run(
+    folder: Path,
+    *,
+    specification: Mapping[str, Any],
+    study: Study,
+    seeds: Mapping[str, int],
+    inputs: Mapping[str, Path],
+    overwrite: bool,
+) -> Iterator[RunDirectory]:
+    """Open a run directory; when the work in it is done, write its manifest.
+
+    Parameters
+    ----------
+    folder : Path
+        The run directory.
+    specification : mapping
+        What determines the numbers of the run.
+    study : Study
+        For the manifest.
+    seeds : mapping of str to int
+        For the manifest.
+    inputs : mapping of str to Path
+        The files that were read, by their role; hashed before the work begins.
+    overwrite : bool
+        Whether a finished run there is moved aside; it is refused otherwise.
+
+    Raises
+    ------
+    RunDirectoryError
+        When the directory is in use, holds another run, or cannot be written.
+    """
+    from driftwalk import _core
+    from driftwalk.core.provenance import manifest
+    from driftwalk.core.rundir import RunDirectory
+
+    with RunDirectory(
+        folder, specification=specification, on_existing="overwrite" if overwrite else "resume"
+    ) as run:
+        about = manifest(
+            command=["driftwalk", *sys.argv[1:]],
+            study=study.to_dict(),
+            seeds=dict(seeds),
+            inputs=dict(inputs),
+            instruction_set=_core.instruction_set(),
+        )
+        yield run
+        run.finish(about)
