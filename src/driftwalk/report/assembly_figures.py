@@ -6,8 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from driftwalk.core.errors import InputError
-from driftwalk.report.figures import METADATA, _save
+from driftwalk.report.figures import write_each
 from driftwalk.report.plot_biplot import plot_biplot
 from driftwalk.report.plot_blocks import plot_film_strip
 from driftwalk.report.plot_class_times import plot_class_times, plot_survival
@@ -26,7 +25,6 @@ from driftwalk.report.style import (
     SINGLE_COLUMN_MM,
     letter_panels,
     new_figure,
-    print_style,
 )
 
 if TYPE_CHECKING:
@@ -101,7 +99,7 @@ def write_assembly_figures(
         makers["class_times"] = lambda: class_times_figure(times)
     if path is not None:
         makers["film_strip"] = lambda: figure_of(plot_film_strip(path, run=run)[0])
-    return _write(makers, folder, formats)
+    return write_each(makers, folder, formats)
 
 
 def write_sensitivity_figures(
@@ -148,7 +146,7 @@ def write_sensitivity_figures(
     if components is not None:
         makers["biplot"] = lambda: biplot_figure(components, sensitivity, "complete")
         makers["biplot_l1"] = lambda: biplot_figure(components, sensitivity, "l1_distance")
-    return _write(makers, folder, formats)
+    return write_each(makers, folder, formats)
 
 
 def outcomes_figure(
@@ -198,21 +196,3 @@ def biplot_figure(
     figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=80.0)
     plot_biplot(components, figure.add_subplot(), sensitivity=sensitivity, color=color)
     return figure
-
-
-def _write(
-    makers: dict[str, Callable[[], Figure]], folder: str | Path, formats: Sequence[str]
-) -> list[Path]:
-    """Make and write every figure; nothing is written when a format is not known."""
-    unknown = [name for name in formats if name not in METADATA]
-    if unknown:
-        raise InputError(
-            f"no figure can be written as {', '.join(unknown)}: choose from {', '.join(METADATA)}"
-        )
-    target = Path(folder)
-    target.mkdir(parents=True, exist_ok=True)
-    written: list[Path] = []
-    with print_style():
-        for name, make in makers.items():
-            written += _save(make(), target / name, formats)
-    return written

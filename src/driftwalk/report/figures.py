@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -85,13 +85,6 @@ def write_figures(
     --------
     ``write_figures(calibration, flow=flow, trajectory=recording, folder="run/figures")``
     """
-    unknown = [name for name in formats if name not in METADATA]
-    if unknown:
-        raise InputError(
-            f"no figure can be written as {', '.join(unknown)}: choose from {', '.join(METADATA)}"
-        )
-    target = Path(folder)
-    target.mkdir(parents=True, exist_ok=True)
     makers: dict[str, Callable[[], Figure]] = {
         "flow": lambda: flow_figure(flow),
         "trajectory": lambda: trajectory_figure(trajectory, body=body),
@@ -102,14 +95,7 @@ def write_figures(
         "validation": lambda: validation_figure(calibration),
     }
     footer = FOOTER if calibration.attrs.get("simulated_recording") == "yes" else ""
-    written: list[Path] = []
-    with print_style():
-        for name, make in makers.items():
-            figure = make()
-            if footer:
-                add_footer(figure, footer)
-            written += _save(figure, target / name, formats)
-    return written
+    return write_each(makers, folder, formats, footer=footer)
 
 
 def flow_figure(flow: xr.Dataset) -> Figure:
@@ -217,6 +203,31 @@ def validation_figure(calibration: xr.Dataset) -> Figure:
 
 def _legend_above(ax: Any) -> None:
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)
+
+
+def write_each(
+    makers: Mapping[str, Callable[[], Figure]],
+    folder: str | Path,
+    formats: Sequence[str],
+    *,
+    footer: str = "",
+) -> list[Path]:
+    """Make every figure and write it by its name; nothing is made when a format is not known."""
+    unknown = [name for name in formats if name not in METADATA]
+    if unknown:
+        raise InputError(
+            f"no figure can be written as {', '.join(unknown)}: choose from {', '.join(METADATA)}"
+        )
+    target = Path(folder)
+    target.mkdir(parents=True, exist_ok=True)
+    written: list[Path] = []
+    with print_style():
+        for name, make in makers.items():
+            figure = make()
+            if footer:
+                add_footer(figure, footer)
+            written += _save(figure, target / name, formats)
+    return written
 
 
 def _save(figure: Figure, stem: Path, formats: Sequence[str]) -> list[Path]:

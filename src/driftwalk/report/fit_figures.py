@@ -10,17 +10,15 @@ import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.report.arena import arena_of, draw_arena, label_position
-from driftwalk.report.figures import FOOTER, METADATA, _save, trajectory_figure
+from driftwalk.report.figures import FOOTER, trajectory_figure, write_each
 from driftwalk.report.labels import in_unit
 from driftwalk.report.plot_flow import plot_flow
 from driftwalk.report.style import (
     DOUBLE_COLUMN_MM,
     add_colorbar,
-    add_footer,
     axes_or_new,
     letter_panels,
     new_figure,
-    print_style,
     speed_colormap,
 )
 from driftwalk.schema import FLAGS
@@ -122,25 +120,11 @@ def write_fit_figures(
     --------
     ``write_fit_figures("fit/figures", flow=flow, trajectory=recording)``
     """
-    unknown = [name for name in formats if name not in METADATA]
-    if unknown:
-        raise InputError(
-            f"no figure can be written as {', '.join(unknown)}: choose from {', '.join(METADATA)}"
-        )
-    target = Path(folder)
-    target.mkdir(parents=True, exist_ok=True)
     makers: dict[str, Callable[[], Figure]] = {
         "flow": lambda: _flow_figure(flow),
         "trajectory": lambda: trajectory_figure(trajectory, body=body),
     }
-    written: list[Path] = []
-    with print_style():
-        for name, make in makers.items():
-            figure = make()
-            if simulated:
-                add_footer(figure, FOOTER)
-            written += _save(figure, target / name, formats)
-    return written
+    return write_each(makers, folder, formats, footer=FOOTER if simulated else "")
 
 
 def _flow_figure(flow: xr.Dataset) -> Figure:
