@@ -4,7 +4,6 @@ from driftwalk.assemble.classify import classify
 from driftwalk.assemble.components import Alignment, disconnected_alignment, principal_components
 from driftwalk.assemble.distribution import (
     outcome_distribution,
-    outcomes_at,
     proportion_interval,
     sampling_variance,
 )
@@ -65,7 +64,6 @@ __all__ = [
     "merge_chirality",
     "outcome_classes",
     "outcome_distribution",
-    "outcomes_at",
     "pairwise_l1",
     "path_recording",
     "polyomino_cells",

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.assemble.events import classes_at
 from driftwalk.assemble.outcome import class_shapes
 from driftwalk.assemble.polyomino import shape_size
 from driftwalk.core.errors import InputError
@@ -43,7 +44,7 @@ def outcome_distribution(
     confidence : float
         Probability with which all intervals hold at once, in (0, 1).
     time : float, optional
-        Read the outcomes at this time [s] of the runs, see `outcomes_at`; default: at their end.
+        Read the outcomes at this time [s] of the runs, see `class_at`; default: at their end.
         Only for an `assembly` dataset.
 
     Returns
@@ -142,12 +143,10 @@ def outcomes_at(assembly: xr.Dataset, time: float) -> Integers:
     ([1, 1], [0, 1])
     """
     require_assembly(assembly, "outcome", "event_time", "event_class")
-    check_times(np.array([time]), duration(assembly))
-    happened = (assembly["event_time"].values <= time).sum(axis=1)
-    last = np.maximum(happened - 1, 0)[:, None]
-    index = np.take_along_axis(assembly["event_class"].values, last, axis=1)[:, 0].astype(np.int64)
-    index[happened == 0] = class_names(assembly).index(all_single(assembly))
-    index[assembly["outcome"].values < 0] = -1
+    moment = np.array([time])
+    check_times(moment, duration(assembly))
+    start = class_names(assembly).index(all_single(assembly))
+    index: Integers = classes_at(assembly, moment, start=start)[0].astype(np.int64)
     return index
 
 

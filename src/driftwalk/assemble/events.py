@@ -130,13 +130,24 @@ def class_at(assembly: xr.Dataset, time: npt.ArrayLike) -> npt.NDArray[np.int32]
     times = _checked_times(assembly, time)
     names = [str(name) for name in assembly["class"].values]
     apart = class_name(["1"] * assembly.sizes["block"])
+    rows = classes_at(assembly, times.ravel(), start=names.index(apart))
+    return rows.reshape(*times.shape, rows.shape[1])
+
+
+def classes_at(
+    assembly: xr.Dataset, times: npt.NDArray[np.float64], *, start: int
+) -> npt.NDArray[np.int32]:
+    """Return what `class_at` does for times in a row, unchecked: (time, run).
+
+    `start` is the index of the class in which every block is alone.
+    """
     events = assembly["event_class"].values
-    start = np.full((len(events), 1), names.index(apart))
-    history = np.concatenate([start, events], axis=1).astype(np.int32)
+    begin = np.full((len(events), 1), start)
+    history = np.concatenate([begin, events], axis=1).astype(np.int32)
     clock, run = assembly["event_time"].values, np.arange(len(events))
     history[assembly["outcome"].values < 0] = -1
-    rows = [history[run, (clock <= moment).sum(axis=1)] for moment in times.ravel()]
-    return np.array(rows, dtype=np.int32).reshape(*times.shape, len(events))
+    rows = [history[run, (clock <= moment).sum(axis=1)] for moment in times]
+    return np.array(rows, dtype=np.int32).reshape(len(times), len(events))
 
 
 class _Events(NamedTuple):
