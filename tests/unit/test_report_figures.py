@@ -168,3 +168,23 @@ def test_an_unknown_format_is_refused_before_anything_is_written(datasets, tmp_p
             calibration, flow=flow, trajectory=trajectory, folder=tmp_path / "x", formats=["gif"]
         )
     assert not (tmp_path / "x").exists()
+
+
+def test_without_bootstrap_the_profiles_are_drawn_alone(datasets, tmp_path) -> None:
+    calibration, flow, trajectory = datasets
+    names = [name for name in calibration if name.startswith(("bootstrap_", "region_"))]
+    assert "bootstrap_drag_coefficient" in names
+    bare = calibration.drop_vars(names)
+    with print_style():
+        figure = figures.validation_figure(bare)
+    assert len(figure.axes) == 2
+    with print_style():
+        full = figures.validation_figure(calibration)
+    for alone, beside in zip(figure.axes, full.axes, strict=False):
+        assert len(alone.lines) == len(beside.lines) > 0
+        for one, other in zip(alone.lines, beside.lines, strict=True):
+            np.testing.assert_array_equal(one.get_xydata(), other.get_xydata())
+    written = write_figures(
+        bare, flow=flow, trajectory=trajectory, folder=tmp_path, formats=["png"]
+    )
+    assert [path.stem for path in written] == NAMES

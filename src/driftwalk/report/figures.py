@@ -13,7 +13,7 @@ from driftwalk.report.plot_flow import COMPONENTS, SPEED_LABEL, plot_flow, veloc
 from driftwalk.report.plot_ks_map import LEGEND_ORDER, plot_ks_map, plot_refined_map
 from driftwalk.report.plot_steps import plot_steps
 from driftwalk.report.plot_trajectory import plot_trajectory
-from driftwalk.report.plot_validation import plot_validation
+from driftwalk.report.plot_validation import plot_distance_profile, plot_validation
 from driftwalk.report.style import (
     DOUBLE_COLUMN_MM,
     SINGLE_COLUMN_MM,
@@ -187,7 +187,9 @@ def panels_figure(calibration: xr.Dataset, parameter: Any) -> Figure:
 
 
 def validation_figure(calibration: xr.Dataset) -> Figure:
-    """Return the distance around the optimum and the bootstrap estimates."""
+    """Return the distance around the optimum and, where there are any, the bootstrap estimates."""
+    if "bootstrap_drag_coefficient" not in calibration:
+        return _profiles_figure(calibration)
     figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=68.0)
     row = plot_validation(calibration, list(figure.subplots(1, 3)))
     letter_panels(row, ["along $C_d$", r"along $\sigma_F$", "estimates"])
@@ -198,6 +200,16 @@ def validation_figure(calibration: xr.Dataset) -> Figure:
             handles.append(handle)
             labels.append(label)
     figure.legend(handles, labels, loc="outside upper center", ncols=7)
+    return figure
+
+
+def _profiles_figure(calibration: xr.Dataset) -> Figure:
+    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=68.0)
+    row = list(figure.subplots(1, 2))
+    plot_distance_profile(calibration, row[0], parameter="drag_coefficient")
+    plot_distance_profile(calibration, row[1], parameter="force_std")
+    letter_panels(row, ["along $C_d$", r"along $\sigma_F$"])
+    figure.legend(*row[0].get_legend_handles_labels(), loc="outside upper center", ncols=7)
     return figure
 
 
