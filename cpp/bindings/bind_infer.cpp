@@ -16,11 +16,17 @@ using driftwalk::InnovationsFilter;
 
 namespace {
 
-bool angle_known(const std::string& orientation) {
-  if (orientation != "given" && orientation != "none") {
-    throw std::invalid_argument("orientation must be 'given' or 'none'");
+driftwalk::Angle angle_of(const std::string& orientation) {
+  if (orientation == "given") {
+    return driftwalk::Angle::given;
   }
-  return orientation == "given";
+  if (orientation == "none") {
+    return driftwalk::Angle::none;
+  }
+  if (orientation != "state") {
+    throw std::invalid_argument("orientation must be 'given', 'none' or 'state'");
+  }
+  return driftwalk::Angle::state;
 }
 
 DragModel drag_model(double side, double mass, double depth, int strips, double water_density,
@@ -33,7 +39,7 @@ DragModel drag_model(double side, double mass, double depth, int strips, double 
   }
   return DragModel({side, mass, depth, strips, water_density},
                    {nullptr, origin_x, origin_y, spacing, columns, rows}, coefficients.data(),
-                   drag_coefficient, angle_known(orientation));
+                   drag_coefficient, angle_of(orientation));
 }
 
 // Left as it comes: the filter writes every number of it, and the Jacobian is large.
@@ -55,13 +61,14 @@ nb::dict run(InnovationsFilter& filter, std::int64_t wanted) {
   const std::int64_t count = std::min(wanted, filter.remaining());
   const auto n = static_cast<std::size_t>(count);
   const auto parameters = static_cast<std::size_t>(filter.parameters());
+  const auto d = static_cast<std::size_t>(filter.coordinates());
   const bool sensitivities = filter.sensitivities();
-  Out<double> innovation = uninitialised<double>({n, 2}),
-              covariance = uninitialised<double>({n, 3});
-  Out<double> state = uninitialised<double>({n, 4});
+  Out<double> innovation = uninitialised<double>({n, d}),
+              covariance = uninitialised<double>({n, d * (d + 1) / 2});
+  Out<double> state = uninitialised<double>({n, 2 * d});
   Out<std::uint8_t> used = uninitialised<std::uint8_t>({n});
-  Out<double> whitened = uninitialised<double>({sensitivities ? 2 * n : 0});
-  Out<double> jacobian = uninitialised<double>({sensitivities ? 2 * n : 0, parameters});
+  Out<double> whitened = uninitialised<double>({sensitivities ? d * n : 0});
+  Out<double> jacobian = uninitialised<double>({sensitivities ? d * n : 0, parameters});
   {
     const nb::gil_scoped_release released;
     filter.run(count, {innovation.data(), covariance.data(), used.data(), state.data(),
@@ -79,6 +86,55 @@ nb::dict run(InnovationsFilter& filter, std::int64_t wanted) {
   return out;
 }
 
+nb::dict sums(InnovationsFilter& filter, const In<std::uint8_t, 1>& kept,
+              const In<double, 3>& right) {
+  const auto n = static_cast<std::size_t>(filter.remaining());
+  if (kept.size() != n || right.shape(0) != n ||
+      right.shape(1) != std::size_t(filter.coordinates())) {
+    throw std::invalid_argument("kept must have shape (n,) and right (n, coordinates, columns), n "
+                                "the samples that remain");
+  }
+  const auto parameters = static_cast<std::size_t>(filter.parameters());
+  const auto columns = right.shape(2);
+  InnovationsFilter::Sums found;
+  {
+    const nb::gil_scoped_release released;
+    found = filter.sums(kept.data(), right.data(), static_cast<int>(columns));
+  }
+  nb::dict out;
+  out["information"] = hand_out(std::move(found.information), {parameters, parameters});
+  out["products"] = hand_out(std::move(found.products), {columns, parameters});
+  return out;
+}
+
+template <int D>
+nb::dict response_of(const DragModel& model, const In<double, 3>& coefficients,
+                     const In<double, 1>& mean, double theta, double omega,
+                     const In<double, 2>& covariance) {
+  constexpr std::size_t n = 2 * D;
+  if (mean.shape(0) != n || covariance.shape(0) != n || covariance.shape(1) != n) {
+    throw std::invalid_argument("mean must have shape (4,) and covariance (4, 4), (6,) and (6, 6) "
+                                "with orientation 'state'");
+  }
+  double P[n][n];
+  std::copy_n(covariance.data(), n * n, &P[0][0]);
+  std::vector<double> by_coefficients(D * coefficients.size(), 0.0);
+  const driftwalk::DragResponse<D> drag =
+      model.drag<D>(D == 3 ? mean.data()[2] : theta, D == 3 ? mean.data()[n - 1] : omega,
+                    mean.data(), P, by_coefficients.data());
+  const auto matrix = [](const double (&values)[D][D]) {
+    return hand_out(std::vector<double>(&values[0][0], &values[0][0] + D * D), {D, D});
+  };
+  nb::dict out;
+  out["acceleration"] =
+      hand_out(std::vector<double>(drag.acceleration, drag.acceleration + D), {D});
+  out["by_position"] = matrix(drag.by_position);
+  out["by_velocity"] = matrix(drag.by_velocity);
+  out["by_coefficients"] =
+      hand_out(std::move(by_coefficients), {D, 2, coefficients.shape(1), coefficients.shape(2)});
+  return out;
+}
+
 nb::dict expected_drag(double side, double mass, double depth, int strips, double water_density,
                        double origin_x, double origin_y, double spacing, int columns, int rows,
                        const In<double, 3>& coefficients, double drag_coefficient,
@@ -87,25 +143,9 @@ nb::dict expected_drag(double side, double mass, double depth, int strips, doubl
   const DragModel model =
       drag_model(side, mass, depth, strips, water_density, origin_x, origin_y, spacing, columns,
                  rows, coefficients, drag_coefficient, orientation);
-  if (mean.shape(0) != 4 || covariance.shape(0) != 4 || covariance.shape(1) != 4) {
-    throw std::invalid_argument("mean must have shape (4,) and covariance (4, 4)");
-  }
-  double P[4][4];
-  std::copy_n(covariance.data(), 16, &P[0][0]);
-  std::vector<double> by_coefficients(2 * coefficients.size(), 0.0);
-  const driftwalk::DragResponse drag =
-      model.drag(theta, omega, mean.data(), P, by_coefficients.data());
-  const auto matrix = [](const double (&values)[2][2]) {
-    return hand_out(std::vector<double>(&values[0][0], &values[0][0] + 4), {2, 2});
-  };
-  nb::dict out;
-  out["acceleration"] =
-      hand_out(std::vector<double>(drag.acceleration, drag.acceleration + 2), {2});
-  out["by_position"] = matrix(drag.by_position);
-  out["by_velocity"] = matrix(drag.by_velocity);
-  out["by_coefficients"] =
-      hand_out(std::move(by_coefficients), {2, 2, coefficients.shape(1), coefficients.shape(2)});
-  return out;
+  return model.angle() == driftwalk::Angle::state
+             ? response_of<3>(model, coefficients, mean, theta, omega, covariance)
+             : response_of<2>(model, coefficients, mean, theta, omega, covariance);
 }
 
 } // namespace
@@ -120,8 +160,8 @@ void register_infer(nb::module_& module) {
              double mass, double depth, int strips, double water_density, double origin_x,
              double origin_y, double spacing, int columns, int rows, In<double, 3> coefficients,
              double drag_coefficient, double noise_intensity, double position_noise,
-             double largest_step, double longest_gap, const std::string& orientation,
-             bool sensitivities) {
+             double force_lever, double angle_noise, double largest_step, double longest_gap,
+             const std::string& orientation, bool sensitivities) {
             const std::size_t n = time.size();
             if (x.size() != n || y.size() != n || theta.size() != n || omega.size() != n ||
                 excluded.size() != n) {
@@ -132,17 +172,22 @@ void register_infer(nb::module_& module) {
                  static_cast<std::int64_t>(n)},
                 drag_model(side, mass, depth, strips, water_density, origin_x, origin_y, spacing,
                            columns, rows, coefficients, drag_coefficient, orientation),
-                {noise_intensity, position_noise, largest_step, longest_gap}, sensitivities);
+                {noise_intensity, position_noise, force_lever, angle_noise, largest_step,
+                 longest_gap},
+                sensitivities);
           },
           "time"_a, "x"_a, "y"_a, "theta"_a, "omega"_a, "excluded"_a, nb::kw_only(), "side"_a,
           "mass"_a, "depth"_a, "strips"_a, "water_density"_a, "origin_x"_a, "origin_y"_a,
           "spacing"_a, "columns"_a, "rows"_a, "coefficients"_a, "drag_coefficient"_a,
-          "noise_intensity"_a, "position_noise"_a, "largest_step"_a = 0.05, "longest_gap"_a = 1.0,
-          "orientation"_a = "given", "sensitivities"_a = false)
+          "noise_intensity"_a, "position_noise"_a, "force_lever"_a = 0.0, "angle_noise"_a = 0.01,
+          "largest_step"_a = 0.05, "longest_gap"_a = 1.0, "orientation"_a = "given",
+          "sensitivities"_a = false)
       .def_prop_ro("samples", &InnovationsFilter::samples)
       .def_prop_ro("remaining", &InnovationsFilter::remaining)
       .def_prop_ro("parameters", &InnovationsFilter::parameters)
-      .def("run", &run, "count"_a);
+      .def_prop_ro("coordinates", &InnovationsFilter::coordinates)
+      .def("run", &run, "count"_a)
+      .def("sums", &sums, "kept"_a, "right"_a);
   module.def("expected_drag", &expected_drag, nb::kw_only(), "side"_a, "mass"_a, "depth"_a,
              "strips"_a, "water_density"_a, "origin_x"_a, "origin_y"_a, "spacing"_a, "columns"_a,
              "rows"_a, "coefficients"_a, "drag_coefficient"_a, "orientation"_a, "mean"_a, "theta"_a,

@@ -28,7 +28,7 @@ bool all_finite(const double* values, std::int64_t count) {
   return std::all_of(values, values + count, [](double value) { return std::isfinite(value); });
 }
 
-void check(const Track& track, bool angle_known) {
+void check(const Track& track, Angle angle) {
   require(all_finite(track.time, track.samples), "times must be finite");
   require(std::adjacent_find(track.time, track.time + track.samples, std::greater_equal<>()) ==
               track.time + track.samples,
@@ -37,9 +37,13 @@ void check(const Track& track, bool angle_known) {
     require(!std::isinf(track.x[k]) && !std::isinf(track.y[k]),
             "positions must be finite, or NaN where a sample is missing");
   }
-  if (angle_known) {
+  if (angle == Angle::given) {
     require(all_finite(track.theta, track.samples) && all_finite(track.omega, track.samples),
             "angles and their rates must be finite, missing samples included: interpolate them");
+  } else if (angle == Angle::state) {
+    require(std::none_of(track.theta, track.theta + track.samples,
+                         [](double theta) { return std::isinf(theta); }),
+            "angles must be finite, or NaN where one is missing");
   }
 }
 
@@ -60,8 +64,8 @@ InferKernel chosen_infer_kernel() {
 }
 
 DragModel::DragModel(const FloatingBlock& block, const SplineView& flow, const double* coefficients,
-                     double drag_coefficient, bool angle_known)
-    : flow_(flow), angle_known_(angle_known) {
+                     double drag_coefficient, Angle angle)
+    : flow_(flow), angle_(angle) {
   require(positive(block.side) && positive(block.mass) && positive(block.depth) &&
               positive(block.water_density),
           "side, mass, depth and water density must be positive");
@@ -80,12 +84,13 @@ DragModel::DragModel(const FloatingBlock& block, const SplineView& flow, const d
   block_.half_side = block.side / 2;
   block_.strip_width = block.side / block.strips;
   block_.strips = block.strips;
+  block_.mass_by_inertia = 6 / (block.side * block.side);
   block_.drag_scale =
       0.5 * block.water_density * drag_coefficient * block_.strip_width * block.depth / block.mass;
   for (std::size_t k = 0; k < orientations; ++k) {
-    const double angle = std::numbers::pi / 2 * double(k) / orientations;
-    cosine_[k] = std::cos(angle);
-    sine_[k] = std::sin(angle);
+    const double turned = std::numbers::pi / 2 * double(k) / orientations;
+    cosine_[k] = std::cos(turned);
+    sine_[k] = std::sin(turned);
   }
 }
 
@@ -94,24 +99,41 @@ FilterProblem DragModel::problem() const {
   problem.flow = flow_;
   problem.flow.nodes = nodes_.data();
   problem.block = block_;
-  problem.orientations = {cosine_.data(), sine_.data(), angle_known_ ? 0 : orientations};
+  problem.orientations = {cosine_.data(), sine_.data(), angle_ == Angle::none ? orientations : 0};
   return problem;
 }
 
 std::int64_t DragModel::shares() const {
-  return std::int64_t(4) * block_.strips * (angle_known_ ? 1 : orientations);
+  return std::int64_t(4) * block_.strips * (angle_ == Angle::none ? orientations : 1);
 }
 
-DragResponse DragModel::drag(double theta, double omega, const double mean[4],
-                             const double (*covariance)[4], double* by_coefficients) const {
-  std::vector<StripShare> room(by_coefficients == nullptr ? 0 : std::size_t(shares()));
-  return chosen_infer_kernel().drag(problem(), theta, omega, mean, covariance,
-                                    room.empty() ? nullptr : room.data(), by_coefficients);
+namespace {
+template <int D>
+const InferKernelOf<D>& kernel_of(const InferKernel& kernel) {
+  if constexpr (D == 3) {
+    return kernel.pose;
+  } else {
+    return kernel.position;
+  }
 }
+} // namespace
+
+template <int D>
+DragResponse<D> DragModel::drag(double theta, double omega, const double* mean,
+                                const double (*covariance)[2 * D], double* by_coefficients) const {
+  std::vector<StripShare<D>> room(by_coefficients == nullptr ? 0 : std::size_t(shares()));
+  const InferKernel kernel = chosen_infer_kernel();
+  return kernel_of<D>(kernel).drag(problem(), theta, omega, mean, covariance,
+                                   room.empty() ? nullptr : room.data(), by_coefficients);
+}
+template DragResponse<2> DragModel::drag(double, double, const double*, const double (*)[4],
+                                         double*) const;
+template DragResponse<3> DragModel::drag(double, double, const double*, const double (*)[6],
+                                         double*) const;
 
 InnovationsFilter::InnovationsFilter(const Track& track, DragModel model,
                                      const FilterSettings& settings, bool sensitivities)
-    : model_(std::move(model)), problem_(model_.problem()), scratch_{}, state_{} {
+    : model_(std::move(model)), sensitivities_(sensitivities), problem_(model_.problem()) {
   require(std::isfinite(settings.noise_intensity) && settings.noise_intensity >= 0,
           "the noise intensity must not be negative");
   require(positive(settings.position_noise), "the position noise must be positive");
@@ -119,19 +141,45 @@ InnovationsFilter::InnovationsFilter(const Track& track, DragModel model,
   require(settings.longest_gap > 0, "the longest gap must be positive");
   require(settings.longest_gap / settings.largest_step <= 1e6,
           "the longest gap must not be above a million of the largest steps");
-  check(track, problem_.orientations.count == 0);
+  check(track, model_.angle());
   copy(track);
-  problem_.noise_intensity = settings.noise_intensity;
-  problem_.position_variance = settings.position_noise * settings.position_noise;
+  const double q = settings.noise_intensity;
+  const double position = settings.position_noise * settings.position_noise;
+  problem_.intensity[0] = problem_.intensity[1] = q;
+  problem_.variance[0] = problem_.variance[1] = position;
   problem_.largest_step = settings.largest_step;
   problem_.longest_gap = settings.longest_gap;
-  if (sensitivities) {
-    shares_.resize(std::size_t(model_.shares()));
-    scratch_.shares = shares_.data();
-    scratch_.parameters = parameters();
-    scratch_.stride = (parameters() + 7) / 8 * 8;
-    sensitivity_.assign(std::size_t(4 * scratch_.stride), 0.0);
-    scratch_.sensitivity = sensitivity_.data();
+  if (model_.angle() != Angle::state) {
+    make_memory<2>();
+    return;
+  }
+  require(std::isfinite(settings.force_lever) && settings.force_lever >= 0,
+          "the lever of the force must not be negative");
+  require(positive(settings.angle_noise), "the angle noise must be positive");
+  const double per_inertia = problem_.block.mass_by_inertia * settings.force_lever;
+  problem_.intensity[2] = q * per_inertia * per_inertia;
+  problem_.variance[2] = settings.angle_noise * settings.angle_noise;
+  make_memory<3>();
+}
+
+template <int D>
+void InnovationsFilter::make_memory() {
+  Memory<D>& memory = memory_.emplace<Memory<D>>();
+  memory.state = {};
+  memory.scratch = {};
+  if (sensitivities_) {
+    memory.shares.resize(std::size_t(model_.shares()));
+    memory.scratch.shares = memory.shares.data();
+    memory.scratch.parameters = parameters();
+    memory.scratch.stride = (parameters() + 7) / 8 * 8;
+    memory.sensitivity.assign(std::size_t(2 * D * memory.scratch.stride), 0.0);
+    memory.row.resize(std::size_t(D * memory.scratch.stride));
+    memory.touched.assign(std::size_t(memory.scratch.stride / 8), 0);
+    memory.active.resize(std::size_t(memory.scratch.stride / 8));
+    memory.scratch.sensitivity = memory.sensitivity.data();
+    memory.scratch.row = memory.row.data();
+    memory.scratch.touched = memory.touched.data();
+    memory.scratch.active = memory.active.data();
   }
 }
 
@@ -147,8 +195,57 @@ void InnovationsFilter::copy(const Track& track) {
                     n};
 }
 
+std::int64_t InnovationsFilter::remaining() const {
+  return samples() - std::visit([](const auto& memory) { return memory.state.next; }, memory_);
+}
+
 void InnovationsFilter::run(std::int64_t count, const FilterOutputs& out) {
-  chosen_infer_kernel().run(problem_, state_, scratch_, out, std::min(count, remaining()));
+  run(count, out, nullptr);
+}
+
+void InnovationsFilter::run(std::int64_t count, const FilterOutputs& out, const ProductSums* sums) {
+  const InferKernel kernel = chosen_infer_kernel();
+  const std::int64_t now = std::min(count, remaining());
+  std::visit(
+      [&]<int D>(Memory<D>& memory) {
+        kernel_of<D>(kernel).run(problem_, memory.state, memory.scratch, out, sums, now);
+      },
+      memory_);
+}
+
+InnovationsFilter::Sums InnovationsFilter::sums(const std::uint8_t* kept, const double* right,
+                                                int columns) {
+  require(sensitivities_, "sums need sensitivities");
+  const std::int64_t n = remaining(), d = coordinates();
+  const std::int64_t count = parameters(), stride = (count + 7) / 8 * 8;
+  std::vector<double> innovation(std::size_t(n * d)), covariance(std::size_t(n * d * (d + 1) / 2));
+  std::vector<double> state(std::size_t(2 * n * d));
+  std::vector<std::uint8_t> used(std::size_t(n), 0);
+  std::vector<double> information(std::size_t(stride * stride), 0.0);
+  std::vector<double> products(std::size_t(columns * stride), 0.0);
+  std::vector<double> rows(std::size_t(ProductSums::most_rows * stride));
+  std::vector<double> beside(std::size_t(ProductSums::most_rows * columns));
+  std::vector<double> size(std::size_t(stride / 8));
+  std::vector<std::int32_t> groups(std::size_t(stride / 8));
+  const ProductSums sums{
+      columns,         samples() - n, kept,          right,       information.data(),
+      products.data(), rows.data(),   beside.data(), size.data(), groups.data()};
+  run(n, {innovation.data(), covariance.data(), used.data(), state.data(), nullptr, nullptr},
+      &sums);
+  Sums found;
+  found.information.resize(std::size_t(count * count));
+  for (std::int64_t i = 0; i < count; ++i) {
+    for (std::int64_t j = i; j < count; ++j) {
+      // Groups of eight columns are multiplied on and above the diagonal of groups.
+      found.information[std::size_t(i * count + j)] =
+          found.information[std::size_t(j * count + i)] = information[std::size_t(i * stride + j)];
+    }
+  }
+  for (int column = 0; column < columns; ++column) {
+    found.products.insert(found.products.end(), products.begin() + column * stride,
+                          products.begin() + column * stride + count);
+  }
+  return found;
 }
 
 } // namespace driftwalk

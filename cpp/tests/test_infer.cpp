@@ -16,6 +16,7 @@
 
 namespace {
 
+using driftwalk::Angle;
 using driftwalk::DragModel;
 using driftwalk::Eight;
 using driftwalk::InnovationsFilter;
@@ -180,24 +181,26 @@ struct Circle {
   }
 };
 
-DragModel drag_model(const Flow& flow, int strips = 8, bool angle_known = true,
+DragModel drag_model(const Flow& flow, int strips = 8, Angle angle = Angle::given,
                      double drag_coefficient = 0.5) {
   return DragModel({0.03, 0.0116, 0.03, strips, 1000}, flow.view, flow.coefficients.data(),
-                   drag_coefficient, angle_known);
+                   drag_coefficient, angle);
 }
 
-constexpr driftwalk::FilterSettings settings{4.5e-5, 3e-4, 0.05, 1.0};
+constexpr driftwalk::FilterSettings settings{4.5e-5, 3e-4, 1e-4, 0.01, 0.05, 1.0};
 constexpr double untouched = 12345;
 
 struct Outputs {
   std::vector<double> innovation, covariance, state, whitened, jacobian;
   std::vector<std::uint8_t> used;
 
-  Outputs(std::int64_t samples, std::int64_t parameters)
-      : innovation(std::size_t(2 * samples), untouched),
-        covariance(std::size_t(3 * samples), untouched), state(std::size_t(4 * samples), untouched),
-        whitened(std::size_t(2 * samples), untouched),
-        jacobian(std::size_t(2 * samples * parameters), untouched), used(std::size_t(samples), 77) {
+  // For d coordinates.
+  Outputs(std::int64_t samples, std::int64_t parameters, int d)
+      : innovation(std::size_t(d * samples), untouched),
+        covariance(std::size_t(d * (d + 1) / 2 * samples), untouched),
+        state(std::size_t(2 * d * samples), untouched),
+        whitened(std::size_t(d * samples), untouched),
+        jacobian(std::size_t(d * samples * parameters), untouched), used(std::size_t(samples), 77) {
   }
 
   driftwalk::FilterOutputs view() {
@@ -216,7 +219,7 @@ struct Outputs {
 
 Outputs run(const Circle& track, DragModel model) {
   InnovationsFilter filter(track.view(), std::move(model), settings, true);
-  Outputs out(filter.samples(), filter.parameters());
+  Outputs out(filter.samples(), filter.parameters(), filter.coordinates());
   filter.run(filter.samples() + 5, out.view());
   CHECK(filter.remaining() == 0);
   return out;
@@ -225,11 +228,11 @@ Outputs run(const Circle& track, DragModel model) {
 void check_that_all_is_written() {
   const Flow flow;
   for (const int strips : {1, 7, 8, 9, 64}) {
-    for (const bool angle_known : {true, false}) {
+    for (const Angle angle : {Angle::given, Angle::none, Angle::state}) {
       Circle track(40);
       track.x[0] = track.y[17] = missing;
       track.x[30] = 1e200; // far beyond the grid
-      const Outputs out = run(track, drag_model(flow, strips, angle_known));
+      const Outputs out = run(track, drag_model(flow, strips, angle));
       CHECK(out.complete());
       CHECK(std::count(out.used.begin(), out.used.end(), 1) > 25);
       CHECK(std::all_of(out.jacobian.begin(), out.jacobian.end(),
@@ -260,7 +263,7 @@ void check_pieces() {
   InnovationsFilter filter(track.view(), drag_model(flow), settings, true);
   std::int64_t from = 0;
   for (const std::int64_t count : {1, 13, 0, 36}) {
-    Outputs part(count, filter.parameters());
+    Outputs part(count, filter.parameters(), 2);
     filter.run(count, part.view());
     const auto slice = [&](const std::vector<double>& values, std::int64_t width) {
       return std::vector<double>(values.begin() + from * width,
@@ -274,6 +277,47 @@ void check_pieces() {
   CHECK(filter.remaining() == 0);
 }
 
+// The sums over the samples against the derivatives that a run hands out, column by column.
+void check_sums() {
+  const Flow flow;
+  const Circle track(90);
+  for (const Angle angle : {Angle::given, Angle::state}) {
+    const Outputs whole = run(track, drag_model(flow, 8, angle));
+    InnovationsFilter filter(track.view(), drag_model(flow, 8, angle), settings, true);
+    const std::int64_t n = filter.samples(), d = filter.coordinates(), p = filter.parameters();
+    std::vector<std::uint8_t> kept(std::size_t(n), 1);
+    kept[20] = kept[61] = 0;
+    std::vector<double> right(std::size_t(n * d * 2));
+    for (std::size_t k = 0; k < right.size(); ++k) {
+      right[k] = std::sin(double(k));
+    }
+    const InnovationsFilter::Sums sums = filter.sums(kept.data(), right.data(), 2);
+    CHECK(filter.remaining() == 0);
+    std::vector<double> information(std::size_t(p * p), 0), products(std::size_t(2 * p), 0);
+    for (std::int64_t row = 0; row < n * d; ++row) {
+      const double* const J = whole.jacobian.data() + row * p;
+      for (std::int64_t i = 0; kept[std::size_t(row / d)] != 0 && i < p; ++i) {
+        for (std::int64_t j = 0; j < p; ++j) {
+          information[std::size_t(i * p + j)] += J[i] * J[j];
+        }
+        products[std::size_t(i)] += J[i] * right[std::size_t(2 * row)];
+        products[std::size_t(p + i)] += J[i] * right[std::size_t(2 * row + 1)];
+      }
+    }
+    const auto far = [](const std::vector<double>& a, const std::vector<double>& b) {
+      double most = 0, apart = 0;
+      for (std::size_t k = 0; k < a.size(); ++k) {
+        most = std::max(most, std::fabs(b[k]));
+        apart = std::max(apart, std::fabs(a[k] - b[k]));
+      }
+      return apart / most;
+    };
+    CHECK(sums.information.size() == information.size() && sums.products.size() == products.size());
+    CHECK(far(sums.information, information) < 1e-7);
+    CHECK(far(sums.products, products) < 1e-7);
+  }
+}
+
 // Eight orientations against 720, in random flows.
 void check_orientations() {
   double worst = 0;
@@ -281,18 +325,18 @@ void check_orientations() {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> draw(-1, 1);
   const double known[4][4] = {{1e-8, 0, 0, 0}, {0, 1e-8, 0, 0}, {0, 0, 1e-5, 0}, {0, 0, 0, 1e-5}};
-  const DragModel turned = drag_model(flow), averaged = drag_model(flow, 8, false);
+  const DragModel turned = drag_model(flow), averaged = drag_model(flow, 8, Angle::none);
   for (int k = 0; k < 50; ++k) {
     const double mean[4] = {0.03 * draw(random), 0.02 * draw(random), 0.1 * draw(random),
                             0.1 * draw(random)};
     double x = 0, y = 0;
     for (int i = 0; i < 720; ++i) {
-      const driftwalk::DragResponse one =
-          turned.drag(i * std::acos(-1.0) / 1440, 0, mean, known, nullptr);
+      const driftwalk::DragResponse<2> one =
+          turned.drag<2>(i * std::acos(-1.0) / 1440, 0, mean, known, nullptr);
       x += one.acceleration[0] / 720;
       y += one.acceleration[1] / 720;
     }
-    const driftwalk::DragResponse all = averaged.drag(0.7, 3, mean, known, nullptr);
+    const driftwalk::DragResponse<2> all = averaged.drag<2>(0.7, 3, mean, known, nullptr);
     worst = std::max(worst, std::hypot(all.acceleration[0] - x, all.acceleration[1] - y) /
                                 std::hypot(x, y));
   }
@@ -313,7 +357,7 @@ bool refuses(const Make& make) {
 void check_refusals() {
   const Flow flow;
   CHECK(refuses([&] { drag_model(flow, 0); }));
-  CHECK(refuses([&] { drag_model(flow, 8, true, -1); }));
+  CHECK(refuses([&] { drag_model(flow, 8, Angle::given, -1); }));
   Flow narrow;
   narrow.view.columns = 3;
   CHECK(refuses([&] { drag_model(narrow); }));
@@ -331,6 +375,7 @@ int main() {
   check_that_all_is_written();
   check_small_grid();
   check_pieces();
+  check_sums();
   check_orientations();
   check_refusals();
   return check::result();

@@ -151,11 +151,13 @@ def assemble(
 
 # --- the likelihood fit -------------------------------------------------------------------------
 class InnovationsFilter:
-    # Time [s] increasing; x and y [m], NaN where a sample is missing; theta [rad] without jumps by
-    # 2 pi and omega [rad/s], finite everywhere. excluded: 1 where the interval that ends at the
-    # sample says nothing about the water. Coefficients of u and v (2, rows, columns) [m/s].
-    # noise_intensity: sigma_F^2 * force_interval / mass^2 [m^2/s^3]. orientation: "given", or
-    # "none" for the drag averaged over the angle.
+    # Time [s] increasing; x and y [m], NaN where a sample is missing. excluded: 1 where the
+    # interval that ends at the sample says nothing about the water. Coefficients of u and v
+    # (2, rows, columns) [m/s]. noise_intensity: sigma_F^2 * force_interval / mass^2 [m^2/s^3].
+    # orientation: "given": theta [rad], without jumps by 2 pi, and omega [rad/s] are inputs, finite
+    # everywhere; "none": the drag is averaged over the angle; "state": theta is measured like x and
+    # y, NaN where missing, with angle_noise [rad], and the force acts force_lever [m] from the
+    # centre.
     def __init__(
         self,
         time: _Floats,
@@ -179,6 +181,8 @@ class InnovationsFilter:
         drag_coefficient: float,
         noise_intensity: float,
         position_noise: float,
+        force_lever: float = 0.0,
+        angle_noise: float = 0.01,
         largest_step: float = 0.05,
         longest_gap: float = 1.0,
         orientation: str = "given",
@@ -190,15 +194,25 @@ class InnovationsFilter:
     def remaining(self) -> int: ...
     @property
     def parameters(self) -> int: ...
+    @property
+    def coordinates(self) -> int: ...  # D: 3 with orientation "state", else 2
 
-    # The next k = min(count, remaining) samples: innovation (k, 2) and covariance (k, 3) as xx, xy,
-    # yy, NaN where a sample has none; used (k,) uint8; state (k, 4) after the sample, NaN while
-    # there is none. With sensitivities whitened (2k,) and jacobian (2k, parameters) of the
-    # prediction in the same units, x and y of a sample in turn, zero where not used.
+    # The next k = min(count, remaining) samples: innovation (k, D) and covariance (k, D (D + 1)/2)
+    # as xx, xy, yy, x theta, y theta, theta theta, NaN where a sample has none; used (k,) uint8;
+    # state (k, 2 D) after the sample, NaN while there is none. With sensitivities whitened (D k,)
+    # and jacobian (D k, parameters) of the prediction in the same units, the coordinates of a
+    # sample in turn, zero where not used.
     def run(self, count: int) -> dict[str, npt.NDArray[Any]]: ...
 
-# The mean acceleration (2,) [m/s^2] of a block whose (x, y, vx, vy) has this mean and covariance,
-# by_position and by_velocity (2, 2), by_coefficients (2, 2, rows, columns).
+    # Over the n samples that remain: information (parameters, parameters) = J' J and products
+    # (columns, parameters) = R' J, J the rows of jacobian of samples that are used and kept (n,),
+    # R right (n, D, columns).
+    def sums(self, kept: npt.NDArray[np.uint8], right: _Floats) -> dict[str, _Floats]: ...
+
+# The mean acceleration (D,) [m/s^2, rad/s^2] of a block whose (x, y, vx, vy) has this mean and
+# covariance, by_position and by_velocity (D, D), by_coefficients (D, 2, rows, columns). With
+# orientation "state" mean and covariance are those of (x, y, theta, vx, vy, omega), and theta and
+# omega are not read.
 def expected_drag(
     *,
     side: float,

@@ -334,8 +334,10 @@ def test_filter_is_the_dense_one(orientation):
     assert np.isfinite(got["state"][20:23]).all()
     for name in ("innovation", "covariance", "state", "whitened", "jacobian"):
         scale = np.nanmax(np.abs(want[name]))
+        # Derivatives that have become as good as zero are set to zero.
+        least = 1e-8 if name == "jacobian" else 1e-11
         np.testing.assert_allclose(
-            got[name], want[name], rtol=1e-9, atol=1e-11 * scale, err_msg=name
+            got[name], want[name], rtol=1e-9, atol=least * scale, err_msg=name
         )
 
 
@@ -479,7 +481,7 @@ def test_whitened_innovations_of_a_linear_world_are_standard_normal():
         ("longest_gap", np.inf, "longest gap must not be above"),
         ("strips", 0, "at least one strip"),
         ("mass", np.nan, "must be positive"),
-        ("orientation", "some", "'given' or 'none'"),
+        ("orientation", "some", "'given', 'none' or 'state'"),
     ],
 )
 def test_refuses(name, value, message):

@@ -22,9 +22,9 @@ def passes() -> Passes:
     study = coarse_study()
     outline = outline_of(study.tank.to_arena())
     tracks = [body_track(recording(60.0, name)) for name in ("first", "second")]
-    series, _ = _series(tracks, study, outline, True)
+    series, _ = _series(tracks, study, outline, "given")
     spline = lay_spline(outline, side=0.03, spacing=0.03)
-    return Passes(series, _body(study, True), spline)
+    return Passes(series, _body(study, "given"), spline)
 
 
 @pytest.fixture(scope="module")
@@ -66,14 +66,19 @@ def test_without_noise_derivatives_the_rest_is_the_same(passes: Passes, point: P
     assert np.linalg.eigvalsh(whole.information)[-3:].min() > 0.0
 
 
-def test_the_ranges_of_a_pass_do_not_matter(
-    passes: Passes, point: Point, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    whole = passes.sums(point)
-    monkeypatch.setattr("driftwalk.calibrate.fit_pass.SAMPLES_AT_ONCE", 97)
-    parts = passes.sums(point)
-    assert parts.deviance == pytest.approx(whole.deviance, rel=1e-12)
-    assert parts.information == pytest.approx(whole.information, rel=1e-9, abs=1e-6)
+def test_the_products_are_those_of_the_derivatives(passes: Passes, point: Point) -> None:
+    """The filter's own sums against its derivatives, multiplied at once.
+
+    Left out is what is 1e-7 of the largest derivative at that time.
+    """
+    series = passes.series[0]
+    sums = replace(passes, series=[series]).sums(point, noise="without")
+    whole = passes._filter(series, point, sensitivities=True).run(series.time.size)
+    wanted = whole["jacobian"].T @ whole["jacobian"]
+    assert sums.information == pytest.approx(wanted, rel=1e-6, abs=1e-7 * np.abs(wanted).max())
+    score = whole["jacobian"].T @ whole["whitened"]
+    assert sums.score == pytest.approx(score, rel=1e-6, abs=1e-6 * np.abs(score).max())
+    assert sums.used == whole["used"].sum()
 
 
 def test_a_held_parameter_stays_and_the_others_are_the_best(passes: Passes, point: Point) -> None:
@@ -105,5 +110,5 @@ def test_the_prior_is_the_gradient_of_its_own_deviance(passes: Passes, point: Po
 def test_a_wrong_variance_is_found_in_one_step() -> None:
     """n draws of a variance v, tried at v0: the step in ln v is n/2 (v/v0 - 1) over n/2."""
     for ratio in (0.2, 1.0, 7.0):
-        step = limited(np.array([0.0, ratio - 1.0, 0.5 * (ratio - 1.0)]))
+        step = limited(np.array([0.0, ratio - 1.0, 0.5 * (ratio - 1.0)]), 0)
         assert step[1:] == pytest.approx([math.log(ratio), 0.5 * math.log(ratio)])

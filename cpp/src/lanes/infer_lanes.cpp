@@ -5,27 +5,33 @@
 DRIFTWALK_LANES_BEGIN
 
 namespace {
-void run_filter(const FilterProblem& problem, FilterState& state, const FilterScratch& scratch,
-                const FilterOutputs& out, std::int64_t count) {
-  FilterRun(problem, state, scratch, out).run(count);
+template <int D>
+void run_filter(const FilterProblem& problem, FilterState<D>& state,
+                const FilterScratch<D>& scratch, const FilterOutputs& out, const ProductSums* sums,
+                std::int64_t count) {
+  FilterRun<D>(problem, state, scratch, out, sums).run(count);
 }
 
-DragResponse drag_alone(const FilterProblem& problem, double theta, double omega,
-                        const double mean[4], const double (*covariance)[4], StripShare* shares,
-                        double* by_coefficients) {
-  const UncertainBlock block{mean[0], mean[1], mean[2], mean[3], omega, covariance};
-  const DragResponse drag =
-      expected_drag(problem.flow, problem.block, problem.orientations, theta, block, shares);
+template <int D>
+DragResponse<D> drag_alone(const FilterProblem& problem, double theta, double omega,
+                           const double* mean, const double (*covariance)[2 * D],
+                           StripShare<D>* shares, double* by_coefficients) {
+  const UncertainBlock<D> block{mean[0], mean[1], mean[D], mean[D + 1], omega, covariance};
+  const DragResponse<D> drag =
+      expected_drag<D>(problem.flow, problem.block, problem.orientations, theta, block, shares);
   const std::int64_t nodes = std::int64_t(problem.flow.rows) * problem.flow.columns;
+  double* rows[D];
+  for (int a = 0; a < D; ++a) {
+    rows[a] = by_coefficients + 2 * nodes * a;
+  }
   for (int k = 0; k < drag.shares; ++k) {
-    add_share(shares[k], problem.flow.columns, nodes, shares[k].response, -1, by_coefficients,
-              by_coefficients + 2 * nodes);
+    add_share<D>(shares[k], problem.flow.columns, nodes, shares[k].response, -1, rows);
   }
   return drag;
 }
 } // namespace
 
-inline constexpr InferKernel kernel{run_filter, drag_alone};
+inline constexpr InferKernel kernel{{run_filter<2>, drag_alone<2>}, {run_filter<3>, drag_alone<3>}};
 
 DRIFTWALK_LANES_END
 

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from driftwalk.calibrate.fit_agreement import NOTABLE_DISAGREEMENT, angle_given_facts
 from driftwalk.calibrate.fit_angle import no_angle, smooth_angle
-from driftwalk.calibrate.fit_newton import Mode, Prior, Tell, find_mode
+from driftwalk.calibrate.fit_newton import Mode, Prior, Tell, find_mode, silent
 from driftwalk.calibrate.fit_pass import LONGEST_GAP_S, Body, Passes, Series
 from driftwalk.calibrate.fit_reml import Restricted, restricted_drag
 from driftwalk.calibrate.fit_result import (
@@ -40,7 +41,7 @@ ORIENTED_SHARE = 0.5
 NOTABLE_AUTOCORRELATION = 0.05
 NOTABLE_STDS = 4.0
 
-AngleUse = Literal["auto", "given", "none"]
+AngleUse = Literal["auto", "state", "given", "none"]
 
 
 def fit_motion(
@@ -64,8 +65,8 @@ def fit_motion(
         A `trajectory`, or several of the same block in the same tank and flow.
     study : Study, optional
         Block, tank, water, force interval and the section [fit]; default: the paper's.
-    angle : {"auto", "given", "none"}, optional
-        Whether the recorded orientation is used; default: what the study says.
+    angle : {"auto", "state", "given", "none"}, optional
+        How the recorded orientation is used; default: what the study says.
     body : str, optional
         The body, where a recording has several.
     tell : callable, optional
@@ -96,7 +97,7 @@ def fit_motion(
 
     chosen = study if study is not None else Study()
     many = _as_list(recordings)
-    tracks, series, oriented, wall_share = _prepare(many, chosen, angle, body)
+    tracks, series, used_angle, wall_share = _prepare(many, chosen, angle, body)
     outline = outline_of(chosen.tank.to_arena())
     spline = lay_spline(
         outline,
@@ -105,15 +106,22 @@ def fit_motion(
             side_m=chosen.block.side_m, widest_m=max(chosen.tank.extent_m)
         ),
     )
-    passes = Passes(series, _body(chosen, oriented), spline)
-    mode, restricted = _search(passes, tracks, chosen, tell or _silent)
+    passes = Passes(series, _body(chosen, used_angle), spline)
+    mode, restricted = _search(passes, tracks, chosen, tell or silent)
     whiteness = whiteness_of(passes.innovations(restricted.point))
+    facts_given: dict[str, Any] = {}
+    if used_angle == "state":
+        given, _ = _series(tracks, chosen, outline, "given")
+        facts_given = angle_given_facts(
+            Passes(given, _body(chosen, "given"), spline), mode, restricted, chosen
+        )
     attrs: dict[str, Any] = {
         **parameter_attrs(restricted.point, parameter_covariance(mode, restricted), chosen),
         "maximum_likelihood_drag_coefficient": math.exp(mode.point.log_drag),
         "wetted_depth_m": chosen.wetted_depth_m,
         "wall_share": wall_share,
-        "angle": "given" if oriented else "none",
+        "angle": used_angle,
+        **facts_given,
         "restricted": "yes" if restricted.has_minimum else "no",
         "samples": sum(one.time.size for one in series),
         "samples_used": mode.used,
@@ -129,7 +137,9 @@ def fit_motion(
         "study": chosen.to_toml(),
     }
     attrs["warnings"] = json.dumps(_warnings(attrs, whiteness))
-    return build_fit(spline, mode, restricted, series, study=chosen, oriented=oriented, attrs=attrs)
+    return build_fit(
+        spline, mode, restricted, series, study=chosen, oriented=used_angle != "none", attrs=attrs
+    )
 
 
 def check_fit(
@@ -172,17 +182,13 @@ def _as_list(recordings: xr.Dataset | Sequence[xr.Dataset]) -> list[xr.Dataset]:
 
 def _prepare(
     many: Sequence[xr.Dataset], study: Study, angle: AngleUse | None, body: str | None
-) -> tuple[list[Track], list[Series], bool, float]:
-    """Return tracks, what the filter takes of them, whether angles are used, and the wall share."""
+) -> tuple[list[Track], list[Series], str, float]:
+    """Return tracks, what the filter takes of them, how angles are used, and the wall share."""
     tracks = [_checked_track(recording, body) for recording in many]
-    oriented = _use_angle(tracks, study.fit.angle if angle is None else angle)
+    used_angle = _use_angle(tracks, study.fit.angle if angle is None else angle)
     outline = outline_of(study.tank.to_arena())
-    series, wall_share = _series(tracks, study, outline, oriented)
-    return tracks, series, oriented, wall_share
-
-
-def _silent(done: int, total: int, what: str) -> None:
-    """Tell nobody."""
+    series, wall_share = _series(tracks, study, outline, used_angle)
+    return tracks, series, used_angle, wall_share
 
 
 def _simulated(recording: xr.Dataset) -> bool:
@@ -203,21 +209,23 @@ def _checked_track(recording: xr.Dataset, body: str | None) -> Track:
     return track
 
 
-def _use_angle(tracks: Sequence[Track], wanted: str) -> bool:
-    """Return whether orientations are used."""
-    if wanted not in ("auto", "given", "none"):
-        raise InputError(f"angle must be 'auto', 'given' or 'none', got {wanted!r}")
+def _use_angle(tracks: Sequence[Track], wanted: str) -> str:
+    """Return how orientations are used: "state", "given" or "none"."""
+    if wanted not in ("auto", "state", "given", "none"):
+        raise InputError(f"angle must be 'auto', 'state', 'given' or 'none', got {wanted!r}")
     seen = min(float(np.isfinite(track.theta).mean()) for track in tracks)
-    if wanted == "given" and seen == 0.0:
+    if wanted in ("state", "given") and seen == 0.0:
         raise InputError(
-            "a recording has no orientations: leave out angle = 'given' (--angle), or read the "
+            f"a recording has no orientations: leave out angle = {wanted!r} (--angle), or read the "
             "column that holds them"
         )
-    return wanted == "given" or (wanted == "auto" and seen >= ORIENTED_SHARE)
+    if wanted == "auto":
+        return "state" if seen >= ORIENTED_SHARE else "none"
+    return wanted
 
 
 def _series(
-    tracks: Sequence[Track], study: Study, outline: Outline, oriented: bool
+    tracks: Sequence[Track], study: Study, outline: Outline, used_angle: str
 ) -> tuple[list[Series], float]:
     """Return the tracks as the filter takes them, and the share of intervals at the wall."""
     found, near_wall, intervals, usable = [], 0, 0, 0
@@ -225,7 +233,7 @@ def _series(
         time = track.time - track.time[0]
         smooth = no_angle(time.size)
         corners = None
-        if oriented:
+        if used_angle != "none":
             smooth = smooth_angle(time, track.theta, longest_gap=LONGEST_GAP_S)
             corners = np.where(np.isfinite(track.theta), track.theta, smooth.theta)
         wall = wall_intervals(
@@ -246,7 +254,7 @@ def _series(
                 time,
                 np.ascontiguousarray(track.x),
                 np.ascontiguousarray(track.y),
-                smooth.theta,
+                np.ascontiguousarray(track.theta) if used_angle == "state" else smooth.theta,
                 smooth.omega,
                 excluded.astype(np.uint8),
             )
@@ -261,14 +269,14 @@ def _series(
     return found, near_wall / intervals
 
 
-def _body(study: Study, oriented: bool) -> Body:
+def _body(study: Study, used_angle: str) -> Body:
     return Body(
         side=study.block.side_m,
         mass=study.block.mass_kg,
         depth=study.wetted_depth_m,
         strips=study.block.strips_per_face,
         water_density=study.water.density_kg_m3,
-        orientation="given" if oriented else "none",
+        orientation=used_angle,
     )
 
 
@@ -277,7 +285,7 @@ def _search(
 ) -> tuple[Mode, Restricted]:
     """Return the maximum of the likelihood and that of the restricted one."""
     prior = Prior(passes)
-    start = first_point(tracks, study, passes.spline)
+    start = first_point(tracks, study, passes.spline, angle=passes.body.orientation)
     weights = first_weights(tracks, passes.spline)
     try:
         mode = find_mode(passes, start, weights, prior, iterations=study.fit.iterations, tell=tell)
@@ -310,6 +318,13 @@ def _warnings(facts: dict[str, Any], whiteness: Whiteness) -> list[str]:
     if facts["angle"] == "none":
         found.append(
             "no orientation was used: the drag is averaged over all orientations of the block"
+        )
+    apart = facts.get("angle_disagreement_std", 0.0)
+    if apart > NOTABLE_DISAGREEMENT:
+        found.append(
+            f"with the angle as an input C_d is {facts['drag_coefficient_angle_given']:.3g}, "
+            f"{apart:.1f} combined standard deviations away: the turning of the block and its "
+            "motion do not agree on one drag law, and the intervals are too narrow"
         )
     off = abs(whiteness.autocorrelation)
     if off > max(NOTABLE_STDS * whiteness.autocorrelation_std, NOTABLE_AUTOCORRELATION):

@@ -20,9 +20,18 @@ from driftwalk.calibrate.fit_spline import Floats, penalties
 PRIOR_DRAG = 0.5
 """Centre of the weak prior of C_d, and where the search begins."""
 PRIOR_LOG_DRAG_STD = 0.7
-HELD = ((-3, -1), (-3,))
-"""Parameters (from the end) that the first steps leave as they are: flow and q have to settle
-before a step of C_d or r means anything."""
+HELD = ((0, 2, 3, 4), (0,))
+"""Parameters, counted from C_d on, that the first steps leave as they are: flow and q have to
+settle before a step of C_d or of the other noises means anything."""
+PRIOR_LEVER = 0.01
+"""Centre of the weak prior of the force's lever, in sides of the block, and its first value."""
+PRIOR_LOG_LEVER_STD = 1.0
+LEVER = 3
+"""Place of the lever, counted from C_d on."""
+MOST_LOG_LEVER_STEP = 1.0
+LEVER_COUNTS = 0.2
+"""Share of the lever's step, in standard deviations, when convergence is judged: it hardly moves
+the others."""
 MOST_LOG_DRAG_STEP = 0.5
 MOST_FACTOR = 10.0
 """By which q, r^2 or the weight of a penalty may change in a step."""
@@ -44,13 +53,14 @@ class Prior:
 
     def __init__(self, passes: Passes) -> None:
         self.roughness, self.size = penalties(passes.spline)
+        self.log_lever = math.log(PRIOR_LEVER * passes.body.side)
 
     def matrix(self, weights: Weights) -> Floats:
         """Return the precision of one component's coefficients."""
         return weights.roughness * self.roughness + weights.size * self.size
 
     def add(self, sums: Sums, point: Point, weights: Weights) -> Sums:
-        """Return the sums with the prior of the coefficients and of C_d in them."""
+        """Return the sums with the prior of the coefficients, of C_d and of the lever in them."""
         precision = self.matrix(weights)
         count = len(precision)
         coefficients = point.coefficients.reshape(2, -1)
@@ -60,12 +70,17 @@ class Prior:
             part = slice(component * count, (component + 1) * count)
             information[part, part] += precision
             score[part] -= pull[component]
-        off = point.log_drag - math.log(PRIOR_DRAG)
-        drag = 2 * count
-        information[drag, drag] += 1.0 / PRIOR_LOG_DRAG_STD**2
-        score[drag] -= off / PRIOR_LOG_DRAG_STD**2
         deviance = sums.deviance + 0.5 * float((pull * coefficients).sum())
-        deviance += 0.5 * (off / PRIOR_LOG_DRAG_STD) ** 2
+        drag = 2 * count
+        single = [(drag, point.log_drag - math.log(PRIOR_DRAG), PRIOR_LOG_DRAG_STD)]
+        if point.log_lever is not None:
+            single.append((drag + LEVER, point.log_lever - self.log_lever, PRIOR_LOG_LEVER_STD))
+        for index, off, std in single:
+            deviance += 0.5 * (off / std) ** 2
+            # Without derivatives by the noises there is no row of the lever.
+            if index < score.size:
+                information[index, index] += 1.0 / std**2
+                score[index] -= off / std**2
         return Sums(deviance, score, information, sums.used)
 
     def updated(self, weights: Weights, point: Point, covariance: Floats) -> Weights:
@@ -102,8 +117,19 @@ class Mode:
 Tell = Callable[[int, int, str], None]
 
 
+def silent(done: int, total: int, what: str) -> None:
+    """Tell nobody."""
+
+
 def find_mode(
-    passes: Passes, start: Point, weights: Weights, prior: Prior, *, iterations: int, tell: Tell
+    passes: Passes,
+    start: Point,
+    weights: Weights,
+    prior: Prior,
+    *,
+    iterations: int,
+    tell: Tell = silent,
+    hold_first: bool = True,
 ) -> Mode:
     """Search the maximum of the penalised likelihood.
 
@@ -121,6 +147,9 @@ def find_mode(
         Most steps.
     tell : callable
         Told the number of steps done, the most, and what is done.
+    hold_first : bool
+        Whether the first steps leave C_d and some noises as they are: not where the search begins
+        near its end.
     """
     point, used, converged = start, 0, False
     covariance = np.zeros((0, 0))
@@ -128,13 +157,16 @@ def find_mode(
         tell(index, iterations, "likelihood")
         sums = prior.add(passes.sums(point), point, weights)
         used = sums.used
-        held = HELD[index] if index < len(HELD) else ()
+        drag = point.coefficients.size
+        held = [drag + k for k in (HELD[index] if hold_first and index < len(HELD) else ())]
+        held = [one for one in held if one < sums.score.size]
         covariance = inverse(sums.information)
-        step = limited(newton_step(sums, covariance, held=held))
+        step = limited(newton_step(sums, covariance, held=held), drag)
         point = point.moved(step)
         weights = prior.updated(weights, point, covariance)
         moves = np.abs(step) / np.sqrt(np.diag(covariance))
-        near = max(float(moves[-3:].max()), float(np.sqrt((moves[:-3] ** 2).mean())))
+        moves[drag + LEVER : drag + LEVER + 1] *= LEVER_COUNTS
+        near = max(float(moves[drag:].max()), float(np.sqrt((moves[:drag] ** 2).mean())))
         if len(held) == 0 and near < CLOSE:
             converged = True
             break
@@ -150,15 +182,31 @@ def newton_step(sums: Sums, covariance: Floats, *, held: Sequence[int] = ()) -> 
     return np.asarray(step)
 
 
-def limited(step: Floats) -> Floats:
-    """Return the step, shortened where C_d would jump, with those of q and r^2 taken as factors.
+def limited(step: Floats, drag: int) -> Floats:
+    """Return the step, shortened where C_d or the lever would jump, with other noises as factors.
 
-    The step is the same whether it is made in ln q or in q; made in q it finds a wrong variance in
-    one step, from whatever side.
+    The step is the same whether it is made in the logarithm of a variance or in the variance; made
+    in the variance it finds a wrong one in one step, from whatever side. The first of the noises is
+    a variance, q, the others are standard deviations. The lever is another matter: where the force
+    has none it is known from its prior alone, which is one of the logarithm.
+
+    Parameters
+    ----------
+    step : ndarray
+        In (coefficients, ln C_d, noises).
+    drag : int
+        Where ln C_d stands in it.
     """
-    shorter = step * min(1.0, MOST_LOG_DRAG_STEP / max(abs(float(step[-3])), 1e-300))
-    factors = np.clip(1.0 + step[-2:] * (1.0, 2.0), 1.0 / MOST_FACTOR, MOST_FACTOR)
-    shorter[-2:] = np.log(factors) / (1.0, 2.0)
+    shorter = step * min(1.0, MOST_LOG_DRAG_STEP / max(abs(float(step[drag])), 1e-300))
+    for index, power in ((1, 1.0), (2, 2.0), (4, 2.0)):
+        if drag + index < step.size:
+            factor = np.clip(1.0 + power * step[drag + index], 1.0 / MOST_FACTOR, MOST_FACTOR)
+            shorter[drag + index] = math.log(factor) / power
+    if drag + LEVER < step.size:
+        wanted = float(step[drag + LEVER])
+        # Its information goes with its fourth power, so that whole steps go back and forth.
+        wanted *= 0.7 if abs(wanted) < MOST_LOG_LEVER_STEP else 1.0
+        shorter[drag + LEVER] = np.clip(wanted, -MOST_LOG_LEVER_STEP, MOST_LOG_LEVER_STEP)
     return np.asarray(shorter)
 
 

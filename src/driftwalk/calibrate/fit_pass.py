@@ -3,9 +3,11 @@
 The filter predicts each position from the past. Its innovations e_k are independent normals with
 covariances S_k if the parameters are right, so twice the negative log likelihood is the sum of
 ``ln det S_k + e_k' S_k^-1 e_k``. The parameters are, in this order, the flow's coefficients,
-ln C_d, ln q (intensity of the stochastic acceleration) and ln r (tracking noise). For the first two
-the filter itself gives the derivatives of its predictions; for the other two it is run again with
-slightly larger values, and the derivatives of S_k enter as well.
+ln C_d, and the noises: ln q (intensity of the stochastic acceleration), ln r (tracking noise) and,
+where the angle is a part of the state, the logarithms of the force's lever and of the angle's
+noise. For the first two the filter itself adds up the products of the derivatives of its
+predictions; for the noises it is run again with slightly larger values, and the derivatives of S_k
+enter as well.
 """
 
 from __future__ import annotations
@@ -27,10 +29,8 @@ LARGEST_STEP_S = 0.05
 """Longest step of the filter's integrator."""
 LONGEST_GAP_S = 1.0
 """Longest gap that is predicted over; after a longer one the motion is found anew."""
-SAMPLES_AT_ONCE = 2048
-"""Rows of derivatives that are held at a time: some 20 MB."""
 STEP = 1e-4
-"""Relative change of q and r for their derivatives."""
+"""Relative change of a noise for the derivatives by it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,8 @@ class Body:
     strips: int
     water_density: float
     orientation: str
-    """"given" or "none": whether the track's angle turns the block's faces."""
+    """"state", "given" or "none": the track's angle is measured like the position, is an input, or
+    is not used."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,14 +72,29 @@ class Point:
     """ln q, q in m^2/s^3."""
     log_noise: float
     """ln r, r in m."""
+    log_lever: float | None = None
+    """Logarithm of the rms distance [m] from the centre at which the stochastic force acts; with
+    the angle in the state only."""
+    log_angle_noise: float | None = None
+    """Logarithm of the noise of the angle [rad]; with the angle in the state only."""
+
+    @property
+    def noises(self) -> dict[str, float]:
+        """Names and values of the noises, in the order of the parameters."""
+        names = ("log_intensity", "log_noise", "log_lever", "log_angle_noise")
+        found = {name: getattr(self, name) for name in names}
+        return {name: value for name, value in found.items() if value is not None}
 
     def moved(self, step: Floats) -> Point:
-        """Return the point after a step in (coefficients, ln C_d, ln q, ln r)."""
-        return Point(
-            self.coefficients + step[:-3].reshape(self.coefficients.shape),
-            self.log_drag + float(step[-3]),
-            self.log_intensity + float(step[-2]),
-            self.log_noise + float(step[-1]),
+        """Return the point after a step in (coefficients, ln C_d, noises)."""
+        size = self.coefficients.size
+        noises = zip(self.noises.items(), step[size + 1 :], strict=True)
+        changed: dict[str, Any] = {name: old + float(change) for (name, old), change in noises}
+        return replace(
+            self,
+            coefficients=self.coefficients + step[:size].reshape(self.coefficients.shape),
+            log_drag=self.log_drag + float(step[size]),
+            **changed,
         )
 
 
@@ -121,36 +137,65 @@ class Passes:
         point : Point
             Where.
         noise : {"with", "without"}
-            Whether the last two parameters, ln q and ln r, have derivatives; without them score
-            and information end with ln C_d.
+            Whether the noises have derivatives; without them score and information end with
+            ln C_d.
         """
-        size = 2 * self.spline.size + (3 if noise == "with" else 1)
-        deviance, used = 0.0, 0
-        score, information = np.zeros(size), np.zeros((size, size))
+        names = list(point.noises) if noise == "with" else []
+        size = 2 * self.spline.size + 1 + len(names)
+        total = Sums(0.0, np.zeros(size), np.zeros((size, size)), 0)
         for series in self.series:
-            filters = [self._filter(series, point, sensitivities=True)]
-            if noise == "with":
-                more = replace(point, log_intensity=point.log_intensity + STEP)
-                filters.append(self._filter(series, more))
-                more = replace(point, log_noise=point.log_noise + STEP)
-                filters.append(self._filter(series, more))
-            for start in range(0, series.time.size, SAMPLES_AT_ONCE):
-                count = min(SAMPLES_AT_ONCE, series.time.size - start)
-                found = [one.run(count) for one in filters]
-                part = _part(found)
-                deviance += part.deviance
-                score += part.score
-                information += part.information
-                used += part.used
-        return Sums(deviance, score, information, used)
+            total = _added(total, self._sums_of(series, point, names))
+        return total
+
+    def _sums_of(self, series: Series, point: Point, names: list[str]) -> Sums:
+        base = self._run(series, point)
+        others = []
+        for name in names:
+            more: dict[str, Any] = {name: point.noises[name] + STEP}
+            others.append(self._run(series, replace(point, **more)))
+        used = np.logical_and.reduce([_used(one) for one in (base, *others)])
+        white, changes, spreads = _noise_derivatives(base, others, used)
+        right = np.zeros((used.size, white.shape[1], 1 + len(changes)))
+        right[used] = np.stack([white, *changes], axis=-1)
+        found = self._filter(series, point, sensitivities=True).sums(used.astype(np.uint8), right)
+        deviance = 0.5 * float((white**2).sum()) + float(
+            np.log(np.einsum("aan->an", factor(base["covariance"][used]))).sum()
+        )
+        count = len(found["information"])
+        size = count + len(names)
+        score, information = np.empty(size), np.empty((size, size))
+        score[:count] = found["products"][0]
+        information[:count, :count] = found["information"]
+        information[count:, :count] = found["products"][1:]
+        information[:count, count:] = found["products"][1:].T
+        for k, (change, spread) in enumerate(zip(changes, spreads, strict=True)):
+            bent = np.einsum("abn,na,nb->", spread, white, white, optimize=True)
+            score[count + k] = (change * white).sum() + 0.5 * (bent - np.einsum("aan->", spread))
+            for other in range(len(names)):
+                information[count + k, count + other] = (change * changes[other]).sum() + 0.5 * (
+                    spread * spreads[other]
+                ).sum()
+        return Sums(deviance, score, information, int(used.sum()))
 
     def innovations(self, point: Point) -> list[tuple[Floats, Flags]]:
-        """Return each recording's whitened innovations, shape (n, 2), and which were used."""
-        found = [self._filter(series, point).run(series.time.size) for series in self.series]
-        return [(_whiten(one["innovation"], one["covariance"]), _used(one)) for one in found]
+        """Return each recording's whitened innovations, shape (n, D), and which were used.
+
+        D is 3 with the angle in the state, else 2. The innovation of a missing angle is 0.
+        """
+        found = [self._run(series, point) for series in self.series]
+        return [
+            (forward(factor(one["covariance"]), one["innovation"].T).T, _used(one)) for one in found
+        ]
+
+    def _run(self, series: Series, point: Point) -> dict[str, Any]:
+        return dict(self._filter(series, point).run(series.time.size))
 
     def _filter(self, series: Series, point: Point, *, sensitivities: bool = False) -> Any:
         body, spline = self.body, self.spline
+        pose: dict[str, float] = {}
+        if point.log_lever is not None and point.log_angle_noise is not None:
+            pose["force_lever"] = math.exp(point.log_lever)
+            pose["angle_noise"] = math.exp(point.log_angle_noise)
         return _core.InnovationsFilter(
             series.time,
             series.x,
@@ -176,6 +221,7 @@ class Passes:
             longest_gap=LONGEST_GAP_S,
             orientation=body.orientation,
             sensitivities=sensitivities,
+            **pose,
         )
 
 
@@ -183,77 +229,60 @@ def _used(found: dict[str, Any]) -> Flags:
     return np.asarray(found["used"], dtype=bool)
 
 
-def _part(found: list[dict[str, Any]]) -> Sums:
-    """Add up one range of samples; the first filter is the one at the point itself."""
-    base = found[0]
-    used = np.logical_and.reduce([_used(one) for one in found])
-    covariance = base["covariance"][used]
-    white = np.asarray(base["whitened"]).reshape(-1, 2)[used]
-    determinant = covariance[:, 0] * covariance[:, 2] - covariance[:, 1] ** 2
-    deviance = 0.5 * float(np.log(determinant).sum() + (white**2).sum())
-    rows = np.repeat(used, 2)
-    # Rows of samples that are not used are zero already, unless another filter left them out.
-    jacobian = (
-        base["jacobian"] if used.sum() == _used(base).sum() else base["jacobian"] * rows[:, None]
+def _added(one: Sums, other: Sums) -> Sums:
+    return Sums(
+        one.deviance + other.deviance,
+        one.score + other.score,
+        one.information + other.information,
+        one.used + other.used,
     )
-    size = jacobian.shape[1] + len(found) - 1
-    information, score = np.zeros((size, size)), np.zeros(size)
-    information[: jacobian.shape[1], : jacobian.shape[1]] = jacobian.T @ jacobian
-    score[: jacobian.shape[1]] = jacobian.T @ np.asarray(base["whitened"])
-    if len(found) > 1:
-        _add_noise(found, used, white, information, score)
-    return Sums(deviance, score, information, int(used.sum()))
 
 
-def _add_noise(
-    found: list[dict[str, Any]], used: Flags, white: Floats, information: Floats, score: Floats
-) -> None:
-    """Fill in the last rows and columns: the derivatives by ln q and ln r."""
-    base = found[0]
-    covariance = base["covariance"][used]
+def _noise_derivatives(
+    base: dict[str, Any], others: list[dict[str, Any]], used: Flags
+) -> tuple[Floats, list[Floats], list[Floats]]:
+    """Return whitened innovations (n, D), their derivatives by the noises, and those of S.
+
+    The derivatives of S are whitened from both sides, L^-1 dS L^-T, shape (D, D, n).
+    """
+    root = factor(base["covariance"][used])
+    white = forward(root, base["innovation"][used].T).T
     changes, spreads = [], []
-    for other in found[1:]:
+    for other in others:
         change = (base["innovation"][used] - other["innovation"][used]) / STEP
-        changes.append(_whiten(change, covariance).ravel())
-        spreads.append(_spread((other["covariance"][used] - covariance) / STEP, covariance))
-    columns = np.stack(changes, axis=1)
-    first = -len(changes)
-    cross = base["jacobian"][np.repeat(used, 2)].T @ columns
-    information[:first, first:], information[first:, :first] = cross, cross.T
-    # tr(AB) of symmetric 2x2 matrices, stored as xx, xy, yy.
-    traces = np.einsum("akc,bkc,c->ab", spreads, spreads, [1.0, 2.0, 1.0])
-    information[first:, first:] = columns.T @ columns + 0.5 * traces
-    excess = [(_quadratic(one, white) - one[:, 0] - one[:, 2]).sum() for one in spreads]
-    score[first:] = columns.T @ white.ravel() + 0.5 * np.array(excess)
+        changes.append(forward(root, change.T).T)
+        widening = unpacked((other["covariance"][used] - base["covariance"][used]) / STEP)
+        half = forward(root, widening)
+        spreads.append(forward(root, half.transpose(1, 0, 2)))
+    return white, changes, spreads
 
 
-def _whiten(innovation: Floats, covariance: Floats) -> Floats:
-    """Return L^-1 e with L L' = S, rows (xx, xy, yy) of S; shape (n, 2)."""
-    first = np.sqrt(covariance[:, 0])
-    lean = covariance[:, 1] / first
-    second = np.sqrt(covariance[:, 2] - lean**2)
-    along = innovation[:, 0] / first
-    return np.column_stack([along, (innovation[:, 1] - lean * along) / second])
+def unpacked(lower: Floats) -> Floats:
+    """Return symmetric matrices (D, D, n) from their lower parts (n, D (D + 1) / 2), row by row."""
+    count = {3: 2, 6: 3}[lower.shape[1]]
+    full = np.empty((count, count, lower.shape[0]))
+    for column, (a, b) in enumerate(zip(*np.tril_indices(count), strict=True)):
+        full[a, b] = full[b, a] = lower[:, column]
+    return full
 
 
-def _spread(change: Floats, covariance: Floats) -> Floats:
-    """Return L^-1 dS L^-T as rows (xx, xy, yy)."""
-    first = np.sqrt(covariance[:, 0])
-    lean = covariance[:, 1] / covariance[:, 0]
-    second = np.sqrt(covariance[:, 2] - lean * covariance[:, 1])
-    cross = change[:, 1] - lean * change[:, 0]
-    return np.column_stack(
-        [
-            change[:, 0] / covariance[:, 0],
-            cross / (first * second),
-            (change[:, 2] - lean * change[:, 1] - lean * cross) / second**2,
-        ]
-    )
+def factor(lower: Floats) -> Floats:
+    """Return the Cholesky factors L (D, D, n), L L' the matrices of which these are lower parts."""
+    full = unpacked(lower)
+    root = np.zeros_like(full)
+    for a in range(len(full)):
+        for b in range(a + 1):
+            rest = full[a, b] - (root[a, :b] * root[b, :b]).sum(axis=0)
+            root[a, b] = np.sqrt(rest) if a == b else rest / root[b, b]
+    return root
 
 
-def _quadratic(matrix: Floats, vector: Floats) -> Floats:
-    return np.asarray(
-        matrix[:, 0] * vector[:, 0] ** 2
-        + 2.0 * matrix[:, 1] * vector[:, 0] * vector[:, 1]
-        + matrix[:, 2] * vector[:, 1] ** 2
-    )
+def forward(root: Floats, right: Floats) -> Floats:
+    """Return L^-1 b for n triangular L (D, D, n) and b (D, n), or (D, m, n)."""
+    found = np.empty_like(right)
+    for a in range(len(root)):
+        rest = right[a].copy()
+        for b in range(a):
+            rest -= root[a, b] * found[b]
+        found[a] = rest / root[a, a]
+    return found

@@ -32,7 +32,14 @@ if TYPE_CHECKING:
 SCHEMA_VERSION: Final = 1
 LEAST_COUNT: Final = 3
 """Samples with the block over a node that make the node a measured one."""
-PARAMETERS: Final = ("ln_drag_coefficient", "ln_noise_intensity", "ln_tracking_noise")
+PARAMETERS: Final = (
+    "ln_drag_coefficient",
+    "ln_noise_intensity",
+    "ln_tracking_noise",
+    "ln_force_lever",
+    "ln_orientation_noise",
+)
+"""The last two with the angle in the state only."""
 
 
 class Whiteness(NamedTuple):
@@ -47,7 +54,9 @@ class Whiteness(NamedTuple):
 
 
 def whiteness_of(innovations: list[tuple[Floats, npt.NDArray[np.bool_]]]) -> Whiteness:
-    """Return the check of whitened innovations, given with which of them were used.
+    """Return the check of whitened innovations (n, D), given with which of them were used.
+
+    Innovations of exactly 0 are those of missing angles, and do not count.
 
     Examples
     --------
@@ -58,20 +67,23 @@ def whiteness_of(innovations: list[tuple[Floats, npt.NDArray[np.bool_]]]) -> Whi
     """
     squares, products, samples, pairs = 0.0, 0.0, 0, 0
     for white, used in innovations:
-        squares += float((white[used] ** 2).sum())
-        samples += 2 * int(used.sum())
-        both = used[1:] & used[:-1]
+        there = used[:, None] & (white != 0.0)
+        squares += float((white[there] ** 2).sum())
+        samples += int(there.sum())
+        both = there[1:] & there[:-1]
         products += float((white[1:][both] * white[:-1][both]).sum())
-        pairs += 2 * int(both.sum())
+        pairs += int(both.sum())
     variance = squares / max(samples, 1)
     count = max(pairs, 1)
     return Whiteness(variance, products / count / max(variance, 1e-300), 1.0 / math.sqrt(count))
 
 
 def parameter_covariance(mode: Mode, restricted: Restricted) -> Floats:
-    """Return the covariance of (ln C_d, ln q, ln r), with C_d's variance from its own criterion."""
-    covariance = mode.covariance[-3:, -3:].copy()
-    scale = np.array([restricted.log_drag_std / math.sqrt(covariance[0, 0]), 1.0, 1.0])
+    """Return the covariance of ln C_d and the noises, C_d's variance from its own criterion."""
+    drag = mode.point.coefficients.size
+    covariance = mode.covariance[drag:, drag:].copy()
+    scale = np.ones(len(covariance))
+    scale[0] = restricted.log_drag_std / math.sqrt(covariance[0, 0])
     return np.asarray(covariance * np.outer(scale, scale))
 
 
@@ -90,6 +102,9 @@ def parameter_attrs(point: Any, covariance: Floats, study: Study) -> dict[str, A
         "force_noise_intensity_N2_s": (intensity, reach[1]),
         "tracking_noise_m": (math.exp(point.log_noise), reach[2]),
     }
+    if point.log_lever is not None:
+        values["force_lever_m"] = (math.exp(point.log_lever), reach[3])
+        values["orientation_noise_rad"] = (math.exp(point.log_angle_noise), reach[4])
     attrs: dict[str, Any] = {"force_interval_s": interval, "confidence": confidence}
     for name, (value, width) in values.items():
         attrs[name] = value
@@ -122,6 +137,8 @@ def build_fit(
     profiles = restricted.profiles
     least = min(one.deviance for one in profiles)
     flat = profiles[0].half_log_determinant
+    uncertainty = parameter_covariance(mode, restricted)
+    names = np.array(PARAMETERS[: len(uncertainty)], dtype=object)
     plane, knots = ("y", "x"), ("component", "knot_y", "knot_x")
     data: dict[str, Any] = {
         "u": (plane, values[0], speed),
@@ -137,7 +154,7 @@ def build_fit(
         "coefficient": (knots, coefficients, speed),
         "covariance": (
             ("parameter", "other_parameter"),
-            parameter_covariance(mode, restricted),
+            uncertainty,
             {"units": "1"},
         ),
         "profile_deviance": ("profile", [one.deviance - least for one in profiles], {"units": "1"}),
@@ -151,8 +168,8 @@ def build_fit(
         "y": ("y", grid.y, {"units": "m"}),
         "x": ("x", grid.x, {"units": "m"}),
         "component": ("component", np.array(["u", "v"], dtype=object)),
-        "parameter": ("parameter", np.array(PARAMETERS, dtype=object)),
-        "other_parameter": ("other_parameter", np.array(PARAMETERS, dtype=object)),
+        "parameter": ("parameter", names),
+        "other_parameter": ("other_parameter", names),
         "profile": ("profile", [math.exp(one.log_drag) for one in profiles], {"units": "1"}),
     }
     facts = {
@@ -220,14 +237,15 @@ def footprint_count(
 ) -> npt.NDArray[np.float64]:
     """Return for each node how many samples have the block over it.
 
-    Without orientations the circle inside the block stands for it.
+    Without orientations the circle inside the block stands for it; samples that lack one among
+    others that have are left out.
     """
     half = 0.5 * side
     reach = math.ceil(half * (math.sqrt(2.0) if oriented else 1.0) / grid.cell_size)
     offsets = np.arange(-reach, reach + 1)
     total = np.zeros(grid.size)
     for one in series:
-        kept = (one.excluded == 0) & np.isfinite(one.x)
+        kept = (one.excluded == 0) & np.isfinite(one.x) & np.isfinite(one.theta)
         x, y, theta = one.x[kept], one.y[kept], one.theta[kept]
         column = np.round((x - grid.x[0]) / grid.cell_size).astype(np.intp)
         row = np.round((y - grid.y[0]) / grid.cell_size).astype(np.intp)

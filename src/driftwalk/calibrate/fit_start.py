@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from driftwalk.calibrate.fit_newton import PRIOR_DRAG, Weights
+from driftwalk.calibrate.fit_newton import PRIOR_DRAG, PRIOR_LEVER, Weights
 from driftwalk.calibrate.fit_pass import Point
 from driftwalk.calibrate.fit_spline import Floats, Spline, penalties
 from driftwalk.calibrate.own_flow import flow_from_track
@@ -28,18 +29,32 @@ SMALLEST_NOISE = 1e-3
 """Least tracking noise at the start, of the step between samples."""
 
 
-def first_point(tracks: Sequence[Track], study: Study, spline: Spline) -> Point:
+def first_point(tracks: Sequence[Track], study: Study, spline: Spline, *, angle: str) -> Point:
     """Return the first values: C_d = 0.5, the flow of Eq. 4, the noise of `driftwalk info`."""
-    noise = [recorded_camera(track, study, position_quantum=0.0).position_noise for track in tracks]
+    cameras = [recorded_camera(track, study, position_quantum=0.0) for track in tracks]
     steps = np.concatenate([np.hypot(np.diff(track.x), np.diff(track.y)) for track in tracks])
     least = max(SMALLEST_NOISE * float(np.median(steps[steps > 0.0])), 1e-9)
-    seen = [value for value in noise if math.isfinite(value)]
-    return Point(
+    point = Point(
         coefficients=_flow_coefficients(tracks[0], study, spline),
         log_drag=math.log(PRIOR_DRAG),
         log_intensity=math.log(UNREST * typical_speed(tracks) ** 3 / study.block.side_m),
-        log_noise=math.log(max(float(np.mean(seen)) if seen else least, least)),
+        log_noise=_log_noise([camera.position_noise for camera in cameras], least),
     )
+    if angle != "state":
+        return point
+    # The angle that a noise of the position at a corner would make.
+    least_angle = least / study.block.side_m
+    return replace(
+        point,
+        log_lever=math.log(PRIOR_LEVER * study.block.side_m),
+        log_angle_noise=_log_noise([camera.orientation_noise for camera in cameras], least_angle),
+    )
+
+
+def _log_noise(estimates: Sequence[float], least: float) -> float:
+    """Return the logarithm of the mean of the estimates there are, and of the least if none."""
+    seen = [value for value in estimates if math.isfinite(value)]
+    return math.log(max(float(np.mean(seen)) if seen else least, least))
 
 
 def first_weights(tracks: Sequence[Track], spline: Spline) -> Weights:

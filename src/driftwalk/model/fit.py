@@ -32,12 +32,13 @@ class Fit(Section):
             "(2 cm for 3 cm), or a 24th of the tank where that is more."
         ),
     )
-    angle: Literal["auto", "given", "none"] = Field(
+    angle: Literal["auto", "state", "given", "none"] = Field(
         default="auto",
         description=(
-            'Whether the recorded orientation turns the faces of the block: "given", or "none" '
-            'for the drag averaged over all orientations; "auto" is "given" where most samples '
-            "have one."
+            'How the recorded orientation is used: "state" predicts it like the position and '
+            'learns from its errors too, "given" takes it (smoothed) as it is, "none" averages the '
+            'drag over all orientations; "auto" is "state" where most samples have one, else '
+            '"none".'
         ),
     )
     iterations: Annotated[int, Quantity("1", ge=4, le=1000, whole=True)] = Field(

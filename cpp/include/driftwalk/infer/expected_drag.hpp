@@ -1,16 +1,18 @@
-// The mean of the strip drag over an uncertain position and velocity, in closed form, and its
-// derivatives.
+// The mean of the strip drag over an uncertain state, in closed form, and its derivatives.
 //
-// A strip with outward normal n and tangent t moves through the water with w = u - v (block). Its
-// closing speed is s = -n.w, its slip w_t = t.w, and its force max(0, s) w. With (position,
-// velocity) normal of covariance P, w is normal to first order with covariance B P B', B = [grad u,
-// -I]. For s ~ N(m, tau^2), c = cov(s, w_t), and phi, Phi at m / tau:
+// A strip with outward normal n and tangent t, at r from the centre, moves through the water with
+// w = u(position + r) - velocity - omega J r, J a quarter turn. Its closing speed is s = -n.w, its
+// slip w_t = t.w, and its force max(0, s) w. Seen in the block's own frame, to first order,
+//     dw = grad u dposition - dvelocity - J r domega - q dtheta,  q = J w - grad u J r - omega r
+// so with a normal state of covariance P, (s, w_t) are normal too. For s ~ N(m, tau^2), c = cov(s,
+// w_t), and phi, Phi at m / tau:
 //     E[s+]        = m Phi + tau phi
 //     E[s+^2]      = (m^2 + tau^2) Phi + m tau phi
 //     E[s+ w_t]    = w_t E[s+] + c Phi
 //     E[w_t; s>0]  = w_t Phi + c phi / tau
-// Derivatives by velocity are exact for a given P; those by position and coefficients leave out
-// that B moves with them, which is zero where only the velocity is uncertain.
+// Derivatives by velocities are exact for a given P; those by coordinates and coefficients leave
+// out that dw moves with them, which is zero where only the velocities are uncertain. That an
+// uncertain angle also turns the force is left out: some 1e-4 of it at an angle known to a degree.
 #pragma once
 
 #include "driftwalk/infer/normal.hpp"
@@ -18,35 +20,37 @@
 
 DRIFTWALK_LANES_BEGIN
 
+// D = 2: the covariance is that of (x, y, vx, vy), theta and omega are known. D = 3: of (x, y,
+// theta, vx, vy, omega).
+template <int D>
 struct UncertainBlock {
   double x, y, vx, vy, omega;
-  const double (*covariance)[4]; // of (x, y, vx, vy), symmetric
+  const double (*covariance)[2 * D]; // symmetric
 };
 
 struct Side {
   double nx, ny; // outward normal; the tangent is (-ny, nx)
 };
 
-// Covariance of position and velocity as a side sees it.
-struct SideCovariance {
-  double xx, xy, yy;           // of the position
-  double x_normal, y_normal;   // of position and normal velocity
-  double x_tangent, y_tangent; // of position and tangential velocity
-  double normal, cross;        // of the normal velocity; of normal and tangential
+// How w at a strip moves with the state, along one direction: one number a coordinate and velocity.
+template <int D>
+struct AlongState {
+  Eight by[2 * D];
 };
 
-inline SideCovariance side_covariance(const double P[4][4], Side side) {
-  const double nx = side.nx, ny = side.ny, tx = -ny, ty = nx;
-  const double normal_x = P[2][2] * nx + P[2][3] * ny, normal_y = P[2][3] * nx + P[3][3] * ny;
-  return {P[0][0],
-          P[0][1],
-          P[1][1],
-          P[0][2] * nx + P[0][3] * ny,
-          P[1][2] * nx + P[1][3] * ny,
-          P[0][2] * tx + P[0][3] * ty,
-          P[1][2] * tx + P[1][3] * ty,
-          nx * normal_x + ny * normal_y,
-          tx * normal_x + ty * normal_y};
+// variance = n' P n, cross = - n' P t: of the closing speed, and of it and the slip.
+template <int D>
+inline void spread_of(const double (*P)[2 * D], const AlongState<D>& n, const AlongState<D>& t,
+                      Eight& variance, Eight& cross) {
+  variance = cross = Eight(0);
+  for (int a = 0; a < 2 * D; ++a) {
+    Eight row = P[a][0] * n.by[0];
+    for (int b = 1; b < 2 * D; ++b) {
+      row += P[a][b] * n.by[b];
+    }
+    variance += n.by[a] * row;
+    cross -= t.by[a] * row;
+  }
 }
 
 // Moments of the closing speed and the slip of the strips of a side.
@@ -72,21 +76,26 @@ inline StripMoments strip_moments(Eight mean, Eight slip, Eight variance, Eight 
   return m;
 }
 
+template <int D>
 struct DragSumsOfEight {
-  Eight acceleration[2];
-  Eight by_position[2][2];
-  Eight by_velocity[2][2];
+  Eight acceleration[D];
+  Eight by_position[D][D];
+  Eight by_velocity[D][D];
 };
 
-inline void keep_shares(const StripsOnGrid& grid, const Eight response[2][2], Eight::Mask part,
-                        StripShare* shares, int& count) {
+template <int D>
+inline void keep_shares(const StripsOnGrid& grid, const Eight (&response)[D][2], Eight::Mask part,
+                        StripShare<D>* shares, int& count) {
   for (int lane = 0; lane < 8; ++lane) {
     if (!part[lane]) {
       continue;
     }
-    StripShare& share = shares[count++];
+    StripShare<D>& share = shares[count++];
+    for (int a = 0; a < D; ++a) {
+      share.response[a][0] = response[a][0][lane];
+      share.response[a][1] = response[a][1][lane];
+    }
     for (int k = 0; k < 4; ++k) {
-      share.response[k] = response[k / 2][k % 2][lane];
       share.weight_y[k] = grid.weight_y[k][lane];
     }
     share.along_x = grid.along_x[lane];
@@ -97,9 +106,10 @@ inline void keep_shares(const StripsOnGrid& grid, const Eight response[2][2], Ei
 inline constexpr double lane_numbers[8] = {0, 1, 2, 3, 4, 5, 6, 7};
 
 // Strips `first` .. `first + 7` of a side; `shares` may be null.
-inline void add_strips(const SplineView& flow, const StripBlock& block, const UncertainBlock& state,
-                       Side side, int first, double scale, DragSumsOfEight& sums,
-                       StripShare* shares, int& count) {
+template <int D>
+inline void add_strips(const SplineView& flow, const StripBlock& block,
+                       const UncertainBlock<D>& state, Side side, int first, double scale,
+                       DragSumsOfEight<D>& sums, StripShare<D>* shares, int& count) {
   const double nx = side.nx, ny = side.ny, tx = -ny, ty = nx, h = block.half_side;
   const Eight strip = Eight::load(lane_numbers) + first;
   const Eight::Mask real = strip < block.strips;
@@ -109,14 +119,26 @@ inline void add_strips(const SplineView& flow, const StripBlock& block, const Un
   const FlowAtStrips at = flow_at_strips(flow, state.x + arm_x, state.y + arm_y, grid);
   const Eight wx = at.u - (state.vx - state.omega * arm_y);
   const Eight wy = at.v - (state.vy + state.omega * arm_x);
-  // Gradients of the flow along the normal and along the tangent.
-  const Eight gnx = nx * at.u_x + ny * at.v_x, gny = nx * at.u_y + ny * at.v_y;
-  const Eight gtx = tx * at.u_x + ty * at.v_x, gty = tx * at.u_y + ty * at.v_y;
-  const SideCovariance c = side_covariance(state.covariance, side);
-  const Eight px = c.xx * gnx + c.xy * gny, py = c.xy * gnx + c.yy * gny;
-  const Eight variance = gnx * (px - 2 * c.x_normal) + gny * (py - 2 * c.y_normal) + c.normal;
-  const Eight cross = -(gtx * (px - c.x_normal) + gty * (py - c.y_normal) -
-                        (gnx * c.x_tangent + gny * c.y_tangent) + c.cross);
+  // q of the head of this file.
+  const Eight turn_x = at.u_x * arm_y - at.u_y * arm_x - wy - state.omega * arm_x;
+  const Eight turn_y = at.v_x * arm_y - at.v_y * arm_x + wx - state.omega * arm_y;
+  AlongState<D> along_n, along_t;
+  along_n.by[0] = nx * at.u_x + ny * at.v_x;
+  along_n.by[1] = nx * at.u_y + ny * at.v_y;
+  along_t.by[0] = tx * at.u_x + ty * at.v_x;
+  along_t.by[1] = tx * at.u_y + ty * at.v_y;
+  along_n.by[D] = Eight(-nx);
+  along_n.by[D + 1] = Eight(-ny);
+  along_t.by[D] = Eight(-tx);
+  along_t.by[D + 1] = Eight(-ty);
+  if constexpr (D == 3) {
+    along_n.by[2] = -(nx * turn_x + ny * turn_y);
+    along_t.by[2] = -(tx * turn_x + ty * turn_y);
+    along_n.by[5] = offset;
+    along_t.by[5] = Eight(-h);
+  }
+  Eight variance, cross;
+  spread_of<D>(state.covariance, along_n, along_t, variance, cross);
   const Eight slip = tx * wx + ty * wy;
   const StripMoments m = strip_moments(-(nx * wx + ny * wy), slip, variance, cross);
   const Eight::Mask part = m.takes_part & real;
@@ -125,34 +147,53 @@ inline void add_strips(const SplineView& flow, const StripBlock& block, const Un
   }
   const Eight K = select(part, Eight(scale), Eight(0));
   const Eight along_normal = K * m.square, along_tangent = K * m.closing_slip;
-  sums.acceleration[0] += tx * along_tangent - nx * along_normal;
-  sums.acceleration[1] += ty * along_tangent - ny * along_normal;
+  const Eight force[2] = {tx * along_tangent - nx * along_normal,
+                          ty * along_tangent - ny * along_normal};
+  sums.acceleration[0] += force[0];
+  sums.acceleration[1] += force[1];
   // d(acceleration)/d(velocity) = E[w n'; s > 0] - E[s+] I, with w = -s n + w_t t.
   const Eight closing = K * m.closing, windward_slip = K * m.windward_slip;
   const Eight mean_x = tx * windward_slip - nx * closing,
               mean_y = ty * windward_slip - ny * closing;
-  const Eight response[2][2] = {{mean_x * nx - closing, mean_x * ny},
-                                {mean_y * nx, mean_y * ny - closing}};
-  for (int a = 0; a < 2; ++a) {
-    for (int b = 0; b < 2; ++b) {
-      sums.by_velocity[a][b] += response[a][b];
+  Eight response[D][2];
+  response[0][0] = mean_x * nx - closing;
+  response[0][1] = mean_x * ny;
+  response[1][0] = mean_y * nx;
+  response[1][1] = mean_y * ny - closing;
+  if constexpr (D == 3) {
+    const Eight lever_x = block.mass_by_inertia * arm_x, lever_y = block.mass_by_inertia * arm_y;
+    sums.acceleration[2] += lever_x * force[1] - lever_y * force[0];
+    response[2][0] = lever_x * response[1][0] - lever_y * response[0][0];
+    response[2][1] = lever_x * response[1][1] - lever_y * response[0][1];
+    sums.by_position[0][2] -= force[1];
+    sums.by_position[1][2] += force[0];
+  }
+  for (int a = 0; a < D; ++a) {
+    const Eight x = response[a][0], y = response[a][1];
+    sums.by_velocity[a][0] += x;
+    sums.by_velocity[a][1] += y;
+    sums.by_position[a][0] -= x * at.u_x + y * at.v_x;
+    sums.by_position[a][1] -= x * at.u_y + y * at.v_y;
+    if constexpr (D == 3) {
+      sums.by_velocity[a][2] += y * arm_x - x * arm_y;
+      sums.by_position[a][2] += x * turn_x + y * turn_y;
     }
-    sums.by_position[a][0] -= response[a][0] * at.u_x + response[a][1] * at.v_x;
-    sums.by_position[a][1] -= response[a][0] * at.u_y + response[a][1] * at.v_y;
   }
   if (shares != nullptr) {
-    keep_shares(grid, response, part, shares, count);
+    keep_shares<D>(grid, response, part, shares, count);
   }
 }
 
 // One orientation of the block, its four sides.
+template <int D>
 inline void add_orientation(const SplineView& flow, const StripBlock& block,
-                            const UncertainBlock& state, double cosine, double sine, double scale,
-                            DragSumsOfEight& sums, StripShare* shares, int& count) {
+                            const UncertainBlock<D>& state, double cosine, double sine,
+                            double scale, DragSumsOfEight<D>& sums, StripShare<D>* shares,
+                            int& count) {
   Side side{cosine, sine};
   for (int k = 0; k < 4; ++k) {
     for (int first = 0; first < block.strips; first += 8) {
-      add_strips(flow, block, state, side, first, scale, sums, shares, count);
+      add_strips<D>(flow, block, state, side, first, scale, sums, shares, count);
     }
     side = {-side.ny, side.nx};
   }
@@ -160,25 +201,32 @@ inline void add_orientation(const SplineView& flow, const StripBlock& block,
 
 // The drag at angle `theta`, or averaged over the orientations, without turning, if there are any.
 // `shares`, if not null, takes what each strip contributes to the derivative by the coefficients.
-inline DragResponse expected_drag(const SplineView& flow, const StripBlock& block,
-                                  const Orientations& orientations, double theta,
-                                  const UncertainBlock& state, StripShare* shares) {
-  DragSumsOfEight sums{{0, 0}, {{0, 0}, {0, 0}}, {{0, 0}, {0, 0}}};
-  DragResponse response;
+template <int D>
+inline DragResponse<D> expected_drag(const SplineView& flow, const StripBlock& block,
+                                     const Orientations& orientations, double theta,
+                                     const UncertainBlock<D>& state, StripShare<D>* shares) {
+  DragSumsOfEight<D> sums;
+  for (int a = 0; a < D; ++a) {
+    sums.acceleration[a] = Eight(0);
+    for (int b = 0; b < D; ++b) {
+      sums.by_position[a][b] = sums.by_velocity[a][b] = Eight(0);
+    }
+  }
+  DragResponse<D> response;
   response.shares = 0;
   if (orientations.count == 0) {
-    add_orientation(flow, block, state, __builtin_cos(theta), __builtin_sin(theta),
-                    block.drag_scale, sums, shares, response.shares);
+    add_orientation<D>(flow, block, state, __builtin_cos(theta), __builtin_sin(theta),
+                       block.drag_scale, sums, shares, response.shares);
   }
-  UncertainBlock still = state;
+  UncertainBlock<D> still = state;
   still.omega = 0;
   for (int k = 0; k < orientations.count; ++k) {
-    add_orientation(flow, block, still, orientations.cosine[k], orientations.sine[k],
-                    block.drag_scale / orientations.count, sums, shares, response.shares);
+    add_orientation<D>(flow, block, still, orientations.cosine[k], orientations.sine[k],
+                       block.drag_scale / orientations.count, sums, shares, response.shares);
   }
-  for (int a = 0; a < 2; ++a) {
+  for (int a = 0; a < D; ++a) {
     response.acceleration[a] = sum(sums.acceleration[a]);
-    for (int b = 0; b < 2; ++b) {
+    for (int b = 0; b < D; ++b) {
       response.by_position[a][b] = sum(sums.by_position[a][b]);
       response.by_velocity[a][b] = sum(sums.by_velocity[a][b]);
     }

@@ -1,5 +1,5 @@
-// The innovations filter on one instruction set: an extended Kalman filter of (x, y, vx, vy) on the
-// samples of a track.
+// The innovations filter on one instruction set: an extended Kalman filter on the samples of a
+// track, of (x, y, vx, vy) with the angle an input, or of (x, y, theta, vx, vy, omega).
 //
 // Between samples the state goes in equal steps not above the largest one, each a half drift, a
 // kick by the mean drag over the covariance at its middle, and a half drift.
@@ -7,6 +7,7 @@
 
 #include "driftwalk/infer/expected_drag.hpp"
 #include "driftwalk/infer/kalman.hpp"
+#include "driftwalk/infer/products.hpp"
 #include "driftwalk/infer/sensitivity.hpp"
 
 DRIFTWALK_LANES_BEGIN
@@ -14,55 +15,100 @@ DRIFTWALK_LANES_BEGIN
 // Speed that a block may have where nothing is known of its velocity, and that a wall may have
 // given it: the sd of either component [m/s].
 inline constexpr double unknown_speed = 0.1;
-// An innovation of a larger chi squared (2 degrees of freedom; one in 5e8) is no noise.
+// An innovation of a larger chi squared (2 degrees of freedom: one in 5e8, 3: one in 1e8) is no
+// noise.
 inline constexpr double outlier_chi_squared = 40;
+// A missing angle counts as one that is known so badly that nothing follows from it [rad^2].
+inline constexpr double variance_of_nothing = 1e12;
+inline constexpr double full_turn = 6.283185307179586;
 
+template <int D>
 class FilterRun {
 public:
-  FilterRun(const FilterProblem& problem, FilterState& state, const FilterScratch& scratch,
-            const FilterOutputs& out)
+  // With sums derivatives are added up there instead of handed out.
+  FilterRun(const FilterProblem& problem, FilterState<D>& state, const FilterScratch<D>& scratch,
+            const FilterOutputs& out, const ProductSums* sums)
       : problem_(problem), track_(problem.track), state_(state), scratch_(scratch), out_(out),
-        sensitivity_(scratch) {}
+        sensitivity_(scratch), sums_(sums),
+        products_(sums == nullptr ? ProductSums{} : *sums, scratch.stride) {}
 
   void run(std::int64_t count) {
     for (std::int64_t row = 0; row < count; ++row) {
       step(row);
       ++state_.next;
+      if (with_sensitivities() && state_.next % samples_between_forgetting == 0) {
+        sensitivity_.forget();
+      }
+    }
+    if (sums_ != nullptr) {
+      products_.flush();
     }
   }
 
 private:
   bool with_sensitivities() const { return scratch_.shares != nullptr; }
 
+  struct Sample {
+    double value[D], variance[D];
+    bool there; // the position
+    bool whole; // the angle too, if it is part of it
+  };
+
+  Sample sample(std::int64_t k) const {
+    const double x = track_.x[k], y = track_.y[k];
+    Sample sample{{x, y}, {problem_.variance[0], problem_.variance[1]}, x == x && y == y, false};
+    sample.whole = sample.there;
+    if constexpr (D == 3) {
+      const double theta = track_.theta[k];
+      const bool seen = theta == theta;
+      sample.whole = sample.there && seen;
+      sample.variance[2] = seen ? problem_.variance[2] : variance_of_nothing;
+      sample.value[2] = seen && state_.open ? next_to(theta, state_.mean[2])
+                        : seen              ? theta
+                                            : state_.mean[2];
+    }
+    return sample;
+  }
+
+  static double next_to(double angle, double other) {
+    return angle - full_turn * __builtin_rint((angle - other) / full_turn);
+  }
+
   void step(std::int64_t row) {
     const std::int64_t k = state_.next;
-    const double x = track_.x[k], y = track_.y[k];
-    const bool there = x == x && y == y;
     if (state_.open && track_.time[k] - state_.seen > problem_.longest_gap) {
       state_.open = false;
     }
     if (state_.open) {
       predict(k);
     }
-    if (state_.open && there) {
-      take_sample(row, k, x, y);
+    const Sample found = sample(k);
+    if (state_.open && found.there) {
+      take_sample(row, k, found);
     } else {
       write_nothing(row);
     }
-    if (!state_.open && there) {
-      open(x, y, 0, 0);
+    if (!state_.open && found.whole) {
+      const double still[D] = {};
+      open(found, still);
     }
-    if (there) {
+    if (found.there) {
       state_.seen = track_.time[k];
     }
     write_state(row);
   }
 
-  void open(double x, double y, double vx, double vy) {
-    state_ = {{x, y, vx, vy}, {}, state_.seen, true, state_.next};
-    for (int a = 0; a < 2; ++a) {
-      state_.covariance[a][a] = problem_.position_variance;
-      state_.covariance[a + 2][a + 2] = unknown_speed * unknown_speed;
+  double unknown_velocity(int a) const {
+    return a < 2 ? unknown_speed : unknown_speed / problem_.block.half_side;
+  }
+
+  void open(const Sample& found, const double* velocity) {
+    state_ = {{}, {}, state_.seen, true, state_.next};
+    for (int a = 0; a < D; ++a) {
+      state_.mean[a] = found.value[a];
+      state_.mean[a + D] = velocity[a];
+      state_.covariance[a][a] = problem_.variance[a];
+      state_.covariance[a + D][a + D] = unknown_velocity(a) * unknown_velocity(a);
     }
     if (with_sensitivities()) {
       sensitivity_.clear();
@@ -74,64 +120,80 @@ private:
     const double wanted = __builtin_ceil(interval / problem_.largest_step - 1e-9);
     const int steps = wanted > 1 ? static_cast<int>(wanted) : 1;
     const double h = interval / steps;
-    const double turn = track_.theta[k] - track_.theta[k - 1];
-    const double spin = track_.omega[k] - track_.omega[k - 1];
     for (int i = 0; i < steps; ++i) {
-      const double middle = (i + 0.5) / steps;
       // The second half drift of a step and the first of the next are one pass of sensitivities.
-      advance(h, track_.theta[k - 1] + turn * middle, track_.omega[k - 1] + spin * middle,
-              i == 0 ? h / 2 : h);
+      advance(h, k, (i + 0.5) / steps, i == 0 ? h / 2 : h);
     }
     if (with_sensitivities()) {
       sensitivity_.drift(h / 2);
     }
     if (track_.excluded[k] != 0) {
-      state_.covariance[2][2] += unknown_speed * unknown_speed;
-      state_.covariance[3][3] += unknown_speed * unknown_speed;
+      for (int a = 0; a < D; ++a) {
+        state_.covariance[a + D][a + D] += unknown_velocity(a) * unknown_velocity(a);
+      }
     }
   }
 
-  void advance(double h, double theta, double omega, double sensitivity_drift) {
-    drift_mean(state_.mean, h / 2);
-    drift_covariance(state_.covariance, h / 2);
-    const DragResponse drag = drag_in_the_middle(h, theta, omega);
-    const Kick kick = make_kick(drag, h);
-    state_.mean[2] += kick.change[0];
-    state_.mean[3] += kick.change[1];
-    drift_mean(state_.mean, h / 2);
-    kick_covariance(state_.covariance, kick);
-    drift_covariance(state_.covariance, h / 2);
-    add_noise(state_.covariance, kick.inverse, problem_.noise_intensity, h);
+  // A step h; `share` says where its middle is between the samples k - 1 and k.
+  void advance(double h, std::int64_t k, double share, double sensitivity_drift) {
+    drift_mean(state_, h / 2);
+    drift_covariance(state_, h / 2);
+    const DragResponse<D> drag = drag_in_the_middle(h, k, share);
+    const Kick<D> kick = make_kick(drag, h);
+    for (int a = 0; a < D; ++a) {
+      state_.mean[a + D] += kick.change[a];
+    }
+    drift_mean(state_, h / 2);
+    kick_covariance(state_, kick);
+    drift_covariance(state_, h / 2);
+    add_noise(state_, kick.inverse, problem_.intensity, h);
     if (with_sensitivities()) {
       sensitivity_.drift_and_kick(sensitivity_drift, kick);
       sensitivity_.add_flow(scratch_.shares, drag.shares, problem_.flow.columns, kick, h);
     }
   }
 
-  DragResponse drag_in_the_middle(double h, double theta, double omega) const {
-    double covariance[4][4];
+  DragResponse<D> drag_in_the_middle(double h, std::int64_t k, double share) const {
+    Square<2 * D> covariance;
     __builtin_memcpy(covariance, state_.covariance, sizeof covariance);
-    covariance[2][2] += problem_.noise_intensity * h / 2;
-    covariance[3][3] += problem_.noise_intensity * h / 2;
-    const UncertainBlock block{state_.mean[0], state_.mean[1], state_.mean[2],
-                               state_.mean[3], omega,          covariance};
-    return expected_drag(problem_.flow, problem_.block, problem_.orientations, theta, block,
-                         scratch_.shares);
+    for (int a = 0; a < D; ++a) {
+      covariance[a + D][a + D] += problem_.intensity[a] * h / 2;
+    }
+    UncertainBlock<D> block{state_.mean[0], state_.mean[1], state_.mean[D], state_.mean[D + 1], 0,
+                            covariance};
+    double theta;
+    if constexpr (D == 3) {
+      theta = state_.mean[2];
+      block.omega = state_.mean[5];
+    } else {
+      const double *angle = track_.theta + k, *spin = track_.omega + k;
+      theta = angle[-1] + (angle[0] - angle[-1]) * share;
+      block.omega = spin[-1] + (spin[0] - spin[-1]) * share;
+    }
+    return expected_drag<D>(problem_.flow, problem_.block, problem_.orientations, theta, block,
+                            scratch_.shares);
   }
 
-  void take_sample(std::int64_t row, std::int64_t k, double x, double y) {
+  void take_sample(std::int64_t row, std::int64_t k, const Sample& found) {
     const bool excluded = track_.excluded[k] != 0;
-    const Innovation e = innovation_of(state_, x, y, problem_.position_variance);
+    const Innovation<D> e = innovation_of<D>(state_, found.value, found.variance);
     const bool fits = e.chi_squared() < outlier_chi_squared;
     write_innovation(row, e);
     write_likelihood(row, fits && !excluded ? &e : nullptr);
     if (!fits && !excluded) {
-      const double vx = state_.mean[2], vy = state_.mean[3];
-      const bool finite = __builtin_isfinite(vx) && __builtin_isfinite(vy);
-      open(x, y, finite ? vx : 0, finite ? vy : 0);
+      double velocity[D];
+      bool finite = true;
+      for (int a = 0; a < D; ++a) {
+        velocity[a] = state_.mean[a + D];
+        finite = finite && __builtin_isfinite(velocity[a]);
+      }
+      for (double& value : velocity) {
+        value = finite ? value : 0;
+      }
+      open(found, velocity);
       return;
     }
-    const Gain gain = gain_of(state_.covariance, e);
+    const Gain<D> gain = gain_of<D>(state_.covariance, e);
     update(state_, e, gain);
     if (with_sensitivities()) {
       sensitivity_.update(gain);
@@ -140,51 +202,83 @@ private:
 
   // What a row says unless its sample has an innovation.
   void write_nothing(std::int64_t row) {
-    const double nothing = __builtin_nan("");
-    write_innovation(row, {nothing, nothing, nothing, nothing, nothing});
+    Innovation<D> nothing;
+    for (int a = 0; a < D; ++a) {
+      nothing.e[a] = __builtin_nan("");
+      for (int b = 0; b < D; ++b) {
+        nothing.S[a][b] = __builtin_nan("");
+      }
+    }
+    write_innovation(row, nothing);
     write_likelihood(row, nullptr);
   }
 
-  void write_innovation(std::int64_t row, const Innovation& e) {
-    out_.innovation[2 * row] = e.x;
-    out_.innovation[2 * row + 1] = e.y;
-    out_.covariance[3 * row] = e.xx;
-    out_.covariance[3 * row + 1] = e.xy;
-    out_.covariance[3 * row + 2] = e.yy;
+  void write_innovation(std::int64_t row, const Innovation<D>& e) {
+    double* covariance = out_.covariance + row * (D * (D + 1) / 2);
+    for (int a = 0; a < D; ++a) {
+      out_.innovation[D * row + a] = e.e[a];
+      for (int b = 0; b <= a; ++b) {
+        *covariance++ = e.S[a][b];
+      }
+    }
   }
 
   // The innovation's part in the likelihood; null where it has none.
-  void write_likelihood(std::int64_t row, const Innovation* e) {
+  void write_likelihood(std::int64_t row, const Innovation<D>* e) {
     out_.used[row] = e != nullptr ? 1 : 0;
-    if (!with_sensitivities()) {
+    if (sums_ != nullptr) {
+      add_products(e);
+    } else if (with_sensitivities()) {
+      write_derivatives(row, e);
+    }
+  }
+
+  void add_products(const Innovation<D>* e) {
+    const std::int64_t k = state_.next - sums_->first;
+    if (e == nullptr || sums_->kept[k] == 0) {
       return;
     }
-    double* const whitened = out_.whitened + 2 * row;
-    double* const row_x = out_.jacobian + 2 * row * scratch_.parameters;
-    double* const row_y = row_x + scratch_.parameters;
+    double* rows[D];
+    for (int a = 0; a < D; ++a) {
+      rows[a] = products_.row(a);
+    }
+    sensitivity_.write_whitened(*e, rows);
+    products_.add(D, sums_->right + k * D * sums_->columns);
+  }
+
+  void write_derivatives(std::int64_t row, const Innovation<D>* e) {
+    const auto bytes = sizeof(double) * std::size_t(scratch_.parameters);
+    double* const whitened = out_.whitened + D * row;
+    double* const jacobian = out_.jacobian + D * row * scratch_.parameters;
+    double* rows[D];
+    for (int a = 0; a < D; ++a) {
+      rows[a] = scratch_.row + a * scratch_.stride;
+      whitened[a] = e == nullptr ? 0 : e->white[a];
+    }
     if (e == nullptr) {
-      whitened[0] = whitened[1] = 0;
-      __builtin_memset(row_x, 0, 2 * sizeof(double) * std::size_t(scratch_.parameters));
+      __builtin_memset(jacobian, 0, D * bytes);
       return;
     }
-    const Whitening whiten = whitening_of(*e);
-    whitened[0] = e->x * whiten.per_xx;
-    whitened[1] = (e->y - whiten.yx * whitened[0]) * whiten.per_yy;
-    sensitivity_.write_whitened(whiten, row_x, row_y);
+    sensitivity_.write_whitened(*e, rows);
+    for (int a = 0; a < D; ++a) {
+      __builtin_memcpy(jacobian + a * scratch_.parameters, rows[a], bytes);
+    }
   }
 
   void write_state(std::int64_t row) {
-    for (int a = 0; a < 4; ++a) {
-      out_.state[4 * row + a] = state_.open ? state_.mean[a] : __builtin_nan("");
+    for (int a = 0; a < 2 * D; ++a) {
+      out_.state[2 * D * row + a] = state_.open ? state_.mean[a] : __builtin_nan("");
     }
   }
 
   const FilterProblem& problem_;
   const Track& track_;
-  FilterState& state_;
-  const FilterScratch& scratch_;
+  FilterState<D>& state_;
+  const FilterScratch<D>& scratch_;
   const FilterOutputs& out_;
-  Sensitivity sensitivity_;
+  Sensitivity<D> sensitivity_;
+  const ProductSums* sums_;
+  Products products_;
 };
 
 DRIFTWALK_LANES_END

@@ -5,6 +5,7 @@
 #include "driftwalk/infer/problem.hpp"
 
 #include <array>
+#include <variant>
 #include <vector>
 
 namespace driftwalk {
@@ -17,33 +18,42 @@ struct FloatingBlock {
   double water_density; // [kg/m^3]
 };
 
+// What is known of the block's orientation.
+enum class Angle {
+  given, // an input, with its rate
+  none,  // nothing: the drag is averaged over equally spaced orientations, without turning
+  state, // measured with noise, like the position, and predicted like it
+};
+
 // A block in a spline flow. Copies the coefficients.
 class DragModel {
 public:
-  // `flow.nodes` is not read; coefficients are [2][rows][columns], of u and of v. With
-  // `angle_known` false the drag is averaged over equally spaced orientations.
+  // `flow.nodes` is not read; coefficients are [2][rows][columns], of u and of v.
   // Throws std::invalid_argument.
   DragModel(const FloatingBlock& block, const SplineView& flow, const double* coefficients,
-            double drag_coefficient, bool angle_known);
+            double drag_coefficient, Angle angle);
 
   // Orientations between 0 and a quarter turn that stand for an unknown angle. With eight the drag
   // is within 1 % of that of many, mostly 0.1 % (cpp/tests/test_infer.cpp).
   static constexpr int orientations = 8;
 
+  Angle angle() const { return angle_; }
   // Flow, block and orientations, with pointers into this object.
   FilterProblem problem() const;
   std::int64_t coefficients() const { return 2 * std::int64_t(flow_.rows) * flow_.columns; }
   // The most strips that can take part at once.
   std::int64_t shares() const;
 
-  // The mean acceleration, and if not null its derivative by the coefficients [2][coefficients()].
-  DragResponse drag(double theta, double omega, const double mean[4], const double (*covariance)[4],
-                    double* by_coefficients) const;
+  // The mean acceleration, and if not null its derivative by the coefficients [D][coefficients()].
+  // `mean` and `covariance` are those of UncertainBlock<D>; D = 3 with Angle::state, else 2.
+  template <int D>
+  DragResponse<D> drag(double theta, double omega, const double* mean,
+                       const double (*covariance)[2 * D], double* by_coefficients) const;
 
 private:
   SplineView flow_;
   StripBlock block_;
-  bool angle_known_;
+  Angle angle_;
   std::vector<double> nodes_;
   std::array<double, orientations> cosine_, sine_;
 };
@@ -51,6 +61,8 @@ private:
 struct FilterSettings {
   double noise_intensity; // [m^2/s^3]
   double position_noise;  // [m]
+  double force_lever;     // rms distance from the centre at which the force acts [m]
+  double angle_noise;     // [rad]; read with Angle::state only, as the lever is
   double largest_step;    // [s]
   double longest_gap;     // [s]
 };
@@ -64,24 +76,45 @@ public:
   InnovationsFilter& operator=(const InnovationsFilter&) = delete;
 
   std::int64_t samples() const { return problem_.track.samples; }
-  std::int64_t remaining() const { return samples() - state_.next; }
+  std::int64_t remaining() const;
   std::int64_t parameters() const { return model_.coefficients() + 1; }
-  bool sensitivities() const { return !shares_.empty(); }
+  bool sensitivities() const { return sensitivities_; }
+  // Coordinates of a sample: 3 with Angle::state, else 2.
+  int coordinates() const { return model_.angle() == Angle::state ? 3 : 2; }
 
   // The next min(count, remaining()) samples.
   void run(std::int64_t count, const FilterOutputs& out);
 
+  // All samples that remain: adds up J' J [parameters][parameters] and R' J [columns][parameters],
+  // J the whitened derivatives of samples that are used and kept, [samples][coordinates] rows, R
+  // the numbers beside them. Needs sensitivities.
+  struct Sums {
+    std::vector<double> information, products;
+  };
+  Sums sums(const std::uint8_t* kept, const double* right, int columns);
+
 private:
+  template <int D>
+  struct Memory {
+    FilterState<D> state;
+    FilterScratch<D> scratch;
+    std::vector<StripShare<D>> shares;
+    std::vector<double> sensitivity, row;
+    std::vector<std::uint8_t> touched;
+    std::vector<std::int32_t> active;
+  };
+
   void copy(const Track& track);
+  template <int D>
+  void make_memory();
+  void run(std::int64_t count, const FilterOutputs& out, const ProductSums* sums);
 
   DragModel model_;
+  bool sensitivities_;
   std::vector<double> track_;
   std::vector<std::uint8_t> excluded_;
-  std::vector<StripShare> shares_;
-  std::vector<double> sensitivity_;
   FilterProblem problem_;
-  FilterScratch scratch_;
-  FilterState state_;
+  std::variant<Memory<2>, Memory<3>> memory_;
 };
 
 } // namespace driftwalk

@@ -1,4 +1,4 @@
-// Mean and covariance of (x, y, vx, vy) through a drift, a kick and a sample.
+// Mean and covariance of D coordinates and their velocities through a drift, a kick and a sample.
 #pragma once
 
 #include "driftwalk/config.hpp"
@@ -6,133 +6,240 @@
 
 DRIFTWALK_LANES_BEGIN
 
-using Matrix2 = double[2][2];
-using Matrix4 = double[4][4];
+template <int N>
+using Square = double[N][N];
 
-// Positions move by `dt` times the velocities.
-inline void drift_mean(double mean[4], double dt) {
-  mean[0] += dt * mean[2];
-  mean[1] += dt * mean[3];
+// Coordinates move by `dt` times their velocities.
+template <int D>
+inline void drift_mean(FilterState<D>& state, double dt) {
+  for (int a = 0; a < D; ++a) {
+    state.mean[a] += dt * state.mean[a + D];
+  }
 }
-inline void drift_covariance(Matrix4& P, double dt) {
-  for (int a = 0; a < 2; ++a) {
-    for (int b = 0; b < 4; ++b) {
-      P[a][b] += dt * P[a + 2][b];
+template <int D>
+inline void drift_covariance(FilterState<D>& state, double dt) {
+  Square<2 * D>& P = state.covariance;
+  for (int a = 0; a < D; ++a) {
+    for (int b = 0; b < 2 * D; ++b) {
+      P[a][b] += dt * P[a + D][b];
     }
   }
-  for (int a = 0; a < 4; ++a) {
-    for (int b = 0; b < 2; ++b) {
-      P[a][b] += dt * P[a][b + 2];
+  for (int a = 0; a < 2 * D; ++a) {
+    for (int b = 0; b < D; ++b) {
+      P[a][b] += dt * P[a][b + D];
+    }
+  }
+}
+
+inline void invert(const Square<2>& A, Square<2>& out) {
+  const double determinant = A[0][0] * A[1][1] - A[0][1] * A[1][0];
+  out[0][0] = A[1][1] / determinant;
+  out[0][1] = -A[0][1] / determinant;
+  out[1][0] = -A[1][0] / determinant;
+  out[1][1] = A[0][0] / determinant;
+}
+inline void invert(const Square<3>& A, Square<3>& out) {
+  for (int a = 0; a < 3; ++a) {
+    const int b = (a + 1) % 3, c = (a + 2) % 3;
+    for (int k = 0; k < 3; ++k) {
+      const int l = (k + 1) % 3, m = (k + 2) % 3;
+      out[k][a] = A[b][l] * A[c][m] - A[b][m] * A[c][l];
+    }
+  }
+  const double determinant = A[0][0] * out[0][0] + A[0][1] * out[1][0] + A[0][2] * out[2][0];
+  for (int a = 0; a < 3; ++a) {
+    for (int b = 0; b < 3; ++b) {
+      out[a][b] /= determinant;
     }
   }
 }
 
 // A linearly implicit kick: v' = v + h W a with W = (I - h/2 da/dv)^-1, and its derivatives with W
 // held fixed, as the gain of the filter is.
+template <int D>
 struct Kick {
-  Matrix2 inverse;     // W
-  double change[2];    // of the velocity
-  Matrix2 by_position; // d(v')/d(position)
-  Matrix2 by_velocity; // d(v')/d(v)
+  Square<D> inverse;     // W
+  double change[D];      // of the velocity
+  Square<D> by_position; // d(v')/d(coordinates)
+  Square<D> by_velocity; // d(v')/d(v)
 };
 
-inline Kick make_kick(const DragResponse& drag, double h) {
-  const double a = 1 - h / 2 * drag.by_velocity[0][0], b = -h / 2 * drag.by_velocity[0][1];
-  const double c = -h / 2 * drag.by_velocity[1][0], d = 1 - h / 2 * drag.by_velocity[1][1];
-  const double determinant = a * d - b * c;
-  Kick kick{{{d / determinant, -b / determinant}, {-c / determinant, a / determinant}}, {}, {}, {}};
-  for (int i = 0; i < 2; ++i) {
-    const double wx = h * kick.inverse[i][0], wy = h * kick.inverse[i][1];
-    kick.change[i] = wx * drag.acceleration[0] + wy * drag.acceleration[1];
-    for (int j = 0; j < 2; ++j) {
-      kick.by_position[i][j] = wx * drag.by_position[0][j] + wy * drag.by_position[1][j];
-      kick.by_velocity[i][j] =
-          (i == j ? 1 : 0) + wx * drag.by_velocity[0][j] + wy * drag.by_velocity[1][j];
+template <int D>
+inline Kick<D> make_kick(const DragResponse<D>& drag, double h) {
+  Square<D> implicit;
+  for (int a = 0; a < D; ++a) {
+    for (int b = 0; b < D; ++b) {
+      implicit[a][b] = (a == b ? 1 : 0) - h / 2 * drag.by_velocity[a][b];
+    }
+  }
+  Kick<D> kick{};
+  invert(implicit, kick.inverse);
+  for (int a = 0; a < D; ++a) {
+    kick.by_velocity[a][a] = 1;
+    for (int c = 0; c < D; ++c) {
+      const double w = h * kick.inverse[a][c];
+      kick.change[a] += w * drag.acceleration[c];
+      for (int b = 0; b < D; ++b) {
+        kick.by_position[a][b] += w * drag.by_position[c][b];
+        kick.by_velocity[a][b] += w * drag.by_velocity[c][b];
+      }
     }
   }
   return kick;
 }
 
-inline void kick_covariance(Matrix4& P, const Kick& kick) {
-  const Matrix2 &X = kick.by_position, &V = kick.by_velocity;
-  for (int b = 0; b < 4; ++b) {
-    const double x = P[0][b], y = P[1][b], vx = P[2][b], vy = P[3][b];
-    P[2][b] = X[0][0] * x + X[0][1] * y + V[0][0] * vx + V[0][1] * vy;
-    P[3][b] = X[1][0] * x + X[1][1] * y + V[1][0] * vx + V[1][1] * vy;
-  }
-  for (int a = 0; a < 4; ++a) {
-    const double x = P[a][0], y = P[a][1], vx = P[a][2], vy = P[a][3];
-    P[a][2] = X[0][0] * x + X[0][1] * y + V[0][0] * vx + V[0][1] * vy;
-    P[a][3] = X[1][0] * x + X[1][1] * y + V[1][0] * vx + V[1][1] * vy;
+// The velocity that follows from a state's coordinates and velocities, by the linear part of a
+// kick.
+template <int D, class Real>
+inline void kick_linear(const Kick<D>& kick, const Real (&coordinates)[D],
+                        const Real (&velocities)[D], Real (&after)[D]) {
+  for (int a = 0; a < D; ++a) {
+    Real sum = kick.by_position[a][0] * coordinates[0];
+    for (int b = 1; b < D; ++b) {
+      sum = sum + kick.by_position[a][b] * coordinates[b];
+    }
+    for (int b = 0; b < D; ++b) {
+      sum = sum + kick.by_velocity[a][b] * velocities[b];
+    }
+    after[a] = sum;
   }
 }
 
-// White acceleration of intensity q over a step h, damped by W as the kick is. Without W the force
-// came out up to 6 % low.
-inline void add_noise(Matrix4& P, const Matrix2& W, double q, double h) {
-  const double position = q * h * h * h / 3, mixed = q * h * h / 2, velocity = q * h;
-  for (int a = 0; a < 2; ++a) {
-    for (int b = 0; b < 2; ++b) {
-      const double damped = W[a][0] * W[b][0] + W[a][1] * W[b][1];
-      P[a][b] += position * damped;
-      P[a][b + 2] += mixed * damped;
-      P[a + 2][b] += mixed * damped;
-      P[a + 2][b + 2] += velocity * damped;
+template <int D>
+inline void kick_covariance(FilterState<D>& state, const Kick<D>& kick) {
+  Square<2 * D>& P = state.covariance;
+  double coordinates[D], velocities[D], after[D];
+  for (int b = 0; b < 2 * D; ++b) {
+    for (int a = 0; a < D; ++a) {
+      coordinates[a] = P[a][b];
+      velocities[a] = P[a + D][b];
+    }
+    kick_linear<D, double>(kick, coordinates, velocities, after);
+    for (int a = 0; a < D; ++a) {
+      P[a + D][b] = after[a];
+    }
+  }
+  for (int b = 0; b < 2 * D; ++b) {
+    for (int a = 0; a < D; ++a) {
+      coordinates[a] = P[b][a];
+      velocities[a] = P[b][a + D];
+    }
+    kick_linear<D, double>(kick, coordinates, velocities, after);
+    for (int a = 0; a < D; ++a) {
+      P[b][a + D] = after[a];
     }
   }
 }
 
-// The innovation of a sample and its covariance S.
-struct Innovation {
-  double x, y;
-  double xx, xy, yy; // S
-
-  double determinant() const { return xx * yy - xy * xy; }
-  double chi_squared() const { return (yy * x * x - 2 * xy * x * y + xx * y * y) / determinant(); }
-};
-
-inline Innovation innovation_of(const FilterState& state, double x, double y, double variance) {
-  const Matrix4& P = state.covariance;
-  return {x - state.mean[0], y - state.mean[1], P[0][0] + variance, P[0][1], P[1][1] + variance};
+// White acceleration over a step h, damped by W as the kick is. Without W the force came out up to
+// 6 % low.
+template <int D>
+inline void add_noise(FilterState<D>& state, const Square<D>& W, const double* intensity,
+                      double h) {
+  Square<2 * D>& P = state.covariance;
+  for (int a = 0; a < D; ++a) {
+    for (int b = 0; b < D; ++b) {
+      double damped = 0;
+      for (int c = 0; c < D; ++c) {
+        damped += W[a][c] * intensity[c] * W[b][c];
+      }
+      P[a][b] += h * h * h / 3 * damped;
+      P[a][b + D] += h * h / 2 * damped;
+      P[a + D][b] += h * h / 2 * damped;
+      P[a + D][b + D] += h * damped;
+    }
+  }
 }
 
-// L^-1, L L' = S: x / l_xx and (y - l_yx x) / l_yy, with x the first result.
-struct Whitening {
-  double per_xx, yx, per_yy;
+// The innovation of a sample, e, its covariance S = L L', and L^-1 e.
+template <int D>
+struct Innovation {
+  double e[D];
+  Square<D> S;
+  Square<D> L;        // below the diagonal
+  double per_root[D]; // 1 / the diagonal of L
+  double white[D];
+
+  double chi_squared() const {
+    double sum = 0;
+    for (int a = 0; a < D; ++a) {
+      sum += white[a] * white[a];
+    }
+    return sum;
+  }
 };
 
-inline Whitening whitening_of(const Innovation& e) {
-  const double lxx = __builtin_sqrt(e.xx), lyx = e.xy / lxx;
-  return {1 / lxx, lyx, 1 / __builtin_sqrt(e.yy - lyx * lyx)};
+template <int D>
+inline Innovation<D> innovation_of(const FilterState<D>& state, const double (&sample)[D],
+                                   const double (&variance)[D]) {
+  Innovation<D> out{};
+  for (int a = 0; a < D; ++a) {
+    out.e[a] = sample[a] - state.mean[a];
+    for (int b = 0; b < D; ++b) {
+      out.S[a][b] = state.covariance[a][b] + (a == b ? variance[a] : 0);
+    }
+  }
+  for (int a = 0; a < D; ++a) {
+    double rest = out.S[a][a], white = out.e[a];
+    for (int b = 0; b < a; ++b) {
+      double product = out.S[a][b];
+      for (int c = 0; c < b; ++c) {
+        product -= out.L[a][c] * out.L[b][c];
+      }
+      out.L[a][b] = product * out.per_root[b];
+      rest -= out.L[a][b] * out.L[a][b];
+      white -= out.L[a][b] * out.white[b];
+    }
+    out.per_root[a] = 1 / __builtin_sqrt(rest);
+    out.white[a] = white * out.per_root[a];
+  }
+  return out;
 }
 
 // K = P H' S^-1
+template <int D>
 struct Gain {
-  double by_x[4], by_y[4];
+  double by[2 * D][D];
 };
 
-inline Gain gain_of(const Matrix4& P, const Innovation& e) {
-  const double determinant = e.determinant();
-  const double xx = e.yy / determinant, xy = -e.xy / determinant, yy = e.xx / determinant;
-  Gain gain;
-  for (int a = 0; a < 4; ++a) {
-    gain.by_x[a] = P[a][0] * xx + P[a][1] * xy;
-    gain.by_y[a] = P[a][0] * xy + P[a][1] * yy;
+template <int D>
+inline Gain<D> gain_of(const Square<2 * D>& P, const Innovation<D>& e) {
+  Gain<D> gain;
+  for (int row = 0; row < 2 * D; ++row) {
+    double (&g)[D] = gain.by[row];
+    for (int a = 0; a < D; ++a) {
+      g[a] = P[row][a];
+      for (int b = 0; b < a; ++b) {
+        g[a] -= e.L[a][b] * g[b];
+      }
+      g[a] *= e.per_root[a];
+    }
+    for (int a = D - 1; a >= 0; --a) {
+      for (int b = a + 1; b < D; ++b) {
+        g[a] -= e.L[b][a] * g[b];
+      }
+      g[a] *= e.per_root[a];
+    }
   }
   return gain;
 }
 
-inline void update(FilterState& state, const Innovation& e, const Gain& gain) {
-  Matrix4 after;
-  for (int a = 0; a < 4; ++a) {
-    state.mean[a] += gain.by_x[a] * e.x + gain.by_y[a] * e.y;
-    for (int b = 0; b < 4; ++b) {
-      after[a][b] = state.covariance[a][b] - gain.by_x[a] * state.covariance[0][b] -
-                    gain.by_y[a] * state.covariance[1][b];
+template <int D>
+inline void update(FilterState<D>& state, const Innovation<D>& e, const Gain<D>& gain) {
+  Square<2 * D> after;
+  for (int a = 0; a < 2 * D; ++a) {
+    for (int b = 0; b < 2 * D; ++b) {
+      after[a][b] = state.covariance[a][b];
+      for (int c = 0; c < D; ++c) {
+        after[a][b] -= gain.by[a][c] * state.covariance[c][b];
+      }
+    }
+    for (int c = 0; c < D; ++c) {
+      state.mean[a] += gain.by[a][c] * e.e[c];
     }
   }
-  for (int a = 0; a < 4; ++a) {
-    for (int b = 0; b < 4; ++b) {
+  for (int a = 0; a < 2 * D; ++a) {
+    for (int b = 0; b < 2 * D; ++b) {
       state.covariance[a][b] = 0.5 * (after[a][b] + after[b][a]);
     }
   }

@@ -5,14 +5,22 @@
 
 namespace driftwalk {
 
+template <int D>
+struct InferKernelOf {
+  // Takes the filter over the next `count` samples. With sums, which may be null, whitened
+  // innovations and derivatives are not handed out.
+  void (*run)(const FilterProblem&, FilterState<D>&, const FilterScratch<D>&, const FilterOutputs&,
+              const ProductSums*, std::int64_t count);
+  // The mean drag at one state, and its derivative by the coefficients (D rows of rows * columns *
+  // 2 numbers, zero before) through `shares`. `mean` and `covariance` as in UncertainBlock.
+  DragResponse<D> (*drag)(const FilterProblem&, double theta, double omega, const double* mean,
+                          const double (*covariance)[2 * D], StripShare<D>* shares,
+                          double* by_coefficients);
+};
+
 struct InferKernel {
-  // Takes the filter over the next `count` samples.
-  void (*run)(const FilterProblem&, FilterState&, const FilterScratch&, const FilterOutputs&,
-              std::int64_t count);
-  // The mean drag at one state, and its derivative by the coefficients (2 rows of rows * columns *
-  // 2 numbers, zero before) through `shares`.
-  DragResponse (*drag)(const FilterProblem&, double theta, double omega, const double mean[4],
-                       const double (*covariance)[4], StripShare* shares, double* by_coefficients);
+  InferKernelOf<2> position; // the angle is an input, or unknown
+  InferKernelOf<3> pose;     // the angle is a part of the state
 };
 
 // The kernel of the chosen instruction set (dispatch.hpp).

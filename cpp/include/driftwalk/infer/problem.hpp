@@ -24,6 +24,7 @@ struct StripBlock {
   double strip_width; // [m]
   int strips;         // a side
   double drag_scale; // acceleration by a strip's squared closing speed, 1/2 rho C_d (a/N) d/m [1/m]
+  double mass_by_inertia; // m/I [1/m^2]
 };
 
 // The orientations over which the drag is averaged: those of a block whose angle is not known.
@@ -33,11 +34,13 @@ struct Orientations {
   int count; // 0: the angle of the track
 };
 
+// What is known of the block's angle is either an input, in `theta` and `omega` without holes, or a
+// measurement like the position, in `theta` alone, NaN where it is missing.
 struct Track {
   const double* time;           // [s], increasing
   const double* x;              // [m], NaN where a sample is missing
   const double* y;              // [m]
-  const double* theta;          // [rad], continuous: no jumps by 2 pi
+  const double* theta;          // [rad]; an input has no jumps by 2 pi
   const double* omega;          // [rad/s]
   const std::uint8_t* excluded; // 1: the interval that ends here says nothing about the water
   std::int64_t samples;
@@ -48,53 +51,76 @@ struct FilterProblem {
   StripBlock block;
   Orientations orientations;
   Track track;
-  double noise_intensity;   // q: the velocity's variance grows by q dt [m^2/s^3]
-  double position_variance; // of one coordinate of a sample [m^2]
-  double largest_step;      // [s]
-  double longest_gap;       // [s] since the last sample; beyond it the state starts anew
+  double intensity[3]; // the variances of vx, vy, omega grow by it times dt [m^2/s^3, rad^2/s^3]
+  double variance[3];  // of a sample's x, y, theta [m^2, rad^2]
+  double largest_step; // [s]
+  double longest_gap;  // [s] since the last sample; beyond it the state starts anew
 };
 
-// Position and velocity: what the filter knows of them.
+// What the filter knows: D coordinates, x, y and for D = 3 theta, then their D velocities.
+template <int D>
 struct FilterState {
-  double mean[4];          // x, y, vx, vy
-  double covariance[4][4]; // of the same
-  double seen;             // time of the last sample that was there [s]
-  bool open;               // whether there is a state at all
-  std::int64_t next;       // the sample that comes next
+  double mean[2 * D];
+  double covariance[2 * D][2 * D];
+  double seen;       // time of the last sample that was there [s]
+  bool open;         // whether there is a state at all
+  std::int64_t next; // the sample that comes next
 };
 
 // The part of one strip in d(acceleration)/d(coefficients).
+template <int D>
 struct StripShare {
-  double response[4]; // d(acceleration)/d(block velocity) of the strip, [axis][axis] [1/s]
-  double weight_y[4]; // B in y at the four rows of nodes
-  double along_x;     // place in the cell, [0, 1]
-  std::int32_t node;  // row * columns + column of the first of the 4 x 4 nodes
+  double response[D][2]; // d(acceleration)/d(velocity of the strip), [axis][x, y]
+  double weight_y[4];    // B in y at the four rows of nodes
+  double along_x;        // place in the cell, [0, 1]
+  std::int32_t node;     // row * columns + column of the first of the 4 x 4 nodes
 };
 
 // Memory of a filter, made once.
+template <int D>
 struct FilterScratch {
-  StripShare* shares;      // one for each strip of each orientation; null without sensitivities
-  double* sensitivity;     // [4][stride]: d(state)/d(parameters)
-  std::int64_t stride;     // a multiple of 8, at least parameters + 8
+  StripShare<D>* shares;   // one for each strip of each orientation; null without sensitivities
+  double* sensitivity;     // [2 D][stride]: d(state)/d(parameters)
+  double* row;             // [D][stride]
+  std::uint8_t* touched;   // [stride / 8]: whether eight columns are not zero
+  std::int32_t* active;    // [stride / 8]: the groups of eight columns that are not
+  std::int64_t stride;     // a multiple of 8, at least parameters
   std::int64_t parameters; // 2 rows columns + 1: coefficients of u, of v, then ln C_d
 };
 
 // Results of `count` samples. An innovation that does not exist is NaN.
 struct FilterOutputs {
-  double* innovation; // [count][2]: sample minus prediction [m]
-  double* covariance; // [count][3]: of the innovation, xx, xy, yy [m^2]
+  double* innovation; // [count][D]: sample minus prediction [m, m, rad]
+  double* covariance; // [count][D (D + 1)/2]: of the innovation: xx, xy, yy, x theta, ...
   std::uint8_t* used; // [count]: whether the innovation belongs to the likelihood
-  double* state;      // [count][4]: after the sample [m, m, m/s, m/s]
-  double* whitened;   // [count][2]: L^-1 innovation, L L' its covariance; 0 where not used
-  double* jacobian;   // [2 count][parameters]: L^-1 d(prediction)/d(parameters); 0 where not used
+  double* state;      // [count][2 D]: after the sample
+  double* whitened;   // [count][D]: L^-1 innovation, L L' its covariance; 0 where not used
+  double* jacobian;   // [D count][parameters]: L^-1 d(prediction)/d(parameters); 0 where not used
 };
 
-// The mean acceleration of a block whose position and velocity are uncertain.
+// What the filter adds up instead of handing out its derivatives, and the room for it. `stride` is
+// that of the scratch.
+struct ProductSums {
+  static constexpr int most_rows = 48;
+  int columns;              // R, beside the derivatives
+  std::int64_t first;       // the sample with which kept and right begin
+  const std::uint8_t* kept; // [samples]: 0 leaves a sample out of the sums
+  const double* right;      // [samples][D][columns]
+  double* information;      // [stride][stride]: J' J, on and above the diagonal
+  double* products;         // [columns][stride]: R' J
+  double* rows;             // [most_rows][stride]
+  double* beside;           // [most_rows][columns]
+  double* size;             // [stride / 8]
+  std::int32_t* groups;     // [stride / 8]
+};
+
+// The mean acceleration of a block whose state is uncertain: of x, y and for D = 3 of the angle.
+template <int D>
 struct DragResponse {
-  double acceleration[2];   // [m/s^2]
-  double by_position[2][2]; // [axis of the acceleration][axis of the position] [1/s^2]
-  double by_velocity[2][2]; // [1/s]
-  int shares;               // strips that take part
+  double acceleration[D];   // [m/s^2, rad/s^2]
+  double by_position[D][D]; // [axis of the acceleration][coordinate]
+  double by_velocity[D][D];
+  int shares; // strips that take part
 };
 
 } // namespace driftwalk

@@ -1,8 +1,9 @@
-// d(state)/d(coefficients, ln C_d): four rows, one column a parameter, carried along with the
+// d(state)/d(coefficients, ln C_d): 2 D rows, one column a parameter, carried along with the
 // filter.
 //
 // The columns go through the same drifts, kicks and gains as the mean, with the gains held fixed.
-// Each operation is one pass over rows that stay in the first-level cache.
+// The samples that follow make the filter forget: columns that the block has left behind become as
+// good as zero, are set to zero now and then, and left out until they are touched again.
 #pragma once
 
 #include "driftwalk/infer/doubles.hpp"
@@ -16,94 +17,186 @@ inline void add_four(double* to, Four value) {
 }
 
 // Adds a strip to the derivatives by the coefficients, of u first and `nodes` further those of v:
-// `row_x` of what goes along x, `row_y` along y. The drag depends on u minus the velocity, so with
-// scale -1 the strip's response to the velocity gives its response to the flow.
-inline void add_share(const StripShare& share, int columns, std::int64_t nodes,
-                      const double response[4], double scale, double* row_x, double* row_y) {
+// rows[a] of what goes along coordinate a. The drag depends on u minus the velocity, so with scale
+// -1 the strip's response to the velocity gives its response to the flow.
+template <int D>
+inline void add_share(const StripShare<D>& share, int columns, std::int64_t nodes,
+                      const double (&response)[D][2], double scale, double* const* rows) {
   const Four by_x = scale * row_weights.value(share.along_x);
   for (int row = 0; row < 4; ++row) {
     const Four weights = share.weight_y[row] * by_x;
     const std::int64_t u = share.node + std::int64_t(row) * columns, v = u + nodes;
-    add_four(row_x + u, response[0] * weights);
-    add_four(row_x + v, response[1] * weights);
-    add_four(row_y + u, response[2] * weights);
-    add_four(row_y + v, response[3] * weights);
+    for (int a = 0; a < D; ++a) {
+      add_four(rows[a] + u, response[a][0] * weights);
+      add_four(rows[a] + v, response[a][1] * weights);
+    }
   }
 }
 
+// Below it a derivative of the state by a coefficient [m / (m/s), m/s / (m/s), ...] counts as zero.
+inline constexpr double forgotten = 1e-10;
+inline constexpr int samples_between_forgetting = 16;
+
+template <int D>
 class Sensitivity {
 public:
-  explicit Sensitivity(const FilterScratch& scratch)
-      : parameters_(scratch.parameters), stride_(scratch.stride),
-        rows_{scratch.sensitivity, scratch.sensitivity + scratch.stride,
-              scratch.sensitivity + 2 * scratch.stride, scratch.sensitivity + 3 * scratch.stride} {}
-
-  void clear() {
-    for (std::int64_t p = 0; p < 4 * stride_; ++p) {
-      rows_[0][p] = 0;
+  // The sensitivities are those of an earlier run of the same scratch, or zero.
+  explicit Sensitivity(const FilterScratch<D>& scratch)
+      : parameters_(scratch.parameters), stride_(scratch.stride), touched_(scratch.touched),
+        active_(scratch.active) {
+    for (int a = 0; a < 2 * D; ++a) {
+      rows_[a] = scratch.sensitivity + a * scratch.stride;
     }
+    list_active();
   }
 
-  // A drift of the positions, then the part of a kick that is linear in the state.
-  void drift_and_kick(double dt, const Kick& kick) {
-    const Matrix2 &X = kick.by_position, &V = kick.by_velocity;
-    for (std::int64_t p = 0; p < stride_; p += 8) {
-      const Eight vx = Eight::load(rows_[2] + p), vy = Eight::load(rows_[3] + p);
-      const Eight x = Eight::load(rows_[0] + p) + dt * vx, y = Eight::load(rows_[1] + p) + dt * vy;
-      x.store(rows_[0] + p);
-      y.store(rows_[1] + p);
-      (X[0][0] * x + X[0][1] * y + V[0][0] * vx + V[0][1] * vy).store(rows_[2] + p);
-      (X[1][0] * x + X[1][1] * y + V[1][0] * vx + V[1][1] * vy).store(rows_[3] + p);
+  void clear() {
+    for (int k = 0; k < count_; ++k) {
+      clear_group(active_[k]);
+    }
+    count_ = 0;
+  }
+
+  // A drift of the coordinates, then the part of a kick that is linear in the state.
+  void drift_and_kick(double dt, const Kick<D>& kick) {
+    Eight coordinates[D], velocities[D], after[D];
+    for (int k = 0; k < count_; ++k) {
+      const std::int64_t p = 8 * std::int64_t(active_[k]);
+      for (int a = 0; a < D; ++a) {
+        velocities[a] = Eight::load(rows_[a + D] + p);
+        coordinates[a] = Eight::load(rows_[a] + p) + dt * velocities[a];
+        coordinates[a].store(rows_[a] + p);
+      }
+      kick_linear<D, Eight>(kick, coordinates, velocities, after);
+      for (int a = 0; a < D; ++a) {
+        after[a].store(rows_[a + D] + p);
+      }
     }
   }
 
   // What the parameters themselves add to the velocity in a kick: the flow at each strip, and the
   // drag as a whole.
-  void add_flow(const StripShare* shares, int count, int columns, const Kick& kick, double h) {
+  void add_flow(const StripShare<D>* shares, int count, int columns, const Kick<D>& kick,
+                double h) {
     const std::int64_t nodes = (parameters_ - 1) / 2;
-    const Matrix2& W = kick.inverse;
     for (int k = 0; k < count; ++k) {
-      const double* const d = shares[k].response;
-      const double damped[4] = {W[0][0] * d[0] + W[0][1] * d[2], W[0][0] * d[1] + W[0][1] * d[3],
-                                W[1][0] * d[0] + W[1][1] * d[2], W[1][0] * d[1] + W[1][1] * d[3]};
-      add_share(shares[k], columns, nodes, damped, -h, rows_[2], rows_[3]);
+      touch(shares[k].node, columns);
+      touch(shares[k].node + nodes, columns);
+      double damped[D][2] = {};
+      for (int a = 0; a < D; ++a) {
+        for (int c = 0; c < D; ++c) {
+          damped[a][0] += kick.inverse[a][c] * shares[k].response[c][0];
+          damped[a][1] += kick.inverse[a][c] * shares[k].response[c][1];
+        }
+      }
+      add_share<D>(shares[k], columns, nodes, damped, -h, rows_ + D);
     }
-    rows_[2][parameters_ - 1] += kick.change[0];
-    rows_[3][parameters_ - 1] += kick.change[1];
+    touch_group((parameters_ - 1) / 8);
+    for (int a = 0; a < D; ++a) {
+      rows_[a + D][parameters_ - 1] += kick.change[a];
+    }
   }
 
   void drift(double dt) {
-    for (std::int64_t p = 0; p < stride_; p += 8) {
-      (Eight::load(rows_[0] + p) + dt * Eight::load(rows_[2] + p)).store(rows_[0] + p);
-      (Eight::load(rows_[1] + p) + dt * Eight::load(rows_[3] + p)).store(rows_[1] + p);
-    }
-  }
-
-  void write_whitened(const Whitening& whiten, double* row_x, double* row_y) const {
-    std::int64_t p = 0;
-    for (; p + 8 <= parameters_; p += 8) {
-      const Eight x = Eight::load(rows_[0] + p) * whiten.per_xx;
-      x.store(row_x + p);
-      ((Eight::load(rows_[1] + p) - whiten.yx * x) * whiten.per_yy).store(row_y + p);
-    }
-    for (; p < parameters_; ++p) {
-      row_x[p] = rows_[0][p] * whiten.per_xx;
-      row_y[p] = (rows_[1][p] - whiten.yx * row_x[p]) * whiten.per_yy;
-    }
-  }
-
-  void update(const Gain& gain) {
-    for (std::int64_t p = 0; p < stride_; p += 8) {
-      const Eight x = Eight::load(rows_[0] + p), y = Eight::load(rows_[1] + p);
-      for (int a = 0; a < 4; ++a) {
-        (Eight::load(rows_[a] + p) - (gain.by_x[a] * x + gain.by_y[a] * y)).store(rows_[a] + p);
+    for (int k = 0; k < count_; ++k) {
+      const std::int64_t p = 8 * std::int64_t(active_[k]);
+      for (int a = 0; a < D; ++a) {
+        (Eight::load(rows_[a] + p) + dt * Eight::load(rows_[a + D] + p)).store(rows_[a] + p);
       }
     }
   }
 
+  // rows[a]: row a of L^-1 d(prediction), `stride` numbers.
+  void write_whitened(const Innovation<D>& e, double* const (&rows)[D]) const {
+    for (int a = 0; a < D; ++a) {
+      __builtin_memset(rows[a], 0, sizeof(double) * std::size_t(stride_));
+    }
+    Eight white[D];
+    for (int k = 0; k < count_; ++k) {
+      const std::int64_t p = 8 * std::int64_t(active_[k]);
+      for (int a = 0; a < D; ++a) {
+        white[a] = Eight::load(rows_[a] + p);
+        for (int b = 0; b < a; ++b) {
+          white[a] -= e.L[a][b] * white[b];
+        }
+        white[a] *= e.per_root[a];
+        white[a].store(rows[a] + p);
+      }
+    }
+  }
+
+  void update(const Gain<D>& gain) {
+    Eight coordinates[D];
+    for (int k = 0; k < count_; ++k) {
+      const std::int64_t p = 8 * std::int64_t(active_[k]);
+      for (int a = 0; a < D; ++a) {
+        coordinates[a] = Eight::load(rows_[a] + p);
+      }
+      for (int row = 0; row < 2 * D; ++row) {
+        Eight change = gain.by[row][0] * coordinates[0];
+        for (int a = 1; a < D; ++a) {
+          change += gain.by[row][a] * coordinates[a];
+        }
+        (Eight::load(rows_[row] + p) - change).store(rows_[row] + p);
+      }
+    }
+  }
+
+  // Sets columns that are as good as zero to zero.
+  void forget() {
+    int kept = 0;
+    for (int k = 0; k < count_; ++k) {
+      Eight::Mask large = Eight(0) < Eight(0);
+      for (const double* row : rows_) {
+        const Eight value = Eight::load(row + 8 * std::int64_t(active_[k]));
+        large = large | (value > forgotten) | (value < -forgotten);
+      }
+      if (any(large)) {
+        active_[kept++] = active_[k];
+      } else {
+        clear_group(active_[k]);
+      }
+    }
+    count_ = kept;
+  }
+
 private:
+  void list_active() {
+    count_ = 0;
+    for (std::int64_t group = 0; group < stride_ / 8; ++group) {
+      if (touched_[group] != 0) {
+        active_[count_++] = static_cast<std::int32_t>(group);
+      }
+    }
+  }
+
+  void clear_group(std::int32_t group) {
+    touched_[group] = 0;
+    for (double* row : rows_) {
+      Eight(0).store(row + 8 * std::int64_t(group));
+    }
+  }
+
+  void touch_group(std::int64_t group) {
+    if (touched_[group] == 0) {
+      touched_[group] = 1;
+      active_[count_++] = static_cast<std::int32_t>(group);
+    }
+  }
+
+  // The 4 x 4 columns from the one of a node on.
+  void touch(std::int64_t node, int columns) {
+    for (int row = 0; row < 4; ++row, node += columns) {
+      touch_group(node / 8);
+      touch_group((node + 3) / 8);
+    }
+  }
+
   std::int64_t parameters_, stride_;
-  double* rows_[4];
+  std::uint8_t* touched_;
+  std::int32_t* active_;
+  int count_ = 0;
+  double* rows_[2 * D];
 };
 
 DRIFTWALK_LANES_END
