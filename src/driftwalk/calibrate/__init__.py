@@ -5,6 +5,7 @@ from driftwalk.calibrate.fit import check_fit, fit_motion
 from driftwalk.calibrate.fit_result import fitted_flow
 from driftwalk.calibrate.own_flow import recording_flow
 from driftwalk.calibrate.run import calibrate
+from driftwalk.calibrate.score import score_fit
 
 __all__ = [
     "calibrate",
@@ -13,4 +14,5 @@ __all__ = [
     "fit_motion",
     "fitted_flow",
     "recording_flow",
+    "score_fit",
 ]
