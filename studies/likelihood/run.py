@@ -17,11 +17,12 @@ import time
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 from study_sets import WORLDS, Case, cases_of, keep_motion, load_motion, record
 
 import driftwalk as dw
+from driftwalk.calibrate.fit import AngleUse
 from driftwalk.core.errors import DriftwalkError
 from driftwalk.core.provenance import plain
 
@@ -38,7 +39,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("out", type=Path)
     parser.add_argument("--set", dest="set_name", choices=WORLDS, required=True)
-    parser.add_argument("--angle", default="given", help="as of fit_motion")
+    parser.add_argument("--angle", choices=get_args(AngleUse), default="given")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--count", type=int, default=None, help="worlds; default: all of the set")
     options = parser.parse_args()

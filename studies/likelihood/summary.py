@@ -78,11 +78,15 @@ def figures_of(lines: list[dict[str, Any]]) -> dict[str, Any]:
     for name, (_, bars) in PARAMETERS.items():
         flow = name.startswith("flow")
         error = values_of(away, name if flow else f"{name}_error")
-        found[name] = {**spread(error), "within": {f"{bar:g}": share(error, bar) for bar in bars}}
+        known = error[np.isfinite(error)]
+        within = {f"{bar:g}": share(error, bar) for bar in bars}
+        found[name] = {**spread(known), "within": within} if known.size else {}
     for name in WITH_INTERVAL:
         z, covered = values_of(away, f"{name}_z"), values_of(away, f"{name}_covered")
         found.setdefault(name, {}).update(
-            rms_z=float(np.sqrt(np.mean(z**2))), mean_z=float(z.mean()), covered=float(covered.mean())
+            rms_z=float(np.sqrt(np.mean(z**2))),
+            mean_z=float(z.mean()),
+            covered=float(covered.mean()),
         )
     for name in ("wall_share", "seconds"):
         value = values_of(away, name)
@@ -91,9 +95,8 @@ def figures_of(lines: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def values_of(lines: list[dict[str, Any]], name: str) -> npt.NDArray[np.float64]:
-    """Return one number of every line; those that are not finite are left out."""
-    values = np.array([float(line[name]) for line in lines])
-    return values[np.isfinite(values)]
+    """Return one number of every line."""
+    return np.array([float(line[name]) for line in lines])
 
 
 def spread(error: npt.NDArray[np.float64]) -> dict[str, float]:
@@ -108,7 +111,7 @@ def spread(error: npt.NDArray[np.float64]) -> dict[str, float]:
 
 
 def share(error: npt.NDArray[np.float64], bar: float) -> float:
-    """Return the share of errors within a bar."""
+    """Return the share of errors within a bar; one that is not a number is not."""
     return float(np.mean(np.abs(error) <= bar))
 
 
@@ -118,7 +121,7 @@ def markdown(name: str, tables: dict[str, dict[str, Any]]) -> str:
     notes = []
     for group, found in tables.items():
         for parameter, (label, _) in PARAMETERS.items():
-            if parameter in found:
+            if found.get(parameter):
                 rows.append(row(group, label, found["recordings"], found[parameter]))
         notes.append(note(group, found))
     return "\n".join([*rows, "", *notes, ""])
