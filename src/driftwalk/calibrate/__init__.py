@@ -4,6 +4,8 @@ from driftwalk.calibrate.check import check_recording
 from driftwalk.calibrate.fit import check_fit, fit_motion
 from driftwalk.calibrate.fit_result import fitted_flow
 from driftwalk.calibrate.own_flow import recording_flow
+from driftwalk.calibrate.recover import recovery_study
+from driftwalk.calibrate.recover_check import check_recovery
 from driftwalk.calibrate.run import calibrate
 from driftwalk.calibrate.score import score_fit
 
@@ -11,8 +13,10 @@ __all__ = [
     "calibrate",
     "check_fit",
     "check_recording",
+    "check_recovery",
     "fit_motion",
     "fitted_flow",
     "recording_flow",
+    "recovery_study",
     "score_fit",
 ]

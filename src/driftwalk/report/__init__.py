@@ -18,6 +18,12 @@ from driftwalk.report.plot_validation import (
     plot_distance_profile,
     plot_validation,
 )
+from driftwalk.report.recovery_figures import (
+    plot_flow_recovery,
+    plot_recovery,
+    plot_recovery_error,
+    write_recovery_figures,
+)
 
 __all__ = [
     "plot_biplot",
@@ -31,9 +37,12 @@ __all__ = [
     "plot_film_strip",
     "plot_flow",
     "plot_flow_error",
+    "plot_flow_recovery",
     "plot_ks_map",
     "plot_l1_map",
     "plot_outcomes",
+    "plot_recovery",
+    "plot_recovery_error",
     "plot_refined_map",
     "plot_step_density",
     "plot_steps",
@@ -44,5 +53,6 @@ __all__ = [
     "write_assembly_figures",
     "write_figures",
     "write_fit_figures",
+    "write_recovery_figures",
     "write_sensitivity_figures",
 ]
