@@ -19,7 +19,7 @@ LABELS: Final = {
     "tracking_noise": "tracking noise",
 }
 SUMMARY: Final = (
-    *("median_absolute_error", "absolute_error_90", "bias", "rms_error", "rms_z"),
+    *("median_absolute_error", "absolute_error_90", "bias", "spread", "rms_z"),
     *("coverage", "coverage_low", "coverage_high"),
 )
 ATTRS: Final = (
@@ -27,6 +27,8 @@ ATTRS: Final = (
     *("sample_interval_s", "recordings_per_fit", "missing_share", "seed", "confidence"),
     "coverage_confidence",
 )
+NOTABLE_BIAS: Final = 0.05
+NOTABLE_STANDARD_ERRORS: Final = 3.0
 COLUMNS: Final = ("length", "angle", "of", "median |error|", "90 % within", "bias", "rms z")
 
 
@@ -76,7 +78,7 @@ def warnings(found: xr.Dataset) -> list[str]:
     said = []
     for part in _parts(found):
         number = counts(part)
-        where = f"{duration_text(float(part['duration']))}, angle {part['angle'].values}"
+        where = f"{length_text(float(part['duration']))}, angle {part['angle'].values}"
         if number["at_the_wall"]:
             said.append(
                 f"{where}: {number['at_the_wall']} of {number['recordings']} recordings have more "
@@ -89,7 +91,37 @@ def warnings(found: xr.Dataset) -> list[str]:
                 f"{where}: {number['without_fit']} of {number['recordings']} recordings could not "
                 f"be fitted: {texts[0]}"
             )
+    longest = found.isel(duration=-1)
+    for angle in found["angle"].values:
+        said += _bias_warning(longest.sel(angle=angle))
     return said
+
+
+def _bias_warning(part: xr.Dataset) -> list[str]:
+    """Return what to say of a bias of C_d that is neither chance nor small, at one length."""
+    used = counts(part)["used"]
+    values = {key: float(part[key].sel(parameter="drag_coefficient")) for key in ("bias", "spread")}
+    asked = float(part.attrs["drag_coefficient_precision"])
+    least = asked if np.isfinite(asked) else NOTABLE_BIAS
+    chance = values["spread"] / np.sqrt(max(used, 1))
+    if not abs(values["bias"]) > max(least, NOTABLE_STANDARD_ERRORS * chance):
+        return []
+    return [
+        f"{length_text(float(part['duration']))}, angle {part['angle'].values}: C_d is off by "
+        f"{values['bias']:+.0%} on average (chance gives {chance:.0%}); recording longer does not "
+        "mend what of that is not chance"
+    ]
+
+
+def length_text(seconds: float) -> str:
+    """Return a duration in words, without parts that are zero.
+
+    Examples
+    --------
+    >>> length_text(1800.0), length_text(5400.0)
+    ('30 min', '1 h 30 min')
+    """
+    return duration_text(seconds).removesuffix(" 0 s").removesuffix(" 0 min")
 
 
 def print_answer(found: xr.Dataset, folder: Path) -> None:
@@ -136,7 +168,7 @@ def _rows(part: xr.Dataset) -> list[list[str]]:
         )
     flow = [_percent(float(part[key])) for key in ("median_flow_error", "flow_error_90")]
     rows.append(["flow", *flow])
-    head = [duration_text(float(part["duration"])), str(part["angle"].values)]
+    head = [length_text(float(part["duration"])), str(part["angle"].values)]
     return [[*(head if n == 0 else ("", "")), *row] for n, row in enumerate(rows)]
 
 
@@ -156,30 +188,29 @@ def _needed(part: xr.Dataset) -> dict[str, Any]:
         "drag_coefficient_precision": part.attrs["drag_coefficient_precision"],
         "duration_s": float(part["needed_duration"]),
         "duration_s_interval": [float(part[f"needed_duration_{end}"]) for end in ("low", "high")],
-        "drag_coefficient_error_scale_sqrt_s": float(part["drag_coefficient_error_scale"]),
+        "drag_coefficient_spread_scale_sqrt_s": float(part["drag_coefficient_spread_scale"]),
         "basis": _basis(part),
     }
 
 
 def _basis(part: xr.Dataset) -> str:
-    lengths = ", ".join(duration_text(float(value)) for value in part["duration"].values)
-    return f"rms error of ln C_d at {lengths}, taken to fall with the square root of the length"
+    lengths = ", ".join(length_text(float(value)) for value in part["duration"].values)
+    return f"spread of C_d at {lengths}, taken to fall with the square root of the length"
 
 
 def _needed_sentence(part: xr.Dataset) -> str:
-    scale = float(part["drag_coefficient_error_scale"])
+    scale = float(part["drag_coefficient_spread_scale"])
     head = f"angle {part['angle'].values}: "
     if not np.isfinite(scale):
-        return f"{head}too few fits to say how the error of C_d falls with the length"
-    hour = scale / np.sqrt(3600.0)
-    text = f"{head}C_d to {hour:.1%} (rms) in 1 h"
+        return f"{head}too few fits to say how the spread of C_d falls with the length"
+    text = f"{head}C_d to {scale / np.sqrt(3600.0):.1%} (standard deviation) in 1 h"
     asked = float(part.attrs["drag_coefficient_precision"])
     if np.isfinite(asked):
         time, low, high = (
-            duration_text(float(part[f"needed_duration{end}"])) for end in ("", "_low", "_high")
+            length_text(float(part[f"needed_duration{end}"])) for end in ("", "_low", "_high")
         )
         text = (
-            f"{head}for C_d to {asked:.1%} (rms) record {time} "
+            f"{head}for C_d to {asked:.1%} (standard deviation) record {time} "
             f"({part.attrs['needed_confidence']:.0%} interval {low} to {high})"
         )
     return f"{text}: an estimate from the {_basis(part)}"
