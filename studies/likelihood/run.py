@@ -3,12 +3,14 @@
     python studies/likelihood/run.py OUT --set synthetic --angle given [--workers 2] [--count 16]
 
 OUT holds the motions (`recordings/`, shared by all estimators) and `SET-ANGLE.jsonl`. What is in
-there already is not done again, so a study that was stopped goes on where it was.
+there already is not done again, so a study that was stopped goes on where it was. Each line names
+the version of the estimator's source: after a change, begin with no `.jsonl`.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import multiprocessing
 import os
@@ -26,6 +28,8 @@ from driftwalk.calibrate.fit import AngleUse
 from driftwalk.core.errors import DriftwalkError
 from driftwalk.core.provenance import plain
 
+ROOT: Final = Path(__file__).resolve().parents[2]
+INFER: Final = "cpp/include/driftwalk/infer"
 SKIPPED: Final = 77
 KEPT: Final = (
     "wall_share", "samples_used", "maximum_likelihood_drag_coefficient", "iterations", "converged",
@@ -88,6 +92,7 @@ def fit_one(case: Case, folder: Path, angle: str) -> dict[str, Any]:
     world, poses = load_motion(folder / case.file)
     recording = record(case, poses)
     facts = {
+        "estimator": estimator(),
         "set": case.set_name,
         "number": case.number,
         "family": case.family,
@@ -110,6 +115,14 @@ def fit_one(case: Case, folder: Path, angle: str) -> dict[str, Any]:
     )
     kept = {name: fit.attrs[name] for name in KEPT}
     return dict(plain({**facts, **score, **kept, "seconds": round(seconds, 2)}))
+
+
+def estimator() -> str:
+    """Return a number that is another one for another version of the estimator's source."""
+    files = [*ROOT.glob("src/driftwalk/calibrate/fit*.py"), *ROOT.glob(f"{INFER}/*.hpp")]
+    sources = [file for file in files if not file.name.startswith("fit_check")]
+    content = b"".join(source.read_bytes() for source in sorted(sources))
+    return hashlib.sha256(content).hexdigest()[:12]
 
 
 def read_lines(path: Path) -> list[dict[str, Any]]:

@@ -48,6 +48,9 @@ def main() -> None:
     tables = {source.stem: tables_of(read_lines(source)) for source in sources}
     text = "\n".join(markdown(name, found) for name, found in tables.items())
     print(text)
+    versions = {line["estimator"] for source in sources for line in read_lines(source)}
+    if len(versions) > 1:
+        print(f"These are results of {len(versions)} versions of the estimator.", file=sys.stderr)
     if options.store is not None:
         store(options.store, sources, text, tables)
 
@@ -159,7 +162,7 @@ def store(folder: Path, sources: list[Path], text: str, tables: dict[str, Any]) 
     write_atomic(folder / "tables.json", (json.dumps(tables, indent=1) + "\n").encode())
     stored = {}
     for source in sources:
-        lines = sorted(read_lines(source), key=lambda line: line["number"])
+        lines = sorted(read_lines(source), key=lambda line: (line["number"], line["condition"]))
         stored[source.stem] = folder / source.name
         words = "".join(json.dumps(line) + "\n" for line in lines)
         write_atomic(stored[source.stem], words.encode())
