@@ -116,7 +116,7 @@ def check_model(
     try:
         problems = ready_problems(fit, estimate.study, many, body=body)
         drawn = replicates_drawn(
-            fit, estimate, problems, found.leverage.covariance, count=replicates, seed=seed
+            fit, estimate, problems, found.leverage.spread, count=replicates, seed=seed
         )
         motion = compare_motion(
             np.concatenate([problem.steps for problem in problems]),
@@ -133,7 +133,7 @@ def check_model(
         # A recording whose steps cannot be compared is still told whether its errors are white.
         motion, scan = None, None
         attrs |= {"ks_distance": np.nan, "ks_noise_floor": np.nan, "ks_left_out": str(error)}
-    criteria = criteria_of(errors, found, motion, scan)
+    criteria = criteria_of(errors, found, motion, scan, angle=fit.attrs["angle"])
     parts.append(criterion_variables(criteria))
     for more, at in parts:
         data |= more

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.calibrate.fit import _body, _prepare
-from driftwalk.calibrate.fit_newton import Prior, Weights, inverse
+from driftwalk.calibrate.fit_newton import Prior, Weights
 from driftwalk.calibrate.fit_pass import SAMPLES_AT_ONCE, Passes, Point, Series, Sums
 from driftwalk.calibrate.fit_spline import DEGREE, Floats, Spline, basis
 from driftwalk.core.errors import InputError
@@ -34,8 +34,6 @@ MOST_KEPT_PARTS = 4
 """Parts of the recording whose derivatives are kept for the correction of the autocorrelation."""
 DRAWS = 16
 """Draws of the parameters from which that correction is computed."""
-FOUND_AGAIN_S = 2.0
-"""The filter does not know the velocity after an outlier; it has found it again after this time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,18 +182,24 @@ class Contrast:
 class Leverage:
     """What fitting took out of the errors."""
 
-    covariance: Floats
-    """C, of the flow's coefficients and ln C_d."""
+    spread: Floats
+    """A matrix whose product with standard normals has the covariance C: its root."""
     parameters: float
     """Effective number of parameters: the trace of J C J'."""
     autocovariance: Floats
     """Mean of J C J' at lags 0, 1, ..., shape (D, lags + 1)."""
+
+    @property
+    def covariance(self) -> Floats:
+        """C, of the flow's coefficients and ln C_d."""
+        return np.asarray(self.spread @ self.spread.T)
 
 
 def collect(
     estimate: Estimate, errors: Sequence[Errors], contrasts: Sequence[Contrast], *, lags: int
 ) -> Leverage:
     """Fill the contrasts in one pass with derivatives, and return what fitting took out."""
+    from scipy.linalg import solve_triangular
     from scipy.linalg.blas import dsyrk
 
     parameters = 2 * estimate.passes.spline.size + 1
@@ -230,21 +234,22 @@ def collect(
     data = lower + np.tril(lower, -1).T
     prior = Prior(estimate.passes)
     full = prior.add(Sums(0.0, np.zeros(parameters), data, 0), estimate.point, estimate.weights)
-    covariance = inverse(full.information)
+    root = np.linalg.cholesky(full.information)
+    spread = solve_triangular(root, np.eye(parameters), lower=True).T
     return Leverage(
-        covariance,
-        float((covariance * data).sum()),
-        _autocovariance(covariance, errors, kept, lags),
+        spread,
+        float(((data @ spread) * spread).sum()),
+        _autocovariance(spread, errors, kept, lags),
     )
 
 
 def _autocovariance(
-    covariance: Floats, errors: Sequence[Errors], kept: list[tuple[int, int, Floats]], lags: int
+    spread: Floats, errors: Sequence[Errors], kept: list[tuple[int, int, Floats]], lags: int
 ) -> Floats:
     """Return the mean of J C J' by component and lag, from draws of the parameters."""
     components = errors[0].components
     generator = np.random.default_rng(0)
-    draws = np.linalg.cholesky(covariance) @ generator.normal(size=(len(covariance), DRAWS))
+    draws = spread @ generator.normal(size=(len(spread), DRAWS))
     total, pairs = np.zeros((components, lags + 1)), np.zeros(lags + 1)
     for index, start, jacobian in kept:
         moved = (jacobian @ draws).reshape(-1, components, DRAWS)

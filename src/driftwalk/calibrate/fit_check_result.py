@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from driftwalk.calibrate.fit_check_motion import BAND, Density, Motion
+from driftwalk.calibrate.fit_check_place import Local
 from driftwalk.calibrate.fit_check_residuals import Residuals
-from driftwalk.calibrate.fit_check_verdict import Criterion, components_of
+from driftwalk.calibrate.fit_check_verdict import Criterion, components_of, distance_limit
 
 Parts = tuple[dict[str, Any], dict[str, Any]]
 ONE = {"units": "1"}
@@ -56,7 +57,11 @@ def place_variables(found: Residuals) -> Parts:
         "residual_distance": (
             plane,
             np.sqrt(place.chi_squared).reshape(shape),
-            {**ONE, "long_name": "distance of the mean error from zero, in its sd after fitting"},
+            {
+                **ONE,
+                "long_name": "distance of the mean error from zero, in its sd after fitting",
+                "limit": _limit(place),
+            },
         ),
         "noise_ratio": (plane, found.noise_by_place.ratio.reshape(shape), ONE),
         "noise_ratio_std": (plane, found.noise_by_place.std.reshape(shape), ONE),
@@ -91,6 +96,12 @@ def place_variables(found: Residuals) -> Parts:
         "speed_high": ("speed_range", edges[1:], speed),
     }
     return data, coords
+
+
+def _limit(place: Local) -> float:
+    """Return what the largest distance of all cells exceeds once in twenty."""
+    cells = int(np.isfinite(place.chi_squared).sum())
+    return distance_limit(max(cells, 1), place.mean.shape[1])
 
 
 def motion_variables(motion: Motion) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:

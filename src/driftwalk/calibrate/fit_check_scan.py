@@ -55,7 +55,7 @@ def scan_of(
     layout : Layout
         Cells, and parts of the recordings.
     """
-    from scipy.stats import t
+    from scipy.stats import gumbel_r
 
     stretches = _stretches(layout)
     if not stretches:
@@ -66,15 +66,15 @@ def scan_of(
         return None
     logs = np.log(table[:, known])
     mine, theirs = logs[0], logs[1:]
-    count = len(theirs)
     spread = max(float(np.sqrt(theirs.var(axis=0, ddof=1).mean())), LEAST_SPREAD)
     off = (mine - theirs.mean(axis=0)) / spread
     # Each replicate against the others, as the recording is against all.
-    others = (theirs.sum(axis=0) - theirs) / (count - 1)
+    others = (theirs.sum(axis=0) - theirs) / (len(theirs) - 1)
     largest = ((theirs - others) / spread).max(axis=1)
     best = int(off.argmax())
-    typical = max(float(largest.std(ddof=1)), 1e-12) * np.sqrt(1.0 + 1.0 / count)
-    p_value = float(t.sf((off[best] - largest.mean()) / typical, count - 1))
+    # The largest of many has a tail like Gumbel's: two numbers, from mean and standard deviation.
+    scale = largest.std(ddof=1) * np.sqrt(6.0) / np.pi
+    p_value = float(gumbel_r.sf(off[best], largest.mean() - np.euler_gamma * scale, scale))
     first, last = stretches[int(np.flatnonzero(known)[best])]
     chosen = np.exp(theirs[:, best])
     return Scan(

@@ -105,7 +105,7 @@ def replicates_drawn(
     fit: xr.Dataset,
     estimate: Estimate,
     problems: Sequence[Problem],
-    covariance: Floats,
+    spread: Floats,
     *,
     count: int,
     seed: int,
@@ -118,14 +118,14 @@ def replicates_drawn(
         The fit.
     problems : sequence of Problem
         The recordings.
-    covariance : ndarray
-        Of the flow's coefficients and ln C_d.
+    spread : ndarray
+        Root of the covariance of the flow's coefficients and ln C_d.
     count, seed : int
         How many, and the seed.
     """
     flows = min(FLOWS, count)
     flow_of = np.arange(count) % flows
-    coefficients, factors = _draws(fit, estimate, covariance, flows, seed)
+    coefficients, factors = _draws(fit, estimate, spread, flows, seed)
     drag = fit.attrs["drag_coefficient"] * factors[:, 0]
     force = fit.attrs["force_std_N"] * factors[:, 1]
     parts: list[list[_World]] = []
@@ -150,7 +150,7 @@ def replicates_drawn(
 
 
 def _draws(
-    fit: xr.Dataset, estimate: Estimate, covariance: Floats, count: int, seed: int
+    fit: xr.Dataset, estimate: Estimate, spread: Floats, count: int, seed: int
 ) -> tuple[Floats, Floats]:
     """Return drawn coefficients of the flow, and factors of C_d, force_std and tracking noise.
 
@@ -159,8 +159,8 @@ def _draws(
     """
     generator = np.random.default_rng([seed, DRAW_STREAM])
     logs = generator.multivariate_normal(np.zeros(3), fit["covariance"].values, size=count)
-    free = generator.normal(size=(count, len(covariance))) @ np.linalg.cholesky(covariance).T
-    along = covariance[:-1, -1] / covariance[-1, -1]
+    free = generator.normal(size=(count, len(spread))) @ spread.T
+    along = spread[:-1] @ spread[-1] / (spread[-1] @ spread[-1])
     moved = free[:, :-1] + (logs[:, :1] - free[:, -1:]) * along
     coefficients = estimate.point.coefficients + moved.reshape(
         count, *estimate.point.coefficients.shape
