@@ -94,7 +94,7 @@ def test_json_holds_the_summary(finished: tuple[Path, Done]) -> None:
 
 def test_the_run_directory_is_whole(finished: tuple[Path, Done]) -> None:
     folder = finished[0]
-    for name in ("recovery.png", "recovery.svg", "spread_by_length.png", "spread_by_length.svg"):
+    for name in ("recovery.png", "recovery.svg", "error_by_length.png", "error_by_length.svg"):
         assert (folder / "figures" / name).stat().st_size > 1000
     manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
     assert manifest["seeds"] == {"recovery": 1}
@@ -155,7 +155,7 @@ def test_people_read_a_table_of_random_flows_without_orientation(tmp_path: Path)
     assert head in done.out
     for name in ("C_d", "σ_F", "tracking noise", "flow"):
         assert name in done.out
-    assert "angle none: for C_d to 10.0% (standard deviation) record" in done.out
+    assert "angle none: for C_d to 10.0% (rms) record" in done.out
     assert str(tmp_path / "run" / "recovery.nc") in done.out
     # Done is done.
     assert "--overwrite" in refusal(here(*words(path, tmp_path / "run", "--duration", "60")))

@@ -70,7 +70,7 @@ def recovery_study(
         Kind "recovery". On (duration, angle, recording): estimates, their intervals and errors,
         flow error, wall share and what became of the recording; on (parameter, duration, angle)
         their summary over the recordings that were fitted with at most 30 % of the intervals at the
-        wall (``used``); on (angle) how the spread of C_d falls with the length of a recording, and
+        wall (``used``); on (angle) how the error of C_d falls with the length of a recording, and
         the length that the asked precision needs.
 
     Raises
@@ -85,7 +85,7 @@ def recovery_study(
     >>> noise = {"position_noise_m": "0.3mm", "orientation_noise_rad": "0.5deg"}
     >>> study = dw.Study(observation=noise)
     >>> found = dw.recovery_study(study, dw.tank30_flow())  # doctest: +SKIP
-    >>> float(found["spread"].sel(parameter="drag_coefficient").squeeze())  # doctest: +SKIP
+    >>> float(found["rms_error"].sel(parameter="drag_coefficient").squeeze())  # doctest: +SKIP
     0.04
     """
     check_recovery(study, flow)

@@ -30,6 +30,8 @@ class Summary(NamedTuple):
     """Size of the relative error that 90 % of the recordings stay within."""
     bias: float
     """Mean relative error."""
+    rms_error: float
+    """Root mean square of ln(estimate / truth): chance and bias together."""
     spread: float
     """Standard deviation of ln(estimate) over the recordings."""
     rms_z: float
@@ -64,6 +66,7 @@ def summarise(error: Floats, z: Floats, covered: Floats) -> Summary:
         median_absolute_error=float(np.median(np.abs(error))),
         absolute_error_90=float(np.quantile(np.abs(error), 0.9)),
         bias=float(error.mean()),
+        rms_error=float(np.sqrt(np.mean(np.log1p(error) ** 2))),
         spread=float(np.log1p(error).std(ddof=1)) if error.size >= FEWEST else np.nan,
         rms_z=float(np.sqrt(np.mean(z**2))),
         coverage=float(covered.mean()),
@@ -92,26 +95,26 @@ def coverage_interval(
 
 
 class Scale(NamedTuple):
-    """How the spread of C_d falls with the length T of a recording: scale / sqrt(T)."""
+    """How the error of C_d falls with the length T of a recording: scale / sqrt(T)."""
 
     value: float
-    """Standard deviation of ln(estimate), times sqrt(T) [s^0.5]."""
+    """Root mean square of ln(estimate / truth), times sqrt(T) [s^0.5]."""
     low: float
     high: float
 
     def needed(self, precision: float) -> tuple[float, float, float]:
-        """Return the length [s] at which the spread is `precision`, and its interval."""
+        """Return the length [s] at which the error is `precision`, and its interval."""
         time, low, high = ((part / precision) ** 2 for part in self)
         return time, low, high
 
 
-def spread_scale(duration: Floats, spread: Floats, count: Floats) -> Scale:
-    """Fit spread = scale / sqrt(T) to the lengths of a study, in logarithms.
+def error_scale(duration: Floats, rms_error: Floats, count: Floats) -> Scale:
+    """Fit error = scale / sqrt(T) to the lengths of a study, in logarithms.
 
     Parameters
     ----------
-    duration, spread : ndarray, shape (k,)
-        Lengths [s], and the standard deviation of ln(estimate) at each.
+    duration, rms_error : ndarray, shape (k,)
+        Lengths [s], and the root mean square of ln(estimate / truth) at each.
     count : ndarray, shape (k,)
         Recordings at each, their weights.
 
@@ -124,7 +127,7 @@ def spread_scale(duration: Floats, spread: Floats, count: Floats) -> Scale:
 
     Examples
     --------
-    >>> round(spread_scale(np.array([100.0]), np.array([0.2]), np.array([20])).value, 12)
+    >>> round(error_scale(np.array([100.0]), np.array([0.2]), np.array([20])).value, 12)
     2.0
     """
     from scipy.special import chdtri
@@ -132,10 +135,10 @@ def spread_scale(duration: Floats, spread: Floats, count: Floats) -> Scale:
     enough = count >= FEWEST
     if not enough.any():
         return Scale(np.nan, np.nan, np.nan)
-    logs = np.log(spread[enough]) + 0.5 * np.log(duration[enough])
+    logs = np.log(rms_error[enough]) + 0.5 * np.log(duration[enough])
     value = float(np.exp(np.average(logs, weights=count[enough])))
-    tail, freedom = 0.5 * (1.0 - NEEDED_CONFIDENCE), float(count.max() - 1)
-    # (n - 1) spread^2 / sigma^2 is chi-squared with n - 1 degrees of freedom.
+    tail, freedom = 0.5 * (1.0 - NEEDED_CONFIDENCE), float(count.max())
+    # n rms^2 / sigma^2 is chi-squared with n degrees of freedom.
     low, high = (value * float(np.sqrt(freedom / chdtri(freedom, p))) for p in (tail, 1.0 - tail))
     return Scale(value, low, high)
 
@@ -170,8 +173,8 @@ def add_summary(recovery: xr.Dataset, *, precision: float | None) -> xr.Dataset:
         if errors.size:
             flow["median_flow_error"][place] = np.median(errors)
             flow["flow_error_90"][place] = np.quantile(errors, 0.9)
-    scales, needed = _needed(recovery, tables["spread"][0], precision)
-    by_angle = {"drag_coefficient_spread_scale": (scales, "s0.5"), "needed_duration": (needed, "s")}
+    scales, needed = _needed(recovery, tables["rms_error"][0], precision)
+    by_angle = {"drag_coefficient_error_scale": (scales, "s0.5"), "needed_duration": (needed, "s")}
     return recovery.assign(
         {key: (("parameter", "duration", "angle"), table) for key, table in tables.items()}
         | {key: (("duration", "angle"), table) for key, table in flow.items()}
@@ -183,12 +186,15 @@ def add_summary(recovery: xr.Dataset, *, precision: float | None) -> xr.Dataset:
     ).assign_coords(parameter=np.array(PARAMETERS, dtype=object))
 
 
-def _needed(recovery: xr.Dataset, spread: Floats, precision: float | None) -> tuple[Floats, Floats]:
-    """Return the scale of C_d's spread and the length needed, with their ends, by angle."""
+def _needed(
+    recovery: xr.Dataset, rms_error: Floats, precision: float | None
+) -> tuple[Floats, Floats]:
+    """Return the scale of C_d's error and the length needed, with their ends, by angle."""
     duration = recovery["duration"].values
     counts = (recovery["used"].values == 1).sum(axis=-1)
     scales = [
-        spread_scale(duration, spread[:, one], counts[:, one]) for one in range(spread.shape[1])
+        error_scale(duration, rms_error[:, one], counts[:, one])
+        for one in range(rms_error.shape[1])
     ]
     needed = [
         scale.needed(precision) if precision is not None else (np.nan,) * 3 for scale in scales

@@ -19,7 +19,7 @@ LABELS: Final = {
     "tracking_noise": "tracking noise",
 }
 SUMMARY: Final = (
-    *("median_absolute_error", "absolute_error_90", "bias", "spread", "rms_z"),
+    *("median_absolute_error", "absolute_error_90", "bias", "rms_error", "spread", "rms_z"),
     *("coverage", "coverage_low", "coverage_high"),
 )
 ATTRS: Final = (
@@ -29,6 +29,8 @@ ATTRS: Final = (
 )
 NOTABLE_BIAS: Final = 0.05
 NOTABLE_STANDARD_ERRORS: Final = 3.0
+NOTABLE_EXCESS: Final = 2.0
+"""In standard errors of the logarithm of an rms."""
 COLUMNS: Final = ("length", "angle", "of", "median |error|", "90 % within", "bias", "rms z")
 
 
@@ -78,7 +80,7 @@ def warnings(found: xr.Dataset) -> list[str]:
     said = []
     for part in _parts(found):
         number = counts(part)
-        where = f"{length_text(float(part['duration']))}, angle {part['angle'].values}"
+        where = _where(part)
         if number["at_the_wall"]:
             said.append(
                 f"{where}: {number['at_the_wall']} of {number['recordings']} recordings have more "
@@ -93,24 +95,46 @@ def warnings(found: xr.Dataset) -> list[str]:
             )
     longest = found.isel(duration=-1)
     for angle in found["angle"].values:
-        said += _bias_warning(longest.sel(angle=angle))
+        part = longest.sel(angle=angle)
+        said += [f"{_where(part)}: {text}" for text in _doubts(part)]
     return said
 
 
-def _bias_warning(part: xr.Dataset) -> list[str]:
-    """Return what to say of a bias of C_d that is neither chance nor small, at one length."""
+def _where(part: xr.Dataset) -> str:
+    return f"{length_text(float(part['duration']))}, angle {part['angle'].values}"
+
+
+def _doubts(part: xr.Dataset) -> list[str]:
+    """Return what to say of C_d where its error is not the chance that the fits state."""
     used = counts(part)["used"]
-    values = {key: float(part[key].sel(parameter="drag_coefficient")) for key in ("bias", "spread")}
-    asked = float(part.attrs["drag_coefficient_precision"])
-    least = asked if np.isfinite(asked) else NOTABLE_BIAS
-    chance = values["spread"] / np.sqrt(max(used, 1))
-    if not abs(values["bias"]) > max(least, NOTABLE_STANDARD_ERRORS * chance):
-        return []
-    return [
-        f"{length_text(float(part['duration']))}, angle {part['angle'].values}: C_d is off by "
-        f"{values['bias']:+.0%} on average (chance gives {chance:.0%}); recording longer does not "
-        "mend what of that is not chance"
-    ]
+    value = {key: float(part[key].sel(parameter="drag_coefficient")) for key in SUMMARY}
+    chance = value["spread"] / np.sqrt(max(used, 1))
+    said = []
+    if abs(value["bias"]) > max(NOTABLE_BIAS, NOTABLE_STANDARD_ERRORS * chance):
+        said.append(
+            f"C_d is off by {value['bias']:+.0%} on average, where chance gives {chance:.0%}: more "
+            "recordings do not mend that, and only a comparison of lengths shows whether longer "
+            "ones do"
+        )
+    if value["coverage_high"] < part.attrs["confidence"]:
+        said.append(
+            f"the {part.attrs['confidence']:.0%} intervals of C_d hold the truth in "
+            f"{round(value['coverage'] * used)} of {used}: in this flow they are too narrow by "
+            f"about {value['rms_z']:.1f}"
+        )
+    excess = _excess(part, value["rms_error"])
+    if excess > np.exp(NOTABLE_EXCESS / np.sqrt(2.0 * max(used, 1))):
+        said.append(
+            f"the error of C_d is {excess:.1f} times what the square root of the length gives: do "
+            "not trust the length to record"
+        )
+    return said
+
+
+def _excess(part: xr.Dataset, rms_error: float) -> float:
+    """Return the error over that of the law; the longest recordings show a bias that stays."""
+    law = float(part["drag_coefficient_error_scale"]) / np.sqrt(float(part["duration"]))
+    return float(rms_error / law)
 
 
 def length_text(seconds: float) -> str:
@@ -188,29 +212,29 @@ def _needed(part: xr.Dataset) -> dict[str, Any]:
         "drag_coefficient_precision": part.attrs["drag_coefficient_precision"],
         "duration_s": float(part["needed_duration"]),
         "duration_s_interval": [float(part[f"needed_duration_{end}"]) for end in ("low", "high")],
-        "drag_coefficient_spread_scale_sqrt_s": float(part["drag_coefficient_spread_scale"]),
+        "drag_coefficient_error_scale_sqrt_s": float(part["drag_coefficient_error_scale"]),
         "basis": _basis(part),
     }
 
 
 def _basis(part: xr.Dataset) -> str:
     lengths = ", ".join(length_text(float(value)) for value in part["duration"].values)
-    return f"spread of C_d at {lengths}, taken to fall with the square root of the length"
+    return f"rms error of C_d at {lengths}, taken to fall with the square root of the length"
 
 
 def _needed_sentence(part: xr.Dataset) -> str:
-    scale = float(part["drag_coefficient_spread_scale"])
+    scale = float(part["drag_coefficient_error_scale"])
     head = f"angle {part['angle'].values}: "
     if not np.isfinite(scale):
-        return f"{head}too few fits to say how the spread of C_d falls with the length"
-    text = f"{head}C_d to {scale / np.sqrt(3600.0):.1%} (standard deviation) in 1 h"
+        return f"{head}too few fits to say how the error of C_d falls with the length"
+    text = f"{head}C_d to {scale / np.sqrt(3600.0):.1%} (rms) in 1 h"
     asked = float(part.attrs["drag_coefficient_precision"])
     if np.isfinite(asked):
         time, low, high = (
             length_text(float(part[f"needed_duration{end}"])) for end in ("", "_low", "_high")
         )
         text = (
-            f"{head}for C_d to {asked:.1%} (standard deviation) record {time} "
+            f"{head}for C_d to {asked:.1%} (rms) record {time} "
             f"({part.attrs['needed_confidence']:.0%} interval {low} to {high})"
         )
     return f"{text}: an estimate from the {_basis(part)}"

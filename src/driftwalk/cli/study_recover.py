@@ -57,7 +57,7 @@ def recover(
         float | None,
         typer.Option(
             "--precision",
-            help="Relative standard deviation of C_d that is wanted, as 0.05.",
+            help="Relative error of C_d that is wanted (rms), as 0.05.",
             show_default=False,
         ),
     ] = None,
@@ -121,10 +121,9 @@ def _require_stated(path: Path) -> None:
 def _flow(study: Study, truth: Path, given: Path | None) -> tuple[xr.Dataset | None, Path | None]:
     """Return the true flow field and its file; None where every recording has a random one."""
     from driftwalk.cli.assembly_source import load_flow_for
-    from driftwalk.model.recover import RANDOM
 
     named: Any = study.recover.flow
-    if given is None and named in (None, RANDOM):
+    if given is None and named in (None, "random"):
         return None, None
     path = given if given is not None else truth.parent / named
     return load_flow_for(path, study), path

@@ -80,8 +80,8 @@ class Recover(Section):
     drag_coefficient_precision: Annotated[float | None, Quantity("1", gt=0, lt=1)] = Field(
         default=None,
         description=(
-            "Relative standard deviation of C_d that is wanted: the study says how long to record "
-            "for it."
+            "Relative error of C_d that is wanted, root mean square: the study says how long to "
+            "record for it."
         ),
         examples=[0.05],
     )

@@ -28,7 +28,7 @@ from driftwalk.report.plot_validation import (
 from driftwalk.report.recovery_figures import (
     plot_flow_recovery,
     plot_recovery,
-    plot_recovery_spread,
+    plot_recovery_error,
     write_recovery_figures,
 )
 
@@ -51,7 +51,7 @@ __all__ = [
     "plot_outcomes",
     "plot_predicted_steps",
     "plot_recovery",
-    "plot_recovery_spread",
+    "plot_recovery_error",
     "plot_refined_map",
     "plot_residual_map",
     "plot_residual_time",

@@ -1,4 +1,4 @@
-"""The figures of a recovery study: estimates beside the truth, and how their spread falls."""
+"""The figures of a recovery study: estimates beside the truth, and how their error falls."""
 
 from __future__ import annotations
 
@@ -137,12 +137,11 @@ def plot_flow_recovery(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def plot_recovery_spread(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
-    """Draw how the spread of C_d falls with the length of a recording.
+def plot_recovery_error(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw how the error of C_d falls with the length of a recording.
 
-    Points are the standard deviation of ln(estimate), lines the law T^(-1/2) fitted to them with
-    the band that the number of recordings leaves, crosses the median standard deviation that the
-    fits state.
+    Points are the rms of ln(estimate / truth), lines the law T^(-1/2) fitted to them with the band
+    that the number of recordings leaves, crosses the median standard deviation that the fits state.
 
     Parameters
     ----------
@@ -163,7 +162,7 @@ def plot_recovery_spread(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
 
     Examples
     --------
-    ``plot_recovery_spread(recovery)``
+    ``plot_recovery_error(recovery)``
     """
     _require_recovery(recovery)
     ax = axes_or_new(ax)
@@ -175,14 +174,14 @@ def plot_recovery_spread(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
         used = part["used"].values == 1
         stated = np.where(used, part["drag_coefficient_sd"].values, np.nan)
         known = used.any(axis=1)
-        spread = part["spread"].sel(parameter="drag_coefficient").values
-        ax.plot(minutes, 100.0 * spread, "o", ms=3.5, color=color, label=f"{angle}: measured")
+        rms = part["rms_error"].sel(parameter="drag_coefficient").values
+        ax.plot(minutes, 100.0 * rms, "o", ms=3.5, color=color, label=f"{angle}: measured")
         ax.plot(
             minutes[known], 100.0 * np.nanmedian(stated[known], axis=1), "x", ms=4.0, color=color,
             label=f"{angle}: stated by the fit",
         )  # fmt: skip
         low, middle, high = (
-            float(part[f"drag_coefficient_spread_scale{end}"]) for end in ("_low", "", "_high")
+            float(part[f"drag_coefficient_error_scale{end}"]) for end in ("_low", "", "_high")
         )
         root = np.sqrt(60.0 * drawn)
         ax.plot(drawn, 100.0 * middle / root, color=color, lw=0.9)
@@ -190,11 +189,11 @@ def plot_recovery_spread(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
     asked = float(recovery.attrs["drag_coefficient_precision"])
     if np.isfinite(asked):
         ax.axhline(100.0 * asked, color=MUTED, lw=0.7, dashes=(3, 3), label="wanted")
-    if np.isfinite(recovery["drag_coefficient_spread_scale"].values).any():
+    if np.isfinite(recovery["drag_coefficient_error_scale"].values).any():
         # Without a point a logarithmic axis has no range.
         _logarithmic(ax)
     ax.set_xlabel("length of a recording (min)")
-    ax.set_ylabel("spread of $C_d$ over recordings (%)")
+    ax.set_ylabel("error of $C_d$, rms (%)")
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=6.0)
     return ax
 
@@ -216,7 +215,7 @@ def write_recovery_figures(
     Returns
     -------
     list of pathlib.Path
-        The files: ``recovery`` and ``spread_by_length`` in every format.
+        The files: ``recovery`` and ``error_by_length`` in every format.
 
     Raises
     ------
@@ -232,7 +231,7 @@ def write_recovery_figures(
     _require_recovery(recovery)
     makers: dict[str, Callable[[], Figure]] = {
         "recovery": lambda: _recovery_figure(recovery),
-        "spread_by_length": lambda: _spread_figure(recovery),
+        "error_by_length": lambda: _error_figure(recovery),
     }
     return write_each(makers, folder, formats, footer="")
 
@@ -253,9 +252,9 @@ def _recovery_figure(recovery: xr.Dataset) -> Figure:
     return figure
 
 
-def _spread_figure(recovery: xr.Dataset) -> Figure:
+def _error_figure(recovery: xr.Dataset) -> Figure:
     figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=75.0)
-    plot_recovery_spread(recovery, figure.add_subplot())
+    plot_recovery_error(recovery, figure.add_subplot())
     return figure
 
 

@@ -14,7 +14,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.report import (
     plot_flow_recovery,
     plot_recovery,
-    plot_recovery_spread,
+    plot_recovery_error,
     write_recovery_figures,
 )
 
@@ -72,12 +72,12 @@ def test_flow_error_in_percent(recovery: xr.Dataset) -> None:
     assert "%" in ax.get_ylabel()
 
 
-def test_spread_by_length_with_its_law(recovery: xr.Dataset) -> None:
-    ax = plot_recovery_spread(recovery)
-    spread = recovery["spread"].sel(parameter="drag_coefficient").values
-    assert points(ax) == pytest.approx(np.sort(100 * spread.ravel()))
+def test_error_by_length_with_its_law(recovery: xr.Dataset) -> None:
+    ax = plot_recovery_error(recovery)
+    rms = recovery["rms_error"].sel(parameter="drag_coefficient").values
+    assert points(ax) == pytest.approx(np.sort(100 * rms.ravel()))
     laws = [line for line in ax.lines if len(line.get_xdata()) == 50]
-    for line, scale in zip(laws, recovery["drag_coefficient_spread_scale"].values, strict=True):
+    for line, scale in zip(laws, recovery["drag_coefficient_error_scale"].values, strict=True):
         minutes, percent = (np.asarray(values) for values in line.get_data())
         assert percent == pytest.approx(100 * scale / np.sqrt(60 * minutes))
     assert "(min)" in ax.get_xlabel()
@@ -87,7 +87,7 @@ def test_spread_by_length_with_its_law(recovery: xr.Dataset) -> None:
 
 def test_files(recovery: xr.Dataset, tmp_path: Path) -> None:
     files = write_recovery_figures(tmp_path, recovery=recovery, formats=("png",))
-    assert [path.name for path in files] == ["recovery.png", "spread_by_length.png"]
+    assert [path.name for path in files] == ["recovery.png", "error_by_length.png"]
     assert min(path.stat().st_size for path in files) > 5000
 
 
@@ -103,6 +103,6 @@ def test_a_study_without_a_single_fit_is_drawn(recovery: xr.Dataset, tmp_path: P
 def test_refusals(recovery: xr.Dataset) -> None:
     with pytest.raises(InputError, match="parameter must be one of"):
         plot_recovery(recovery, "mass")
-    for plot in (plot_recovery, plot_flow_recovery, plot_recovery_spread):
+    for plot in (plot_recovery, plot_flow_recovery, plot_recovery_error):
         with pytest.raises(InputError, match="not a recovery study"):
             plot(xr.Dataset())
