@@ -67,7 +67,8 @@ def white_of(errors: Sequence[Errors], leverage: Leverage, *, lags: int = LAGS) 
     std = np.broadcast_to(1.0 / np.sqrt(pairs[1:]), found.shape)
     off = (found - expected) / std
     samples = pairs[0]
-    portmanteau = float(((samples + 2.0) / (samples - np.arange(1, lags + 1)) * off**2).sum())
+    # Each term is divided by its own number of pairs, which allows for gaps too.
+    portmanteau = float((1.0 + 2.0 / samples) * (off**2).sum())
     values = np.concatenate([one.white[one.used] for one in errors])
     unit = values / np.sqrt(variance[:, 0])
     component, lag = divmod(int(np.abs(off).argmax()), lags)
