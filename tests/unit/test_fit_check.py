@@ -189,7 +189,7 @@ def test_several_recordings_with_holes() -> None:
 
 
 def test_without_orientations_the_errors_are_still_white() -> None:
-    """Averaged over orientations the drag is wrong for a block that turns, but no memory is left."""
+    """Averaged over orientations the drag is wrong for a block that turns, yet leaves no memory."""
     track = recording(200.0)
     track["theta"].values[:] = np.nan
     found = dw.check_model(dw.fit_motion(track, coarse_study()), track)

@@ -91,7 +91,8 @@ def compare_motion(
         When fewer than four replicates of either set are sound.
     """
     for replicates in (at_estimate, drawn):
-        if len(replicates.steps) < FEWEST_REPLICATES:
+        alone = replicates is drawn and np.unique(drawn.flow).size < 2
+        if len(replicates.steps) < FEWEST_REPLICATES or alone:
             raise InputError(
                 f"{replicates.broken} of {replicates.broken + len(replicates.steps)} simulated "
                 "recordings broke down: the fitted model cannot be simulated"

@@ -10,9 +10,9 @@ that the check needs are collected in one pass; J itself is never held.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -195,6 +195,16 @@ class Leverage:
         return np.asarray(self.spread @ self.spread.T)
 
 
+class _Part(NamedTuple):
+    """Some samples of one recording."""
+
+    recording: int
+    start: int
+    jacobian: Floats
+    """Shape (rows, parameters): the components of a sample one after the other."""
+    white: Floats
+
+
 def collect(
     estimate: Estimate, errors: Sequence[Errors], contrasts: Sequence[Contrast], *, lags: int
 ) -> Leverage:
@@ -202,40 +212,33 @@ def collect(
     from scipy.linalg import solve_triangular
     from scipy.linalg.blas import dsyrk
 
-    parameters = 2 * estimate.passes.spline.size + 1
-    for contrast in contrasts:
-        contrast.begin(parameters)
-    information = np.zeros((parameters, parameters), order="F")
     flow = estimate.point.coefficients.ravel()
-    parts = [
-        (index, start)
-        for index, one in enumerate(errors)
-        for start in range(0, one.used.size, SAMPLES_AT_ONCE)
-    ]
-    chosen = set(np.linspace(0, len(parts) - 1, MOST_KEPT_PARTS).astype(int).tolist())
-    kept: list[tuple[int, int, Floats]] = []
-    running: dict[int, Any] = {}
-    for number, (index, start) in enumerate(parts):
-        if start == 0:
-            series = errors[index].series
-            running = {index: estimate.passes._filter(series, estimate.point, sensitivities=True)}
-        found = running[index].run(SAMPLES_AT_ONCE)
-        jacobian, white = np.asarray(found["jacobian"]), np.asarray(found["whitened"]).ravel()
-        dsyrk(1.0, jacobian.T, beta=1.0, c=information, overwrite_c=1, lower=1)
-        weights = {"one": np.ones(white.size), "drag": jacobian[:, parameters - 1]}
-        weights["flow"] = jacobian[:, : flow.size] @ flow
-        rows = slice(start, start + SAMPLES_AT_ONCE)
+    count = sum(math.ceil(one.used.size / SAMPLES_AT_ONCE) for one in errors)
+    chosen = set(np.linspace(0, count - 1, MOST_KEPT_PARTS).astype(int).tolist())
+    kept = []
+    lower: Any = None
+    for number, part in enumerate(_parts(estimate, errors)):
+        jacobian = part.jacobian
+        if lower is None:
+            lower = np.zeros((jacobian.shape[1],) * 2, order="F")
+            for contrast in contrasts:
+                contrast.begin(len(lower))
+        lower = dsyrk(1.0, jacobian.T, beta=1.0, c=lower, overwrite_c=1, lower=1)
+        weights = {
+            "one": np.ones(part.white.size),
+            "flow": jacobian[:, : flow.size] @ flow,
+            "drag": jacobian[:, flow.size],
+        }
         for contrast in contrasts:
-            group = contrast.groups[index][rows].ravel()
-            contrast.add(group, weights[contrast.by], white, jacobian)
+            group = contrast.groups[part.recording][part.start : part.start + SAMPLES_AT_ONCE]
+            contrast.add(group.ravel(), weights[contrast.by], part.white, jacobian)
         if number in chosen:
-            kept.append((index, start, jacobian))
-    lower = np.tril(information)
-    data = lower + np.tril(lower, -1).T
+            kept.append(part)
+    data = np.tril(lower) + np.tril(lower, -1).T
     prior = Prior(estimate.passes)
-    full = prior.add(Sums(0.0, np.zeros(parameters), data, 0), estimate.point, estimate.weights)
-    root = np.linalg.cholesky(full.information)
-    spread = solve_triangular(root, np.eye(parameters), lower=True).T
+    sums = Sums(0.0, np.zeros(len(data)), data, 0)
+    full = prior.add(sums, estimate.point, estimate.weights).information
+    spread = solve_triangular(np.linalg.cholesky(full), np.eye(len(full)), lower=True).T
     return Leverage(
         spread,
         float(((data @ spread) * spread).sum()),
@@ -243,17 +246,27 @@ def collect(
     )
 
 
+def _parts(estimate: Estimate, errors: Sequence[Errors]) -> Iterator[_Part]:
+    """Run the filter with derivatives over every recording, some samples at a time."""
+    for index, one in enumerate(errors):
+        running = estimate.passes._filter(one.series, estimate.point, sensitivities=True)
+        for start in range(0, one.used.size, SAMPLES_AT_ONCE):
+            found = running.run(SAMPLES_AT_ONCE)
+            white = np.asarray(found["whitened"]).ravel()
+            yield _Part(index, start, np.asarray(found["jacobian"]), white)
+
+
 def _autocovariance(
-    spread: Floats, errors: Sequence[Errors], kept: list[tuple[int, int, Floats]], lags: int
+    spread: Floats, errors: Sequence[Errors], kept: Sequence[_Part], lags: int
 ) -> Floats:
     """Return the mean of J C J' by component and lag, from draws of the parameters."""
     components = errors[0].components
     generator = np.random.default_rng(0)
     draws = spread @ generator.normal(size=(len(spread), DRAWS))
     total, pairs = np.zeros((components, lags + 1)), np.zeros(lags + 1)
-    for index, start, jacobian in kept:
-        moved = (jacobian @ draws).reshape(-1, components, DRAWS)
-        used = errors[index].used[start : start + len(moved)]
+    for part in kept:
+        moved = (part.jacobian @ draws).reshape(-1, components, DRAWS)
+        used = errors[part.recording].used[part.start : part.start + len(moved)]
         for lag in range(lags + 1):
             both = used[lag:] & used[: used.size - lag]
             products = moved[lag:][both] * moved[: used.size - lag][both]

@@ -158,13 +158,14 @@ def _draws(
     correlated.
     """
     generator = np.random.default_rng([seed, DRAW_STREAM])
-    logs = generator.multivariate_normal(np.zeros(3), fit["covariance"].values, size=count)
+    size = estimate.point.coefficients.size
+    found = fit["covariance"].values[:3, :3]
+    logs = generator.multivariate_normal(np.zeros(3), found, size=count)
     free = generator.normal(size=(count, len(spread))) @ spread.T
-    along = spread[:-1] @ spread[-1] / (spread[-1] @ spread[-1])
-    moved = free[:, :-1] + (logs[:, :1] - free[:, -1:]) * along
-    coefficients = estimate.point.coefficients + moved.reshape(
-        count, *estimate.point.coefficients.shape
-    )
+    along = spread[:size] @ spread[size] / (spread[size] @ spread[size])
+    moved = free[:, :size] + (logs[:, :1] - free[:, size : size + 1]) * along
+    shape = (count, *estimate.point.coefficients.shape)
+    coefficients = estimate.point.coefficients + moved.reshape(shape)
     return coefficients, np.exp(logs * (1.0, 0.5, 1.0))
 
 
