@@ -75,7 +75,7 @@ def test_json_holds_the_summary(finished: tuple[Path, Done]) -> None:
     found = answer(finished[1])
     assert found["truth"]["drag_coefficient"] == 0.4
     assert found["truth"]["tracking_noise_m"] == pytest.approx(3e-4)
-    assert found["truth"]["flow"] == "true.csv"
+    assert found["truth"]["flow"] == "flow/true.csv"
     assert [part["duration_s"] for part in found["results"]] == [60.0, 90.0]
     stored = recovery(finished[0])
     for index, part in enumerate(found["results"]):
@@ -193,6 +193,7 @@ def test_mistakes_are_one_line(
         (("--recordings", "1"), "--recordings"),
         (("--duration", "long"), "expected"),
         (("--precision", "2"), "drag_coefficient_precision"),
+        (("--precision", "good"), "--precision"),
         (("--flow", "nowhere.nc"), "there is no such file"),
     ],
 )

@@ -129,6 +129,7 @@ def test_the_dataset_is_whole(found: xr.Dataset) -> None:
         assert found.attrs[name] == value
     assert dw.parse_study(found.attrs["study"]).recover.recordings == 2
     assert np.isfinite(found["needed_duration"].values).all()
+    assert found.attrs["flow"] == "flow_true.csv"
 
 
 def test_the_numbers_do_not_depend_on_the_other_lengths(

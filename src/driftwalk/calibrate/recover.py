@@ -22,6 +22,7 @@ from driftwalk.calibrate.recover_one import (
 )
 from driftwalk.calibrate.recover_summary import COVERAGE_CONFIDENCE, NEEDED_CONFIDENCE, add_summary
 from driftwalk.calibrate.score import SCORED
+from driftwalk.model.recover import RANDOM
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
 from driftwalk.sweep.processes import single_threaded_processes
 
@@ -179,4 +180,5 @@ def _attrs(study: Study, flow: xr.Dataset | None) -> dict[str, Any]:
 def _flow_name(study: Study, flow: xr.Dataset | None) -> str:
     if flow is None:
         return f"random, {study.recover.flow_family}"
-    return str(flow.attrs.get("source", "given"))
+    named = study.recover.flow
+    return str(flow.attrs.get("source", "given")) if named in (None, RANDOM) else str(named)

@@ -227,14 +227,16 @@ def _needed_sentence(part: xr.Dataset) -> str:
     head = f"angle {part['angle'].values}: "
     if not np.isfinite(scale):
         return f"{head}too few fits to say how the error of C_d falls with the length"
-    text = f"{head}C_d to {scale / np.sqrt(3600.0):.1%} (rms) in 1 h"
+    hour, low, high = (
+        f"{float(part[f'drag_coefficient_error_scale{end}']) / np.sqrt(3600.0):.1%}"
+        for end in ("", "_low", "_high")
+    )
+    within = f"{part.attrs['needed_confidence']:.0%} interval"
+    text = f"{head}C_d to {hour} (rms) in 1 h ({within} {low} to {high})"
     asked = float(part.attrs["drag_coefficient_precision"])
     if np.isfinite(asked):
         time, low, high = (
             length_text(float(part[f"needed_duration{end}"])) for end in ("", "_low", "_high")
         )
-        text = (
-            f"{head}for C_d to {asked:.1%} (rms) record {time} "
-            f"({part.attrs['needed_confidence']:.0%} interval {low} to {high})"
-        )
+        text = f"{head}for C_d to {asked:.1%} (rms) record {time} ({within} {low} to {high})"
     return f"{text}: an estimate from the {_basis(part)}"

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from driftwalk.cli.options import Json, Seed, quantity_parser, resolve_study, study_overrides
+from driftwalk.cli.options import (
+    Json,
+    Seed,
+    quantity_option,
+    quantity_parser,
+    resolve_study,
+    study_overrides,
+)
 from driftwalk.cli.output import print_json
 from driftwalk.core.errors import ConfigurationError
 
@@ -19,6 +26,7 @@ if TYPE_CHECKING:
 RECOVER_KEYS: Final[dict[str, str]] = {
     "recordings": "recover.recordings",
     "duration": "recover.durations_s",
+    "flow": "recover.flow",
     "precision": "recover.drag_coefficient_precision",
     "seed": "recover.seed",
 }
@@ -55,11 +63,7 @@ def recover(
     ] = None,
     precision: Annotated[
         float | None,
-        typer.Option(
-            "--precision",
-            help="Relative error of C_d that is wanted (rms), as 0.05.",
-            show_default=False,
-        ),
+        quantity_option("--precision", "1", "Relative error of C_d that is wanted (rms)."),
     ] = None,
     seed: Seed = None,
     threads: Annotated[
@@ -91,6 +95,7 @@ def recover(
         recordings=recordings,
         duration=[read(text) for text in duration] if duration else None,
         precision=precision,
+        flow=None if flow is None else str(flow),
         seed=seed,
     )
     chosen = resolve_study(truth, overrides, keys=RECOVER_KEYS)
