@@ -8,6 +8,7 @@ import xarray as xr
 from recovery_worlds import small_study
 
 import driftwalk as dw
+from driftwalk.calibrate import recover_one
 from driftwalk.calibrate.recover_one import Truth, simulated_recordings
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.model import apply_overrides
@@ -151,6 +152,23 @@ def test_what_cannot_be_fitted_is_data() -> None:
     assert np.isnan(found["bias"].values).all()
     assert np.isnan(found["needed_duration"].values).all()
     assert told == [(0, 2), (1, 2), (2, 2)]
+
+
+def test_a_simulation_that_breaks_is_data(
+    flow: xr.Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sound = dw.simulate.simulate
+
+    def broken(*arguments: object, **options: object) -> xr.Dataset:
+        run = sound(*arguments, **options)
+        run["status"].values[-1] = 1
+        return run
+
+    monkeypatch.setattr(recover_one, "simulate", broken)
+    found = dw.recovery_study(small_study(recordings_per_fit=2), flow)
+    assert (found["status"].values == 2).all()
+    assert np.isnan(found["drag_coefficient"].values).all()
+    assert not found["used"].values.any()
 
 
 @pytest.mark.parametrize(

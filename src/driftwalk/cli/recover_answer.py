@@ -119,8 +119,8 @@ def _doubts(part: xr.Dataset) -> list[str]:
     if value["coverage_high"] < part.attrs["confidence"]:
         said.append(
             f"the {part.attrs['confidence']:.0%} intervals of C_d hold the truth in "
-            f"{round(value['coverage'] * used)} of {used}: in this flow they are too narrow by "
-            f"about {value['rms_z']:.1f}"
+            f"{round(value['coverage'] * used)} of {used}: they are too narrow here, by a "
+            f"factor of about {value['rms_z']:.1f}"
         )
     excess = _excess(part, value["rms_error"])
     if excess > np.exp(NOTABLE_EXCESS / np.sqrt(2.0 * max(used, 1))):
