@@ -44,11 +44,12 @@ def check_model(
 ) -> xr.Dataset:
     """Say whether the model explains the recordings that it was fitted to, and where it does not.
 
-    Ten criteria, each a p value for the errors of prediction or the steps of simulated recordings;
-    the model explains the recording unless one is below 0.004. A recording that was simulated from
-    the very model fails once in 25 times by that count (Bonferroni; measured: see
-    docs/explanation/likelihood.md). What fitting hundreds of coefficients takes out of the errors
-    is allowed for: their covariance at the estimate is ``I - J C J'``.
+    Ten criteria with a p value, for the errors of prediction and the motion of simulated
+    recordings, and a largest share of outliers; the model explains the recording unless a p value
+    is below 0.004. A recording of the very model fails once in 25 times by that count (Bonferroni;
+    measured: docs/explanation/likelihood.md). What
+    fitting hundreds of coefficients takes out of the errors is allowed for: their covariance at the
+    estimate is ``I - J C J'``.
 
     Parameters
     ----------

@@ -48,6 +48,8 @@ class Motion(NamedTuple):
     """KS distance of the recording to each replicate with drawn parameters."""
     drawn_between: Floats
     """Mean distance of each of those to the others that are in another flow."""
+    flows: int
+    """Number of drawn flows."""
     step_length: Density
     turning_angle: Density
 
@@ -62,13 +64,16 @@ class Motion(NamedTuple):
 
     @property
     def p_value(self) -> float:
-        """The same from a normal distribution of the logarithms, which goes beyond the ranks."""
+        """The same from a normal distribution of the logarithms, which goes beyond the ranks.
+
+        Replicates in one flow are alike, so the degrees of freedom are those of the flows.
+        """
         from scipy.stats import t
 
         logs = np.log(self.drawn_between)
         spread = max(float(logs.std(ddof=1)), 1e-12) * np.sqrt(1.0 + 1.0 / logs.size)
         off = (np.log(self.drawn_distance.mean()) - logs.mean()) / spread
-        return float(t.sf(off, logs.size - 1))
+        return float(t.sf(off, self.flows - 1))
 
 
 def compare_motion(
@@ -112,6 +117,7 @@ def compare_motion(
         floor.ravel(),
         _distances([real], drawn.steps, threads)[0],
         np.nanmean(among, axis=1),
+        int(np.unique(drawn.flow).size),
         _density(real, drawn, 0, np.linspace(0.0, limits[0] or 1.0, BINS + 1)),
         _density(real, drawn, 1, np.linspace(-limits[1], limits[1], BINS + 1)),
     )

@@ -17,8 +17,8 @@ from driftwalk.calibrate.fit_check_white import White
 from driftwalk.calibrate.fit_spline import Floats
 
 LEVEL = 0.004
-"""A recording of the very model fails one criterion this often; with ten of them, that is one
-recording in 25."""
+"""A recording of the very model fails one criterion this often; ten of them, that is one recording
+in 25 at most. Measured: see docs/explanation/likelihood.md."""
 MOST_OUTLIERS = 1e-3
 """Share of samples. One in 5e8 is expected, but a tracker may slip now and then."""
 DRAG_CHANGE_OF_THE_FIT = 0.05
