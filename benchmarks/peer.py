@@ -1,4 +1,8 @@
-"""The peer of the simulation benchmarks, `ode/ode_peer.cpp`: built, given a case, run."""
+"""Programs on the Open Dynamics Engine: built, given a case, run.
+
+`ode/ode_peer.cpp` is the peer of the simulation benchmarks, `ode/ode_recording.cpp` makes the
+recordings of another engine in `studies/likelihood`.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +21,7 @@ from driftwalk.model import Study
 
 Floats = npt.NDArray[np.float64]
 
-SOURCE = Path(__file__).parent / "ode" / "ode_peer.cpp"
+SOURCES = Path(__file__).parent / "ode"
 WALLS = ("impulse", "boxes")
 
 
@@ -42,12 +46,13 @@ def _compiler() -> str:
     return str(found)
 
 
-def build_peer(folder: Path) -> Path:
-    program = folder / "ode_peer"
-    command = [_compiler(), "-std=c++20", "-O3", "-march=native", str(SOURCE), "-o", str(program)]
+def build_peer(folder: Path, name: str = "ode_peer") -> Path:
+    """Compile one of the programs in `ode` into a folder."""
+    program, source = folder / name, SOURCES / f"{name}.cpp"
+    command = [_compiler(), "-std=c++20", "-O3", "-march=native", str(source), "-o", str(program)]
     begin = time.perf_counter()
     subprocess.run([*command, "-lode"], check=True)
-    print(f"compiled the peer in {time.perf_counter() - begin:.1f} s")
+    print(f"compiled {name} in {time.perf_counter() - begin:.1f} s")
     return program
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_module
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -36,6 +37,8 @@ FIT_KEYS: Final[dict[str, str]] = {
     "spline_spacing": "fit.spline_spacing_m",
     "confidence": "fit.confidence",
 }
+MOST_FINDINGS: Final = 2
+"""Findings that are printed; all are in the file."""
 RecordingFiles = Annotated[
     list[Path],
     typer.Argument(metavar="RECORDING...", help="Recordings of one block in one tank, read alike."),
@@ -70,6 +73,10 @@ def fit(
     confidence: Annotated[
         float | None, quantity_option("--confidence", "1", "Confidence of the intervals.")
     ] = None,
+    no_check: Annotated[
+        bool,
+        typer.Option("--no-check", help="Do not ask whether the model explains the recording."),
+    ] = False,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Move a finished run aside and start anew.")
     ] = False,
@@ -79,7 +86,8 @@ def fit(
 
     A filter predicts each position from the earlier ones; the parameters are those that make its
     errors likely. Gaps and uneven clocks are no matter. The run directory holds the fit (fit.nc),
-    the flow (flow.nc) for every command that takes one, the recording, figures and manifest.json.
+    the flow (flow.nc) for every command that takes one, the recording, the check of the model
+    (check.nc), figures and manifest.json.
     """
     from driftwalk.cli.fit_run import FitWork, run_fit
     from driftwalk.cli.tank import require_inside, study_in_arena
@@ -111,13 +119,13 @@ def fit(
         remark = f"the tank is the default study's, a {chosen.tank.describe()}"
     inputs = {"recording" if n == 0 else f"recording-{n + 1}": p for n, p in enumerate(recordings)}
     inputs.update({"study": study} if study is not None else {})
-    found = run_fit(
-        FitWork(trajectories, chosen, how.body, inputs, remark), out, overwrite=overwrite
-    )
+    work = FitWork(trajectories, chosen, how.body, inputs, remark, check=not no_check)
+    found = run_fit(work, out, overwrite=overwrite)
     if json:
-        print_json(summary(found))
+        print_json(summary(found.fit) | verdict(found.check))
     else:
-        print_answer(found, out)
+        print_answer(found.fit, out)
+        print_verdict(found.check)
 
 
 _KEYS = (
@@ -178,3 +186,39 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
     for warning in json_module.loads(facts["warnings"]):
         print_note(f"warning: {warning}")
     print(f"flow                   {folder / 'flow.nc'}")
+
+
+def verdict(check: xr.Dataset | None) -> dict[str, Any]:
+    """Return what ``--json`` prints of the check of the model; nothing where there was none."""
+    if check is None:
+        return {}
+    facts = check.attrs
+    distances = {key: float(facts[key]) for key in ("ks_distance", "ks_noise_floor")}
+    return {
+        "explained": facts["explained"] == "yes",
+        "findings": json_module.loads(facts["findings"]),
+        **{key: value if isfinite(value) else None for key, value in distances.items()},
+    }
+
+
+def print_verdict(check: xr.Dataset | None) -> None:
+    """Print whether the model explains the recording, and the worst of what speaks against it."""
+    if check is None:
+        return
+    found = verdict(check)
+    if found["explained"]:
+        print("model check            the model explains this recording")
+    else:
+        print("model check            THE MODEL DOES NOT EXPLAIN THIS RECORDING:")
+        for finding in found["findings"][:MOST_FINDINGS]:
+            print(f"  {finding}")
+        more = len(found["findings"]) - MOST_FINDINGS
+        if more > 0:
+            print(f"  and {more} more: see findings in check.nc, or --json")
+    if found["ks_distance"] is None:
+        print(f"KS distance            not to be had: {check.attrs['ks_left_out']}")
+    else:
+        print(
+            f"KS distance            {found['ks_distance']:.3f}, "
+            f"noise floor {found['ks_noise_floor']:.3f}"
+        )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from driftwalk.cli.calibration_run import dataset_hash, netcdf_bytes
 from driftwalk.cli.output import print_note
@@ -34,6 +34,8 @@ class FitWork:
         The files that were read, by their role.
     remark : str or None
         What the user should know when the run begins.
+    check : bool
+        Whether the model is checked.
     """
 
     recordings: Sequence[xr.Dataset]
@@ -41,13 +43,22 @@ class FitWork:
     body: str | None
     inputs: Mapping[str, Path]
     remark: str | None = None
+    check: bool = True
 
 
-def run_fit(work: FitWork, folder: Path, *, overwrite: bool) -> xr.Dataset:
-    """Fit in a run directory and return the fit.
+class Fitted(NamedTuple):
+    """What a run found."""
 
-    Writes ``fit.nc``, ``flow.nc``, ``recording.nc`` (``recording-2.nc``, ...), ``figures/`` and,
-    last, ``manifest.json``.
+    fit: xr.Dataset
+    check: xr.Dataset | None
+    """Whether the model explains the recordings; None where it was not asked for."""
+
+
+def run_fit(work: FitWork, folder: Path, *, overwrite: bool) -> Fitted:
+    """Fit in a run directory, check the model, and return both.
+
+    Writes ``fit.nc``, ``flow.nc``, ``recording.nc`` (``recording-2.nc``, ...), ``check.nc``,
+    ``figures/`` and, last, ``manifest.json``.
 
     Parameters
     ----------
@@ -65,8 +76,8 @@ def run_fit(work: FitWork, folder: Path, *, overwrite: bool) -> xr.Dataset:
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
     """
-    from driftwalk.calibrate import check_fit, fit_motion, fitted_flow
-    from driftwalk.report import write_fit_figures
+    from driftwalk.calibrate import check_fit, check_model, fit_motion, fitted_flow
+    from driftwalk.report import write_check_figures, write_fit_figures
 
     check_fit(work.recordings, work.study, body=work.body)
     with open_run(
@@ -94,7 +105,13 @@ def run_fit(work: FitWork, folder: Path, *, overwrite: bool) -> xr.Dataset:
                 body=work.body,
                 simulated=found.attrs["simulated_recording"] == "yes",
             )
-    return found
+            check = None
+            if work.check:
+                progress.update(found.attrs["iterations"], found.attrs["iterations"], "check")
+                check = check_model(found, work.recordings, body=work.body)
+                run.write("check.nc", netcdf_bytes(check))
+                write_check_figures(run.folder("figures"), check=check)
+    return Fitted(found, check)
 
 
 def _specification(work: FitWork) -> dict[str, Any]:
@@ -103,5 +120,6 @@ def _specification(work: FitWork) -> dict[str, Any]:
         "kind": "fit",
         "study": work.study.to_dict(),
         "body": work.body,
+        "check": work.check,
         "recordings_sha256": [dataset_hash(one, ("x", "y", "theta")) for one in work.recordings],
     }

@@ -1,4 +1,4 @@
-"""`driftwalk study`: write and check study files."""
+"""`driftwalk study`: write and check study files, and try a design before the experiment."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from typing import Annotated
 
 import typer
 
+from driftwalk.cli.main import paragraphs
 from driftwalk.cli.options import Json
 from driftwalk.cli.output import print_json, print_note, require_place
+from driftwalk.cli.study_recover import recover
 
 study_app = typer.Typer(name="study", add_completion=False, help="Write and check study files.")
 
@@ -55,3 +57,6 @@ def check(
         print_json({**study.to_dict(), "resolved": resolved})
     else:
         typer.echo(study.to_toml(), nl=False)
+
+
+study_app.command("recover", help=paragraphs(recover.__doc__ or ""))(recover)

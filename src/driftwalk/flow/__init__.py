@@ -18,6 +18,7 @@ from driftwalk.flow.analytic import (
 from driftwalk.flow.evaluate import bilinear
 from driftwalk.flow.extract import extract_flow
 from driftwalk.flow.inertia import inertia_correction
+from driftwalk.flow.random_flow import random_tank_flow
 from driftwalk.flow.read import load_flow
 from driftwalk.flow.write import save_flow
 
@@ -29,6 +30,7 @@ __all__ = [
     "jets_flow",
     "jets_velocity",
     "load_flow",
+    "random_tank_flow",
     "save_flow",
     "shear_flow",
     "shear_velocity",

@@ -8,6 +8,7 @@ from driftwalk.model.flow import Flow
 from driftwalk.model.forces import Forces
 from driftwalk.model.observation import Observation
 from driftwalk.model.recording import Columns, Recording
+from driftwalk.model.recover import Recover
 from driftwalk.model.sensitivity import Sensitivity
 from driftwalk.model.simulation import Pose, Simulation
 from driftwalk.model.steps import Steps
@@ -28,6 +29,7 @@ __all__ = [
     "Observation",
     "Pose",
     "Recording",
+    "Recover",
     "Sensitivity",
     "Simulation",
     "Steps",

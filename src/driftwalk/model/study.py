@@ -19,6 +19,7 @@ from driftwalk.model.flow import Flow
 from driftwalk.model.forces import Forces
 from driftwalk.model.observation import Observation
 from driftwalk.model.recording import Recording
+from driftwalk.model.recover import Recover
 from driftwalk.model.section import Section, did_you_mean
 from driftwalk.model.sensitivity import Sensitivity
 from driftwalk.model.simulation import Pose, Simulation, resolve_time_step
@@ -67,6 +68,10 @@ class Study(Section):
     fit: Fit = Field(
         default_factory=Fit,
         description="How flow, drag, force and tracking noise are fitted together.",
+    )
+    recover: Recover = Field(
+        default_factory=Recover,
+        description="Which recordings of known truth a recovery study simulates and fits.",
     )
     assembly: Assembly = Field(
         default_factory=Assembly, description="How blocks assemble, and how often it is simulated."

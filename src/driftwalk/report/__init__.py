@@ -1,10 +1,17 @@
 """Figures of stored datasets: functions that take axes and return them, and a writer of files."""
 
 from driftwalk.report.assembly_figures import write_assembly_figures, write_sensitivity_figures
+from driftwalk.report.check_figures import write_check_figures
 from driftwalk.report.figures import write_figures
 from driftwalk.report.fit_figures import plot_flow_error, write_fit_figures
 from driftwalk.report.plot_biplot import plot_biplot
 from driftwalk.report.plot_blocks import plot_blocks, plot_film_strip, write_animation
+from driftwalk.report.plot_check import (
+    plot_innovations,
+    plot_predicted_steps,
+    plot_residual_map,
+    plot_residual_time,
+)
 from driftwalk.report.plot_class_times import plot_class_times, plot_survival
 from driftwalk.report.plot_density_panels import plot_density_panels
 from driftwalk.report.plot_flow import plot_flow
@@ -17,6 +24,12 @@ from driftwalk.report.plot_validation import (
     plot_bootstrap,
     plot_distance_profile,
     plot_validation,
+)
+from driftwalk.report.recovery_figures import (
+    plot_flow_recovery,
+    plot_recovery,
+    plot_recovery_error,
+    write_recovery_figures,
 )
 
 __all__ = [
@@ -31,10 +44,17 @@ __all__ = [
     "plot_film_strip",
     "plot_flow",
     "plot_flow_error",
+    "plot_flow_recovery",
+    "plot_innovations",
     "plot_ks_map",
     "plot_l1_map",
     "plot_outcomes",
+    "plot_predicted_steps",
+    "plot_recovery",
+    "plot_recovery_error",
     "plot_refined_map",
+    "plot_residual_map",
+    "plot_residual_time",
     "plot_step_density",
     "plot_steps",
     "plot_survival",
@@ -42,7 +62,9 @@ __all__ = [
     "plot_validation",
     "write_animation",
     "write_assembly_figures",
+    "write_check_figures",
     "write_figures",
     "write_fit_figures",
+    "write_recovery_figures",
     "write_sensitivity_figures",
 ]

@@ -1,0 +1,134 @@
+"""`driftwalk study recover`: how well a set-up gives back a truth that is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+
+from driftwalk.cli.options import (
+    Json,
+    Seed,
+    quantity_option,
+    quantity_parser,
+    resolve_study,
+    study_overrides,
+)
+from driftwalk.cli.output import print_json
+from driftwalk.core.errors import ConfigurationError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+RECOVER_KEYS: Final[dict[str, str]] = {
+    "recordings": "recover.recordings",
+    "duration": "recover.durations_s",
+    "flow": "recover.flow",
+    "precision": "recover.drag_coefficient_precision",
+    "seed": "recover.seed",
+}
+STATED: Final = ("forces.drag_coefficient", "forces.force_std_N")
+"""What has a default, but is no truth unless the file says it."""
+
+
+def recover(
+    truth: Annotated[
+        Path,
+        typer.Option(
+            "--truth", metavar="FILE", help="Study file with the true values and [recover]."
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="DIR", help="Run directory to make or continue.")
+    ],
+    flow: Annotated[
+        Path | None,
+        typer.Option("--flow", metavar="FILE", help="The true flow field.", show_default=False),
+    ] = None,
+    recordings: Annotated[
+        int | None,
+        typer.Option("--recordings", min=2, help="Recordings of each length.", show_default=False),
+    ] = None,
+    duration: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--duration",
+            metavar="<s>",
+            help="Length of the recordings; repeatable, to compare lengths.",
+            show_default=False,
+        ),
+    ] = None,
+    precision: Annotated[
+        float | None,
+        quantity_option("--precision", "1", "Relative error of C_d that is wanted (rms)."),
+    ] = None,
+    seed: Seed = None,
+    threads: Annotated[
+        int | None,
+        typer.Option(
+            "--threads",
+            min=1,
+            help="Recordings that are fitted at once; all processors without it.",
+            show_default=False,
+        ),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Move a finished run aside and start anew.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Simulate recordings of known truth, fit them, and say how well the truth comes back.
+
+    For designing an experiment: what would recordings of this length, with this camera, in this
+    flow tell? The directory holds recovery.nc, figures and manifest.json. Killed and started again,
+    it continues.
+    """
+    from driftwalk.cli.recover_answer import print_answer, summary
+    from driftwalk.cli.recover_run import RecoverWork, run_recovery
+
+    read = quantity_parser("s")
+    overrides = study_overrides(
+        keys=RECOVER_KEYS,
+        recordings=recordings,
+        duration=[read(text) for text in duration] if duration else None,
+        precision=precision,
+        flow=None if flow is None else str(flow),
+        seed=seed,
+    )
+    chosen = resolve_study(truth, overrides, keys=RECOVER_KEYS)
+    _require_stated(truth)
+    field, flow_file = _flow(chosen, truth, flow)
+    inputs = {"truth": truth, **({} if flow_file is None else {"flow": flow_file})}
+    found = run_recovery(RecoverWork(chosen, field, inputs, threads), out, overwrite=overwrite)
+    if json:
+        print_json(summary(found))
+    else:
+        print_answer(found, out)
+
+
+def _require_stated(path: Path) -> None:
+    """Refuse a file in which a true value is only a default."""
+    from driftwalk.model import load_study
+
+    study = load_study(path)
+    for name in STATED:
+        section, _, key = name.partition(".")
+        if key not in getattr(study, section).model_fields_set:
+            raise ConfigurationError(
+                f"{path}: the truth lacks [{section}] {key}: say the true value, that of a fit or "
+                "a guess"
+            )
+
+
+def _flow(study: Study, truth: Path, given: Path | None) -> tuple[xr.Dataset | None, Path | None]:
+    """Return the true flow field and its file; None where every recording has a random one."""
+    from driftwalk.cli.assembly_source import load_flow_for
+
+    named: Any = study.recover.flow
+    if given is None and named in (None, "random"):
+        return None, None
+    path = given if given is not None else truth.parent / named
+    return load_flow_for(path, study), path

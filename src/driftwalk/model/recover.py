@@ -1,0 +1,142 @@
+"""Which recordings of known truth a recovery study simulates and fits."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar, Final, Literal, TypeVar
+
+from pydantic import Field, field_validator
+
+from driftwalk.core.errors import ConfigurationError
+from driftwalk.model.fit import Fit
+from driftwalk.model.section import Quantity, Section, did_you_mean, quoted, words_of
+
+LARGEST_STEP_S: Final = 0.0025
+"""Largest time step of a simulation that is taken for the truth: its error is then far below what
+a recording can tell."""
+RANDOM: Final = "random"
+
+Item = TypeVar("Item", float, str)
+
+
+class Recover(Section):
+    """The recordings of a recovery study: their flow, number, lengths, camera's clock and gaps.
+
+    The true C_d and sigma_F are those of [forces], the camera's noise that of [observation].
+
+    Examples
+    --------
+    >>> Recover(durations_s=["10min", "1h"]).durations_s
+    (600.0, 3600.0)
+    """
+
+    section_name: ClassVar[str] = "recover"
+
+    flow: str | None = Field(
+        default=None,
+        description=(
+            'File of the true flow field, found from where the study file is; "random" draws '
+            "another flow for every recording."
+        ),
+        examples=["fit/flow.nc"],
+    )
+    flow_family: Literal["swirl", "eddies"] = Field(
+        default="swirl",
+        description=(
+            'Random flows: "swirl" with jets and a sink, where a block goes round on regular '
+            'orbits, or "eddies".'
+        ),
+    )
+    flow_speed_m_s: Annotated[float | None, Quantity("m/s", gt=0, le=100)] = Field(
+        default=None,
+        description="Root mean square speed of random flows; as drawn without it.",
+        examples=[0.05],
+    )
+    recordings: Annotated[int, Quantity("1", ge=2, le=100_000, whole=True)] = Field(
+        default=20, description="Recordings to simulate and fit, of each length."
+    )
+    durations_s: tuple[Annotated[float, Quantity("s", gt=0, le=1e6)], ...] = Field(
+        default=(1800.0,), description="Lengths of the recordings to compare."
+    )
+    sample_interval_s: Annotated[float, Quantity("s", gt=0, le=1)] = Field(
+        default=0.1, description="Time from one sample of the camera to the next."
+    )
+    recordings_per_fit: Annotated[int, Quantity("1", ge=1, le=1000, whole=True)] = Field(
+        default=1,
+        description="Recordings of one flow, from different starts, that are fitted together.",
+    )
+    missing_share: Annotated[float, Quantity("1", ge=0, le=0.9)] = Field(
+        default=0.0, description="Share of the samples that the camera misses, at random."
+    )
+    settling_s: Annotated[float, Quantity("s", ge=0, le=1e6)] = Field(
+        default=20.0,
+        description="Time from the start, at rest, to the first sample of the recording.",
+    )
+    angle: tuple[str, ...] | None = Field(
+        default=None,
+        description="Uses of the orientation to compare, words of [fit] angle; that one without.",
+        examples=['["given", "none"]'],
+    )
+    drag_coefficient_precision: Annotated[float | None, Quantity("1", gt=0, lt=1)] = Field(
+        default=None,
+        description=(
+            "Relative error of C_d that is wanted, root mean square: the study says how long to "
+            "record for it."
+        ),
+        examples=[0.05],
+    )
+    seed: Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)] = Field(
+        default=1, description="Seed of the flows, starts, forces, camera and gaps."
+    )
+
+    @field_validator("durations_s")
+    @classmethod
+    def _durations(cls, values: tuple[float, ...]) -> tuple[float, ...]:
+        return tuple(sorted(_distinct(values)))
+
+    @field_validator("angle")
+    @classmethod
+    def _angles(cls, values: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        if values is None:
+            return None
+        known = words_of(Fit, "angle")
+        for word in _distinct(values):
+            if word not in known:
+                raise ConfigurationError(
+                    f"must be a list of {quoted(known)}, got {word!r}{did_you_mean(word, known)}"
+                )
+        return values
+
+
+def _distinct(values: tuple[Item, ...]) -> tuple[Item, ...]:
+    if not values:
+        raise ConfigurationError("the list is empty; leave the key out or name a value")
+    if len(set(values)) < len(values):
+        raise ConfigurationError(f"the list names a value twice: {list(values)}")
+    return values
+
+
+def true_time_step_s(time_step_s: float | Literal["auto"], *, force_interval_s: float) -> float:
+    """Return the time step of a simulation that is taken for the truth [s].
+
+    Parameters
+    ----------
+    time_step_s : float or "auto"
+        What [simulation] says: taken where it is not above 2.5 ms.
+    force_interval_s : float
+        How long one draw of the stochastic force lasts [s].
+
+    Returns
+    -------
+    float
+        Else the largest whole divisor of the interval that is not above 2.5 ms.
+
+    Examples
+    --------
+    >>> true_time_step_s("auto", force_interval_s=0.016)
+    0.002285714285714286
+    """
+    if time_step_s != "auto" and time_step_s <= LARGEST_STEP_S:
+        return time_step_s
+    parts = max(1, math.ceil(force_interval_s / LARGEST_STEP_S - 1e-9))
+    return force_interval_s / parts

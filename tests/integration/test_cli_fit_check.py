@@ -1,0 +1,69 @@
+"""`driftwalk fit` asks at its end whether the model explains the recording."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import RECORDING, Done, here
+
+SHORT = ("--to", "150", "--spline-spacing", "3cm", "--force-interval", "16ms")
+FIGURES = ("check_innovations", "check_map", "check_time", "check_steps")
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Done]:
+    folder = tmp_path_factory.mktemp("fit") / "run"
+    return folder, here("fit", RECORDING, *SHORT, "-o", folder, "--json")
+
+
+def test_json_says_whether_the_model_explains_it(finished: tuple[Path, Done]) -> None:
+    assert finished[1].code == 0, finished[1].err
+    found = json.loads(finished[1].out)
+    assert found["explained"] is True
+    assert found["findings"] == []
+    # Two halves of a short recording: a distance is of the size of its floor, within a factor.
+    assert 0.0 < found["ks_distance"] < 4.0 * found["ks_noise_floor"] < 1.0
+
+
+def test_the_check_is_written_with_its_figures(finished: tuple[Path, Done]) -> None:
+    folder = finished[0]
+    for name in FIGURES:
+        assert (folder / "figures" / f"{name}.png").stat().st_size > 1000
+        assert (folder / "figures" / f"{name}.svg").stat().st_size > 1000
+    with xr.open_dataset(folder / "check.nc", engine="h5netcdf") as stored:
+        assert stored.attrs["kind"] == "model_check"
+        assert stored.attrs["explained"] == "yes"
+        assert stored.attrs["ks_distance"] == json.loads(finished[1].out)["ks_distance"]
+        assert stored["x"].attrs["units"] == "m"
+
+
+def test_people_are_told_and_the_check_can_be_left_out(tmp_path: Path) -> None:
+    done = here("fit", RECORDING, *SHORT, "-o", tmp_path / "run", "--no-check")
+    assert done.code == 0, done.err
+    assert "model check" not in done.out
+    assert not (tmp_path / "run" / "check.nc").exists()
+    assert not (tmp_path / "run" / "figures" / "check_map.png").exists()
+
+
+def test_a_recording_that_is_not_explained_gets_the_reasons(tmp_path: Path) -> None:
+    """The bundled recording with bursts of noise on it: every tenth second five times as much."""
+    generator = np.random.default_rng(2)
+    lines = RECORDING.read_text(encoding="utf-8").splitlines()
+    first = next(k for k, line in enumerate(lines) if line[:1].isdigit())
+    for k in range(first, min(first + 1500, len(lines))):
+        cells = lines[k].split(",")
+        if float(cells[0]) % 10.0 < 1.0:
+            for column in (1, 2):
+                cells[column] = f"{float(cells[column]) + 1e-3 * generator.normal():.6f}"
+        lines[k] = ",".join(cells)
+    path = tmp_path / "bursts.csv"
+    path.write_text("\n".join(lines), encoding="utf-8")
+    done = here("fit", path, *SHORT, "-o", tmp_path / "run")
+    assert done.code == 0, done.err
+    assert "THE MODEL DOES NOT EXPLAIN THIS RECORDING" in done.out
+    assert "excess kurtosis" in done.out
+    assert "noise floor" in done.out

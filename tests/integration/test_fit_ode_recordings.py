@@ -1,0 +1,45 @@
+"""How good the likelihood fit has to be on recordings of other flows, made by another engine.
+
+Two of the sixteen of studies/likelihood, one of each family of flows.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import driftwalk as dw
+from driftwalk.schema import build_flow_field, build_trajectory
+
+FOLDER = Path(__file__).resolve().parents[1] / "data" / "ode_recordings"
+AXIS = np.linspace(-0.165, 0.165, 133)
+NOISE_M = 0.3e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["ode-002", "ode-003"])
+def test_half_an_hour_of_another_engine(name: str) -> None:
+    """Measured: C_d +0.9 and -1.1 %, sigma_F +0.6 and -0.9 %, flow 2.4 and 6.1 %."""
+    with np.load(FOLDER / f"{name}.npz") as stored:
+        x, y, u, v = (1e-5 * stored[key] for key in ("x", "y", "u", "v"))
+        theta = 1e-4 * stored["theta"]
+        drag, force = float(stored["drag_coefficient"]), float(stored["force_std_N"])
+    recording = build_trajectory(0.1 * np.arange(x.size), x, y, theta)
+    flow = build_flow_field(AXIS, AXIS, u=u, v=v, flag=np.ones(u.shape, dtype=np.int8))
+    fit = dw.fit_motion(recording, angle="given")
+    score = dw.score_fit(
+        fit,
+        drag_coefficient=drag,
+        force_std=force,
+        tracking_noise=NOISE_M,
+        flow=flow,
+        recordings=recording,
+    )
+    assert fit.attrs["wall_share"] < 0.3
+    assert abs(score["drag_coefficient_error"]) <= 0.10
+    assert abs(score["force_std_N_error"]) <= 0.03
+    assert abs(score["tracking_noise_m_error"]) <= 0.03
+    assert score["flow_error"] <= 0.08
+    assert abs(score["drag_coefficient_z"]) <= 3.0

@@ -1,0 +1,108 @@
+"""The figures of a recovery study: what is drawn is what is in the dataset."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.axes import Axes
+from recovery_worlds import synthetic_recovery
+
+from driftwalk.core.errors import InputError
+from driftwalk.report import (
+    plot_flow_recovery,
+    plot_recovery,
+    plot_recovery_error,
+    write_recovery_figures,
+)
+
+
+@pytest.fixture(scope="module")
+def recovery() -> xr.Dataset:
+    return synthetic_recovery(recordings=4)
+
+
+def points(ax: Axes) -> np.ndarray:
+    """Return the heights of all markers, sorted."""
+    lines = [line for line in ax.lines if line.get_marker() == "o"]
+    return np.sort(np.concatenate([np.asarray(line.get_ydata(), float) for line in lines]))
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "truth", "label"),
+    [
+        ("drag_coefficient", 1.0, 0.4, "$C_d$"),
+        ("force_std", 1e3, 0.6, "$\\sigma_F$ (mN)"),
+        ("tracking_noise", 1e3, 0.3, "tracking noise (mm)"),
+    ],
+)
+def test_estimates_beside_the_truth(
+    recovery: xr.Dataset, name: str, factor: float, truth: float, label: str
+) -> None:
+    ax = plot_recovery(recovery, name)
+    assert points(ax) == pytest.approx(np.sort(factor * recovery[name].values.ravel()))
+    level = [line for line in ax.lines if line.get_label() == "truth"]
+    assert list(level[0].get_ydata()) == pytest.approx([truth, truth])
+    assert ax.get_ylabel() == label
+    assert [text.get_text() for text in ax.get_xticklabels()] == ["10 min", "40 min"]
+    # An interval is a segment from its low to its high end.
+    segments = [path for item in ax.collections for path in item.get_segments()]
+    lows = np.sort([segment[0, 1] for segment in segments])
+    assert lows == pytest.approx(np.sort(factor * recovery[f"{name}_low"].values.ravel()))
+
+
+def test_what_is_not_used_is_open(recovery: xr.Dataset) -> None:
+    ax = plot_recovery(recovery)
+    faces = {
+        float(y): line.get_markerfacecolor()
+        for line in ax.lines
+        if line.get_marker() == "o"
+        for y in line.get_ydata()
+    }
+    values, used = recovery["drag_coefficient"].values.ravel(), recovery["used"].values.ravel()
+    assert [faces[value] == "white" for value in values] == [kept == 0 for kept in used]
+
+
+def test_flow_error_in_percent(recovery: xr.Dataset) -> None:
+    ax = plot_flow_recovery(recovery)
+    assert points(ax) == pytest.approx(np.sort(100 * recovery["flow_error"].values.ravel()))
+    assert ax.get_ylim()[0] == 0.0
+    assert "%" in ax.get_ylabel()
+
+
+def test_error_by_length_with_its_law(recovery: xr.Dataset) -> None:
+    ax = plot_recovery_error(recovery)
+    rms = recovery["rms_error"].sel(parameter="drag_coefficient").values
+    assert points(ax) == pytest.approx(np.sort(100 * rms.ravel()))
+    laws = [line for line in ax.lines if len(line.get_xdata()) == 50]
+    for line, scale in zip(laws, recovery["drag_coefficient_error_scale"].values, strict=True):
+        minutes, percent = (np.asarray(values) for values in line.get_data())
+        assert percent == pytest.approx(100 * scale / np.sqrt(60 * minutes))
+    assert "(min)" in ax.get_xlabel()
+    crosses = [line for line in ax.lines if line.get_marker() == "x"]
+    assert np.concatenate([line.get_ydata() for line in crosses]) == pytest.approx([10.0] * 4)
+
+
+def test_files(recovery: xr.Dataset, tmp_path: Path) -> None:
+    files = write_recovery_figures(tmp_path, recovery=recovery, formats=("png",))
+    assert [path.name for path in files] == ["recovery.png", "error_by_length.png"]
+    assert min(path.stat().st_size for path in files) > 5000
+
+
+def test_a_study_without_a_single_fit_is_drawn(recovery: xr.Dataset, tmp_path: Path) -> None:
+    nothing = recovery.copy(deep=True)
+    for name in nothing.data_vars:
+        if nothing[name].dtype.kind == "f":
+            nothing[name].values[...] = np.nan
+    nothing["used"].values[...] = 0
+    assert len(write_recovery_figures(tmp_path, recovery=nothing, formats=("png",))) == 2
+
+
+def test_refusals(recovery: xr.Dataset) -> None:
+    with pytest.raises(InputError, match="parameter must be one of"):
+        plot_recovery(recovery, "mass")
+    for plot in (plot_recovery, plot_flow_recovery, plot_recovery_error):
+        with pytest.raises(InputError, match="not a recovery study"):
+            plot(xr.Dataset())

@@ -1,0 +1,320 @@
+"""The parts of the model check against dense linear algebra, brute force and made-up worlds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from driftwalk.calibrate.fit_check_motion import compare_motion
+from driftwalk.calibrate.fit_check_pass import Contrast, Errors, Leverage, velocity_at
+from driftwalk.calibrate.fit_check_place import (
+    Layout,
+    cell_of,
+    groups_of,
+    lay_out,
+    local_scores,
+    spread_of,
+    trend_of,
+)
+from driftwalk.calibrate.fit_check_scan import scan_of
+from driftwalk.calibrate.fit_check_verdict import motion_criterion
+from driftwalk.calibrate.fit_check_white import white_of
+from driftwalk.calibrate.fit_check_worlds import Replicates
+from driftwalk.calibrate.fit_pass import Series
+from driftwalk.calibrate.fit_spline import Spline
+from driftwalk.compare import ks_distance
+from driftwalk.core.errors import InputError
+
+ROWS, PARAMETERS, COMPONENTS = 400, 12, 2
+
+
+def linear_world(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return derivatives J, the precision of the prior, and C = (J'J + Lambda)^-1."""
+    generator = np.random.default_rng(seed)
+    jacobian = generator.normal(size=(ROWS, PARAMETERS)) * generator.uniform(0.1, 1.0, PARAMETERS)
+    # Some parameters move whole blocks of rows, as a coefficient of the flow moves a cell.
+    jacobian[:, :8] += np.kron(np.eye(8), np.ones((ROWS // 8, 1)))
+    precision = np.diag(generator.uniform(1.0, 60.0, PARAMETERS))
+    return jacobian, precision, np.linalg.inv(jacobian.T @ jacobian + precision)
+
+
+def contrast_of(
+    group: np.ndarray, size: int, weight: np.ndarray, white: np.ndarray, jacobian: np.ndarray
+) -> Contrast:
+    found = Contrast([group], size)
+    found.begin(PARAMETERS)
+    half = ROWS // 2
+    for rows in (slice(0, half), slice(half, ROWS)):
+        found.add(group.ravel()[rows], weight[rows], white[rows], jacobian[rows])
+    return found
+
+
+def test_sums_and_their_variance_by_dense_algebra() -> None:
+    jacobian, _, covariance = linear_world(1)
+    generator = np.random.default_rng(2)
+    white, weight = generator.normal(size=(2, ROWS))
+    group = generator.integers(-1, 5, ROWS)
+    found = contrast_of(group, 5, weight, white, jacobian)
+    matrix = np.array([(group == k) * weight for k in range(5)])
+    assert found.score == pytest.approx(matrix @ white)
+    assert found.power == pytest.approx(np.diag(matrix @ matrix.T))
+    left = matrix @ (np.eye(ROWS) - jacobian @ covariance @ jacobian.T) @ matrix.T
+    trend = trend_of(found, covariance)
+    assert trend.dof == 5
+    assert trend.change == pytest.approx(np.linalg.solve(left, matrix @ white))
+    assert trend.std == pytest.approx(np.sqrt(np.diag(np.linalg.inv(left))))
+    assert trend.chi_squared == pytest.approx(
+        matrix @ white @ np.linalg.solve(left, matrix @ white)
+    )
+
+
+def test_chi_squared_of_a_cell_by_dense_algebra() -> None:
+    jacobian, _, covariance = linear_world(3)
+    generator = np.random.default_rng(4)
+    white = generator.normal(size=ROWS)
+    cell = np.repeat(generator.integers(0, 3, ROWS // COMPONENTS), COMPONENTS)
+    group = cell * COMPONENTS + np.tile(np.arange(COMPONENTS), ROWS // COMPONENTS)
+    found = contrast_of(group, 3 * COMPONENTS, np.ones(ROWS), white, jacobian)
+    local = local_scores(
+        found.score.reshape(3, -1),
+        found.power.reshape(3, -1)[:, 0],
+        found.slope.reshape(3, COMPONENTS, -1),
+        covariance,
+    )
+    for k in range(3):
+        matrix = np.array([group == k * COMPONENTS + d for d in range(COMPONENTS)], dtype=float)
+        left = matrix @ (np.eye(ROWS) - jacobian @ covariance @ jacobian.T) @ matrix.T
+        total = matrix @ white
+        assert local.chi_squared[k] == pytest.approx(total @ np.linalg.solve(left, total))
+        assert local.mean[k] == pytest.approx(total / matrix[0].sum())
+    assert local.samples.sum() == ROWS / COMPONENTS
+
+
+def test_residuals_of_a_fit_have_the_stated_variance() -> None:
+    """A linear world whose coefficients come from the prior: 4000 fits, 5 sd of a variance each."""
+    jacobian, precision, covariance = linear_world(5)
+    generator = np.random.default_rng(6)
+    group = np.arange(ROWS) // 50
+    matrix = np.array([group == k for k in range(8)], dtype=float)
+    left = matrix @ (np.eye(ROWS) - jacobian @ covariance @ jacobian.T) @ matrix.T
+    fits = 4000
+    truth = generator.normal(size=(PARAMETERS, fits)) / np.sqrt(np.diag(precision))[:, None]
+    seen = jacobian @ truth + generator.normal(size=(ROWS, fits))
+    residual = seen - jacobian @ (covariance @ (jacobian.T @ seen))
+    variance = (matrix @ residual).var(axis=1)
+    assert variance == pytest.approx(np.diag(left), rel=5.0 * np.sqrt(2.0 / fits))
+    # The correction is worth making: fitting takes 40 % of it away, somewhere.
+    assert (np.diag(left) < 0.6 * 50).any()
+
+
+def errors_of_noise(white: np.ndarray, used: np.ndarray | None = None) -> Errors:
+    """Return errors made on a circle of 8 cm, one turn in 40 s, at 10 Hz."""
+    time = 0.1 * np.arange(len(white))
+    angle = 2.0 * np.pi * time / 40.0
+    used = np.ones(time.size, dtype=bool) if used is None else used
+    series = Series(
+        time,
+        0.08 * np.cos(angle),
+        0.08 * np.sin(angle),
+        angle,
+        0.0 * time,
+        np.zeros(time.size, np.uint8),
+    )
+    return Errors(
+        series,
+        np.where(used[:, None], white, 0.0),
+        used,
+        np.zeros(time.size, bool),
+        0.02 + 0.01 * np.cos(angle),
+    )
+
+
+def nothing_fitted(components: int = 2) -> Leverage:
+    return Leverage(np.zeros((1, 1)), 0.0, np.zeros((components, 21)))
+
+
+def test_portmanteau_without_gaps_is_that_of_ljung_and_box() -> None:
+    white = np.random.default_rng(7).normal(size=(800, 2))
+    found = white_of([errors_of_noise(white)], nothing_fitted())
+    expected = 0.0
+    for column in white.T:
+        for lag in range(1, 21):
+            rho = (column[lag:] * column[:-lag]).sum() / (column**2).sum()
+            expected += 800 * 802 * rho**2 / (800 - lag)
+    # Each product is divided by its number of pairs; at 20 of 800 lags that is 2.5 % of a term.
+    assert found.portmanteau == pytest.approx(expected, rel=0.03)
+    assert found.portmanteau_dof == 40
+    assert found.p_value == pytest.approx(chi2.sf(found.portmanteau, 40))
+
+
+def test_autocorrelation_with_gaps_by_brute_force() -> None:
+    generator = np.random.default_rng(8)
+    white, used = generator.normal(size=(300, 2)), generator.random(300) < 0.7
+    found = white_of([errors_of_noise(white, used)], nothing_fitted())
+    for lag in (1, 7, 20):
+        pairs = [(k, k + lag) for k in range(300 - lag) if used[k] and used[k + lag]]
+        mean = np.mean([white[a] * white[b] for a, b in pairs], axis=0)
+        variance = (white[used] ** 2).mean(axis=0)
+        assert found.autocorrelation[:, lag - 1] == pytest.approx(mean / variance)
+        assert found.std[:, lag - 1] == pytest.approx(1.0 / np.sqrt(len(pairs)))
+
+
+def test_what_fitting_puts_in_is_taken_out_again() -> None:
+    """Residuals of a local mean are anticorrelated; with the leverage known they count as white."""
+    generator = np.random.default_rng(9)
+    white = generator.normal(size=(20_000, 2))
+    jacobian = np.kron(np.eye(400), np.ones((50, 1)))
+    residual = white - jacobian @ (jacobian.T @ white) / 50.0
+    # J C J' is 1/50 within a block of 50: at lag l a share (50 - l) / 50 of the pairs is in one.
+    lags = np.arange(21)
+    leverage = Leverage(np.zeros((1, 1)), 800.0, np.tile((50 - lags) / 50**2, (2, 1)))
+    corrected = white_of([errors_of_noise(residual)], leverage)
+    naive = white_of([errors_of_noise(residual)], nothing_fitted())
+    assert naive.p_value < 1e-6
+    assert corrected.p_value > 1e-3
+    assert corrected.expected_chi_squared == pytest.approx(0.98)
+    assert corrected.chi_squared == pytest.approx(np.full(2, 0.98), abs=0.05)
+
+
+def test_moving_average_and_tails_are_seen() -> None:
+    generator = np.random.default_rng(10)
+    noise = generator.normal(size=(6001, 2))
+    found = white_of(
+        [errors_of_noise((noise[1:] + 0.5 * noise[:-1]) / np.sqrt(1.25))], nothing_fitted()
+    )
+    assert found.autocorrelation[:, 0] == pytest.approx([0.4, 0.4], abs=0.05)
+    assert found.p_value < 1e-12
+    assert found.largest[1] == 1
+    # The excess kurtosis of Student's t with 10 degrees of freedom is 6 / (10 - 4).
+    tails = white_of(
+        [errors_of_noise(generator.standard_t(10, size=(40_000, 2)))], nothing_fitted()
+    )
+    assert tails.excess_kurtosis == pytest.approx([1.0, 1.0], abs=0.3)
+    assert tails.kurtosis_p_value.max() < 1e-6
+
+
+def test_layout_cells_parts_and_speeds() -> None:
+    errors = [errors_of_noise(np.zeros((6000, 2))), errors_of_noise(np.zeros((3000, 2)))]
+    layout = lay_out(errors, (-0.15, -0.15, 0.15, 0.15), side=0.03)
+    assert layout.size == pytest.approx(0.02)
+    assert (layout.x.size, layout.y.size) == (15, 15)
+    assert layout.parts == 10
+    assert np.bincount(layout.recording).tolist() == [7, 3]
+    assert layout.end[6] == pytest.approx(599.9)
+    cell = cell_of(layout, np.array([0.0, -0.145, 9.0]), np.array([0.0, 0.145, -9.0]))
+    assert cell.tolist() == [7 * 15 + 7, 14 * 15, 14]
+    groups = groups_of(layout, errors)
+    before = errors[0].series.x[:-1], errors[0].series.y[:-1]
+    assert (groups[0].cell[1:] == cell_of(layout, *before)).all()
+    assert np.bincount(groups[0].part).min() > 850
+    counts = np.bincount(np.concatenate([one.speed for one in groups]))
+    assert counts == pytest.approx(np.full(6, 1500), rel=0.05)
+
+
+def test_louder_noise_in_one_group_is_seen() -> None:
+    generator = np.random.default_rng(11)
+    group = generator.integers(0, 4, 8000)
+    white = generator.normal(size=(8000, 2)) * np.where(group == 2, 1.3, 1.0)[:, None]
+    found = spread_of([errors_of_noise(white)], [group], 5)
+    mean = (3 + 1.3**2) / 4
+    assert found.ratio[:4] == pytest.approx(np.array([1.0, 1.0, 1.69, 1.0]) / mean, rel=0.1)
+    assert (found.ratio[2] - 1.0) / found.std[2] > 8.0
+    assert np.isnan(found.ratio[4])
+
+
+def test_flow_at_scattered_points_is_that_of_the_grid() -> None:
+    spline = Spline(-0.1, -0.08, 0.02, 13, 11)
+    coefficients = np.random.default_rng(12).normal(size=(2, 11, 13))
+    x, y = np.linspace(-0.09, 0.09, 7), np.linspace(-0.07, 0.07, 5)
+    at_x, at_y = (part.ravel() for part in np.meshgrid(x, y))
+    found = velocity_at(spline, coefficients, at_x, at_y)
+    assert found.reshape(2, 5, 7) == pytest.approx(spline.values(coefficients, x, y))
+    assert np.isnan(velocity_at(spline, coefficients, np.array([np.nan]), np.zeros(1))).all()
+
+
+def turning(
+    seed: int, *, backwards: tuple[float, float] = (0.0, 0.0)
+) -> list[tuple[np.ndarray, ...]]:
+    """Return a body that goes round at 5 cm/s at random radii, the other way for a while."""
+    generator = np.random.default_rng(seed)
+    time = 0.1 * np.arange(6000)
+    sign = np.where((time >= backwards[0]) & (time < backwards[1]), -1.0, 1.0)
+    radius = 0.08 + 0.02 * np.sin(2.0 * np.pi * time / 97.0 + generator.uniform(0.0, 6.0))
+    angle = generator.uniform(0.0, 6.0) + np.cumsum(sign * 0.05 / radius) * 0.1
+    noise = 0.0003 * generator.normal(size=(2, time.size))
+    return [(time, radius * np.cos(angle) + noise[0], radius * np.sin(angle) + noise[1])]
+
+
+def ten_parts() -> Layout:
+    axis = 0.02 * np.arange(-7.0, 8.0)
+    start = 60.0 * np.arange(10)
+    return Layout(axis, axis, 0.02, np.zeros(10, np.int64), start, start + 60.0, np.zeros(2))
+
+
+def test_scan_names_the_stretch_that_differs() -> None:
+    simulated = [turning(seed) for seed in range(1, 17)]
+    found = scan_of(turning(100, backwards=(180.0, 300.0)), simulated, ten_parts())
+    assert found is not None
+    assert (found.first, found.last) == (3, 4)
+    # The other way round at 5 cm/s: 10 cm/s apart.
+    assert found.difference == pytest.approx(0.1, rel=0.1)
+    assert found.p_value < 1e-6
+    assert found.expected < 0.03
+
+
+def test_scan_of_steady_motion_is_not_alarmed() -> None:
+    """Twenty recordings at a level of 5 %: more than four alarms once in 400 such tests."""
+    simulated = [turning(seed) for seed in range(1, 17)]
+    p_values = []
+    for seed in range(200, 220):
+        found = scan_of(turning(seed), simulated, ten_parts())
+        assert found is not None
+        p_values.append(found.p_value)
+    assert np.count_nonzero(np.array(p_values) < 0.05) <= 4
+
+
+def replicates(seed: int, *, count: int = 8, spread: float = 1.0) -> Replicates:
+    generator = np.random.default_rng(seed)
+    steps = [np.abs(generator.normal(size=(500, 2))) * spread for _ in range(count)]
+    return Replicates(steps, [[] for _ in steps], np.arange(count) % 4, 0)
+
+
+def test_distances_and_bands_by_brute_force() -> None:
+    real = np.abs(np.random.default_rng(1).normal(size=(400, 2)))
+    estimate, drawn = replicates(2), replicates(3)
+    found = compare_motion(real, estimate, drawn, threads=1)
+    assert found.distance == pytest.approx([ks_distance(real, one) for one in estimate.steps])
+    pairs = [ks_distance(a, b) for a in estimate.steps[:4] for b in estimate.steps[4:]]
+    assert found.floor == pytest.approx(pairs)
+    for k, one in enumerate(drawn.steps):
+        others = [s for j, s in enumerate(drawn.steps) if drawn.flow[j] != drawn.flow[k]]
+        assert found.drawn_between[k] == pytest.approx(
+            np.mean([ks_distance(one, s) for s in others])
+        )
+    width = np.diff(found.step_length.edge)
+    assert (found.step_length.recording * width).sum() == pytest.approx(1.0, abs=0.01)
+    assert (found.turning_angle.low <= found.turning_angle.median).all()
+    assert (found.turning_angle.median <= found.turning_angle.high).all()
+    assert found.p_value > 0.01
+    assert found.rank_p_value > 1 / 9
+    wide = compare_motion(1.5 * real, estimate, drawn, threads=1)
+    assert wide.rank_p_value == pytest.approx(1 / 9)
+    assert wide.p_value < 1e-3
+
+
+def test_steps_that_differ_are_put_into_words() -> None:
+    real = 1.5 * np.abs(np.random.default_rng(1).normal(size=(400, 2)))
+    motion = compare_motion(real, replicates(2), replicates(3), threads=1)
+    found = {angle: motion_criterion(motion, angle=angle) for angle in ("given", "none")}
+    assert found["given"].failed
+    assert f"KS distance {motion.drawn_distance.mean():.3f}" in found["given"].sentence
+    assert "averaged the drag over all orientations" in found["none"].sentence
+    assert "orientations" not in found["given"].sentence
+    assert not motion_criterion(None, angle="given").failed
+
+
+def test_too_few_sound_replicates_are_refused() -> None:
+    few = Replicates(replicates(4).steps[:2], [[], []], np.arange(2), 6)
+    with pytest.raises(InputError, match="6 of 8 simulated recordings broke down"):
+        compare_motion(np.ones((40, 2)), replicates(5), few, threads=1)

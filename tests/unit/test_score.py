@@ -1,0 +1,144 @@
+"""A fit held beside its truth: every number of the score, worked out another way."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+from fit_worlds import DRAG, FORCE_N, NOISE_M, coarse_study, recording
+
+import driftwalk as dw
+from driftwalk.calibrate.score import block_flow
+from driftwalk.core.errors import InputError
+
+R, SIDE = 0.15, 0.03
+
+
+@pytest.fixture(scope="module")
+def track() -> xr.Dataset:
+    return recording(300.0)
+
+
+@pytest.fixture(scope="module")
+def fit(track: xr.Dataset) -> xr.Dataset:
+    return dw.fit_motion(track, coarse_study())
+
+
+def scored(fit: xr.Dataset, **changes: object) -> dict[str, object]:
+    truth: dict[str, object] = {
+        "drag_coefficient": DRAG,
+        "force_std": FORCE_N,
+        "tracking_noise": NOISE_M,
+        "flow": dw.tank30_flow(),
+    }
+    return dw.score_fit(fit, **{**truth, **changes})
+
+
+def test_the_parameters_are_held_beside_the_truth(fit: xr.Dataset) -> None:
+    """The standard deviations by the fit's own covariance of (ln C_d, ln q, ln r)."""
+    score = scored(fit)
+    sd = np.sqrt(np.diag(fit["covariance"].values))[:3] * (1.0, 0.5, 1.0)
+    truths = {"drag_coefficient": DRAG, "force_std_N": FORCE_N, "tracking_noise_m": NOISE_M}
+    for (name, truth), width in zip(truths.items(), sd, strict=True):
+        value = fit.attrs[name]
+        assert score[name] == value
+        assert score[f"{name}_true"] == truth
+        assert score[f"{name}_sd"] == pytest.approx(width, rel=1e-6)
+        assert score[f"{name}_error"] == pytest.approx((value - truth) / truth)
+        assert score[f"{name}_z"] == pytest.approx(np.log(value / truth) / width, rel=1e-6)
+        assert [score[f"{name}_low"], score[f"{name}_high"]] == fit.attrs[f"{name}_interval"]
+
+
+@pytest.mark.parametrize("name", ["drag_coefficient", "force_std", "tracking_noise"])
+@pytest.mark.parametrize(
+    ("sds", "covered"), [(1.6, True), (1.7, False), (-1.6, True), (-1.7, False)]
+)
+def test_a_90_percent_interval_reaches_1_645_standard_deviations(
+    fit: xr.Dataset, name: str, sds: float, covered: bool
+) -> None:
+    key = {"force_std": "force_std_N", "tracking_noise": "tracking_noise_m"}.get(name, name)
+    plain = scored(fit)
+    truth = fit.attrs[key] * math.exp(sds * float(plain[f"{key}_sd"]))  # type: ignore[arg-type]
+    score = scored(fit, **{name: truth})
+    assert score[f"{key}_covered"] is covered
+    assert score[f"{key}_z"] == pytest.approx(-sds)
+
+
+def test_the_flow_error_by_brute_force(fit: xr.Dataset, track: xr.Dataset) -> None:
+    """Cell by cell, sample by sample, point by point of the block."""
+    score = scored(fit, recordings=track)
+    estimated, truth = dw.fitted_flow(fit), dw.tank30_flow()
+    x, y = (track[name].values[:, 0] for name in ("x", "y"))
+    total, size, cells = 0.0, 0.0, 0
+    points = [(i - 2.5) / 6 * SIDE for i in range(6)]
+    for row in range(50):
+        for column in range(50):
+            left, low = -R + 0.006 * column, -R + 0.006 * row
+            here = (x >= left) & (x < left + 0.006) & (y >= low) & (y < low + 0.006)
+            free = np.hypot(x, y) < R - SIDE / math.sqrt(2.0) - 0.002
+            if np.count_nonzero(here & free) < 3:
+                continue
+            cells += 1
+            places = [
+                (
+                    left + 0.003 + math.cos(turn) * a - math.sin(turn) * b,
+                    low + 0.003 + math.sin(turn) * a + math.cos(turn) * b,
+                )
+                for turn in (0.0, math.pi / 8, math.pi / 4, 3 * math.pi / 8)
+                for a in points
+                for b in points
+            ]
+            means = [
+                np.mean(
+                    [dw.bilinear(one, [px for px, _ in places], [py for _, py in places])], axis=-1
+                )
+                for one in (estimated, truth)
+            ]
+            total += float(((means[0] - means[1]) ** 2).sum())
+            size += float((means[1] ** 2).sum())
+    assert cells > 100
+    assert score["flow_cells"] == cells
+    assert score["flow_error"] == pytest.approx(math.sqrt(total / size), rel=1e-9)
+
+
+def test_without_the_recording_about_the_same_cells_count(
+    fit: xr.Dataset, track: xr.Dataset
+) -> None:
+    exact, about = scored(fit, recordings=track), scored(fit)
+    assert about["flow_cells"] == pytest.approx(exact["flow_cells"], rel=0.5)
+    assert about["flow_error"] == pytest.approx(exact["flow_error"], rel=0.4)
+
+
+def test_a_flow_that_is_a_tenth_too_strong_is_off_by_a_tenth(
+    fit: xr.Dataset, track: xr.Dataset
+) -> None:
+    estimated = dw.fitted_flow(fit)
+    truth = estimated.assign(u=estimated["u"] / 1.1, v=estimated["v"] / 1.1)
+    score = scored(fit, flow=truth, recordings=[track])
+    assert score["flow_error"] == pytest.approx(0.1)
+    assert score["flow_point_error"] == pytest.approx(0.1)
+    exact = scored(fit, flow=estimated, recordings=[track])
+    assert exact["flow_error"] == 0.0
+    assert exact["flow_z_rms"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_block_averages_a_parabola_by_its_second_moment() -> None:
+    """Mean of y^2 over a square of side a is y0^2 + a^2/12 at any angle; midpoints: (1 - 1/36)."""
+    flow = dw.flow_from_function(lambda x, y: (y**2, 0.0 * x), cells=2000)
+    found = block_flow(flow, [0.0, 0.02], [0.0, 0.05], side=SIDE)
+    spread = SIDE**2 / 12 * (1 - 1 / 36)
+    assert found[:, 0] == pytest.approx([spread, 0.05**2 + spread], rel=1e-3)
+    assert found[:, 1] == pytest.approx([0.0, 0.0], abs=1e-15)
+
+
+@pytest.mark.parametrize("wrong", [0.0, -1.0, math.nan, math.inf])
+def test_a_truth_has_to_be_positive(fit: xr.Dataset, wrong: float) -> None:
+    with pytest.raises(InputError, match="the true force_std_N is"):
+        scored(fit, force_std=wrong)
+
+
+def test_what_is_no_fit_is_refused(track: xr.Dataset) -> None:
+    with pytest.raises(InputError, match="not a fit"):
+        scored(track)
