@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from driftwalk.calibrate.fit import _body, _prepare
 from driftwalk.calibrate.fit_newton import Prior, Weights
-from driftwalk.calibrate.fit_pass import SAMPLES_AT_ONCE, Passes, Point, Series, Sums
+from driftwalk.calibrate.fit_pass import Passes, Point, Series, Sums
 from driftwalk.calibrate.fit_spline import DEGREE, Floats, Spline, basis
 from driftwalk.core.errors import InputError
 
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 Integers = npt.NDArray[np.int64]
 
+SAMPLES_AT_ONCE = 2048
+"""Rows of derivatives that are held at a time: some 20 MB."""
 MOST_KEPT_PARTS = 4
 """Parts of the recording whose derivatives are kept for the correction of the autocorrelation."""
 DRAWS = 16
@@ -53,7 +55,7 @@ def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str 
     if fit.attrs.get("kind") != "fit":
         raise InputError(f"not a fit: its kind is {fit.attrs.get('kind')!r}; fit_motion makes one")
     study = parse_study(fit.attrs["study"])
-    _, series, oriented, _ = _prepare(recordings, study, fit.attrs["angle"], body)
+    _, series, used_angle, _ = _prepare(recordings, study, fit.attrs["angle"], body)
     samples = sum(one.time.size for one in series)
     if samples != int(fit.attrs["samples"]):
         raise InputError(
@@ -72,8 +74,14 @@ def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str 
         math.log(intensity),
         math.log(fit.attrs["tracking_noise_m"]),
     )
+    if used_angle == "state":
+        point = replace(
+            point,
+            log_lever=math.log(fit.attrs["force_lever_m"]),
+            log_angle_noise=math.log(fit.attrs["orientation_noise_rad"]),
+        )
     weights = Weights(float(fit.attrs["roughness_weight"]), float(fit.attrs["size_weight"]))
-    return Estimate(study, Passes(series, _body(study, oriented), spline), point, weights)
+    return Estimate(study, Passes(series, _body(study, used_angle), spline), point, weights)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +121,9 @@ def _relative_speed(states: Floats, estimate: Estimate) -> Floats:
     flow = velocity_at(
         estimate.passes.spline, estimate.point.coefficients, states[:, 0], states[:, 1]
     )
-    return np.asarray(np.hypot(flow[0] - states[:, 2], flow[1] - states[:, 3]))
+    # Coordinates come first, as many as velocities.
+    velocity = states[:, states.shape[1] // 2 :]
+    return np.asarray(np.hypot(flow[0] - velocity[:, 0], flow[1] - velocity[:, 1]))
 
 
 def velocity_at(spline: Spline, coefficients: Floats, x: Floats, y: Floats) -> Floats:

@@ -153,6 +153,7 @@ def find_mode(
     """
     point, used, converged = start, 0, False
     covariance = np.zeros((0, 0))
+    last = np.zeros(start.coefficients.size + 1 + len(start.noises))
     for index in range(iterations):
         tell(index, iterations, "likelihood")
         sums = prior.add(passes.sums(point), point, weights)
@@ -162,6 +163,7 @@ def find_mode(
         held = [one for one in held if one < sums.score.size]
         covariance = inverse(sums.information)
         step = limited(newton_step(sums, covariance, held=held), drag)
+        step, last = damped(step, last, sums.information), step
         point = point.moved(step)
         weights = prior.updated(weights, point, covariance)
         moves = np.abs(step) / np.sqrt(np.diag(covariance))
@@ -180,6 +182,18 @@ def newton_step(sums: Sums, covariance: Floats, *, held: Sequence[int] = ()) -> 
         at = list(held)
         step = step - covariance[:, at] @ np.linalg.solve(covariance[np.ix_(at, at)], step[at])
     return np.asarray(step)
+
+
+def damped(step: Floats, last: Floats, information: Floats) -> Floats:
+    """Return the step, shortened where it takes back the last one.
+
+    Gauss and Newton's step leaves out how the derivatives change; where they change much it goes too
+    far, and back again. If a step is lambda times the last one, lambda < 0, then the sum of all the
+    steps to come is 1 / (1 - lambda) of it.
+    """
+    length = float(last @ information @ last)
+    ratio = float(step @ information @ last) / length if length > 0.0 else 0.0
+    return step / (1.0 - ratio) if ratio < 0.0 else step
 
 
 def limited(step: Floats, drag: int) -> Floats:
@@ -204,8 +218,6 @@ def limited(step: Floats, drag: int) -> Floats:
             shorter[drag + index] = math.log(factor) / power
     if drag + LEVER < step.size:
         wanted = float(step[drag + LEVER])
-        # Its information goes with its fourth power, so that whole steps go back and forth.
-        wanted *= 0.7 if abs(wanted) < MOST_LOG_LEVER_STEP else 1.0
         shorter[drag + LEVER] = np.clip(wanted, -MOST_LOG_LEVER_STEP, MOST_LOG_LEVER_STEP)
     return np.asarray(shorter)
 
