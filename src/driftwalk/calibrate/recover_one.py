@@ -28,7 +28,7 @@ Floats = npt.NDArray[np.float64]
 
 STATUS: Final = {"fitted": 0, "not_fitted": 1, "not_simulated": 2}
 """What became of a recording. Not fitted: the fit refused it, with a message."""
-MESSAGE: Final = 200
+MESSAGE: Final = 400
 """Letters of a message that are kept."""
 PARTS: Final = ("", "_low", "_high", "_sd", "_error", "_z", "_covered")
 """What a score holds of each parameter; its name goes before."""

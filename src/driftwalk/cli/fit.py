@@ -39,6 +39,7 @@ FIT_KEYS: Final[dict[str, str]] = {
 }
 MOST_FINDINGS: Final = 2
 """Findings that are printed; all are in the file."""
+FAR_ABOVE_FLOOR: Final = 2.0
 RecordingFiles = Annotated[
     list[Path],
     typer.Argument(metavar="RECORDING...", help="Recordings of one block in one tank, read alike."),
@@ -218,7 +219,9 @@ def print_verdict(check: xr.Dataset | None) -> None:
     if found["ks_distance"] is None:
         print(f"KS distance            not to be had: {check.attrs['ks_left_out']}")
     else:
+        far = found["ks_distance"] > FAR_ABOVE_FLOOR * found["ks_noise_floor"]
         print(
             f"KS distance            {found['ks_distance']:.3f}, "
             f"noise floor {found['ks_noise_floor']:.3f}"
+            + (": far, but within what the fit leaves open" if found["explained"] and far else "")
         )
