@@ -50,27 +50,26 @@ def wall_intervals(
     -------
     ndarray of bool, shape (n,)
         True at sample k where the interval from k - 1 to k counts as one at the wall: a corner at
-        k - 1, or where the motion from k - 3 to k - 1 leads by k, comes within 2 mm of the wall.
+        k - 1, or where the motion and the turning from k - 3 to k - 1 lead by k, comes within 2 mm
+        of the wall.
     """
-    gap_x, gap_y = _onward(time, x, longest_gap), _onward(time, y, longest_gap)
-    here = _least_depth(x[:-1], y[:-1], _but_last(theta), outline, side)
-    there = _least_depth(x[:-1] + gap_x, y[:-1] + gap_y, _but_last(theta), outline, side)
+    turned = None if theta is None else np.unwrap(theta)
+    ahead_x, ahead_y = (_continued(time, axis, longest_gap) for axis in (x, y))
+    ahead = None if turned is None else _continued(time, turned, longest_gap)
+    here = _least_depth(x[:-1], y[:-1], None if turned is None else turned[:-1], outline, side)
+    there = _least_depth(ahead_x, ahead_y, ahead, outline, side)
     near = np.zeros(time.size, dtype=bool)
     near[1:] = np.minimum(here, there) < MARGIN
     return near
 
 
-def _but_last(values: Floats | None) -> Floats | None:
-    return None if values is None else values[:-1]
-
-
-def _onward(time: Floats, position: Floats, longest_gap: float) -> Floats:
-    """Return how far the motion of the last two intervals leads in the next, shape (n - 1,)."""
+def _continued(time: Floats, values: Floats, longest_gap: float) -> Floats:
+    """Return where the change over the last two intervals leads in the next, shape (n - 1,)."""
     onward = np.zeros(time.size - 1)
     past = time[2:-1] - time[:-3]
-    speed = (position[2:-1] - position[:-3]) / past
-    onward[2:] = np.where(past <= longest_gap, speed * (time[3:] - time[2:-1]), 0.0)
-    return np.where(np.diff(time) <= longest_gap, onward, 0.0)
+    rate = (values[2:-1] - values[:-3]) / past
+    onward[2:] = np.where(past <= longest_gap, rate * (time[3:] - time[2:-1]), 0.0)
+    return np.asarray(values[:-1] + np.where(np.diff(time) <= longest_gap, onward, 0.0))
 
 
 def _least_depth(
