@@ -223,9 +223,9 @@ InnovationsFilter::Sums InnovationsFilter::sums(const std::uint8_t* kept, const 
   std::vector<std::uint8_t> used(std::size_t(n), 0);
   std::vector<double> information(std::size_t(stride * stride), 0.0);
   std::vector<double> products(std::size_t(columns * stride), 0.0);
-  std::vector<double> rows(std::size_t(ProductSums::most_rows * stride));
+  std::vector<double> rows(std::size_t(ProductSums::most_rows * stride), 0.0);
   std::vector<double> beside(std::size_t(ProductSums::most_rows * columns));
-  std::vector<double> size(std::size_t(stride / 8));
+  std::vector<double> size(std::size_t(stride / 8), 0.0);
   std::vector<std::int32_t> groups(std::size_t(stride / 8));
   const ProductSums sums{
       columns,         samples() - n, kept,          right,       information.data(),

@@ -52,7 +52,7 @@ def angle_given_facts(
         other = find_mode(
             passes, start, mode.weights, prior, iterations=study.fit.iterations, hold_first=False
         )
-        found = restricted_drag(passes, other, prior)
+        found = restricted_drag(passes, other, prior, intensity=False)
     except np.linalg.LinAlgError:
         return {"angle_disagreement_std": math.nan}
     covariance = parameter_covariance(other, found)

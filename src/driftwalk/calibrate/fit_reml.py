@@ -5,16 +5,16 @@ C_d: the fitted flow takes up part of the scatter of the velocity, and what is l
 pulled back to it more strongly (as a mean-reversion rate is biased upwards when means are
 estimated). The restricted likelihood integrates the coefficients out instead. To first order
 (Laplace) that adds ``ln det(J' J + Lambda) / 2`` of the coefficients' block of the information to
-the profile of the negative log likelihood; its minimum over ln C_d is the estimate. The noises come
-out too small in the same way, as a variance does when means are estimated, by one part or two in a
-hundred: one Newton step with the slope of the same determinant puts them right.
+the profile of the negative log likelihood; its minimum over ln C_d is the estimate. The stochastic force
+comes out too small in the same way, as a variance does when means are estimated, by one or two parts
+in a hundred: one Newton step with the slope of the same determinant puts it right.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,10 +27,8 @@ SPAN = 2.0
 NEAR = 1.0
 """A first guess within so many standard deviations of the likelihood's maximum is the minimum."""
 LATTICE = 2001
-NOISE_STEP = 0.05
-"""Change of the logarithm of a noise for the slope of the determinant."""
-NOISES = ("log_intensity", "log_noise", "log_angle_noise")
-"""The lever is left as it is: its weak prior does more than a determinant."""
+INTENSITY_STEP = 0.05
+"""Change of ln q for the slope of the determinant."""
 MOST_STD_RATIO = 4.0
 """A criterion that is so much flatter or sharper than the likelihood has no minimum worth the name:
 the motion does not follow the model, or tells nothing of C_d."""
@@ -85,7 +83,9 @@ def profile_at(
     )
 
 
-def restricted_drag(passes: Passes, mode: Mode, prior: Prior) -> Restricted:
+def restricted_drag(
+    passes: Passes, mode: Mode, prior: Prior, *, intensity: bool = True
+) -> Restricted:
     """Minimise the restricted criterion over ln C_d.
 
     Parameters
@@ -96,6 +96,8 @@ def restricted_drag(passes: Passes, mode: Mode, prior: Prior) -> Restricted:
         The maximum of the likelihood; noises and smoothness stay as they are there.
     prior : Prior
         The penalties.
+    intensity : bool
+        Whether q, too, is made that of the restricted criterion.
 
     Returns
     -------
@@ -131,29 +133,36 @@ def restricted_drag(passes: Passes, mode: Mode, prior: Prior) -> Restricted:
     point = replace(
         point, log_drag=log_drag, coefficients=coefficients.reshape(start.coefficients.shape)
     )
-    point = _with_restricted_noises(passes, mode, prior, point)
+    if intensity:
+        point = _with_restricted_intensity(passes, mode, prior, point, found)
     return Restricted(point, std, found, has_minimum=True)
 
 
-def _with_restricted_noises(passes: Passes, mode: Mode, prior: Prior, point: Point) -> Point:
-    """Return the point after one Newton step of the noises on the restricted criterion."""
-    flat = point.coefficients.ravel()
+def _with_restricted_intensity(
+    passes: Passes, mode: Mode, prior: Prior, point: Point, found: list[Profile]
+) -> Point:
+    """Return the point after one Newton step in ln q on the restricted criterion.
 
-    def determinant(at: Point) -> float:
-        return profile_at(passes, replace(mode, point=at), prior, at.log_drag, flat)[3]
-
-    here = determinant(point)
-    slope = np.zeros(len(point.noises))
-    for k, (name, value) in enumerate(point.noises.items()):
-        if name in NOISES:
-            more: dict[str, Any] = {name: value + NOISE_STEP}
-            slope[k] = (determinant(replace(point, **more)) - here) / NOISE_STEP
-    drag = flat.size
-    own = mode.covariance[drag + 1 :, drag + 1 :]
+    The other noises go along the ridge of the likelihood; their own slopes, and that of the lever,
+    are too small to matter.
+    """
+    at = np.array([one.log_drag for one in found])
+    order = np.argsort(at)
+    values = np.array([one.half_log_determinant for one in found])
+    here = float(np.interp(point.log_drag, at[order], values[order]))
+    more = replace(point, log_intensity=point.log_intensity + INTENSITY_STEP)
+    there = profile_at(
+        passes, replace(mode, point=more), prior, point.log_drag, point.coefficients.ravel()
+    )
+    slope = (there.half_log_determinant - here) / INTENSITY_STEP
+    drag = point.coefficients.size
     with_drag = mode.covariance[drag + 1 :, drag]
-    at_this_drag = own - np.outer(with_drag, with_drag) / mode.covariance[drag, drag]
-    step = np.zeros(drag + 1 + slope.size)
-    step[drag + 1 :] = -at_this_drag @ slope
+    # Of the noises with ln q, at this C_d.
+    column = mode.covariance[drag + 1 :, drag + 1] - with_drag * (
+        with_drag[0] / mode.covariance[drag, drag]
+    )
+    step = np.zeros(drag + 1 + column.size)
+    step[drag + 1 :] = -column * slope
     return point.moved(step)
 
 
@@ -162,30 +171,27 @@ def _minimum(found: list[Profile]) -> tuple[float, float]:
 
     The standard deviation is infinite where there is no minimum near the points.
 
-    Values and slopes of the likelihood and values of the determinant determine a polynomial each.
+    Slopes alone are used of the likelihood. They are those of the predictions, as in the search;
+    its values also hold what the covariances of the innovations have to say about C_d, which is
+    wrong to the order in which a Kalman filter is.
     """
     centre = found[0].log_drag
     scale = max(abs(one.log_drag - other.log_drag) for one in found for other in found)
     at = (np.array([one.log_drag for one in found]) - centre) / scale
-    values = np.array([one.deviance for one in found])
-    slopes = np.array([one.slope for one in found]) * scale
-    origin = values.min()
-    degree = min(3 if len(found) == 2 else 4, 2 * len(found) - 1)
-    powers = np.arange(degree + 1)
-    rows = np.concatenate(
-        [at[:, None] ** powers, powers * at[:, None] ** np.maximum(powers - 1, 0)]
-    )
-    likelihood = np.linalg.lstsq(rows, np.concatenate([values - origin, slopes]), rcond=None)[0]
-    determinants = np.array([one.half_log_determinant for one in found])
-    determinant = np.polynomial.polynomial.polyfit(at, determinants, min(2, len(found) - 1))
-    criterion = np.polynomial.Polynomial(likelihood) + np.polynomial.Polynomial(determinant)
+    degree = min(2, len(found) - 1)
+    polynomial = np.polynomial.Polynomial
+    slopes = [one.slope * scale for one in found]
+    determinants = [one.half_log_determinant - found[0].half_log_determinant for one in found]
+    slope = polynomial.fit(at, slopes, degree).convert()
+    slope = slope + polynomial.fit(at, determinants, degree).convert().deriv()
     lattice = np.linspace(at.min() - 0.5, at.max() + 0.5, LATTICE)
-    best = int(np.argmin(criterion(lattice)))
-    curvature = float(criterion.deriv(2)(lattice[best]))
-    lowest = centre + scale * float(lattice[best])
-    if best in (0, LATTICE - 1) or curvature <= 0.0:
-        return lowest, math.inf
-    return lowest, scale / math.sqrt(curvature)
+    values = slope(lattice)
+    upward = np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))
+    if not upward.size:
+        downhill = -1 if values.sum() < 0.0 else 0
+        return centre + scale * float(lattice[downhill]), math.inf
+    best = lattice[upward[np.argmin(np.abs(lattice[upward]))]]
+    return centre + scale * float(best), scale / math.sqrt(float(slope.deriv()(best)))
 
 
 def _coefficients_at(found: list[Profile], nearest: Profile, log_drag: float) -> Floats:

@@ -41,8 +41,9 @@ struct Doubles {
 
   Doubles() = default;
   Doubles(double value) {
+    // Not plus zero, which would make an addition of it: that changes -0.
     for (Vector& vector : part) {
-      vector = Vector{} + value;
+      vector = value - Vector{};
     }
   }
   // Vector by vector: a copy of the whole may be made in smaller pieces, and reading it back in

@@ -59,6 +59,8 @@ struct StripMoments {
   Eight square;        // E[s+^2]
   Eight closing_slip;  // E[s+ w_t]
   Eight windward_slip; // E[w_t; s > 0]
+  Eight windward;      // P(s > 0)
+  Eight edge_slip;     // E[w_t delta(s)]
   Eight::Mask takes_part;
 };
 
@@ -72,6 +74,8 @@ inline StripMoments strip_moments(Eight mean, Eight slip, Eight variance, Eight 
   m.square = (mean * mean + variance) * law.probability + mean * (tau * law.density);
   m.closing_slip = slip * m.closing + cross * law.probability;
   m.windward_slip = slip * law.probability + cross * law.density / tau;
+  m.windward = law.probability;
+  m.edge_slip = law.density / tau * (slip - cross * mean / (tau * tau));
   m.takes_part = z > -normal_reach;
   return m;
 }
@@ -81,7 +85,27 @@ struct DragSumsOfEight {
   Eight acceleration[D];
   Eight by_position[D][D];
   Eight by_velocity[D][D];
+  Eight bend[D][D][D]; // second derivatives by velocities, [axis][b][c], b <= c
 };
+
+// Adds the second derivatives of the drag of a strip by the velocities. Its forces along -n and t
+// are s+^2 and s+ w_t.
+template <int D>
+inline void add_bend(const Eight (&closing)[D], const Eight (&slip)[D], const StripMoments& m,
+                     const Eight (&by_square)[D], const Eight (&by_product)[D],
+                     DragSumsOfEight<D>& sums) {
+  for (int b = 0; b < D; ++b) {
+    for (int c = b; c < D; ++c) {
+      const Eight both = closing[b] * closing[c];
+      const Eight square = 2 * m.windward * both;
+      const Eight product =
+          m.edge_slip * both + m.windward * (closing[b] * slip[c] + slip[b] * closing[c]);
+      for (int a = 0; a < D; ++a) {
+        sums.bend[a][b][c] += by_square[a] * square + by_product[a] * product;
+      }
+    }
+  }
+}
 
 template <int D>
 inline void keep_shares(const StripsOnGrid& grid, const Eight (&response)[D][2], Eight::Mask part,
@@ -179,6 +203,22 @@ inline void add_strips(const SplineView& flow, const StripBlock& block,
       sums.by_position[a][2] += x * turn_x + y * turn_y;
     }
   }
+  Eight closing_by[D], slip_by[D], by_square[D], by_product[D];
+  closing_by[0] = Eight(nx);
+  closing_by[1] = Eight(ny);
+  slip_by[0] = Eight(-tx);
+  slip_by[1] = Eight(-ty);
+  by_square[0] = -nx * K;
+  by_square[1] = -ny * K;
+  by_product[0] = tx * K;
+  by_product[1] = ty * K;
+  if constexpr (D == 3) {
+    closing_by[2] = -offset;
+    slip_by[2] = Eight(-h);
+    by_square[2] = block.mass_by_inertia * offset * K;
+    by_product[2] = block.mass_by_inertia * h * K;
+  }
+  add_bend<D>(closing_by, slip_by, m, by_square, by_product, sums);
   if (shares != nullptr) {
     keep_shares<D>(grid, response, part, shares, count);
   }
@@ -210,6 +250,9 @@ inline DragResponse<D> expected_drag(const SplineView& flow, const StripBlock& b
     sums.acceleration[a] = Eight(0);
     for (int b = 0; b < D; ++b) {
       sums.by_position[a][b] = sums.by_velocity[a][b] = Eight(0);
+      for (int c = b; c < D; ++c) {
+        sums.bend[a][b][c] = Eight(0);
+      }
     }
   }
   DragResponse<D> response;
@@ -229,6 +272,9 @@ inline DragResponse<D> expected_drag(const SplineView& flow, const StripBlock& b
     for (int b = 0; b < D; ++b) {
       response.by_position[a][b] = sum(sums.by_position[a][b]);
       response.by_velocity[a][b] = sum(sums.by_velocity[a][b]);
+      for (int c = b; c < D; ++c) {
+        response.bend[a][b][c] = response.bend[a][c][b] = sum(sums.bend[a][b][c]);
+      }
     }
   }
   return response;

@@ -138,7 +138,12 @@ private:
   void advance(double h, std::int64_t k, double share, double sensitivity_drift) {
     drift_mean(state_, h / 2);
     drift_covariance(state_, h / 2);
-    const DragResponse<D> drag = drag_in_the_middle(h, k, share);
+    Square<2 * D> middle;
+    __builtin_memcpy(middle, state_.covariance, sizeof middle);
+    for (int a = 0; a < D; ++a) {
+      middle[a + D][a + D] += problem_.intensity[a] * h / 2;
+    }
+    const DragResponse<D> drag = drag_at(middle, k, share);
     const Kick<D> kick = make_kick(drag, h);
     for (int a = 0; a < D; ++a) {
       state_.mean[a + D] += kick.change[a];
@@ -146,19 +151,24 @@ private:
     drift_mean(state_, h / 2);
     kick_covariance(state_, kick);
     drift_covariance(state_, h / 2);
-    add_noise(state_, kick.inverse, problem_.intensity, h);
+    // What the drag's bend adds stays about the same from one sample to the next.
+    Square<D> intensity;
+    bend_covariance<D>(drag, middle, intensity);
+    const double interval = track_.time[k] - track_.time[k - 1];
+    for (int a = 0; a < D; ++a) {
+      for (int b = 0; b < D; ++b) {
+        intensity[a][b] *= interval;
+      }
+      intensity[a][a] += problem_.intensity[a];
+    }
+    add_noise<D>(state_, kick.inverse, intensity, h);
     if (with_sensitivities()) {
       sensitivity_.drift_and_kick(sensitivity_drift, kick);
       sensitivity_.add_flow(scratch_.shares, drag.shares, problem_.flow.columns, kick, h);
     }
   }
 
-  DragResponse<D> drag_in_the_middle(double h, std::int64_t k, double share) const {
-    Square<2 * D> covariance;
-    __builtin_memcpy(covariance, state_.covariance, sizeof covariance);
-    for (int a = 0; a < D; ++a) {
-      covariance[a + D][a + D] += problem_.intensity[a] * h / 2;
-    }
+  DragResponse<D> drag_at(const Square<2 * D>& covariance, std::int64_t k, double share) const {
     UncertainBlock<D> block{state_.mean[0], state_.mean[1], state_.mean[D], state_.mean[D + 1], 0,
                             covariance};
     double theta;
@@ -238,11 +248,8 @@ private:
     if (e == nullptr || sums_->kept[k] == 0) {
       return;
     }
-    double* rows[D];
-    for (int a = 0; a < D; ++a) {
-      rows[a] = products_.row(a);
-    }
-    sensitivity_.write_whitened(*e, rows);
+    sensitivity_.write_whitened(
+        *e, [&](int a, std::int32_t group) { return products_.place(a, group); });
     products_.add(D, sums_->right + k * D * sums_->columns);
   }
 
@@ -250,18 +257,20 @@ private:
     const auto bytes = sizeof(double) * std::size_t(scratch_.parameters);
     double* const whitened = out_.whitened + D * row;
     double* const jacobian = out_.jacobian + D * row * scratch_.parameters;
-    double* rows[D];
     for (int a = 0; a < D; ++a) {
-      rows[a] = scratch_.row + a * scratch_.stride;
       whitened[a] = e == nullptr ? 0 : e->white[a];
     }
     if (e == nullptr) {
       __builtin_memset(jacobian, 0, D * bytes);
       return;
     }
-    sensitivity_.write_whitened(*e, rows);
+    __builtin_memset(scratch_.row, 0, sizeof(double) * std::size_t(D * scratch_.stride));
+    sensitivity_.write_whitened(*e, [&](int a, std::int32_t group) {
+      return scratch_.row + a * scratch_.stride + 8 * std::int64_t(group);
+    });
     for (int a = 0; a < D; ++a) {
-      __builtin_memcpy(jacobian + a * scratch_.parameters, rows[a], bytes);
+      __builtin_memcpy(jacobian + a * scratch_.parameters, scratch_.row + a * scratch_.stride,
+                       bytes);
     }
   }
 

@@ -131,17 +131,48 @@ inline void kick_covariance(FilterState<D>& state, const Kick<D>& kick) {
   }
 }
 
+// The covariance of what the mean and the slope of the drag leave out where velocities are
+// uncertain, to second order: tr(H_a V H_b V) / 2, H the second derivatives and V the velocities'
+// covariance.
+template <int D>
+inline void bend_covariance(const DragResponse<D>& drag, const Square<2 * D>& P, Square<D>& out) {
+  Square<D> product[D]; // H_a V
+  for (int a = 0; a < D; ++a) {
+    for (int b = 0; b < D; ++b) {
+      for (int c = 0; c < D; ++c) {
+        product[a][b][c] = 0;
+        for (int k = 0; k < D; ++k) {
+          product[a][b][c] += drag.bend[a][b][k] * P[k + D][c + D];
+        }
+      }
+    }
+  }
+  for (int a = 0; a < D; ++a) {
+    for (int b = 0; b < D; ++b) {
+      double trace = 0;
+      for (int k = 0; k < D; ++k) {
+        for (int l = 0; l < D; ++l) {
+          trace += product[a][k][l] * product[b][l][k];
+        }
+      }
+      out[a][b] = trace / 2;
+    }
+  }
+}
+
 // White acceleration over a step h, damped by W as the kick is. Without W the force came out up to
 // 6 % low.
 template <int D>
-inline void add_noise(FilterState<D>& state, const Square<D>& W, const double* intensity,
+inline void add_noise(FilterState<D>& state, const Square<D>& W, const Square<D>& intensity,
                       double h) {
   Square<2 * D>& P = state.covariance;
   for (int a = 0; a < D; ++a) {
     for (int b = 0; b < D; ++b) {
       double damped = 0;
       for (int c = 0; c < D; ++c) {
-        damped += W[a][c] * intensity[c] * W[b][c];
+        for (int d = 0; d < D; ++d) {
+          damped += W[a][c] * intensity[c][d] * W[b][d];
+        }
       }
       P[a][b] += h * h * h / 3 * damped;
       P[a][b + D] += h * h / 2 * damped;

@@ -108,9 +108,9 @@ struct ProductSums {
   const double* right;      // [samples][D][columns]
   double* information;      // [stride][stride]: J' J, on and above the diagonal
   double* products;         // [columns][stride]: R' J
-  double* rows;             // [most_rows][stride]
+  double* rows;             // [stride / 8][most_rows][8], zero before
   double* beside;           // [most_rows][columns]
-  double* size;             // [stride / 8]
+  double* size;             // [stride / 8], zero before
   std::int32_t* groups;     // [stride / 8]
 };
 
@@ -120,7 +120,8 @@ struct DragResponse {
   double acceleration[D];   // [m/s^2, rad/s^2]
   double by_position[D][D]; // [axis of the acceleration][coordinate]
   double by_velocity[D][D];
-  int shares; // strips that take part
+  double bend[D][D][D]; // second derivatives by velocities
+  int shares;           // strips that take part
 };
 
 } // namespace driftwalk

@@ -12,7 +12,7 @@
 DRIFTWALK_LANES_BEGIN
 
 // Of the largest derivative among the samples that are multiplied at a time.
-inline constexpr double as_good_as_zero = 1e-7;
+inline constexpr double as_good_as_zero = 1e-4;
 
 inline Eight size_of(Eight value) {
   return select(value < 0, -value, value);
@@ -30,12 +30,16 @@ class Products {
 public:
   Products(const ProductSums& sums, std::int64_t stride) : sums_(sums), stride_(stride) {}
 
-  // Where the next row of derivatives is to be written, `stride` numbers.
-  double* row(int ahead) const { return sums_.rows + (rows_ + ahead) * stride_; }
+  // Where eight columns of a row are to be written, `ahead` rows beyond those taken over. What is
+  // not written is zero.
+  double* place(int ahead, std::int32_t group) {
+    sums_.size[group] = 1;
+    return block_of(group) + 8 * (rows_ + ahead);
+  }
 
-  // Takes over the rows that were written, `right` columns beside each.
+  // Takes over the rows that were written, with what stands beside each.
   void add(int rows, const double* right) {
-    for (std::int64_t k = 0; k < rows * sums_.columns; ++k) {
+    for (int k = 0; k < rows * sums_.columns; ++k) {
       sums_.beside[rows_ * sums_.columns + k] = right[k];
     }
     rows_ += rows;
@@ -53,28 +57,36 @@ public:
         multiply(sums_.groups[i], sums_.groups[j]);
       }
     }
-    rows_ = 0;
+    clear();
   }
 
 private:
   static constexpr int most_coordinates = 3;
 
+  // Of eight columns: row by row, so that a product reads memory in order.
+  double* block_of(std::int32_t group) const {
+    return sums_.rows + std::int64_t(group) * ProductSums::most_rows * 8;
+  }
+
   // Lists the groups of eight columns that count, in order.
   int find_groups() const {
     double most = 0;
-    const std::int64_t all = stride_ / 8;
-    for (std::int64_t group = 0; group < all; ++group) {
+    const auto all = static_cast<std::int32_t>(stride_ / 8);
+    for (std::int32_t group = 0; group < all; ++group) {
+      if (sums_.size[group] == 0) {
+        continue;
+      }
       Eight size = 0;
       for (int row = 0; row < rows_; ++row) {
-        size = at_least(size_of(Eight::load(sums_.rows + row * stride_ + 8 * group)), size);
+        size = at_least(size_of(Eight::load(block_of(group) + 8 * row)), size);
       }
       sums_.size[group] = largest(size);
       most = sums_.size[group] > most ? sums_.size[group] : most;
     }
     int count = 0;
-    for (std::int64_t group = 0; group < all; ++group) {
+    for (std::int32_t group = 0; group < all; ++group) {
       if (sums_.size[group] > as_good_as_zero * most) {
-        sums_.groups[count++] = static_cast<std::int32_t>(group);
+        sums_.groups[count++] = group;
       }
     }
     return count;
@@ -85,15 +97,16 @@ private:
     for (Eight& line : block) {
       line = Eight(0);
     }
-    const double* row = sums_.rows;
-    for (int k = 0; k < rows_; ++k, row += stride_) {
-      const Eight right = Eight::load(row + 8 * across);
+    const double *left = block_of(down), *right = block_of(across);
+    for (int k = 0; k < rows_; ++k, left += 8, right += 8) {
+      const Eight values = Eight::load(right);
       for (int line = 0; line < 8; ++line) {
-        block[line] += row[8 * down + line] * right;
+        block[line] += left[line] * values;
       }
     }
     for (int line = 0; line < 8; ++line) {
-      double* const to = sums_.information + (8 * std::int64_t(down) + line) * stride_ + 8 * across;
+      double* const to =
+          sums_.information + (8 * std::int64_t(down) + line) * stride_ + 8 * std::int64_t(across);
       (Eight::load(to) + block[line]).store(to);
     }
   }
@@ -102,12 +115,21 @@ private:
     for (int column = 0; column < sums_.columns; ++column) {
       Eight sum = 0;
       for (int k = 0; k < rows_; ++k) {
-        sum += sums_.beside[k * sums_.columns + column] *
-               Eight::load(sums_.rows + k * stride_ + 8 * group);
+        sum += sums_.beside[k * sums_.columns + column] * Eight::load(block_of(group) + 8 * k);
       }
-      double* const to = sums_.products + column * stride_ + 8 * group;
+      double* const to = sums_.products + column * stride_ + 8 * std::int64_t(group);
       (Eight::load(to) + sum).store(to);
     }
+  }
+
+  void clear() {
+    for (std::int32_t group = 0; group < stride_ / 8; ++group) {
+      if (sums_.size[group] != 0) {
+        __builtin_memset(block_of(group), 0, sizeof(double) * ProductSums::most_rows * 8);
+        sums_.size[group] = 0;
+      }
+    }
+    rows_ = 0;
   }
 
   ProductSums sums_;

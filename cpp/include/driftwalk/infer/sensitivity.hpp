@@ -106,21 +106,19 @@ public:
     }
   }
 
-  // rows[a]: row a of L^-1 d(prediction), `stride` numbers.
-  void write_whitened(const Innovation<D>& e, double* const (&rows)[D]) const {
-    for (int a = 0; a < D; ++a) {
-      __builtin_memset(rows[a], 0, sizeof(double) * std::size_t(stride_));
-    }
+  // L^-1 d(prediction), eight columns of row a at place(a, group); other columns are zero.
+  template <class Place>
+  void write_whitened(const Innovation<D>& e, const Place& place) const {
     Eight white[D];
     for (int k = 0; k < count_; ++k) {
-      const std::int64_t p = 8 * std::int64_t(active_[k]);
+      const std::int32_t group = active_[k];
       for (int a = 0; a < D; ++a) {
-        white[a] = Eight::load(rows_[a] + p);
+        white[a] = Eight::load(rows_[a] + 8 * std::int64_t(group));
         for (int b = 0; b < a; ++b) {
           white[a] -= e.L[a][b] * white[b];
         }
         white[a] *= e.per_root[a];
-        white[a].store(rows[a] + p);
+        white[a].store(place(a, group));
       }
     }
   }
