@@ -71,11 +71,11 @@ def simulated(flow: xr.Dataset, *, seconds: float = 600.0, seed: int = 1) -> xr.
 
 
 def test_the_bundled_recording_is_explained(check: xr.Dataset, fit: xr.Dataset) -> None:
-    """Another engine, the same model. False alarm: one in 25."""
+    """Another engine, the same model. False alarm: one in 50."""
     explained, findings, failed = verdict(check)
     assert (explained, findings, failed) == ("yes", [], set())
     assert set(check["criterion"].values) == CRITERIA
-    assert (check["p_value"].values >= 0.004).all()
+    assert (check["p_value"].values >= 0.002).all()
     facts = check.attrs
     assert (facts["kind"], facts["schema_version"]) == ("model_check", 1)
     assert 10.0 < facts["effective_parameters"] < 2 * fit["coefficient"].isel(component=0).size
