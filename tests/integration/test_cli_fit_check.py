@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import xarray as xr
 from command_line import RECORDING, Done, here
 
 SHORT = ("--to", "150", "--spline-spacing", "3cm", "--force-interval", "16ms")
+STUDIES = Path(__file__).resolve().parents[2] / "studies" / "real"
 FIGURES = ("check_innovations", "check_map", "check_time", "check_steps")
 
 
@@ -67,3 +69,18 @@ def test_a_recording_that_is_not_explained_gets_the_reasons(tmp_path: Path) -> N
     assert "THE MODEL DOES NOT EXPLAIN THIS RECORDING" in done.out
     assert "excess kurtosis" in done.out
     assert "noise floor" in done.out
+
+
+@pytest.mark.slow
+def test_a_robot_that_drives_itself_is_not_explained(
+    shared_data: Callable[[str], Path], tmp_path: Path
+) -> None:
+    name = "destab_driveA_100pc_0_noisevar_10_randdur_600.csv"
+    recording = shared_data("smarticles-rattling") / name
+    study = STUDIES / "smarticles.toml"
+    done = here("fit", recording, "--study", study, "-o", tmp_path / "run", "--json")
+    assert done.code == 0, done.err
+    found = json.loads(done.out)
+    assert found["explained"] is False
+    assert any("excess kurtosis" in text for text in found["findings"])
+    assert found["ks_distance"] > 4.0 * found["ks_noise_floor"]

@@ -46,7 +46,7 @@ def check_model(
 
     Ten criteria with a p value, for the errors of prediction and the motion of simulated
     recordings, and a largest share of outliers; the model explains the recording unless a p value
-    is below 0.004. A recording of the very model fails once in 25 times by that count (Bonferroni;
+    is below 0.002. A recording of the very model fails once in 50 times by that count (Bonferroni;
     measured: docs/explanation/likelihood.md). What
     fitting hundreds of coefficients takes out of the errors is allowed for: their covariance at the
     estimate is ``I - J C J'``.

@@ -47,7 +47,7 @@ def white_of(errors: Sequence[Errors], leverage: Leverage, *, lags: int = LAGS) 
     Ljung and Box's statistic takes the residuals of a fit for errors. Here each autocorrelation is
     first freed of what the fitted flow has put into it (minus the mean of J C J' at that lag); the
     degrees of freedom are then those of the lags. The two noises, which are fitted as well, take up
-    to two more, of 20 for each component: p is that much too large, by about a tenth of itself.
+    to four of the forty: p is up to four times too large, on the safe side.
     """
     from scipy.stats import chi2, kurtosistest
 
