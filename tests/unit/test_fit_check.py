@@ -157,7 +157,7 @@ def test_errors_of_the_tracker_that_remember_are_found() -> None:
     )
     assert explained == "no"
     assert "autocorrelation" in failed
-    assert any("Ljung-Box statistic" in text and "expected 40" in text for text in findings)
+    assert any("Ljung-Box statistic" in text and "expected 60" in text for text in findings)
 
 
 def test_noise_that_is_louder_in_one_half_of_the_tank_is_found() -> None:

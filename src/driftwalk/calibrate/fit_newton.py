@@ -187,9 +187,9 @@ def newton_step(sums: Sums, covariance: Floats, *, held: Sequence[int] = ()) -> 
 def damped(step: Floats, last: Floats, information: Floats) -> Floats:
     """Return the step, shortened where it takes back the last one.
 
-    Gauss and Newton's step leaves out how the derivatives change; where they change much it goes too
-    far, and back again. If a step is lambda times the last one, lambda < 0, then the sum of all the
-    steps to come is 1 / (1 - lambda) of it.
+    Gauss and Newton's step leaves out how the derivatives change; where they change much it goes
+    too far, and back again. If a step is lambda times the last one, lambda < 0, then the sum of all
+    the steps to come is 1 / (1 - lambda) of it.
     """
     length = float(last @ information @ last)
     ratio = float(step @ information @ last) / length if length > 0.0 else 0.0

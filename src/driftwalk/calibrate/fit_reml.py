@@ -5,9 +5,9 @@ C_d: the fitted flow takes up part of the scatter of the velocity, and what is l
 pulled back to it more strongly (as a mean-reversion rate is biased upwards when means are
 estimated). The restricted likelihood integrates the coefficients out instead. To first order
 (Laplace) that adds ``ln det(J' J + Lambda) / 2`` of the coefficients' block of the information to
-the profile of the negative log likelihood; its minimum over ln C_d is the estimate. The stochastic force
-comes out too small in the same way, as a variance does when means are estimated, by one or two parts
-in a hundred: one Newton step with the slope of the same determinant puts it right.
+the profile of the negative log likelihood; its minimum over ln C_d is the estimate. The stochastic
+force comes out too small in the same way, as a variance does when means are estimated, by one or
+two parts in a hundred: one Newton step with the slope of the same determinant puts it right.
 """
 
 from __future__ import annotations
