@@ -22,6 +22,7 @@ _STAGES = (
     "compare",
     "calibrate",
     "assemble",
+    "track",
     "datasets",
     "report",
 )

@@ -21,6 +21,7 @@ STAGES = (
     "sweep",
     "calibrate",
     "assemble",
+    "track",
     "datasets",
     "report",
 )

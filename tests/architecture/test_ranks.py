@@ -25,12 +25,13 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "simulate": GROUND | {"model", "record"},
     "calibrate": GROUND | {"simulate", "compare", "flow", "model", "sweep"},
     "assemble": GROUND | {"simulate", "compare", "flow", "model", "sweep"},
+    "track": GROUND | {"record"},
     "datasets": GROUND | {"record", "flow", "model", "compare", "sweep", "simulate"},
     "report": GROUND,
     "viewer": GROUND,
     "cli": GROUND
     | {"record", "flow", "model", "compare", "sweep", "simulate", "calibrate", "assemble"}
-    | {"datasets", "report", "viewer"},
+    | {"track", "datasets", "report", "viewer"},
 }
 HEAVY = frozenset(
     {"xarray", "scipy", "pandas", "cv2", "matplotlib", "dask", "optuna", "h5netcdf", "SALib"}

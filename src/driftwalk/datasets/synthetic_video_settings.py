@@ -1,0 +1,209 @@
+"""What a synthetic video shows and what spoils it; three levels of spoiling are fixed here.
+
+The levels stand apart from every tracker: they were fixed before one was written.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+from driftwalk.core.errors import InputError
+
+Colour = tuple[int, int, int]
+"""Red, green, blue, each 0 to 255."""
+
+
+@dataclass(frozen=True)
+class VideoSettings:
+    """Camera, blocks and disturbances of a synthetic video.
+
+    The world is in metres, origin at the tank's centre, y up; the image in pixels (column, row),
+    with pixel centres at whole numbers. A world point is rotated, projected (tilt), scaled, and then
+    moved along the ray from the image's middle by ``1 + k1 r² + k2 r⁴``, with r in units of the
+    image's width.
+
+    Parameters
+    ----------
+    width_px, height_px : int
+        Size of the image.
+    px_per_m : float
+        Scale at the tank's centre [px/m].
+    centre_px : tuple of float, optional
+        Column and row of the tank's centre; the image's middle when left out.
+    rotation_rad : float
+        Turn of the camera [rad].
+    tilt_x_per_m, tilt_y_per_m : float
+        How fast the scale falls along x and y [1/m]: the perspective of a tilted camera.
+    lens_k1, lens_k2 : float
+        Radial distortion.
+    tank_diameter_m : float
+        Inner diameter of the drawn rim [m].
+    rim_m : float
+        Width of the rim [m]; 0 draws none.
+    block_side_m : float
+        Side of a block [m].
+    marker_spacing_m : float
+        Distance between the centres of a marker's two discs [m].
+    marker_diameter_m : float
+        Diameter of a disc [m].
+    marker_angle_rad : float
+        From the block's +x face to the line from disc 1 to disc 2 [rad], counter-clockwise.
+    water, rim, block, disc_1, disc_2 : tuple of int
+        Colours: red, green, blue, 0 to 255.
+    noise_std : float
+        Standard deviation of the camera's noise, of 255, in each channel.
+    blur_px : float
+        Standard deviation of the lens's blur [px].
+    shading : float
+        Light falls from ``1 + shading`` to ``1 - shading`` across the image.
+    shading_angle_rad : float
+        Direction in which the light falls, in the image, from the columns' direction [rad].
+    glare_share : float
+        Share of the image that white reflections cover.
+    glare_radius_px : float
+        Typical radius of a reflection [px].
+    ripple : float
+        Relative amplitude of the brightness waves on the water.
+    ripple_length_m : float
+        Length of these waves [m].
+    exposure_s : float
+        Time during which the shutter is open [s]; the pose in the truth is that of its middle.
+    rolling_s : float
+        Time between the exposure of the first and the last row [s]; the truth is the middle row's.
+    bar_share : float
+        Share of a marker that a bar hides when it is there.
+    bar_time_share : float
+        Share of the time in which a bar lies over a marker.
+    bar_mean_s : float
+        Mean time for which a bar stays [s].
+    seed : int
+        Seed of noise, glare and bars.
+
+    Raises
+    ------
+    InputError
+        When a number is out of range.
+
+    Examples
+    --------
+    >>> VideoSettings(width_px=320, height_px=240, px_per_m=750.0).middle_px
+    (159.5, 119.5)
+    """
+
+    width_px: int = 640
+    height_px: int = 480
+    px_per_m: float = 1500.0
+    centre_px: tuple[float, float] | None = None
+    rotation_rad: float = 0.0
+    tilt_x_per_m: float = 0.0
+    tilt_y_per_m: float = 0.0
+    lens_k1: float = 0.0
+    lens_k2: float = 0.0
+    tank_diameter_m: float = 0.30
+    rim_m: float = 0.004
+    block_side_m: float = 0.03
+    marker_spacing_m: float = 0.014
+    marker_diameter_m: float = 0.010
+    marker_angle_rad: float = 0.0
+    water: Colour = (70, 74, 72)
+    rim: Colour = (150, 150, 150)
+    block: Colour = (196, 194, 188)
+    disc_1: Colour = (206, 52, 92)
+    disc_2: Colour = (46, 160, 92)
+    noise_std: float = 0.0
+    blur_px: float = 0.5
+    shading: float = 0.0
+    shading_angle_rad: float = 0.5
+    glare_share: float = 0.0
+    glare_radius_px: float = 14.0
+    ripple: float = 0.0
+    ripple_length_m: float = 0.04
+    exposure_s: float = 0.0
+    rolling_s: float = 0.0
+    bar_share: float = 0.0
+    bar_time_share: float = 0.0
+    bar_mean_s: float = 0.5
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        positive = ("width_px", "height_px", "px_per_m", "tank_diameter_m", "block_side_m")
+        positive += ("marker_spacing_m", "marker_diameter_m", "glare_radius_px")
+        positive += ("ripple_length_m", "bar_mean_s")
+        not_negative = ("rim_m", "noise_std", "blur_px", "exposure_s", "rolling_s", "ripple")
+        shares = ("shading", "glare_share", "bar_share", "bar_time_share")
+        for names, least, most in (
+            (positive, math.ulp(0.0), math.inf),
+            (not_negative, 0.0, math.inf),
+            (shares, 0.0, 0.9),
+        ):
+            for name in names:
+                value = getattr(self, name)
+                if not (math.isfinite(value) and least <= value <= most):
+                    limit = "above zero" if least > 0 else f"between {least:g} and {most:g}"
+                    raise InputError(f"{name} of a synthetic video must be {limit}, got {value}")
+
+    @property
+    def middle_px(self) -> tuple[float, float]:
+        """Column and row of the image's middle."""
+        return ((self.width_px - 1) / 2, (self.height_px - 1) / 2)
+
+
+VIDEO_LEVELS: Final[dict[str, dict[str, float]]] = {
+    "clean": {},
+    "moderate": {"noise_std": 4.0, "blur_px": 1.0, "shading": 0.2},
+    "heavy": {
+        "noise_std": 12.0,
+        "blur_px": 1.0,
+        "shading": 0.2,
+        "ripple": 0.05,
+        "glare_share": 0.05,
+        "bar_share": 0.3,
+        "bar_time_share": 0.2,
+    },
+}
+"""What each level of disturbance changes in `VideoSettings`."""
+
+
+def video_settings(level: str = "moderate", **changes: Any) -> VideoSettings:
+    """Return the settings of a synthetic video at a fixed level of disturbance.
+
+    Parameters
+    ----------
+    level : {"clean", "moderate", "heavy"}
+        Clean: blur of half a pixel. Moderate: noise of 4 of 255, blur of 1 px, shading ±20 %.
+        Heavy: noise of 12, ripples, glare on 5 % of the image, and bars that hide 30 % of each
+        marker for a fifth of the time.
+    **changes
+        Other fields of `VideoSettings`.
+
+    Returns
+    -------
+    VideoSettings
+        The settings.
+
+    Raises
+    ------
+    InputError
+        When there is no such level or no such field.
+
+    Examples
+    --------
+    >>> video_settings("moderate", width_px=320, height_px=240, px_per_m=750.0).noise_std
+    4.0
+    """
+    if level not in VIDEO_LEVELS:
+        raise InputError(
+            f"no level '{level}' of a synthetic video; there is {', '.join(VIDEO_LEVELS)}"
+        )
+    known = [field.name for field in dataclasses.fields(VideoSettings)]
+    for name in changes:
+        if name not in known:
+            close = difflib.get_close_matches(name, known, n=1)
+            hint = f"; did you mean '{close[0]}'?" if close else ""
+            raise InputError(f"a synthetic video has no setting '{name}'{hint}")
+    return VideoSettings(**{**VIDEO_LEVELS[level], **changes})

@@ -1,0 +1,136 @@
+"""What passes between the parts of the tracker: frames, detections, and what was turned down.
+
+Pixels are (column, row), with pixel centres at whole numbers and rows counted downwards. The world
+is in metres, y up, angles counter-clockwise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+Image = npt.NDArray[np.uint8]
+"""An image, shape (rows, columns, 3), blue, green, red."""
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One image of a video, and when it was taken.
+
+    Parameters
+    ----------
+    index : int
+        Number of the frame in its source, from 0.
+    time : float
+        Presentation time [s].
+    image : array, shape (rows, columns, 3)
+        Blue, green, red, uint8.
+    """
+
+    index: int
+    time: float
+    image: Image
+
+
+@dataclass(frozen=True, eq=False)
+class Detection:
+    """One object found in a frame.
+
+    Parameters
+    ----------
+    x, y : float or None
+        Position [m]; None when the camera is not calibrated.
+    column, row : float
+        Position in the image [px].
+    theta : float
+        Orientation [rad], counter-clockwise; NaN when the object has none. In the world when the
+        camera is calibrated, else in the image seen with y up.
+    covariance : array, shape (3, 3)
+        Of x, y, theta [m, m, rad]; of the position in pixels when the camera is not calibrated.
+        NaN in the row and column of an angle that is not known.
+    area_px : float
+        Area of what was found [px²].
+    key : str or None
+        What a coded tag says; None for objects that look alike.
+    score : float
+        In [0, 1]: how well it fits what was looked for.
+    """
+
+    x: float | None
+    y: float | None
+    column: float
+    row: float
+    theta: float
+    covariance: Array
+    area_px: float
+    key: str | None = None
+    score: float = 1.0
+
+
+@dataclass(frozen=True)
+class Rejected:
+    """A candidate that was turned down.
+
+    Parameters
+    ----------
+    column, row : float
+        Where it was [px].
+    area_px : float
+        Its area [px²].
+    reason : str
+        Why, in words.
+    kind : str
+        The reason as one word, the same for all candidates turned down for it: counted by it.
+    """
+
+    column: float
+    row: float
+    area_px: float
+    reason: str
+    kind: str = "other"
+
+
+@dataclass(frozen=True)
+class FrameResult:
+    """What was found in one frame.
+
+    Parameters
+    ----------
+    index : int
+        Number of the frame.
+    time : float
+        Presentation time [s].
+    detections : list of Detection
+        What was accepted.
+    rejected : list of Rejected
+        What was not, and why.
+    """
+
+    index: int
+    time: float
+    detections: list[Detection] = field(default_factory=list)
+    rejected: list[Rejected] = field(default_factory=list)
+
+
+class PixelToWorld(Protocol):
+    """A calibrated camera."""
+
+    def to_world(self, points: Array) -> Array:
+        """Return pixels, shape (n, 2), as metres."""
+
+    def to_pixel(self, points: Array) -> Array:
+        """Return metres, shape (n, 2), as pixels."""
+
+    def jacobian(self, points: Array) -> Array:
+        """Return d(x, y)/d(column, row) [m/px] at pixels, shape (n, 2, 2)."""
+
+
+class Detector(Protocol):
+    """Finds objects in one image."""
+
+    def detect(self, image: Image) -> tuple[list[Detection], list[Rejected]]:
+        """Return what was found, and what was turned down with the reason."""
