@@ -22,9 +22,9 @@ class VideoSettings:
     """Camera, blocks and disturbances of a synthetic video.
 
     The world is in metres, origin at the tank's centre, y up; the image in pixels (column, row),
-    with pixel centres at whole numbers. A world point is rotated, projected (tilt), scaled, and then
-    moved along the ray from the image's middle by ``1 + k1 r² + k2 r⁴``, with r in units of the
-    image's width.
+    with pixel centres at whole numbers. A world point is rotated, projected (tilt), scaled, and
+    then moved along the ray from the image's middle by ``1 + k1 r² + k2 r⁴``, with r in units of
+    the image's width.
 
     Parameters
     ----------
