@@ -25,7 +25,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "simulate": GROUND | {"model", "record"},
     "calibrate": GROUND | {"simulate", "compare", "flow", "model", "sweep"},
     "assemble": GROUND | {"simulate", "compare", "flow", "model", "sweep"},
-    "track": GROUND | {"record"},
+    "track": GROUND | {"record", "model"},
     "datasets": GROUND | {"record", "flow", "model", "compare", "sweep", "simulate"},
     "report": GROUND,
     "viewer": GROUND,

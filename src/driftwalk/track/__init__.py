@@ -1,12 +1,24 @@
 """Where is every block? From a camera or a video to poses, with reasons for what was left out."""
 
+from driftwalk.track.camera import Camera, Lens, load_camera, save_camera
+from driftwalk.track.markers import MarkerColour, TwoColourMarker, load_markers, save_markers
+from driftwalk.track.two_colour import TwoColourDetector
 from driftwalk.track.types import Detection, Detector, Frame, FrameResult, PixelToWorld, Rejected
 
 __all__ = [
+    "Camera",
     "Detection",
     "Detector",
     "Frame",
     "FrameResult",
+    "Lens",
+    "MarkerColour",
     "PixelToWorld",
     "Rejected",
+    "TwoColourDetector",
+    "TwoColourMarker",
+    "load_camera",
+    "load_markers",
+    "save_camera",
+    "save_markers",
 ]

@@ -1,0 +1,164 @@
+"""What a marker looks like: the file `markers.toml`."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal, Self
+
+from pydantic import Field, model_validator
+
+from driftwalk.core.errors import ConfigurationError
+from driftwalk.model.section import Quantity, Section
+from driftwalk.track.toml_file import load_sections, save_sections
+
+_LEAST_HUE_DIFFERENCE = math.radians(30.0)
+_HEAD = """\
+Two-colour marker: two discs side by side on each block.
+Colours are a* and b* of CIELAB; brightness does not count."""
+
+
+class MarkerColour(Section):
+    """One disc's colour, as the camera sees it.
+
+    Examples
+    --------
+    >>> round(MarkerColour(a_star=30.0, b_star=40.0).chroma, 1)
+    50.0
+    """
+
+    section_name: ClassVar[str] = "colour"
+
+    a_star: Annotated[float, Quantity("1", ge=-128, le=128)] = Field(
+        description="Mean a* (green to red)."
+    )
+    b_star: Annotated[float, Quantity("1", ge=-128, le=128)] = Field(
+        description="Mean b* (blue to yellow)."
+    )
+    spread: Annotated[float, Quantity("1", gt=0, le=60)] = Field(
+        default=6.0, description="Standard deviation of a* and b* over the disc."
+    )
+
+    @property
+    def chroma(self) -> float:
+        """Distance from grey."""
+        return math.hypot(self.a_star, self.b_star)
+
+    @property
+    def hue_rad(self) -> float:
+        """Angle in the plane of a* and b* [rad]."""
+        return math.atan2(self.b_star, self.a_star)
+
+    @model_validator(mode="after")
+    def _coloured(self) -> Self:
+        if self.chroma < 10.0:
+            raise ConfigurationError(
+                f"a marker's colour must differ from grey: the chroma is {self.chroma:.1f}, "
+                "at least 10 is needed"
+            )
+        return self
+
+
+class TwoColourMarker(Section):
+    """A two-colour marker: two discs at a known distance.
+
+    Examples
+    --------
+    >>> marker = TwoColourMarker(
+    ...     spacing_m="14mm", size_m="10mm",
+    ...     colour_1={"a_star": 60, "b_star": 10}, colour_2={"a_star": -45, "b_star": 20},
+    ... )
+    >>> marker.spacing_m
+    0.014
+    """
+
+    kind: Literal["two_colour"] = Field(default="two_colour", description="Kind of the marker.")
+    spacing_m: Annotated[float, Quantity("m", gt=0, le=10)] = Field(
+        description="Distance between the centres of the two discs."
+    )
+    size_m: Annotated[float, Quantity("m", gt=0, le=10)] = Field(description="Diameter of a disc.")
+    angle_offset_rad: Annotated[float, Quantity("rad", ge=-math.pi, le=math.pi)] = Field(
+        default=0.0,
+        description="Direction from disc 1 to disc 2, counter-clockwise from the block's +x face.",
+    )
+    block_side_m: Annotated[float | None, Quantity("m", gt=0, le=10)] = Field(
+        default=None, description="Side of the square block that carries the marker."
+    )
+    colour_1: MarkerColour = Field(description="Colour of the first disc.")
+    colour_2: MarkerColour = Field(description="Colour of the second disc.")
+
+    @model_validator(mode="after")
+    def _distinct(self) -> Self:
+        between = hue_difference(self.colour_1, self.colour_2)
+        if between < _LEAST_HUE_DIFFERENCE:
+            raise ConfigurationError(
+                f"the hues of the two colours differ by {math.degrees(between):.0f}°; "
+                f"at least {math.degrees(_LEAST_HUE_DIFFERENCE):.0f}° are needed to tell them apart"
+            )
+        if self.spacing_m < 0.8 * self.size_m:
+            raise ConfigurationError(
+                f"spacing_m = {self.spacing_m:g} is the distance of the discs' centres and must be "
+                f"at least 0.8 of size_m = {self.size_m:g}"
+            )
+        return self
+
+
+def hue_difference(first: MarkerColour, second: MarkerColour) -> float:
+    """Return the angle between two hues [rad], in [0, pi]."""
+    return abs(math.remainder(first.hue_rad - second.hue_rad, 2 * math.pi))
+
+
+def load_markers(path: str | Path) -> TwoColourMarker:
+    """Read a `markers.toml`.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+
+    Returns
+    -------
+    TwoColourMarker
+        The marker.
+
+    Raises
+    ------
+    FormatError
+        When the file cannot be read, a key is unknown, or a value is out of range.
+
+    Examples
+    --------
+    >>> load_markers("no/such/markers.toml")
+    Traceback (most recent call last):
+    driftwalk.core.errors.FormatError: no/such/markers.toml: no such markers file
+    """
+    return load_sections(path, TwoColourMarker, what="markers")
+
+
+def save_markers(path: str | Path, marker: TwoColourMarker) -> Path:
+    """Write a `markers.toml`, with the meaning of each key.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    marker : TwoColourMarker
+        What is written.
+
+    Returns
+    -------
+    pathlib.Path
+        The file.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> marker = TwoColourMarker(
+    ...     spacing_m=0.014, size_m=0.01,
+    ...     colour_1={"a_star": 60, "b_star": 10}, colour_2={"a_star": -45, "b_star": 20},
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     load_markers(save_markers(f"{folder}/markers.toml", marker)) == marker
+    True
+    """
+    return save_sections(path, marker, head=_HEAD)

@@ -1,0 +1,70 @@
+"""Reading and writing the small TOML files of the tracker: sections of keys with units in the names."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any, TypeVar
+
+from driftwalk.core.atomic import atomic_path
+from driftwalk.core.errors import ConfigurationError, FormatError
+from driftwalk.model.section import Section
+
+Kind = TypeVar("Kind", bound=Section)
+
+
+def load_sections(path: str | Path, kind: type[Kind], *, what: str) -> Kind:
+    """Read a TOML file as one section with its sections.
+
+    Raises
+    ------
+    FormatError
+        When the file is not there, is no TOML, or a key is wrong; the message names the file.
+    """
+    file = Path(path)
+    try:
+        data = tomllib.loads(file.read_text(encoding="utf-8"))
+        return kind(**data)
+    except FileNotFoundError:
+        raise FormatError(f"no such {what} file", path=file) from None
+    except IsADirectoryError:
+        raise FormatError(f"is a folder, not a {what} file", path=file) from None
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise FormatError(f"is not a {what} file: {error}", path=file) from None
+    except ConfigurationError as error:
+        raise FormatError(str(error), path=file) from None
+
+
+def save_sections(path: str | Path, section: Section, *, head: str) -> Path:
+    """Write a section with its sections as TOML, the meaning of each key above it."""
+    with atomic_path(path) as partial:
+        partial.write_text(to_toml(section, head=head), encoding="utf-8")
+    return Path(path)
+
+
+def to_toml(section: Section, *, head: str) -> str:
+    """Return a section with its sections as commented TOML."""
+    plain, nested = [f"# {line}" for line in head.splitlines()], []
+    for key, field in type(section).model_fields.items():
+        value = getattr(section, key)
+        if value is None:
+            continue
+        if isinstance(value, Section):
+            nested.append(to_toml(value, head=field.description or "").rstrip())
+            nested[-1] = _with_header(nested[-1], key)
+        else:
+            plain += ["", f"# {field.description}", f"{key} = {_value(value)}"]
+    return "\n\n".join(["\n".join(plain).strip(), *nested]) + "\n"
+
+
+def _with_header(text: str, key: str) -> str:
+    """Put the section's name under the comment that says what it is."""
+    first, _, rest = text.partition("\n")
+    return f"{first}\n[{key}]\n{rest.strip()}"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, (tuple, list)):
+        return "[" + ", ".join(_value(item) for item in value) + "]"
+    return json.dumps(value)
