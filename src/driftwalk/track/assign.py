@@ -1,0 +1,142 @@
+"""Which track a detection belongs to: solved inside connected groups of the gating graph only.
+
+An edge says that a detection may belong to a track, at a cost: the negative logarithm of its
+likelihood over that of "the track was missed and the detection is something else". So an edge that
+is worth taking is negative, and to leave both alone costs nothing. Groups that share no edge do not
+see each other: one lost body never moves two distant ones.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+# exp(-12): an alternative beyond that is no alternative.
+NO_ALTERNATIVE: Final = 12.0
+# Costs of pairs without an edge; finite, because the solver wants that.
+_FORBIDDEN: Final = 1e9
+
+
+class Assignment(NamedTuple):
+    """Who got what, and how nearly it was another way."""
+
+    detection: Integers
+    """Detection of each track, -1 for none; shape (tracks,)."""
+    score: Floats
+    """Likelihood of the best other assignment that gives this track another detection, or its
+    detection to another track, relative to the one taken: 0 none, 1 as likely; shape (tracks,)."""
+    group: Integers
+    """Number of the connected group of each track, shape (tracks,)."""
+
+
+def assign(cost: Floats) -> Assignment:
+    """Assign detections to tracks at the least total cost.
+
+    Parameters
+    ----------
+    cost : ndarray, shape (tracks, detections)
+        Cost of each edge, infinite where there is none. What is not assigned costs 0.
+
+    Returns
+    -------
+    Assignment
+        The detections, the scores of the alternatives, and the groups.
+
+    Examples
+    --------
+    >>> assign(np.array([[-5.0, -1.0], [np.inf, -4.0]])).detection.tolist()
+    [0, 1]
+    """
+    tracks = len(cost)
+    detection = np.full(tracks, -1, dtype=np.int64)
+    score = np.zeros(tracks)
+    group = np.arange(tracks)
+    for number, (rows, columns) in enumerate(connected_groups(np.isfinite(cost))):
+        group[rows] = number
+        if not columns.size:
+            continue
+        part = cost[np.ix_(rows, columns)]
+        taken = _solve(part)
+        detection[rows] = np.where(taken >= 0, columns[taken], -1)
+        if part.size > 1:
+            score[rows] = _alternatives(part, taken)
+    return Assignment(detection, score, group)
+
+
+def connected_groups(edges: npt.NDArray[np.bool_]) -> list[tuple[Integers, Integers]]:
+    """Return the tracks and the detections of each connected group that has a track.
+
+    Parameters
+    ----------
+    edges : ndarray of bool, shape (tracks, detections)
+        Where a detection may belong to a track.
+
+    Examples
+    --------
+    >>> groups = connected_groups(np.array([[True, False], [True, False], [False, True]]))
+    >>> [(rows.tolist(), columns.tolist()) for rows, columns in groups]
+    [([0, 1], [0]), ([2], [1])]
+    """
+    tracks, detections = edges.shape
+    unseen = np.ones(tracks, dtype=bool)
+    groups = []
+    for track in range(tracks):
+        if not unseen[track]:
+            continue
+        rows = np.zeros(tracks, dtype=bool)
+        columns = np.zeros(detections, dtype=bool)
+        rows[track] = True
+        while True:
+            columns |= edges[rows].any(axis=0)
+            wider = rows | edges[:, columns].any(axis=1)
+            if (wider == rows).all():
+                break
+            rows = wider
+        unseen &= ~rows
+        groups.append((np.flatnonzero(rows), np.flatnonzero(columns)))
+    return groups
+
+
+def _solve(cost: Floats) -> Integers:
+    """Return the detection of each track, -1 for none."""
+    rows, columns = cost.shape
+    if rows == columns == 1:
+        return np.array([0 if cost[0, 0] < 0 else -1])
+    from scipy.optimize import linear_sum_assignment
+
+    # One spare column for each track, at cost 0: to be left alone is always possible.
+    padded = np.zeros((rows, columns + rows))
+    padded[:, :columns] = np.where(np.isfinite(cost), cost, _FORBIDDEN)
+    taken = np.asarray(linear_sum_assignment(padded)[1], dtype=np.int64)
+    return np.where(taken < columns, taken, -1)
+
+
+def _total(cost: Floats, taken: Integers) -> float:
+    at = np.flatnonzero(taken >= 0)
+    return float(cost[at, taken[at]].sum())
+
+
+def _alternatives(cost: Floats, taken: Integers) -> Floats:
+    """Return the score of each track of a group; see `Assignment`."""
+    best = _total(cost, taken)
+    least = np.full(len(cost), math.inf)
+    owner = {int(column): row for row, column in enumerate(taken) if column >= 0}
+    for row, column in np.argwhere(np.isfinite(cost)).tolist():
+        if taken[row] == column:
+            continue
+        excess = _forced(cost, row, column) - best
+        for track in {row, owner.get(column, row)}:
+            least[track] = min(least[track], excess)
+    return np.where(least < NO_ALTERNATIVE, np.exp(-np.maximum(least, 0.0)), 0.0)
+
+
+def _forced(cost: Floats, row: int, column: int) -> float:
+    """Return the least cost of all assignments that hold one edge."""
+    rest = np.delete(np.delete(cost, row, axis=0), column, axis=1)
+    return float(cost[row, column]) + (_total(rest, _solve(rest)) if rest.size else 0.0)

@@ -1,0 +1,89 @@
+"""Which detections a track may have, and how likely each is."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.track.kalman import innovation
+from driftwalk.track.settings import TrackerSettings
+
+Floats = npt.NDArray[np.float64]
+Booleans = npt.NDArray[np.bool_]
+
+
+class Predicted(NamedTuple):
+    """Where tracks are expected, and where they were last seen."""
+
+    mean: Floats
+    """States, shape (n, 6)."""
+    covariance: Floats
+    """Their covariances, shape (n, 6, 6)."""
+    seen_at: Floats
+    """Positions last measured [m], shape (n, 2)."""
+    unseen_for: Floats
+    """Time since then [s], shape (n,)."""
+
+
+class Measured(NamedTuple):
+    """The detections of a frame."""
+
+    pose: Floats
+    """x, y [m], theta [rad] or NaN, shape (m, 3)."""
+    covariance: Floats
+    """Their covariances, shape (m, 3, 3)."""
+
+
+def reach(unseen_for: Floats, noise_std: Floats, settings: TrackerSettings) -> Floats:
+    """Return how far from where it was last seen a body may be measured [m]."""
+    return settings.max_speed * unseen_for + settings.gate * noise_std
+
+
+def edge_costs(predicted: Predicted, measured: Measured, settings: TrackerSettings) -> Floats:
+    """Return the cost of each pair for `assign`, infinite outside the gate; (tracks, detections).
+
+    A pair is inside when the detection is within `gate` standard deviations of the predicted
+    position, which widens with the time since the body was seen, and when no speed above
+    `max_speed` was needed to get there. The angle counts where it is known, but does not close the
+    gate: a marker that was read the wrong way round is still that marker.
+    """
+    cost = np.full((len(predicted.mean), len(measured.pose)), np.inf)
+    noise_std = np.sqrt(np.trace(measured.covariance[:, :2, :2], axis1=1, axis2=2))
+    apart = measured.pose[None, :, :2] - predicted.seen_at[:, None]
+    limit = reach(predicted.unseen_for[:, None], noise_std[None, :], settings)
+    track, detection = np.nonzero(np.hypot(apart[..., 0], apart[..., 1]) <= limit)
+    if not track.size:
+        return cost
+    difference = innovation(predicted.mean[track], measured.pose[detection])
+    total = predicted.covariance[track, :3, :3] + measured.covariance[detection]
+    square, log_density = _position_terms(difference, total)
+    turned, log_turned = _angle_terms(difference[:, 2], total[:, 2, 2], settings.gate)
+    seen = settings.detection_probability
+    alone = math.log(settings.clutter_density) + math.log(1.0 - seen) - math.log(seen)
+    inside = square <= settings.gate**2
+    value = 0.5 * square - log_density + turned - log_turned + alone
+    cost[track[inside], detection[inside]] = value[inside]
+    return cost
+
+
+def _position_terms(difference: Floats, total: Floats) -> tuple[Floats, Floats]:
+    """Return squared distance in standard deviations, and the logarithm of the density there."""
+    a, b, d = total[:, 0, 0], total[:, 0, 1], total[:, 1, 1]
+    determinant = a * d - b * b
+    x, y = difference[:, 0], difference[:, 1]
+    square = (d * x * x - 2.0 * b * x * y + a * y * y) / determinant
+    return square, -0.5 * np.log((2.0 * math.pi) ** 2 * determinant)
+
+
+def _angle_terms(difference: Floats, variance: Floats, gate: float) -> tuple[Floats, Floats]:
+    """Return the same for the angle, its density over that of any angle; 0 where not known."""
+    known = np.isfinite(difference) & np.isfinite(variance)
+    # Beyond one radian a Gaussian on the line is none on the circle: then the angle says nothing.
+    known &= np.where(known, variance, 2.0) < 1.0
+    safe = np.where(known, variance, 1.0)
+    square = np.minimum(np.where(known, difference, 0.0) ** 2 / safe, gate**2)
+    log_density = 0.5 * np.log(2.0 * math.pi / safe)
+    return 0.5 * square, np.where(known, log_density, 0.0)

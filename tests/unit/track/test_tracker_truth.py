@@ -1,0 +1,268 @@
+"""The tracker against simulated bodies whose identities are known."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.track.settings import TrackerSettings
+from driftwalk.track.tracker import Tracker
+from driftwalk.track.types import Detection
+
+NOISE = np.array([0.15e-3, 0.15e-3, math.radians(0.5)])
+RADIUS = 0.15
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass
+class World:
+    """Poses (time, body, 3) and their times."""
+
+    time: Floats
+    pose: Floats
+
+
+def wander(
+    seed: int, *, bodies: int, frames: int, apart: float, jitter: float = 0.0, speed: float = 0.05
+) -> World:
+    """Let bodies wander in a round tank; they keep a distance, 0 to let them cross."""
+    random = np.random.default_rng(seed)
+    interval = 0.1 * (1.0 + jitter * random.uniform(-1, 1, frames))
+    time = np.cumsum(interval)
+    angle = 2 * math.pi * np.arange(bodies) / bodies
+    place = 0.08 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    velocity = random.normal(0, speed, (bodies, 2))
+    theta, turn = random.uniform(-3, 3, bodies), random.normal(0, 0.5, bodies)
+    pose = np.empty((frames, bodies, 3))
+    for frame, step in enumerate(interval):
+        pull = -2.0 * place * (np.hypot(*place.T) > 0.1)[:, None]
+        push = np.zeros_like(place)
+        if apart > 0:
+            gap = place[:, None] - place[None]
+            distance = np.hypot(gap[..., 0], gap[..., 1]) + np.eye(bodies)
+            near = np.maximum(0.0, 2 * apart - distance)[..., None] * gap / distance[..., None]
+            push = 60.0 * near.sum(axis=1)
+        kick = random.normal(0, speed * math.sqrt(2 * step), (bodies, 2))
+        velocity += step * (pull + push - velocity) + kick
+        velocity *= np.minimum(1.0, 0.25 / np.hypot(*velocity.T))[:, None]
+        place = place + step * velocity
+        turn += -step * turn + random.normal(0, 0.7 * math.sqrt(2 * step), bodies)
+        theta = theta + step * turn
+        pose[frame] = np.column_stack([place, theta])
+    return World(time, pose)
+
+
+def seen(pose: Floats, random: np.random.Generator, *, angle: bool = True) -> Detection:
+    """Return what a camera makes of a pose."""
+    x, y, theta = pose + NOISE * random.normal(size=3)
+    return Detection(x, y, 0.0, 0.0, theta if angle else math.nan, np.diag(NOISE**2), 100.0)
+
+
+def clutter(random: np.random.Generator, mean: float) -> list[Detection]:
+    """Return detections of nothing, anywhere in the tank."""
+    places = random.uniform(-RADIUS, RADIUS, (random.poisson(mean), 2))
+    return [
+        Detection(x, y, 0.0, 0.0, random.uniform(-3, 3), np.diag(NOISE**2), 30.0) for x, y in places
+    ]
+
+
+def owners(found: Floats, world: World) -> npt.NDArray[np.int64]:
+    """Return which true body each sample of a recording shows, (time, track); -1 for none."""
+    apart = found[:, :, None, :2] - world.pose[:, None, :, :2]
+    distance = np.hypot(apart[..., 0], apart[..., 1])
+    nearest = np.where(np.isfinite(distance), distance, np.inf).argmin(axis=2)
+    least = np.min(np.where(np.isfinite(distance), distance, np.inf), axis=2)
+    return np.where(least < 6 * NOISE[0], nearest, -1)
+
+
+def unmarked_swaps(recording, world: World) -> tuple[int, int]:
+    """Return how often a column went from one true body to another, and how often unmarked.
+
+    A change between two samples is marked when every sample from the one to the other is.
+    """
+    found = np.stack([recording[name].values for name in ("x", "y", "theta")], axis=-1)
+    owner = owners(found, world)
+    score = recording["ambiguous"].values
+    changes = unmarked = 0
+    for column in range(owner.shape[1]):
+        present = np.flatnonzero(owner[:, column] >= 0)
+        for one, other in zip(present[:-1], present[1:], strict=True):
+            if owner[one, column] != owner[other, column]:
+                changes += 1
+                unmarked += not (score[one + 1 : other + 1, column] > 0).all()
+    return changes, unmarked
+
+
+def follow(world: World, settings: TrackerSettings, seed: int, *, lost=None, false=0.0, angle=True):
+    """Track a world with clutter; `lost` (time, body) says what is hidden."""
+    random = np.random.default_rng(seed)
+    tracker = Tracker(settings)
+    for frame, time in enumerate(world.time):
+        found = [
+            seen(pose, random, angle=angle)
+            for body, pose in enumerate(world.pose[frame])
+            if lost is None or not lost[frame, body]
+        ]
+        found += clutter(random, false)
+        random.shuffle(found)
+        tracker.step(float(time), found)
+    return tracker.finish()
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_four_blocks_with_clutter_and_gaps_never_swap(seed: int) -> None:
+    """Blocks that cannot come nearer than a side: 60 s, 2 % missed, gaps of up to 0.8 s."""
+    world = wander(seed, bodies=4, frames=600, apart=0.03, jitter=0.3)
+    random = np.random.default_rng(1000 + seed)
+    lost = random.random((600, 4)) < 0.02
+    for begin in random.integers(20, 580, 8):
+        lost[begin : begin + random.integers(2, 8), random.integers(4)] = True
+    recording = follow(world, TrackerSettings(max_speed=0.3, bodies=4), seed, lost=lost, false=0.5)
+    assert recording.sizes["body"] == 4
+    changes, unmarked = unmarked_swaps(recording, world)
+    assert changes == 0
+    assert unmarked == 0
+    found = np.stack([recording[name].values for name in ("x", "y", "theta")], axis=-1)
+    owner = owners(found, world)
+    # Every true pose that was seen stands in the recording, but for what clutter displaced.
+    assert (owner >= 0).sum() >= 0.995 * (~lost).sum()
+    assert (recording["ambiguous"].values > 0).mean() < 0.05
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_bodies_that_cross_unseen_are_marked(seed: int) -> None:
+    """Points without angle that cross and are hidden while they do: swaps, none of them unmarked.
+
+    Hidden for up to two seconds, so tracks end and come back as well.
+    """
+    world = wander(seed, bodies=5, frames=900, apart=0.0, speed=0.08)
+    gap = world.pose[:, :, None, :2] - world.pose[:, None, :, :2]
+    near = np.hypot(gap[..., 0], gap[..., 1]) + np.eye(5)
+    close = (near < 0.012).any(axis=2)
+    lost = close.copy()
+    recording = follow(
+        world, TrackerSettings(max_speed=0.4, bodies=5), seed, lost=lost, angle=False
+    )
+    assert lost.sum() > 50
+    _, unmarked = unmarked_swaps(recording, world)
+    assert unmarked == 0
+
+
+def test_marking_is_not_everything() -> None:
+    """The test above could pass by marking all: crossings are marked, the rest is not."""
+    world = wander(3, bodies=5, frames=900, apart=0.0, speed=0.08)
+    recording = follow(world, TrackerSettings(max_speed=0.4, bodies=5), 3, angle=False)
+    assert (recording["ambiguous"].values > 0).mean() < 0.3
+    assert unmarked_swaps(recording, world)[1] == 0
+
+
+def test_measurements_are_written_as_they_were() -> None:
+    world = wander(1, bodies=1, frames=50, apart=0.03)
+    random = np.random.default_rng(0)
+    tracker = Tracker(TrackerSettings(max_speed=0.3))
+    given = [seen(world.pose[frame, 0], random) for frame in range(50)]
+    for time, detection in zip(world.time, given, strict=True):
+        tracker.step(float(time), [detection])
+    recording = tracker.finish(attrs={"source": "test"}, counts={"dropped": 2})
+    assert recording["x"].values[:, 0].tolist() == [d.x for d in given]
+    assert recording["y"].values[:, 0].tolist() == [d.y for d in given]
+    assert recording["time"].values.tolist() == world.time.tolist()
+    variance = recording["covariance"].sel(part="thetatheta").values[:, 0]
+    np.testing.assert_allclose(variance, NOISE[2] ** 2, rtol=1e-6)
+    assert json.loads(recording.attrs["counts"]) == {"frames": 50, "dropped": 2}
+    assert recording.attrs["source"] == "test"
+
+
+def test_a_tag_keeps_its_body() -> None:
+    """Two tags change places while hidden for longer than any track lasts."""
+    tracker = Tracker(TrackerSettings(max_speed=0.3, lost_after=0.5))
+    places = {"7": -0.05, "9": 0.05}
+    for frame in range(60):
+        if frame == 30:
+            places = {"7": 0.05, "9": -0.05}
+        shown = [] if 20 <= frame < 30 else places.items()
+        tracker.step(
+            0.1 * frame,
+            [Detection(x, 0.0, 0.0, 0.0, 0.0, np.diag(NOISE**2), 1.0, key) for key, x in shown],
+        )
+    recording = tracker.finish()
+    assert recording["body"].values.tolist() == ["7", "9"]
+    assert recording["x"].sel(body="7").values[[19, 30]].tolist() == [-0.05, 0.05]
+    assert not recording["ambiguous"].values.any()
+
+
+def test_the_same_tag_twice_is_counted() -> None:
+    tracker = Tracker(TrackerSettings(max_speed=0.3))
+    for frame in range(5):
+        far = Detection(0.1, 0.0, 0.0, 0.0, 0.0, np.diag(NOISE**2), 1.0, "7", score=0.2)
+        near = Detection(0.0, 0.0, 0.0, 0.0, 0.0, np.diag(NOISE**2), 1.0, "7")
+        tracker.step(0.1 * frame, [far, near])
+    recording = tracker.finish()
+    assert recording["x"].values[:, 0].tolist() == [0.0] * 5
+    assert json.loads(recording.attrs["counts"])["same_tag_twice"] == 5
+
+
+def one_at(x: float) -> Detection:
+    return Detection(x, 0.0, 0.0, 0.0, math.nan, np.diag(NOISE**2), 1.0)
+
+
+def test_a_single_body_comes_back_as_itself() -> None:
+    """Nothing else was lost: after 3 s out of sight it is body 0 again, and not ambiguous."""
+    tracker = Tracker(TrackerSettings(max_speed=0.3))
+    for frame in range(100):
+        hidden = 30 <= frame < 60
+        tracker.step(0.1 * frame, [] if hidden else [one_at(0.0 if frame < 30 else 0.1)])
+    recording = tracker.finish()
+    assert recording["body"].values.tolist() == ["0"]
+    assert np.isfinite(recording["x"].values).sum() == 70
+    assert not recording["ambiguous"].values.any()
+
+
+@pytest.mark.parametrize(("bodies", "columns"), [(2, 2), (None, 4)])
+def test_two_that_were_lost_come_back_with_a_mark_or_as_others(
+    bodies: int | None, columns: int
+) -> None:
+    tracker = Tracker(TrackerSettings(max_speed=0.3, bodies=bodies))
+    for frame in range(100):
+        if not 30 <= frame < 60:
+            tracker.step(0.1 * frame, [one_at(-0.05), one_at(0.05)])
+        else:
+            tracker.step(0.1 * frame, [])
+    recording = tracker.finish()
+    assert recording.sizes["body"] == columns
+    marked = recording["ambiguous"].values
+    if bodies is not None:
+        assert (marked[30:60] > 0.05).all()
+    assert not marked[5:28].any()
+
+
+def test_nothing_faster_than_allowed_is_taken() -> None:
+    tracker = Tracker(TrackerSettings(max_speed=0.1, bodies=1))
+    for frame in range(40):
+        tracker.step(0.1 * frame, [one_at(0.0 if frame < 20 else 0.12)])
+    x = tracker.finish()["x"].values[:, 0]
+    # 0.12 m take 1.2 s: until then the body is not there.
+    assert np.isnan(x[20:31]).all()
+    assert (x[-5:] == 0.12).all()
+
+
+def test_bad_input() -> None:
+    tracker = Tracker(TrackerSettings(max_speed=0.1))
+    with pytest.raises(InputError, match="nothing was tracked in 0 frames"):
+        tracker.finish()
+    tracker.step(1.0, [])
+    with pytest.raises(InputError, match="time does not increase"):
+        tracker.step(1.0, [])
+    with pytest.raises(InputError, match="not a finite number"):
+        tracker.step(math.nan, [])
+    nowhere = Detection(None, None, 1.0, 1.0, 0.0, np.eye(3), 1.0)
+    with pytest.raises(InputError, match="no position in metres"):
+        tracker.step(2.0, [nowhere])
+    with pytest.raises(ConfigurationError, match="max_speed is out of range: -1"):
+        TrackerSettings(max_speed=-1)
