@@ -1,8 +1,8 @@
 """How much of a marker's colour a pixel shows, whatever its brightness.
 
-Brightness scales a* and b* together, so a colour is a direction in their plane. A pixel's weight for
-a colour is its chroma along that direction, 1 on the disc itself, and 0 where the hue is another. Both
-are read from a table of all (a*, b*) of an 8-bit image.
+Brightness scales a* and b* together, so a colour is a direction in their plane. A pixel's weight
+for a colour is its chroma along that direction, 1 on the disc itself, and 0 where the hue is
+another. Both are read from a table of all (a*, b*) of an 8-bit image.
 """
 
 from __future__ import annotations

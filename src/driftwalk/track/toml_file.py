@@ -1,4 +1,4 @@
-"""Reading and writing the small TOML files of the tracker: sections of keys with units in the names."""
+"""Reading and writing the small TOML files of the tracker: sections, with units in the keys."""
 
 from __future__ import annotations
 

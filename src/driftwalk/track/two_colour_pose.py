@@ -1,9 +1,9 @@
 """Where the two discs of a marker are, to a small part of a pixel.
 
-Whole discs: the mean place of the colour, weighted by how much of it each pixel shows. Discs that are
-partly hidden: a model of both discs with the marker's size and spacing is laid over the colours. What
-hides a disc takes colour away but never adds any, so colour beyond the model counts in full, and
-missing colour only up to a limit.
+Whole discs: the mean place of the colour, weighted by how much of it each pixel shows. Discs that
+are partly hidden: a model of both discs with the marker's size and spacing is laid over the
+colours. What hides a disc takes colour away but never adds any, so colour beyond the model counts
+in full, and missing colour only up to a limit.
 """
 
 from __future__ import annotations

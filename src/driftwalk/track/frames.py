@@ -1,0 +1,333 @@
+"""Frames with the times at which they were taken: from a video, from images, from a camera.
+
+A frame's time is the stream's presentation time, never its number over a nominal rate. What the
+times tell is counted: frames that are missing, that come twice, that show nothing new.
+"""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import statistics
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Protocol
+
+import numpy as np
+
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.opencv import require_opencv
+from driftwalk.track.types import Frame, Image
+
+_GAP: Final = 1.5
+_STALE_STRIDE: Final = 16
+_IMAGES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
+_TIMES: Final = "times.csv"
+
+
+@dataclass
+class FrameCounts:
+    """What became of a source's frames.
+
+    Parameters
+    ----------
+    frames : int
+        Frames that were handed on.
+    dropped : int
+        Frames that are missing between those there are: from gaps in the times, or taken by a
+        camera while the frame before was still being worked on.
+    duplicates : int
+        Frames with the time of the one before, or an earlier one; left out.
+    stale : int
+        Frames with a new time and exactly the old image, as a camera or a converter makes them to
+        keep its rate; left out.
+
+    Examples
+    --------
+    >>> FrameCounts(frames=10).to_dict()
+    {'frames': 10, 'dropped': 0, 'duplicates': 0, 'stale': 0}
+    """
+
+    frames: int = 0
+    dropped: int = 0
+    duplicates: int = 0
+    stale: int = 0
+
+    def to_dict(self) -> dict[str, int]:
+        """Return the counts by name."""
+        return dataclasses.asdict(self)
+
+
+class FrameSource(Protocol):
+    """Where frames come from; iterated once."""
+
+    name: str
+    counts: FrameCounts
+    interrupted: str | None
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Yield the frames in the order of their times."""
+
+    def close(self) -> None:
+        """Let go of the file or the camera."""
+
+
+class FrameFilter:
+    """Leaves out frames that come twice or show nothing new, and checks the size.
+
+    Parameters
+    ----------
+    name : str
+        The source, for messages.
+    counts : FrameCounts
+        What is counted in.
+    keep_stale : bool
+        Whether frames with exactly the image before are handed on, as a drawn video needs it in
+        which nothing moves.
+    """
+
+    def __init__(self, name: str, counts: FrameCounts, *, keep_stale: bool = False) -> None:
+        self._name, self._counts, self._keep_stale = name, counts, keep_stale
+        self._last: Image | None = None
+        self._time = -np.inf
+        self._gaps: list[float] = []
+
+    def accept(self, index: int, time: float, image: Any) -> Frame | None:
+        """Return the frame, None when it is left out."""
+        picture = _three_channels(image)
+        if self._last is not None and picture.shape != self._last.shape:
+            was, now = self._last.shape, picture.shape
+            raise FormatError(
+                f"frame {index} is {now[1]} x {now[0]} pixels, the frames before are "
+                f"{was[1]} x {was[0]}: a recording has one size",
+                path=self._name,
+            )
+        if not time > self._time:
+            self._counts.duplicates += 1
+            return None
+        stale = self._last is not None and _same(picture, self._last)
+        if self._last is not None:
+            self._gaps.append(time - self._time)
+        self._last, self._time = picture, time
+        if stale:
+            self._counts.stale += 1
+            if not self._keep_stale:
+                return None
+        self._counts.frames += 1
+        return Frame(index, time, picture)
+
+    def count_gaps(self) -> None:
+        """Count the frames that are missing, by the usual time between two."""
+        if len(self._gaps) > 1:
+            usual = statistics.median(self._gaps)
+            long = [gap for gap in self._gaps if gap > _GAP * usual]
+            self._counts.dropped += sum(round(gap / usual) - 1 for gap in long)
+
+
+class VideoFile:
+    """A video file, read once from its start.
+
+    Parameters
+    ----------
+    path : path-like
+        Anything that OpenCV reads.
+    keep_stale : bool
+        See `FrameCounts`.
+
+    Raises
+    ------
+    FormatError
+        When there is no such file, or it is no video.
+    """
+
+    def __init__(self, path: str | Path, *, keep_stale: bool = False) -> None:
+        cv2 = require_opencv()
+        self.name = str(path)
+        self.counts = FrameCounts()
+        self.interrupted: str | None = None
+        self._keep_stale = keep_stale
+        if not Path(path).exists():
+            raise FormatError("no such video", path=path)
+        if Path(path).is_dir() or Path(path).stat().st_size == 0:
+            raise FormatError("is not a video: nothing to read in it", path=path)
+        self._position = cv2.CAP_PROP_POS_MSEC
+        self._capture = _quiet_open(cv2, str(path))
+        if not self._capture.isOpened():
+            raise FormatError("is not a video that OpenCV can read", path=path)
+        self._rate = float(self._capture.get(cv2.CAP_PROP_FPS))
+        self._promised = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Yield the frames.
+
+        Raises
+        ------
+        FormatError
+            When there is no frame, the size changes, or the stream has no times.
+        """
+        keep = FrameFilter(self.name, self.counts, keep_stale=self._keep_stale)
+        index = 0
+        try:
+            while self._capture.grab():
+                time = float(self._capture.get(self._position)) / 1000.0
+                read, image = self._capture.retrieve()
+                if read:
+                    frame = keep.accept(index, time, image)
+                    if frame is not None:
+                        yield frame
+                index += 1
+        finally:
+            keep.count_gaps()
+            self.close()
+        if index == 0:
+            raise FormatError("holds no frame", path=self.name)
+        if index > 1 and self.counts.duplicates == index - 1:
+            raise FormatError(
+                "has no presentation times: write it again with another program", path=self.name
+            )
+        if 0 < index < self._promised - 1:
+            self.interrupted = f"{self.name} ends after {index} of {self._promised} frames"
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._capture.release()
+
+
+class ImageSequence:
+    """Images in a folder, in the order of their names.
+
+    Parameters
+    ----------
+    folder : path-like
+        With a file ``times.csv`` of columns ``file``, ``time_s``, or with a stated rate.
+    rate : float, optional
+        Images per second [Hz]; not used when there is a ``times.csv``.
+    keep_stale : bool
+        See `FrameCounts`.
+
+    Raises
+    ------
+    InputError
+        When there are no images, no times and no rate, or the times cannot be read.
+    """
+
+    def __init__(
+        self, folder: str | Path, *, rate: float | None = None, keep_stale: bool = False
+    ) -> None:
+        self._cv2 = require_opencv()
+        self.name = str(folder)
+        self.counts = FrameCounts()
+        self.interrupted: str | None = None
+        self._keep_stale = keep_stale
+        self._files = _timed_images(Path(folder), rate)
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Yield the frames."""
+        keep = FrameFilter(self.name, self.counts, keep_stale=self._keep_stale)
+        try:
+            for index, (file, time) in enumerate(self._files):
+                image = self._cv2.imread(str(file), self._cv2.IMREAD_COLOR)
+                if image is None:
+                    raise FormatError("is not an image that OpenCV can read", path=file)
+                frame = keep.accept(index, time, image)
+                if frame is not None:
+                    yield frame
+        finally:
+            keep.count_gaps()
+
+    def close(self) -> None:
+        """Do nothing: no file stays open."""
+
+
+def open_source(
+    source: str | Path, *, rate: float | None = None, keep_stale: bool = False
+) -> FrameSource:
+    """Open a video, a folder of images, or a camera.
+
+    Parameters
+    ----------
+    source : str or path-like
+        A video file; a folder of images; ``camera:0`` for the first camera.
+    rate : float, optional
+        Images per second of a folder without a ``times.csv`` [Hz].
+    keep_stale : bool
+        Whether frames with exactly the image before are handed on.
+
+    Returns
+    -------
+    FrameSource
+        Iterate over it for `Frame` objects; then its ``counts`` and ``interrupted`` (None, or why
+        it ended early) are final.
+
+    Raises
+    ------
+    InputError
+        When it cannot be opened.
+
+    Examples
+    --------
+    >>> open_source("no/such/video.mp4")
+    Traceback (most recent call last):
+    driftwalk.core.errors.FormatError: no/such/video.mp4: no such video
+    """
+    text = str(source)
+    if text.startswith("camera:"):
+        from driftwalk.track.live_camera import LiveCamera
+
+        return LiveCamera.open(text)
+    if Path(source).is_dir():
+        return ImageSequence(source, rate=rate, keep_stale=keep_stale)
+    return VideoFile(source, keep_stale=keep_stale)
+
+
+def _timed_images(folder: Path, rate: float | None) -> list[tuple[Path, float]]:
+    if (folder / _TIMES).exists():
+        return _listed_images(folder)
+    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in _IMAGES)
+    if not files:
+        raise InputError(f"{folder}: no images ({', '.join(_IMAGES)}) in this folder")
+    if rate is None or not rate > 0:
+        raise InputError(
+            f"{folder}: images have no times: state their rate in Hz, or put a {_TIMES} with the "
+            "columns file, time_s beside them"
+        )
+    return [(file, index / rate) for index, file in enumerate(files)]
+
+
+def _listed_images(folder: Path) -> list[tuple[Path, float]]:
+    path = folder / _TIMES
+    found = []
+    with path.open(newline="", encoding="utf-8-sig") as stream:
+        for number, row in enumerate(csv.DictReader(stream), start=2):
+            try:
+                found.append((folder / row["file"], float(row["time_s"])))
+            except (KeyError, TypeError, ValueError):
+                raise FormatError(
+                    "needs the columns file and time_s, a time in each row", path=path, line=number
+                ) from None
+    if not found:
+        raise FormatError("lists no image", path=path)
+    return found
+
+
+def _quiet_open(cv2: Any, path: str) -> Any:
+    """Open a file; what OpenCV would print on failure is said by our own error."""
+    level = cv2.getLogLevel() if hasattr(cv2, "getLogLevel") else None
+    if level is not None:
+        cv2.setLogLevel(0)
+    try:
+        return cv2.VideoCapture(path)
+    finally:
+        if level is not None:
+            cv2.setLogLevel(level)
+
+
+def _three_channels(image: Any) -> Image:
+    picture = np.asarray(image, dtype=np.uint8)
+    return picture if picture.ndim == 3 else np.repeat(picture[..., None], 3, axis=2)
+
+
+def _same(first: Image, second: Image) -> bool:
+    coarse = np.s_[::_STALE_STRIDE, ::_STALE_STRIDE]
+    return np.array_equal(first[coarse], second[coarse]) and np.array_equal(first, second)
