@@ -25,7 +25,8 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "simulate": GROUND | {"model", "record"},
     "calibrate": GROUND | {"simulate", "compare", "flow", "model", "sweep"},
     "assemble": GROUND | {"simulate", "compare", "flow", "model", "sweep"},
-    "track": GROUND | {"record", "model"},
+    # `assemble` for the observer: what is seen is classified by the rules of simulated runs.
+    "track": GROUND | {"record", "model", "assemble"},
     "datasets": GROUND | {"record", "flow", "model", "compare", "sweep", "simulate"},
     "report": GROUND,
     "viewer": GROUND,

@@ -109,7 +109,7 @@ def smallest_distance(poses: Poses) -> float:
     return smallest if math.isfinite(smallest) else math.nan
 
 
-class _Pair(NamedTuple):
+class PairPoses(NamedTuple):
     """Two blocks at the samples (n,) that show both; the faces are (2, n) or (2, 1)."""
 
     time: Floats
@@ -142,7 +142,7 @@ def _joins_of_pair(
     # The centres of blocks that fit are hardly farther apart than a side.
     if not (np.hypot(*apart) <= rules.side + rules.join_distance).any():
         return []
-    pair = _Pair(poses.time[at], apart, poses.theta[at][:, blocks].T)
+    pair = PairPoses(poses.time[at], apart, poses.theta[at][:, blocks].T)
     nearest = pair.nearest_faces()
     distance, angle = pair.misfit(nearest, rules.side)
     fits = (distance <= rules.join_distance) & (angle <= rules.join_angle)

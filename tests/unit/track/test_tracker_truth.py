@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from dataclasses import dataclass
@@ -92,7 +93,7 @@ def unmarked_swaps(recording, world: World) -> tuple[int, int]:
     changes = unmarked = 0
     for column in range(owner.shape[1]):
         present = np.flatnonzero(owner[:, column] >= 0)
-        for one, other in zip(present[:-1], present[1:], strict=True):
+        for one, other in itertools.pairwise(present):
             if owner[one, column] != owner[other, column]:
                 changes += 1
                 unmarked += not (score[one + 1 : other + 1, column] > 0).all()
