@@ -1,15 +1,20 @@
 """Where is every block? From a camera or a video to poses, with reasons for what was left out."""
 
 from driftwalk.track.blobs import BlobDetector, median_background
+from driftwalk.track.boards import Board
 from driftwalk.track.camera import Camera, Lens, load_camera, save_camera
 from driftwalk.track.frames import FrameCounts, FrameSource, open_source
+from driftwalk.track.lens import LensCalibration, calibrate_lens, camera_from_board
 from driftwalk.track.live_camera import LiveCamera
 from driftwalk.track.markers import MarkerColour, TwoColourMarker, load_markers, save_markers
+from driftwalk.track.rim import Rim, camera_from_rim, find_rim
+from driftwalk.track.tags import TagDetector
 from driftwalk.track.two_colour import TwoColourDetector
 from driftwalk.track.types import Detection, Detector, Frame, FrameResult, PixelToWorld, Rejected
 
 __all__ = [
     "BlobDetector",
+    "Board",
     "Camera",
     "Detection",
     "Detector",
@@ -18,12 +23,19 @@ __all__ = [
     "FrameResult",
     "FrameSource",
     "Lens",
+    "LensCalibration",
     "LiveCamera",
     "MarkerColour",
     "PixelToWorld",
     "Rejected",
+    "Rim",
+    "TagDetector",
     "TwoColourDetector",
     "TwoColourMarker",
+    "calibrate_lens",
+    "camera_from_board",
+    "camera_from_rim",
+    "find_rim",
     "load_camera",
     "load_markers",
     "median_background",
