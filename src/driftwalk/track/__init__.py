@@ -3,12 +3,20 @@
 from driftwalk.track.blobs import BlobDetector, median_background
 from driftwalk.track.boards import Board
 from driftwalk.track.camera import Camera, Lens, load_camera, save_camera
+from driftwalk.track.explain import explain_frame
 from driftwalk.track.frames import FrameCounts, FrameSource, open_source
 from driftwalk.track.lens import LensCalibration, calibrate_lens, camera_from_board
 from driftwalk.track.live_camera import LiveCamera
 from driftwalk.track.markers import MarkerColour, TwoColourMarker, load_markers, save_markers
 from driftwalk.track.rim import Rim, camera_from_rim, find_rim
 from driftwalk.track.tags import TagDetector
+from driftwalk.track.teach import (
+    ColourSeen,
+    MarkerProposal,
+    colours_seen,
+    missing_colours,
+    propose_markers,
+)
 from driftwalk.track.two_colour import TwoColourDetector
 from driftwalk.track.types import Detection, Detector, Frame, FrameResult, PixelToWorld, Rejected
 
@@ -16,6 +24,7 @@ __all__ = [
     "BlobDetector",
     "Board",
     "Camera",
+    "ColourSeen",
     "Detection",
     "Detector",
     "Frame",
@@ -26,6 +35,7 @@ __all__ = [
     "LensCalibration",
     "LiveCamera",
     "MarkerColour",
+    "MarkerProposal",
     "PixelToWorld",
     "Rejected",
     "Rim",
@@ -35,11 +45,15 @@ __all__ = [
     "calibrate_lens",
     "camera_from_board",
     "camera_from_rim",
+    "colours_seen",
+    "explain_frame",
     "find_rim",
     "load_camera",
     "load_markers",
     "median_background",
+    "missing_colours",
     "open_source",
+    "propose_markers",
     "save_camera",
     "save_markers",
 ]
