@@ -28,6 +28,10 @@ class Command(NamedTuple):
 
 COMMANDS: Final[dict[str, Command]] = {
     "study": Command("study", "study_app", "Write and check study files."),
+    "camera": Command("camera", "camera_app", "Calibrate the camera: lens and plane."),
+    "markers": Command("markers", "markers_app", "Learn what the markers look like."),
+    "track": Command("track", "track", "Track blocks in a video or before a camera."),
+    "watch": Command("watch", "watch", "Watch blocks assemble, live."),
     "info": Command("info", "info", "Say what a recording holds and how it was understood."),
     "convert": Command("convert", "convert", "Turn a recording into a trajectory file."),
     "flow": Command("flow", "flow", "Take the flow field from a recording."),

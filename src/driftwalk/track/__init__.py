@@ -6,9 +6,14 @@ from driftwalk.track.camera import Camera, Lens, load_camera, save_camera
 from driftwalk.track.explain import explain_frame
 from driftwalk.track.frames import FrameCounts, FrameSource, open_source
 from driftwalk.track.lens import LensCalibration, calibrate_lens, camera_from_board
+from driftwalk.track.live import LiveServer, Particle, nmea_frame
 from driftwalk.track.live_camera import LiveCamera
 from driftwalk.track.markers import MarkerColour, TwoColourMarker, load_markers, save_markers
+from driftwalk.track.observer import AssemblyObserver, Observation, SeenEvent, observe
+from driftwalk.track.overlay import OverlayWriter, draw_states, save_picture
 from driftwalk.track.rim import Rim, camera_from_rim, find_rim
+from driftwalk.track.sampled import frame_count, sample_images
+from driftwalk.track.settings import TrackerSettings
 from driftwalk.track.tags import TagDetector
 from driftwalk.track.teach import (
     ColourSeen,
@@ -17,10 +22,12 @@ from driftwalk.track.teach import (
     missing_colours,
     propose_markers,
 )
+from driftwalk.track.tracker import Tracker, TrackState
 from driftwalk.track.two_colour import TwoColourDetector
 from driftwalk.track.types import Detection, Detector, Frame, FrameResult, PixelToWorld, Rejected
 
 __all__ = [
+    "AssemblyObserver",
     "BlobDetector",
     "Board",
     "Camera",
@@ -34,26 +41,40 @@ __all__ = [
     "Lens",
     "LensCalibration",
     "LiveCamera",
+    "LiveServer",
     "MarkerColour",
     "MarkerProposal",
+    "Observation",
+    "OverlayWriter",
+    "Particle",
     "PixelToWorld",
     "Rejected",
     "Rim",
+    "SeenEvent",
     "TagDetector",
+    "TrackState",
+    "Tracker",
+    "TrackerSettings",
     "TwoColourDetector",
     "TwoColourMarker",
     "calibrate_lens",
     "camera_from_board",
     "camera_from_rim",
     "colours_seen",
+    "draw_states",
     "explain_frame",
     "find_rim",
+    "frame_count",
     "load_camera",
     "load_markers",
     "median_background",
     "missing_colours",
+    "nmea_frame",
+    "observe",
     "open_source",
     "propose_markers",
+    "sample_images",
     "save_camera",
     "save_markers",
+    "save_picture",
 ]

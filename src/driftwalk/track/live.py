@@ -278,7 +278,7 @@ class Particle(NamedTuple):
 
 
 def nmea_frame(number: int, particles: Iterable[Particle]) -> str:
-    """Return a frame as SwisTrack sent it until 2022: ``$PARTICLE`` with six arguments.
+    r"""Return a frame as SwisTrack sent it until 2022: ``$PARTICLE`` with six arguments.
 
     The orientation is that in the image, whose rows go down: its sign is the opposite of theta's.
     A body without an orientation has 0.
@@ -297,7 +297,7 @@ def nmea_frame(number: int, particles: Iterable[Particle]) -> str:
 
     Examples
     --------
-    >>> print(nmea_frame(2, [Particle(0, 10.0, 20.0, 0.5, 0.1, 0.2)]).replace("\\r", ""), end="")
+    >>> print(nmea_frame(2, [Particle(0, 10.0, 20.0, 0.5, 0.1, 0.2)]).replace("\r", ""), end="")
     $STEP_START*0D
     $FRAMENUMBER,2*40
     $PARTICLE,0,10.000000,20.000000,-0.500000,0.100000,0.200000*12

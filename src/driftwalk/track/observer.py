@@ -68,8 +68,8 @@ class AssemblyObserver:
 
     Parameters
     ----------
-    bodies : sequence of str
-        Names of all blocks, seen or not.
+    bodies : sequence of str or int
+        Names of all blocks, seen or not; or how many there are: then they are named as they come.
     side : float
         Side of a block [m].
     chirality : {"merged", "distinct"}
@@ -88,7 +88,7 @@ class AssemblyObserver:
 
     def __init__(
         self,
-        bodies: Sequence[str],
+        bodies: Sequence[str] | int,
         *,
         side: float,
         chirality: Chirality = "merged",
@@ -100,7 +100,8 @@ class AssemblyObserver:
         hold: float = HOLD,
     ) -> None:
         require_chirality(chirality)
-        if not bodies:
+        names = [f"unseen {i}" for i in range(bodies)] if isinstance(bodies, int) else list(bodies)
+        if not names:
             raise InputError("there is no block to observe")
         distance = JOIN_DISTANCE * side if join_distance is None else join_distance
         self.rules = JoinRules(
@@ -112,12 +113,13 @@ class AssemblyObserver:
             min_duration=min_duration,
             hold=hold,
         )
-        self.bodies = list(bodies)
+        self.bodies = names
+        self._unnamed = list(range(bodies)) if isinstance(bodies, int) else []
         self.chirality = chirality
         self._times: list[float] = []
         self._pose: dict[int, Pose] = {}
         self._seen: dict[int, float] = {}
-        self._pairs = [PairState(pair, self.rules) for pair in combinations(range(len(bodies)), 2)]
+        self._pairs = [PairState(pair, self.rules) for pair in combinations(range(len(names)), 2)]
         self._history = self._replayed([])
         self._state: list[tuple[Any, ...]] = []
         self._told: set[tuple[str, int, tuple[int, int]]] = set()
@@ -135,6 +137,7 @@ class AssemblyObserver:
         """
         sample = len(self._times)
         self._times.append(time)
+        self._name(poses)
         place = {name: index for index, name in enumerate(self.bodies)}
         now = {place[name]: pose for name, pose in poses.items() if all(map(math.isfinite, pose))}
         self._pose.update(now)
@@ -144,6 +147,15 @@ class AssemblyObserver:
             if one in now and other in now:
                 pair.step(sample, _look(time, now[one], now[other]))
         return self._observation(time)
+
+    def _name(self, poses: Mapping[str, Pose]) -> None:
+        """Name blocks that are seen for the first time."""
+        for name in sorted(poses.keys() - set(self.bodies)):
+            if not self._unnamed:
+                raise InputError(
+                    f"block '{name}' is seen, but there are {len(self.bodies)} others already"
+                )
+            self.bodies[self._unnamed.pop(0)] = name
 
     def _observation(self, time: float) -> Observation:
         samples = len(self._times)

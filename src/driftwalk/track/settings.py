@@ -49,7 +49,7 @@ class TrackerSettings:
 
     max_speed: float
     max_turn_rate: float = 6.0
-    turn_time: float = 1.0
+    turn_time: float = 0.3
     lost_after: float = 1.0
     confirm_after: int = 3
     bodies: int | None = None

@@ -168,7 +168,8 @@ class Tracker:
         self._begin(time, frame, found, measured, taken)
         self._end(time)
         self._name_new_tracks(frame)
-        return [self._state(track) for track in self._tracks if track.body is not None]
+        named = [track for track in self._tracks if track.body is not None]
+        return [self._state(track) for track in sorted(named, key=lambda track: track.body or 0)]
 
     def finish(
         self, *, attrs: Mapping[str, Any] | None = None, counts: Mapping[str, Any] | None = None

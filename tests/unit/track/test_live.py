@@ -35,6 +35,15 @@ def connect() -> Iterator[Callable[..., tuple[socket.socket, TextIO]]]:
         yield to
 
 
+def left(server: LiveServer) -> bool:
+    """Say whether every client is gone after a while."""
+    deadline = time.monotonic() + 10
+    while server.clients and time.monotonic() < deadline:
+        server.publish({"frame": 0})
+        time.sleep(0.01)
+    return server.clients == 0
+
+
 def test_each_client_gets_every_frame_in_order(connect) -> None:
     with LiveServer(0) as server:
         readers = [connect(server)[1] for _ in range(3)]
@@ -76,11 +85,7 @@ def test_client_that_leaves_is_forgotten(connect) -> None:
         assert server.wait_for_clients(1)
         reader.close()
         client.close()
-        deadline = time.monotonic() + 10
-        while server.clients and time.monotonic() < deadline:
-            server.publish({"frame": 0})
-            time.sleep(0.01)
-        assert server.clients == 0
+        assert left(server)
 
 
 def test_image_is_sent_once_on_request_and_scaled(connect) -> None:
@@ -117,10 +122,10 @@ def test_endless_request_ends_the_connection(connect) -> None:
         client, _ = connect(server)
         assert server.wait_for_clients(1)
         client.sendall(b"x" * 10_000)
-        with pytest.raises((ConnectionError, BrokenPipeError)):
-            while client.recv(1024):
-                pass
-            raise ConnectionError
+        # Closed, or reset because the rest of the request was not read.
+        with contextlib.suppress(ConnectionError):
+            assert client.recv(1024) == b""
+        assert left(server)
 
 
 def test_port_in_use_and_no_such_port() -> None:
@@ -130,7 +135,7 @@ def test_port_in_use_and_no_such_port() -> None:
             LiveServer(server.port)
     with pytest.raises(InputError, match="0 to 65535, got 70000"):
         LiveServer(70000)
-    with pytest.raises(InputError, match="cannot listen on 192.0.2.1"):
+    with pytest.raises(InputError, match=r"cannot listen on 192\.0\.2\.1"):
         LiveServer(0, host="192.0.2.1")
 
 

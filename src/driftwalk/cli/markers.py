@@ -1,0 +1,65 @@
+"""`driftwalk markers`: what the markers look like."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from driftwalk.cli import tracking_options as given
+from driftwalk.cli.main import paragraphs
+from driftwalk.cli.output import print_note, print_table
+from driftwalk.cli.tracking_options import TrackingOptions
+
+markers_app = typer.Typer(add_completion=False, help="Describe the markers on the blocks.")
+
+
+def teach(
+    source: given.SourceName,
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.toml", help="File to write.")],
+    camera: given.CameraFile = None,
+    tank_diameter: given.Diameter = None,
+    px_per_m: given.PxPerM = None,
+    image_rate: given.ImageRate = None,
+    side: given.BlockSide = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace files that exist.")
+    ] = False,
+) -> None:
+    """Propose the two colours and the size of the markers from a few frames.
+
+    A picture beside the file, of the same name with .png, shows what was found: look at it.
+    """
+    from driftwalk.cli.tracking_parts import find_camera
+    from driftwalk.core.atomic import require_free, require_target
+    from driftwalk.track import propose_markers, sample_images, save_markers, save_picture
+
+    existing = "replace" if overwrite else "error"
+    require_target(out, existing=existing, endings=(".toml",))
+    picture = out.with_suffix(".png")
+    require_free(picture, existing=existing)
+    images = sample_images(source, 9, rate=image_rate)
+    options = TrackingOptions(
+        source, "", camera=camera, tank_diameter=tank_diameter, px_per_m=px_per_m
+    )
+    proposal = propose_markers(images, find_camera(options, images), block_side=side)
+    save_markers(out, proposal.marker)
+    save_picture(picture, proposal.picture)
+    marker = proposal.marker
+    rows = [
+        ["distance of the discs [mm]", 1e3 * marker.spacing_m],
+        ["diameter of a disc [mm]", 1e3 * marker.size_m],
+        ["pairs measured", proposal.pairs],
+        *(["colour seen", str(seen)] for seen in proposal.colours),
+    ]
+    print_table(rows)
+    print_note(f"wrote {out} and {picture}")
+
+
+markers_app.command("teach", help=paragraphs(teach.__doc__ or ""))(teach)
+
+
+@markers_app.callback()
+def _markers() -> None:
+    """Describe the markers on the blocks."""

@@ -1,0 +1,133 @@
+"""What tracking is made of, by the options: scale, detector, tracker and observer."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from driftwalk.cli.output import print_note
+from driftwalk.cli.tracking_options import TrackingOptions
+from driftwalk.core.errors import ConfigurationError, InputError
+
+if TYPE_CHECKING:
+    from driftwalk.track import AssemblyObserver, Camera, Detector, Tracker
+
+
+class TrackingParts(NamedTuple):
+    """The parts of a tracking run."""
+
+    camera: Camera
+    detector: Detector
+    tracker: Tracker
+    observer: AssemblyObserver | None
+    diameter: float | None
+    """Diameter of the tank [m]."""
+
+
+def build_parts(options: TrackingOptions) -> TrackingParts:
+    """Return the parts that the options ask for.
+
+    Raises
+    ------
+    InputError
+        When the options contradict each other, or what they name is not found in the images.
+    """
+    from driftwalk.track import sample_images
+
+    images = sample_images(options.source, rate=options.image_rate)
+    camera = find_camera(options, images)
+    camera.check_size(images[0].shape[1], images[0].shape[0])
+    detector, side = _detector(options, camera, images)
+    diameter = options.tank_diameter or camera.tank_diameter_m
+    tracker = _tracker(options, camera, diameter)
+    return TrackingParts(camera, detector, tracker, _observer(options, side), diameter)
+
+
+def find_camera(options: TrackingOptions, images: Sequence[Any]) -> Camera:
+    """Return the camera with a scale: from its file, the rim, or the scale that is stated."""
+    from driftwalk.track import Camera, camera_from_rim, load_camera, median_background
+
+    known = load_camera(options.camera) if options.camera is not None else None
+    lens = known.lens if known is not None else None
+    if options.px_per_m is not None:
+        if known is not None and known.homography_px_to_m is not None:
+            raise ConfigurationError(f"--px-per-m: {options.camera} has a scale already")
+        rows, columns = images[0].shape[:2]
+        return Camera.from_scale(columns, rows, px_per_m=options.px_per_m, lens=lens)
+    if known is not None and known.homography_px_to_m is not None:
+        return known
+    if options.tank_diameter is not None:
+        still = median_background(list(images)) if len(images) > 2 else images[0]
+        return camera_from_rim(still, diameter=options.tank_diameter, lens=lens)
+    raise InputError(
+        "no scale: state --tank-diameter (the rim must be seen), or --camera with a plane, or "
+        "--px-per-m"
+    )
+
+
+def _detector(
+    options: TrackingOptions, camera: Camera, images: Sequence[Any]
+) -> tuple[Detector, float | None]:
+    """Return the detector, and the side of the blocks [m] where the markers say it."""
+    from driftwalk.track import (
+        BlobDetector,
+        TagDetector,
+        TwoColourDetector,
+        load_markers,
+        median_background,
+        missing_colours,
+    )
+
+    blob = {
+        "polarity": options.polarity,
+        "least_area_px": options.least_area_px,
+        "most_area_px": options.most_area_px,
+    }
+    given: dict[str, Any] = {key: value for key, value in blob.items() if value is not None}
+    if options.markers == "blob":
+        background = median_background(list(images))
+        return BlobDetector(background, camera, objects=options.bodies, **given), None
+    if given:
+        name = next(iter(given)).replace("_", "-")
+        raise ConfigurationError(f"--{name} is for --markers blob")
+    if options.markers.startswith("aruco:"):
+        return TagDetector(options.markers.partition(":")[2], camera), None
+    marker = load_markers(options.markers)
+    missing = missing_colours(marker, images)
+    if missing is not None:
+        raise InputError(f"{options.markers}: {missing} (driftwalk markers teach)")
+    return TwoColourDetector(marker, camera), marker.block_side_m
+
+
+def _tracker(options: TrackingOptions, camera: Camera, diameter: float | None) -> Tracker:
+    from driftwalk.track import Tracker, TrackerSettings
+
+    given = {
+        "max_speed": options.max_speed or _width(camera, diameter),
+        "bodies": options.bodies,
+        "lost_after": options.lost_after,
+    }
+    settings: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
+    return Tracker(TrackerSettings(**settings))
+
+
+def _width(camera: Camera, diameter: float | None) -> float:
+    """Return the width of the tank, or of what the camera sees [m]."""
+    if diameter is not None:
+        return diameter
+    corners = np.array([[0.0, 0.0], [camera.width_px - 1.0, camera.height_px - 1.0]])
+    return math.dist(*camera.to_world(corners).tolist())
+
+
+def _observer(options: TrackingOptions, side: float | None) -> AssemblyObserver | None:
+    from driftwalk.track import AssemblyObserver
+
+    side = options.side if options.side is not None else side
+    if options.side is not None and options.bodies is None:
+        print_note("who is joined is not said: --side needs --bodies, the number of blocks")
+    if side is None or options.bodies is None or options.markers == "blob":
+        return None
+    return AssemblyObserver(options.bodies, side=side)

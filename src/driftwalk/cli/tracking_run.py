@@ -1,0 +1,299 @@
+"""The loop from frames to a recording, with everything that looks on."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import signal
+import time as clock
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from driftwalk.cli.output import print_note
+from driftwalk.cli.progress import ProgressReporter
+from driftwalk.cli.tracking_options import TrackingOptions
+from driftwalk.cli.tracking_parts import TrackingParts
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.track import Frame, LiveServer, Observation, OverlayWriter, TrackState
+
+Look = Callable[["Frame", "Sequence[TrackState]", "Observation | None"], None]
+
+_SAVE_EVERY_S: Final = 10.0
+# A save may take this share of the time, so that those of a long recording become rarer.
+_SAVING_SHARE: Final = 0.05
+_OVERLAY_RATE: Final = 25.0
+
+
+class TrackingRun:
+    """Tracks a source; what was tracked up to now can be saved at any time.
+
+    Parameters
+    ----------
+    options : TrackingOptions
+        What was asked for.
+    parts : TrackingParts
+        See `build_parts`.
+    out : Path or None
+        The recording to write.
+    look : callable, optional
+        Is called with each frame, its states and what was observed.
+    """
+
+    def __init__(
+        self,
+        options: TrackingOptions,
+        parts: TrackingParts,
+        out: Path | None,
+        look: Look | None = None,
+    ) -> None:
+        self.options, self.parts, self.out, self._look = options, parts, out, look
+        self.rejected: Counter[str] = Counter()
+        self.interrupted: str | None = None
+        self.frames = 0
+        self.working_s = 0.0
+        self._source_counts: dict[str, int] = {}
+        self._saved = clock.monotonic()
+        self._pause = _SAVE_EVERY_S
+
+    def run(self) -> None:
+        """Track to the end of the source, to Ctrl-C, or to an error; all up to there is saved.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            When a file was interrupted; a camera's recording ends that way.
+        """
+        from driftwalk.track import frame_count, open_source
+
+        total = frame_count(self.options.source) or 0
+        source = open_source(self.options.source, rate=self.options.image_rate)
+        with contextlib.ExitStack() as open_things:
+            open_things.callback(source.close)
+            open_things.enter_context(_termination_as_interrupt())
+            servers = self._open_servers(open_things)
+            overlay = self._open_overlay(open_things)
+            progress = open_things.enter_context(ProgressReporter("track"))
+            try:
+                for frame in source:
+                    self._source_counts = source.counts.to_dict()
+                    self._take(frame, servers, overlay)
+                    if total:
+                        progress(min(frame.index + 1, total), total)
+                    self._save_now_and_then()
+                self.interrupted = source.interrupted
+            except KeyboardInterrupt:
+                self.interrupted = f"stopped by hand after {self.frames} frames"
+                if not self.options.is_camera:
+                    raise
+            except BaseException as error:
+                self.interrupted = str(error)
+                raise
+            finally:
+                self._source_counts = source.counts.to_dict()
+                self._save(complete=self.interrupted is None or self.options.is_camera)
+
+    def recording(self, *, complete: bool = True) -> xr.Dataset:
+        """Return what was tracked up to now."""
+        attrs: dict[str, Any] = {
+            "source": Path(self.options.source).name,
+            "markers": Path(self.options.markers).name,
+            "complete": "yes" if complete else "no",
+        }
+        if self.interrupted is not None:
+            attrs["interrupted"] = self.interrupted
+        diameter = self.parts.diameter
+        if diameter is not None:
+            arena = {"shape": "circle", "diameter_m": diameter, "center_m": [0.0, 0.0]}
+            attrs["arena"] = json.dumps(arena)
+        counts = {**self._source_counts, "rejected": dict(self.rejected)}
+        return self.parts.tracker.finish(attrs=attrs, counts=counts)
+
+    def _take(self, frame: Frame, servers: _Servers, overlay: OverlayWriter | None) -> None:
+        from driftwalk.track import draw_states
+
+        began = clock.perf_counter()
+        found, rejected = self.parts.detector.detect(frame.image)
+        self.rejected.update(one.kind for one in rejected)
+        states = self.parts.tracker.step(frame.time, found)
+        observed = self._observe(frame.time, states)
+        self.working_s += clock.perf_counter() - began
+        self.frames += 1
+        servers.publish(frame, states, observed, self._source_counts, began)
+        if overlay is not None:
+            overlay.write(draw_states(frame.image, states, self.parts.camera))
+        if self._look is not None:
+            self._look(frame, states, observed)
+
+    def _observe(self, time: float, states: Sequence[TrackState]) -> Observation | None:
+        if self.parts.observer is None:
+            return None
+        seen = {
+            state.id: (float(one.x), float(one.y), one.theta)
+            for state in states
+            if (one := state.measured) is not None and one.x is not None and one.y is not None
+        }
+        return self.parts.observer.step(time, seen)
+
+    def _open_servers(self, open_things: contextlib.ExitStack) -> _Servers:
+        from driftwalk.track import LiveServer, nmea_frame
+
+        servers = _Servers(self.parts)
+        host = self.options.live_host
+        if self.options.live is not None:
+            servers.json = open_things.enter_context(LiveServer(self.options.live, host=host))
+            print_note(f"JSON lines on {host}, port {servers.json.port}")
+        if self.options.live_nmea is not None:
+            servers.nmea = open_things.enter_context(
+                LiveServer(self.options.live_nmea, host=host, encode=lambda c: nmea_frame(*c))
+            )
+            print_note(f"NMEA sentences on {host}, port {servers.nmea.port}")
+        return servers
+
+    def _open_overlay(self, open_things: contextlib.ExitStack) -> OverlayWriter | None:
+        from driftwalk.track import OverlayWriter
+
+        if self.options.overlay is None:
+            return None
+        writer = OverlayWriter(self.options.overlay, rate=self.options.image_rate or _OVERLAY_RATE)
+        open_things.callback(writer.close)
+        return writer
+
+    def _save_now_and_then(self) -> None:
+        if clock.monotonic() - self._saved >= self._pause:
+            self._save(complete=False)
+
+    def _save(self, *, complete: bool) -> None:
+        from driftwalk.core.errors import InputError
+        from driftwalk.record import save_trajectory
+
+        began = clock.monotonic()
+        if self.out is not None:
+            # Nothing was tracked so far: there is nothing to lose.
+            with contextlib.suppress(InputError):
+                recording = self.recording(complete=complete)
+                save_trajectory(recording, self.out, existing="replace")
+        self._saved = clock.monotonic()
+        self._pause = max(_SAVE_EVERY_S, (self._saved - began) / _SAVING_SHARE)
+
+
+class _Servers:
+    """The servers that are open, and what they send."""
+
+    def __init__(self, parts: TrackingParts) -> None:
+        self.parts = parts
+        self.json: LiveServer | None = None
+        self.nmea: LiveServer | None = None
+        self._numbers: dict[str, int] = {}
+
+    def publish(
+        self,
+        frame: Frame,
+        states: Sequence[TrackState],
+        observed: Observation | None,
+        counts: dict[str, int],
+        began: float,
+    ) -> None:
+        if self.json is not None:
+            message = self._message(frame, states, observed)
+            message["dropped_frames"] = counts.get("dropped", 0)
+            message["latency_s"] = clock.perf_counter() - began
+            self.json.publish(message, frame.image)
+        if self.nmea is not None:
+            self.nmea.publish((frame.index, self._particles(states)))
+
+    def _message(
+        self, frame: Frame, states: Sequence[TrackState], observed: Observation | None
+    ) -> dict[str, Any]:
+        message: dict[str, Any] = {
+            "frame": frame.index,
+            "time_s": frame.time,
+            "bodies": [_body(state) for state in states],
+        }
+        if observed is not None:
+            message["joined"] = [list(faces) for faces in observed.joined]
+            message["outcome"] = observed.outcome or None
+            message["possible"] = sorted(observed.possible)
+            message["events"] = [
+                {
+                    "time_s": event.time,
+                    "kind": event.kind,
+                    "bodies": list(event.bodies),
+                    "faces": list(event.faces),
+                    "outcome": event.outcome,
+                }
+                for event in observed.events
+            ]
+        return message
+
+    def _particles(self, states: Sequence[TrackState]) -> list[Any]:
+        from driftwalk.track import Particle
+
+        found = []
+        for state in states:
+            number = self._numbers.setdefault(state.id, len(self._numbers))
+            one = state.measured
+            if one is not None and one.x is not None and one.y is not None:
+                found.append(Particle(number, one.column, one.row, one.theta, one.x, one.y))
+        return found
+
+
+def _body(state: TrackState) -> dict[str, Any]:
+    seen = state.measured
+    return {
+        "id": state.id,
+        "seen": seen is not None,
+        "x_m": state.x if seen is None else seen.x,
+        "y_m": state.y if seen is None else seen.y,
+        "theta_rad": state.theta if seen is None else seen.theta,
+        "column_px": None if seen is None else seen.column,
+        "row_px": None if seen is None else seen.row,
+        "vx_m_s": state.vx,
+        "vy_m_s": state.vy,
+        "omega_rad_s": state.omega,
+        "ambiguous": state.ambiguous,
+    }
+
+
+@contextlib.contextmanager
+def _termination_as_interrupt() -> Iterator[None]:
+    """Let a request to end count as Ctrl-C, so that what was tracked is saved."""
+
+    def stop(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def summary(run: TrackingRun) -> dict[str, Any]:
+    """Return what a run found with units in the keys, ready for JSON."""
+    recording = run.recording()
+    seen = np.isfinite(recording["x"].values)
+    ambiguous = recording["ambiguous"].values > 0
+    names = [str(name) for name in recording["body"].values]
+    return {
+        "source": run.options.source,
+        "frames": run.frames,
+        "duration_s": float(np.ptp(recording["time"].values)),
+        "bodies": {
+            name: {
+                "seen_share": float(seen[:, at].mean()),
+                "ambiguous_share": float(ambiguous[:, at].mean()),
+            }
+            for at, name in enumerate(names)
+        },
+        "counts": json.loads(recording.attrs["counts"]),
+        "frames_per_s": run.frames / run.working_s if run.working_s > 0 else None,
+        "interrupted": run.interrupted,
+    }

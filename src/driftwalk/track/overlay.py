@@ -1,0 +1,160 @@
+"""Pictures of what was found and what was turned down, over the frames."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from driftwalk.core.errors import InputError
+from driftwalk.core.opencv import require_opencv
+from driftwalk.track.tracker import TrackState
+from driftwalk.track.types import Image, PixelToWorld
+
+# Blue, green, red; of Okabe and Ito, told apart with any kind of colour vision.
+_COLOURS: Final = (
+    (178, 114, 0),
+    (0, 94, 213),
+    (115, 158, 0),
+    (167, 121, 204),
+    (0, 159, 230),
+    (233, 180, 86),
+    (66, 228, 240),
+)
+_DARK, _LIGHT, _WARNING = (0, 0, 0), (255, 255, 255), (0, 0, 255)
+_ARM_PX: Final = 18
+_CODECS: Final = {".mp4": "mp4v", ".avi": "MJPG", ".mkv": "FFV1"}
+
+
+def draw_states(image: Image, states: Iterable[TrackState], camera: PixelToWorld) -> Image:
+    """Return a frame with the bodies drawn over it.
+
+    Parameters
+    ----------
+    image : array, shape (rows, columns, 3)
+        The frame; it is not changed.
+    states : iterable of TrackState
+        The bodies: a line along their orientation, hollow where the body is not seen, a red ring
+        where its identity is ambiguous.
+    camera : PixelToWorld
+        Where metres are in the image.
+
+    Returns
+    -------
+    array, shape (rows, columns, 3)
+        The picture.
+
+    Examples
+    --------
+    >>> from driftwalk.track.camera import Camera
+    >>> state = TrackState("0", 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, None, 0.0)
+    >>> camera = Camera.from_scale(80, 60, px_per_m=100.0)
+    >>> bool(draw_states(np.zeros((60, 80, 3), np.uint8), [state], camera).any())
+    True
+    """
+    cv2 = require_opencv()
+    picture = image.copy()
+    for place, state in enumerate(states):
+        colour = _COLOURS[place % len(_COLOURS)]
+        middle = camera.to_pixel(np.array([[state.x, state.y]]))[0]
+        if not np.isfinite(middle).all():
+            continue
+        at = _whole(middle)
+        cv2.circle(picture, at, 4, colour, 1 if state.measured is None else -1, cv2.LINE_AA)
+        if math.isfinite(state.theta):
+            ahead = np.array([math.cos(state.theta), -math.sin(state.theta)])
+            tip = _whole(middle + _ARM_PX * ahead)
+            cv2.line(picture, at, tip, colour, 2, cv2.LINE_AA)
+        if state.ambiguous > 0:
+            cv2.circle(picture, at, _ARM_PX, _WARNING, 2, cv2.LINE_AA)
+        _write(cv2, picture, state.id, (at[0] + 6, at[1] - 6))
+    return picture
+
+
+class OverlayWriter:
+    """Writes pictures as a video, as they come.
+
+    Parameters
+    ----------
+    path : path-like
+        ``.mp4``, ``.avi`` or ``.mkv``.
+    rate : float
+        Pictures per second [Hz].
+
+    Raises
+    ------
+    InputError
+        When the ending is another one, or the file cannot be written.
+
+    Examples
+    --------
+    >>> OverlayWriter("overlay.gif", rate=10.0)
+    Traceback (most recent call last):
+    driftwalk.core.errors.InputError: overlay.gif: an overlay is written as .mp4, .avi or .mkv
+    """
+
+    def __init__(self, path: str | Path, *, rate: float) -> None:
+        self._path, self._rate = Path(path), rate
+        if self._path.suffix.lower() not in _CODECS:
+            raise InputError(f"{path}: an overlay is written as .mp4, .avi or .mkv")
+        self._cv2 = require_opencv()
+        self._writer: Any = None
+
+    def write(self, picture: Image) -> None:
+        """Add a picture."""
+        if self._writer is None:
+            code = self._cv2.VideoWriter_fourcc(*_CODECS[self._path.suffix.lower()])
+            size = picture.shape[1], picture.shape[0]
+            self._writer = self._cv2.VideoWriter(str(self._path), code, self._rate, size)
+            if not self._writer.isOpened():
+                raise InputError(f"{self._path}: cannot be written as a video")
+        self._writer.write(picture)
+
+    def close(self) -> None:
+        """Finish the file."""
+        if self._writer is not None:
+            self._writer.release()
+
+
+def save_picture(path: str | Path, picture: Image) -> Path:
+    """Write a picture as PNG.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    picture : array, shape (rows, columns, 3)
+        Blue, green, red.
+
+    Returns
+    -------
+    pathlib.Path
+        The file.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_picture(f"{folder}/a.png", np.zeros((4, 4, 3), np.uint8)).name
+    'a.png'
+    """
+    from driftwalk.core.atomic import write_atomic
+
+    done, data = require_opencv().imencode(".png", picture)
+    if not done:
+        raise InputError(f"{path}: the picture cannot be written as PNG")
+    write_atomic(path, data.tobytes())
+    return Path(path)
+
+
+def _whole(point: Any) -> tuple[int, int]:
+    return round(float(point[0])), round(float(point[1]))
+
+
+def _write(cv2: Any, picture: Image, text: str, at: tuple[int, int]) -> None:
+    """Write light letters on a dark rim, readable on any ground."""
+    for colour, width in ((_DARK, 3), (_LIGHT, 1)):
+        cv2.putText(picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, 0.45, colour, width, cv2.LINE_AA)
