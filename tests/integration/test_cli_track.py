@@ -1,0 +1,185 @@
+"""From a synthetic video to a recording, on the command line."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import end, here, refusal, start
+
+import driftwalk as dw
+from driftwalk.schema import build_trajectory
+
+pytest.importorskip("cv2")
+
+FRAMES = 40
+TANK = ("--tank-diameter", "30cm")
+
+
+@pytest.fixture(scope="module")
+def truth() -> xr.Dataset:
+    """Return two blocks, one of which comes to lie beside the other."""
+    time = 0.1 * np.arange(FRAMES)
+    apart = np.maximum(0.06 - 0.015 * time, 0.03)
+    x = np.stack([np.full(FRAMES, -0.02), -0.02 + apart], axis=1)
+    y = np.stack([0.002 * time, 0.002 * time], axis=1)
+    theta = np.stack([np.zeros(FRAMES), np.full(FRAMES, np.pi / 2)], axis=1)
+    return build_trajectory(time, x, y, theta)
+
+
+@pytest.fixture(scope="module")
+def folder(truth: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with a video and its markers file."""
+    place = tmp_path_factory.mktemp("video")
+    settings = dw.video_settings("moderate", width_px=480, height_px=360, px_per_m=1100.0)
+    dw.write_video(place / "video.mkv", truth, settings)
+    done = here(
+        "markers", "teach", place / "video.mkv", *TANK, "--side", "3cm", "-o", place / "m.toml"
+    )
+    assert done.code == 0, done.err
+    assert (place / "m.png").stat().st_size > 1000
+    return place
+
+
+def tracked(folder: Path, out: Path, *words: object):
+    return here(
+        "track", folder / "video.mkv", "--markers", folder / "m.toml", *TANK, "-o", out, *words
+    )
+
+
+def test_video_to_recording(folder: Path, truth: xr.Dataset, tmp_path: Path) -> None:
+    out, overlay = tmp_path / "r.nc", tmp_path / "o.mp4"
+    done = tracked(folder, out, "--bodies", "2", "--overlay", overlay, "--json")
+    assert done.code == 0, done.err
+    found = json.loads(done.out)
+    assert found["frames"] == FRAMES
+    assert found["counts"]["dropped"] == 0
+    recording = xr.load_dataset(out, engine="h5netcdf")
+    assert recording.attrs["complete"] == "yes"
+    assert recording["time"].values == pytest.approx(truth["time"].values)
+    order = np.argsort(recording["x"].values[0])
+    for name, allowed in (("x", 0.15e-3), ("y", 0.15e-3)):
+        error = recording[name].values[:, order] - truth[name].values
+        assert np.isfinite(error).all()
+        assert np.sqrt(np.mean(error**2)) < allowed
+    turned = recording["theta"].values[:, order] - truth["theta"].values
+    assert np.degrees(np.sqrt(np.mean(np.angle(np.exp(1j * turned)) ** 2))) < 0.5
+    assert not recording["ambiguous"].values.any()
+    assert overlay.stat().st_size > 1000
+    # Everything downstream reads it without an option.
+    described = json.loads(here("info", out, "--json").out)
+    assert described["arena"] == {"shape": "circle", "diameter_m": 0.3, "center_m": [0.0, 0.0]}
+    observed = dw.observe(dw.load(out), side=0.03)
+    assert observed["class"].values[observed["outcome"].values[[0, -1]]].tolist() == ["1+1", "2"]
+
+
+def test_explained_frame(folder: Path, tmp_path: Path) -> None:
+    done = tracked(folder, tmp_path / "r.nc", "--explain", "3")
+    assert done.code == 0, done.err
+    assert done.out.count("found") == 2
+    assert (tmp_path / "r-frame-3.png").stat().st_size > 1000
+    assert not (tmp_path / "r.nc").exists()
+    assert "there is no frame 400" in refusal(
+        tracked(folder, tmp_path / "r.nc", "--explain", "400")
+    )
+
+
+def test_watching_tells_the_join(folder: Path) -> None:
+    done = here(
+        "watch", folder / "video.mkv", "--markers", folder / "m.toml", *TANK, "--bodies", "2"
+    )
+    assert done.code == 0, done.err
+    lines = done.out.splitlines()
+    assert sum("  join  " in line for line in lines) == 1
+    assert [line.split()[-1] for line in lines if "  class  " in line][-2:] == ["1+1", "2"]
+
+
+def test_live_client_gets_poses_and_joins(folder: Path, tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        words = ("--bodies", "2", "--live", str(port))
+        assert f"port {port} on 127.0.0.1 is in use" in refusal(
+            tracked(folder, tmp_path / "no.nc", *words)
+        )
+    lines: list[str] = []
+
+    def read() -> None:
+        while True:
+            try:
+                client = socket.create_connection(("127.0.0.1", port), timeout=0.1)
+                break
+            except OSError:
+                continue
+        client.settimeout(30)
+        with client, client.makefile() as reader:
+            lines.extend(reader)
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    done = tracked(folder, tmp_path / "r.nc", *words)
+    reader.join(timeout=30)
+    assert done.code == 0, done.err
+    messages = [json.loads(line) for line in lines]
+    assert messages
+    last = messages[-1]
+    assert last["frame"] == FRAMES - 1
+    assert last["outcome"] == "2"
+    assert len(last["joined"]) == 1
+    assert {body["id"] for body in last["bodies"]} == {"0", "1"}
+    assert all(0 < message["latency_s"] < 10 for message in messages)
+
+
+def test_interrupted_run_keeps_what_it_had(folder: Path, tmp_path: Path) -> None:
+    """The detector presses Ctrl-C at the twentieth frame."""
+    out = tmp_path / "r.nc"
+    before = """
+import os
+from driftwalk.track import TwoColourDetector
+whole, calls = TwoColourDetector.detect, []
+def detect(self, image):
+    calls.append(1)
+    if len(calls) == 20:
+        os.kill(os.getpid(), signal.SIGTERM)
+    return whole(self, image)
+TwoColourDetector.detect = detect
+"""
+    done = end(
+        start(
+            "track", folder / "video.mkv", "--markers", folder / "m.toml", *TANK, "-o", out,
+            before=before,
+        )
+    )  # fmt: skip
+    assert done.code == 130, done.err
+    recording = dw.load(out)
+    assert 15 <= recording.sizes["time"] <= 20
+    assert recording.attrs["complete"] == "no"
+
+
+def test_mistakes_are_said_in_one_line(folder: Path, tmp_path: Path) -> None:
+    video, markers, out = folder / "video.mkv", folder / "m.toml", tmp_path / "r.nc"
+    assert "no scale: state --tank-diameter" in refusal(
+        here("track", video, "--markers", markers, "-o", out)
+    )
+    assert "-o recording.nc" in refusal(here("track", video, "--markers", markers, *TANK))
+    assert "no such markers file" in refusal(
+        here("track", video, "--markers", "no.toml", *TANK, "-o", out)
+    )
+    assert "--polarity is for --markers blob" in refusal(tracked(folder, out, "--polarity", "dark"))
+    text = tmp_path / "text.mp4"
+    text.write_text("no video")
+    assert "is not a video that OpenCV can read" in refusal(
+        here("track", text, "--markers", markers, *TANK, "-o", out)
+    )
+    assert "it takes markers with an orientation" in refusal(
+        here("watch", video, "--markers", markers, *TANK)
+    )
+    assert "--squares is columns x rows" in refusal(
+        here("camera", "calibrate", tmp_path / "a.png", "--squares", "9", "--square", "2cm",
+             "-o", tmp_path / "c.toml")
+    )  # fmt: skip
+    assert not out.exists()
