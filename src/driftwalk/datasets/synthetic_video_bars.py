@@ -42,7 +42,8 @@ class Bars:
         offset, angle = self.offset[frame, body], self.angle[frame, body]
         across = points[..., 0] * np.cos(angle) + points[..., 1] * np.sin(angle) - offset
         along = -points[..., 0] * np.sin(angle) + points[..., 1] * np.cos(angle)
-        return np.minimum(self.width / 2 - np.abs(across), self.length / 2 - np.abs(along))
+        inside: Array = np.minimum(self.width / 2 - np.abs(across), self.length / 2 - np.abs(along))
+        return inside
 
 
 def place_bars(settings: VideoSettings, time: Array, bodies: int) -> Bars:

@@ -21,7 +21,8 @@ def world_to_image(settings: VideoSettings, points: Array) -> Array:
     centre = np.asarray(settings.centre_px) if settings.centre_px is not None else middle
     ray = np.stack([x, -y], axis=-1) * (settings.px_per_m / depth)[..., None] + centre - middle
     square = (ray**2).sum(axis=-1, keepdims=True) / settings.width_px**2
-    return middle + ray * (1.0 + settings.lens_k1 * square + settings.lens_k2 * square**2)
+    bent: Array = middle + ray * (1.0 + settings.lens_k1 * square + settings.lens_k2 * square**2)
+    return bent
 
 
 def image_to_world(settings: VideoSettings, pixels: Array) -> Array:

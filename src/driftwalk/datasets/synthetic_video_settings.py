@@ -131,9 +131,9 @@ class VideoSettings:
 
     def __post_init__(self) -> None:
         """Check the ranges."""
-        positive = ("width_px", "height_px", "px_per_m", "tank_diameter_m", "block_side_m")
-        positive += ("marker_spacing_m", "marker_diameter_m", "glare_radius_px")
-        positive += ("ripple_length_m", "bar_mean_s")
+        sizes = ("width_px", "height_px", "px_per_m", "tank_diameter_m", "block_side_m")
+        others = ("marker_spacing_m", "marker_diameter_m", "glare_radius_px")
+        positive = (*sizes, *others, "ripple_length_m", "bar_mean_s")
         not_negative = ("rim_m", "noise_std", "blur_px", "exposure_s", "rolling_s", "ripple")
         shares = ("shading", "glare_share", "bar_share", "bar_time_share")
         for names, least, most in (

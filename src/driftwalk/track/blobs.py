@@ -137,8 +137,8 @@ class BlobDetector:
         kept.sort(reverse=True)
         if self._objects is not None:
             for area, column, row in kept[self._objects :]:
-                reason = f"smaller than the {self._objects} largest"
-                rejected.append(Rejected(column, row, area, reason, "surplus"))
+                text = f"smaller than the {self._objects} largest"
+                rejected.append(Rejected(column, row, area, text, "surplus"))
             kept = kept[: self._objects]
         return self._place(kept), rejected
 

@@ -67,7 +67,8 @@ class Board:
     def corners(self) -> Array:
         """Return the places of all inner corners on the board [m], shape (n, 2), row by row."""
         column, row = np.meshgrid(np.arange(1, self.columns), np.arange(1, self.rows))
-        return np.stack([column.ravel(), row.ravel()], axis=-1) * self.square_m
+        places = np.stack([column.ravel(), row.ravel()], axis=-1).astype(np.float64)
+        return np.asarray(places * self.square_m, dtype=np.float64)
 
     def find(self, image: Image) -> tuple[Array, Array] | None:
         """Return places on the board [m] and in the image [px] of the corners seen, or None."""

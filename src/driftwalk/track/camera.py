@@ -184,7 +184,7 @@ class Camera(Section):
 
     def to_pixel(self, points: Array) -> Array:
         """Return metres, shape (n, 2), as pixels, shape (n, 2)."""
-        straight = project(np.linalg.inv(self._plane()), points)
+        straight = project(np.asarray(np.linalg.inv(self._plane()), dtype=np.float64), points)
         return straight if self.lens is None else self.lens.bend(straight)
 
     def jacobian(self, points: Array) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -152,7 +152,7 @@ def camera_from_board(image: Image, board: Board, lens: Lens | None = None) -> C
     homography, _ = cv2.findHomography(straight, world, 0)
     if homography is None:
         raise InputError("the corners of the board lie on one line: take the image from above")
-    nine = tuple(float(value) for value in np.asarray(homography).ravel())
+    nine: Any = tuple(float(value) for value in np.asarray(homography).ravel())
     camera = Camera(
         width_px=image.shape[1],
         height_px=image.shape[0],

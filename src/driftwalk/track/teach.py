@@ -112,7 +112,7 @@ def colours_seen(images: Sequence[Image]) -> list[ColourSeen]:
     weight = chroma[coloured]
     counts, _ = np.histogram(hue, _BINS, (-math.pi, math.pi), weights=weight)
     # Around the circle, with the next two bins on each side.
-    smooth = sum(np.roll(counts, k) * (3 - abs(k)) for k in range(-2, 3)) / 9.0
+    smooth = np.sum([np.roll(counts, k) * (3 - abs(k)) for k in range(-2, 3)], axis=0) / 9.0
     peak = (smooth >= np.roll(smooth, 1)) & (smooth > np.roll(smooth, -1))
     peak &= smooth > _PEAK_SHARE * smooth.max(initial=0.0)
     found = []

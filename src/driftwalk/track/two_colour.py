@@ -11,17 +11,16 @@ from driftwalk.core.opencv import require_opencv
 from driftwalk.track.chroma import ChromaTables
 from driftwalk.track.markers import TwoColourMarker
 from driftwalk.track.two_colour_discs import Disc, find_regions, join_pieces, sort_out
+from driftwalk.track.two_colour_outline import outlined_centres
 from driftwalk.track.two_colour_pairs import Pair, pair_discs
-from driftwalk.track.two_colour_pose import Measured, fitted_centres, noise_of, weighted_centres
+from driftwalk.track.two_colour_pose import Measured, noise_of, weighted_centres
 from driftwalk.track.types import Array, Detection, Image, PixelToWorld, Rejected
 
 _LEAST_DIAMETER_PX: Final = 3.0
 _COARSE_DIAMETER_PX: Final = 6.0
 _MOST_FACTOR: Final = 4
-_WHOLE: Final = 0.85
-_EXPLAINED: Final = 0.8
+_WHOLE: Final = 0.93
 _LEAST_VISIBLE: Final = 0.35
-_MOST_VISIBLE: Final = 1.3
 _MOST_OFF: Final = 0.06
 
 
@@ -81,13 +80,13 @@ class TwoColourDetector:
         measured: list[tuple[Pair, Measured]] = []
         for pair in pairs:
             result = self._measure(image, pair)
-            reason = self._fault(pair, result)
-            if reason is None:
+            if result.visible >= _LEAST_VISIBLE:
                 measured.append((pair, result))
             else:
                 column, row = result.centres.mean(axis=0)
                 area = pair.first.area + pair.second.area
-                rejected.append(Rejected(float(column), float(row), area, *reason))
+                reason = f"only {result.visible:.0%} of the marker can be seen"
+                rejected.append(Rejected(float(column), float(row), area, reason, "hidden"))
         return self._place(measured), rejected
 
     def _discs(self, image: Image) -> tuple[tuple[list[Disc], list[Disc]], list[Rejected]]:
@@ -154,18 +153,11 @@ class TwoColourDetector:
         result = weighted_centres(weights, start, diameter=diameter, noise=noise)
         apart = float(np.hypot(*(result.centres[1] - result.centres[0]))) / spacing
         if partly or abs(apart - 1.0) > _MOST_OFF:
-            result = fitted_centres(
-                weights, result.centres, diameter=diameter, spacing=spacing, noise=noise
-            )
+            outlined = outlined_centres(weights, result.centres, diameter=diameter, spacing=spacing)
+            result = outlined if outlined is not None else result
         return Measured(
             result.centres + corner, result.covariance, result.visible, result.explained
         )
-
-    def _fault(self, pair: Pair, result: Measured) -> tuple[str, str] | None:
-        """Return why a measured pair is no marker; None when it is one."""
-        if result.visible < _LEAST_VISIBLE:
-            return f"only {result.visible:.0%} of the marker can be seen", "hidden"
-        return None
 
     def _place(self, measured: list[tuple[Pair, Measured]]) -> list[Detection]:
         """Return the detections in the world."""

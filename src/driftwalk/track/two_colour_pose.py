@@ -1,9 +1,7 @@
 """Where the two discs of a marker are, to a small part of a pixel.
 
-Whole discs: the mean place of the colour, weighted by how much of it each pixel shows. Discs that
-are partly hidden: a model of both discs with the marker's size and spacing is laid over the
-colours. What hides a disc takes colour away but never adds any, so colour beyond the model counts
-in full, and missing colour only up to a limit.
+Each pixel's place counts by how much of the colour it shows; discs that are partly hidden are
+measured by their outlines (`driftwalk.track.two_colour_outline`).
 """
 
 from __future__ import annotations
@@ -20,9 +18,6 @@ from driftwalk.track.types import Array
 _WINDOW: Final = 1.4
 _ROUNDS: Final = 2
 _EDGE_PX: Final = 1.2
-_FIT_ROUNDS: Final = 14
-_LIMITS: Final = (0.8, 0.3)
-"""Size of a missing weight that counts half, at the start and at the end of the fit."""
 _FLOOR_PX: Final = 0.02
 """Standard deviation that no centre is better than: squares of pixels, colours in 8 bits [px]."""
 
@@ -49,8 +44,16 @@ class Measured:
     explained: float
 
 
+_SMOOTHED: Final = 2.6
+"""What the smoothing of a patch hides of its noise: neighbours differ by 1/1.3 of what they would
+alone, and a sum over many pixels varies twice as much."""
+
+
 def noise_of(weights: list[Weights]) -> float:
-    """Return the standard deviation of a pixel's weight, from neighbours inside the discs."""
+    """Return the standard deviation of a pixel's weight, from neighbours inside the discs.
+
+    It is that of the pixels before the patch was smoothed.
+    """
     steps = []
     for weight in weights:
         inside = (weight[:, 1:] > 0.7) & (weight[:, :-1] > 0.7)
@@ -58,7 +61,7 @@ def noise_of(weights: list[Weights]) -> float:
     together = np.concatenate(steps)
     if together.size < 8:
         return 0.1
-    return float(np.median(np.abs(together)) / (0.6745 * math.sqrt(2.0)))
+    return float(_SMOOTHED * np.median(np.abs(together)) / (0.6745 * math.sqrt(2.0)))
 
 
 def weighted_centres(
@@ -105,95 +108,3 @@ def weighted_centres(
         float(np.minimum(masses / whole, 1.0).mean()),
         float(masses.sum() / max(totals.sum(), 1e-9)),
     )
-
-
-def fitted_centres(
-    weights: list[Weights], start: Array, *, diameter: float, spacing: float, noise: float
-) -> Measured:
-    """Return the centres of two discs of which parts may be hidden.
-
-    Parameters
-    ----------
-    weights : list of array, shape (rows, columns)
-        Weight of each colour in a patch.
-    start : array, shape (2, 2)
-        (column, row) of both in the patch, roughly.
-    diameter, spacing : float
-        Of the marker [px].
-    noise : float
-        Standard deviation of a weight.
-    """
-    data = np.stack([np.minimum(weight, 1.0) for weight in weights]).astype(np.float64)
-    rows, columns = np.meshgrid(*(np.arange(n) for n in data.shape[1:]), indexing="ij")
-    place = np.stack([columns, rows]).astype(np.float64)
-    along = start[1] - start[0]
-    pose = np.array([*start.mean(axis=0), math.atan2(along[1], along[0])])
-    normal = np.eye(3)
-    damping = 1e-3
-    cost, slopes, gradient, normal = _terms(data, place, pose, diameter, spacing, _LIMITS[0])
-    for step in range(_FIT_ROUNDS):
-        limit = _LIMITS[0] + (_LIMITS[1] - _LIMITS[0]) * min(step / (_FIT_ROUNDS / 2), 1.0)
-        cost, _, gradient, normal = _terms(data, place, pose, diameter, spacing, limit)
-        change = -np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-9), gradient)
-        # A step of more than a fifth of a disc leaves the edge that the slopes describe.
-        change *= min(1.0, 0.2 * diameter / max(float(np.hypot(change[0], change[1])), 1e-12))
-        change[2] = np.clip(change[2], -0.3, 0.3)
-        pose = pose + change
-        if step >= _FIT_ROUNDS / 2 and np.abs(change).max() < 1e-3:
-            break
-    centres, model, _ = _model(place, pose, diameter, spacing)
-    seen = np.minimum(data, model)
-    variance = noise**2 * np.linalg.inv(normal + 1e-6 * np.eye(3))
-    return Measured(
-        centres,
-        _of_centres(variance, pose[2], spacing),
-        float(seen.sum() / model.sum()),
-        float(seen.sum() / max(data.sum(), 1e-9)),
-    )
-
-
-def _terms(
-    data: Array, place: Array, pose: Array, diameter: float, spacing: float, limit: float
-) -> tuple[float, Array, Array, Array]:
-    """Return cost, slopes, gradient and normal matrix of the one-sided fit."""
-    _, model, slopes = _model(place, pose, diameter, spacing)
-    residual = data - model
-    missing = np.where(residual < 0.0, residual / limit, 0.0)
-    weight = 1.0 / (1.0 + missing**2) ** 2
-    flat = slopes.reshape(3, -1)
-    weighted = flat * weight.ravel()
-    gradient = -weighted @ residual.ravel()
-    normal = weighted @ flat.T + 1e-9 * np.eye(3)
-    cost = float((residual**2 / (1.0 + missing**2)).sum())
-    return cost, slopes, gradient, normal
-
-
-def _model(
-    place: Array, pose: Array, diameter: float, spacing: float
-) -> tuple[Array, Array, Array]:
-    """Return centres, coverage of both discs, and its slopes along column, row and angle."""
-    cos, sin = math.cos(pose[2]), math.sin(pose[2])
-    half = np.array([cos, sin]) * spacing / 2
-    turned = np.array([-sin, cos]) * spacing / 2
-    centres = np.stack([pose[:2] - half, pose[:2] + half])
-    coverage, slopes = [], []
-    for centre, sign in zip(centres, (-1.0, 1.0), strict=True):
-        dc, dr = place[0] - centre[0], place[1] - centre[1]
-        radius = np.hypot(dc, dr)
-        value = 1.0 / (1.0 + np.exp(np.clip((radius - diameter / 2) * (1.7 / _EDGE_PX), -40, 40)))
-        steep = value * (1.0 - value) * (1.7 / _EDGE_PX) / np.maximum(radius, 1e-6)
-        by_column, by_row = steep * dc, steep * dr
-        coverage.append(value)
-        slopes.append(
-            np.stack([by_column, by_row, sign * (by_column * turned[0] + by_row * turned[1])])
-        )
-    return centres, np.stack(coverage), np.stack(slopes, axis=1)
-
-
-def _of_centres(variance: Array, angle: float, spacing: float) -> Array:
-    """Return the covariance of both centres from that of middle and angle."""
-    turned = np.array([-math.sin(angle), math.cos(angle)]) * spacing / 2
-    lever = np.zeros((4, 3))
-    lever[:2, :2] = lever[2:, :2] = np.eye(2)
-    lever[:2, 2], lever[2:, 2] = -turned, turned
-    return np.asarray(lever @ variance @ lever.T + _FLOOR_PX**2 * np.eye(4))
