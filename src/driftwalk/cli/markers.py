@@ -47,7 +47,7 @@ def teach(
     save_markers(out, proposal.marker)
     save_picture(picture, proposal.picture)
     marker = proposal.marker
-    rows = [
+    rows: list[list[object]] = [
         ["distance of the discs [mm]", 1e3 * marker.spacing_m],
         ["diameter of a disc [mm]", 1e3 * marker.size_m],
         ["pairs measured", proposal.pairs],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,10 @@ from driftwalk.core.errors import ConfigurationError, InputError
 
 if TYPE_CHECKING:
     from driftwalk.track import AssemblyObserver, Camera, Detector, Tracker
+
+# Images that are looked at before: the median of many hides what moves, that of a few glare.
+_FOR_BACKGROUND: Final = 25
+_FOR_RIM: Final = 7
 
 
 class TrackingParts(NamedTuple):
@@ -37,7 +41,8 @@ def build_parts(options: TrackingOptions) -> TrackingParts:
     """
     from driftwalk.track import sample_images
 
-    images = sample_images(options.source, rate=options.image_rate)
+    number = _FOR_BACKGROUND if options.markers == "blob" else _FOR_RIM
+    images = sample_images(options.source, number, rate=options.image_rate)
     camera = find_camera(options, images)
     camera.check_size(images[0].shape[1], images[0].shape[0])
     detector, side = _detector(options, camera, images)

@@ -20,6 +20,7 @@ from types import TracebackType
 from typing import Any, Final, NamedTuple, Self
 
 from driftwalk.core.errors import InputError
+from driftwalk.core.opencv import require_opencv
 from driftwalk.track.types import Image
 
 LOOPBACK: Final = "127.0.0.1"
@@ -250,8 +251,7 @@ def requested_width(line: bytes) -> int | None:
 
 def jpeg_text(image: Image, width: int) -> str:
     """Return an image as JPEG in base64, scaled down to a width; never scaled up."""
-    import cv2
-
+    cv2 = require_opencv()
     rows, columns = image.shape[:2]
     if width < columns:
         size = width, max(1, round(rows * width / columns))

@@ -121,7 +121,7 @@ class AssemblyObserver:
         self._seen: dict[int, float] = {}
         self._pairs = [PairState(pair, self.rules) for pair in combinations(range(len(names)), 2)]
         self._history = self._replayed([])
-        self._state: list[tuple[Any, ...]] = []
+        self._state: list[tuple[tuple[int, int], tuple[int, int], int, int]] = []
         self._told: set[tuple[str, int, tuple[int, int]]] = set()
 
     def step(self, time: float, poses: Mapping[str, Pose]) -> Observation:
@@ -160,8 +160,10 @@ class AssemblyObserver:
     def _observation(self, time: float) -> Observation:
         samples = len(self._times)
         joins = self._joins()
-        state = [(join.blocks, join.faces, join.start) for join in joins]
-        state += [(join.stop,) for join in joins if join.stop < samples]
+        state = [
+            (join.blocks, join.faces, join.start, join.stop if join.stop < samples else -1)
+            for join in joins
+        ]
         if state != self._state or samples == 1:
             self._state, self._history = state, self._replayed(joins)
         events = self._news()
@@ -294,8 +296,10 @@ def observe(recording: xr.Dataset, *, side: float, **rules: Any) -> xr.Dataset:
     """
     found = classify(recording, side=side, **rules)
     names = [str(name) for name in found["body"].values]
-    used = ("chirality", "join_distance_m", "join_angle_rad", "release_distance_m")
-    used += ("release_angle_rad", "min_duration_s", "hold_s")
+    used = (
+        *("chirality", "join_distance_m", "join_angle_rad", "release_distance_m"),
+        *("release_angle_rad", "min_duration_s", "hold_s"),
+    )
     given = {_without_unit(key): found.attrs[key] for key in used}
     observer = AssemblyObserver(names, side=side, **given)
     poses = np.stack([recording[name].values for name in ("x", "y", "theta")], axis=-1)

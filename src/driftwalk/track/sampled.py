@@ -13,6 +13,8 @@ from driftwalk.track.frames import open_source
 from driftwalk.track.types import Image
 
 _CAMERA_STRIDE: Final = 5
+# Frames between two samples from which on seeking is quicker than reading what lies between.
+_SEEK_BEYOND: Final = 50
 
 
 def sample_images(
@@ -50,7 +52,7 @@ def sample_images(
         stride = _CAMERA_STRIDE
     elif total is None or total <= number:
         stride = 1
-    elif Path(source).is_file():
+    elif Path(source).is_file() and total > _SEEK_BEYOND * number:
         found = _by_seeking(source, total, number)
         if found:
             return found
