@@ -1,0 +1,122 @@
+"""Where frames come from: times, what is counted, what goes wrong."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from drawn_blocks import moving_blocks
+
+import driftwalk as dw
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.track.frames import FrameFilter
+
+
+def small(level: str = "moderate") -> dw.VideoSettings:
+    return dw.video_settings(level, width_px=160, height_px=120, px_per_m=375.0)
+
+
+def picture(value: int, height: int = 8) -> np.ndarray:
+    return np.full((height, 10, 3), value, dtype=np.uint8)
+
+
+def test_a_video_gives_its_times_and_pixels(tmp_path: Path) -> None:
+    blocks = moving_blocks(5, rate=8.0)
+    path = dw.write_video(tmp_path / "synthetic.mkv", blocks, small())
+    source = dw.open_source(path)
+    frames = list(source)
+    drawn = [image for _, image in dw.render_video(blocks, small())]
+    assert [f.time for f in frames] == pytest.approx(blocks["time"].values, abs=1e-3)
+    assert all((f.image == image).all() for f, image in zip(frames, drawn, strict=True))
+    assert source.counts.to_dict() == {"frames": 5, "dropped": 0, "duplicates": 0, "stale": 0}
+    assert source.interrupted is None
+
+
+def test_dropped_duplicate_and_stale_frames_are_counted() -> None:
+    counts = dw.FrameCounts()
+    keep = FrameFilter("list", counts)
+    times = [0.0, 0.1, 0.1, 0.2, 0.5, 0.6, 0.7]
+    values = [1, 2, 2, 3, 4, 4, 5]
+    frames = [
+        keep.accept(i, t, picture(v)) for i, (t, v) in enumerate(zip(times, values, strict=True))
+    ]
+    keep.count_gaps()
+    assert [f.time for f in frames if f is not None] == [0.0, 0.1, 0.2, 0.5, 0.7]
+    assert counts.to_dict() == {"frames": 5, "dropped": 2, "duplicates": 1, "stale": 1}
+
+
+def test_a_size_that_changes_names_the_frame() -> None:
+    keep = FrameFilter("list", dw.FrameCounts())
+    keep.accept(0, 0.0, picture(1))
+    with pytest.raises(FormatError, match=r"list: frame 1 is 10 x 9 pixels, .* 10 x 8"):
+        keep.accept(1, 0.1, picture(1, height=9))
+
+
+def test_images_need_times_or_a_rate(tmp_path: Path) -> None:
+    for index in range(3):
+        cv2.imwrite(str(tmp_path / f"{index}.png"), picture(40 * index))
+    with pytest.raises(InputError, match="state their rate"):
+        dw.open_source(tmp_path)
+    assert [f.time for f in dw.open_source(tmp_path, rate=4.0)] == [0.0, 0.25, 0.5]
+    (tmp_path / "times.csv").write_text("file,time_s\n0.png,1.0\n2.png,1.75\n")
+    assert [f.time for f in dw.open_source(tmp_path)] == [1.0, 1.75]
+    (tmp_path / "times.csv").write_text("file,time_s\n0.png,soon\n")
+    with pytest.raises(FormatError, match="line 2"):
+        dw.open_source(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [(None, "no such video"), (b"", "nothing to read"), (b"x" * 999, "not a video")],
+)
+def test_what_is_no_video(tmp_path: Path, content: bytes | None, message: str) -> None:
+    path = tmp_path / "film.mp4"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(FormatError, match=message):
+        dw.open_source(path)
+
+
+def test_a_video_without_frames(tmp_path: Path) -> None:
+    path = tmp_path / "none.avi"
+    cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"FFV1"), 10.0, (64, 48)).release()
+    with pytest.raises(FormatError, match=r"none\.avi: "):
+        list(dw.open_source(path))
+
+
+class Camera:
+    """Hands out numbered frames; `gate` holds it until the test has worked on one."""
+
+    def __init__(self, frames: int) -> None:
+        self.left, self.gate, self.ahead = frames, threading.Event(), 3
+        self.released = False
+
+    def read(self) -> tuple[bool, Any]:
+        if self.ahead == 0:
+            self.gate.wait(5.0)
+        self.ahead -= 1
+        self.left -= 1
+        return (True, picture(self.left)) if self.left >= 0 else (False, None)
+
+    def release(self) -> None:
+        self.released = True
+
+
+def test_a_camera_hands_out_the_newest_and_may_disappear() -> None:
+    camera = Camera(frames=6)
+    ticks = iter(np.arange(100.0, 200.0))
+    live = dw.LiveCamera(camera, "camera:0", patience=2.0, now=lambda: float(next(ticks)))
+    frames = []
+    for frame in live:
+        frames.append(frame)
+        camera.gate.set()
+    assert frames
+    assert frames[-1].index == 5
+    assert len(frames) + live.counts.dropped == 6
+    assert frames[-1].time - frames[0].time == frames[-1].index - frames[0].index
+    assert live.interrupted == "camera:0 stopped after 6 frames"
+    assert camera.released
