@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -47,11 +47,11 @@ def teach(
     save_markers(out, proposal.marker)
     save_picture(picture, proposal.picture)
     marker = proposal.marker
-    rows: list[list[object]] = [
+    rows: list[list[Any]] = [
         ["distance of the discs [mm]", 1e3 * marker.spacing_m],
         ["diameter of a disc [mm]", 1e3 * marker.size_m],
         ["pairs measured", proposal.pairs],
-        *(["colour seen", str(seen)] for seen in proposal.colours),
+        *[["colour seen", str(seen)] for seen in proposal.colours],
     ]
     print_table(rows)
     print_note(f"wrote {out} and {picture}")

@@ -22,9 +22,9 @@ from driftwalk.cli.tracking_parts import TrackingParts
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.track import Frame, LiveServer, Observation, OverlayWriter, TrackState
+    from driftwalk.track import Frame, LiveServer, AssemblySeen, OverlayWriter, TrackState
 
-Look = Callable[["Frame", "Sequence[TrackState]", "Observation | None"], None]
+Look = Callable[["Frame", "Sequence[TrackState]", "AssemblySeen | None"], None]
 
 _SAVE_EVERY_S: Final = 10.0
 # A save may take this share of the time, so that those of a long recording become rarer.
@@ -132,7 +132,7 @@ class TrackingRun:
         if self._look is not None:
             self._look(frame, states, observed)
 
-    def _observe(self, time: float, states: Sequence[TrackState]) -> Observation | None:
+    def _observe(self, time: float, states: Sequence[TrackState]) -> AssemblySeen | None:
         if self.parts.observer is None:
             return None
         seen = {
@@ -197,7 +197,7 @@ class _Servers:
         self,
         frame: Frame,
         states: Sequence[TrackState],
-        observed: Observation | None,
+        observed: AssemblySeen | None,
         counts: dict[str, int],
         began: float,
     ) -> None:
@@ -210,7 +210,7 @@ class _Servers:
             self.nmea.publish((frame.index, self._particles(states)))
 
     def _message(
-        self, frame: Frame, states: Sequence[TrackState], observed: Observation | None
+        self, frame: Frame, states: Sequence[TrackState], observed: AssemblySeen | None
     ) -> dict[str, Any]:
         message: dict[str, Any] = {
             "frame": frame.index,

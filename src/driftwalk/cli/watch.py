@@ -14,7 +14,7 @@ from driftwalk.cli.tracking_options import TrackingOptions
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
-    from driftwalk.track import Frame, Observation, TrackState
+    from driftwalk.track import Frame, AssemblySeen, TrackState
 
 _MOST_CLASSES = 6
 
@@ -94,7 +94,7 @@ class _Printer:
         self._next = 0.0
 
     def __call__(
-        self, frame: Frame, states: Sequence[TrackState], observed: Observation | None
+        self, frame: Frame, states: Sequence[TrackState], observed: AssemblySeen | None
     ) -> None:
         if observed is None:
             return
@@ -111,7 +111,7 @@ class _Printer:
             print(f"{frame.time:9.2f} s  {poses}", flush=True)
 
 
-def _classes(observed: Observation) -> str:
+def _classes(observed: AssemblySeen) -> str:
     if observed.outcome:
         return observed.outcome
     names = sorted(observed.possible)

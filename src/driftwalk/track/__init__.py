@@ -9,7 +9,7 @@ from driftwalk.track.lens import LensCalibration, calibrate_lens, camera_from_bo
 from driftwalk.track.live import LiveServer, Particle, nmea_frame
 from driftwalk.track.live_camera import LiveCamera
 from driftwalk.track.markers import MarkerColour, TwoColourMarker, load_markers, save_markers
-from driftwalk.track.observer import AssemblyObserver, Observation, SeenEvent, observe
+from driftwalk.track.observer import AssemblyObserver, AssemblySeen, SeenEvent, observe
 from driftwalk.track.overlay import OverlayWriter, draw_states, save_picture
 from driftwalk.track.rim import Rim, camera_from_rim, find_rim
 from driftwalk.track.sampled import frame_count, sample_images
@@ -28,6 +28,7 @@ from driftwalk.track.types import Detection, Detector, Frame, FrameResult, Pixel
 
 __all__ = [
     "AssemblyObserver",
+    "AssemblySeen",
     "BlobDetector",
     "Board",
     "Camera",
@@ -44,7 +45,6 @@ __all__ = [
     "LiveServer",
     "MarkerColour",
     "MarkerProposal",
-    "Observation",
     "OverlayWriter",
     "Particle",
     "PixelToWorld",

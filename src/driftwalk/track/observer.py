@@ -48,7 +48,7 @@ class SeenEvent(NamedTuple):
     """Outcome class afterwards."""
 
 
-class Observation(NamedTuple):
+class AssemblySeen(NamedTuple):
     """What is known at a frame."""
 
     time: float
@@ -124,7 +124,7 @@ class AssemblyObserver:
         self._state: list[tuple[tuple[int, int], tuple[int, int], int, int]] = []
         self._told: set[tuple[str, int, tuple[int, int]]] = set()
 
-    def step(self, time: float, poses: Mapping[str, Pose]) -> Observation:
+    def step(self, time: float, poses: Mapping[str, Pose]) -> AssemblySeen:
         """Take the poses of a frame.
 
         Parameters
@@ -157,7 +157,7 @@ class AssemblyObserver:
                 )
             self.bodies[self._unnamed.pop(0)] = name
 
-    def _observation(self, time: float) -> Observation:
+    def _observation(self, time: float) -> AssemblySeen:
         samples = len(self._times)
         joins = self._joins()
         state = [
@@ -171,7 +171,7 @@ class AssemblyObserver:
         hidden = self._hidden(time)
         outcome = UNKNOWN if hidden else self._history.outcome[-1]
         names = self.bodies
-        return Observation(
+        return AssemblySeen(
             time,
             [(names[j.blocks[0]], j.faces[0], names[j.blocks[1]], j.faces[1]) for j in active],
             outcome,

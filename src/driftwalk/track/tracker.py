@@ -41,6 +41,8 @@ _LEAST_VARIANCE: Final = np.diag([1e-14, 1e-14, 1e-12])
 _COME_BACK: Final = -50.0
 # Score of two that were lost sight of together: which one went on being seen, nobody can say.
 _PARTED: Final = 0.5
+# Cost of taking two for one that were seen at once, one of them something else for a while.
+_TOGETHER: Final = 20.0
 # Measurements that tell the velocity anew, and with it whether an assignment was right.
 _SETTLES_IN: Final = 3
 
@@ -459,16 +461,19 @@ class Tracker:
             if uncertain and not full:
                 continue
             came_back = [new[column]] if column >= 0 else []
+            since = [gone.samples[-1].frame]
+            together = [track for track in came_back if _seen_together(gone, track)]
+            since += [track.samples[0].frame for track in together]
             for track in came_back:
                 # What it was before that, it was as something else.
                 del track.samples[: self._first_within_reach(gone, track)]
             found.update((track, gone.body) for track in came_back if gone.body is not None)
             beside = gone.lost_beside if came_back else {}
-            if uncertain or beside:
-                since = min([*beside.values(), gone.samples[-1].frame])
-                likely = max(score, _PARTED if beside else 0.0)
+            if uncertain or beside or together:
+                first = min([*beside.values(), *since])
+                likely = max(score, _PARTED if beside or together else 0.0)
                 for marked in (gone, *came_back, *beside):
-                    self._marks.append(_Mark(marked, since, frame, likely))
+                    self._marks.append(_Mark(marked, first, frame, likely))
         return found
 
     def _return_cost(self, gone: _Track, track: _Track) -> float:
@@ -478,7 +483,8 @@ class Tracker:
             return math.inf
         sample = track.samples[first]
         distance = float(np.hypot(*(sample.pose[:2] - gone.seen_at)))
-        return 0.5 * (3.0 * distance / self._reach(gone, sample)) ** 2 + _COME_BACK
+        cost = 0.5 * (3.0 * distance / self._reach(gone, sample)) ** 2 + _COME_BACK
+        return cost + (_TOGETHER if _seen_together(gone, track) else 0.0)
 
     def _first_within_reach(self, gone: _Track, track: _Track) -> int | None:
         """Return the first sample of a new track that a lost body could have reached."""
@@ -579,3 +585,8 @@ def _obey_keys(cost: Floats, tracks: Sequence[_Track], found: Sequence[Detection
                 cost[row, column] = _CERTAIN
             elif track.key is not None or one.key is not None:
                 cost[row, column] = math.inf
+
+
+def _seen_together(gone: _Track, track: _Track) -> bool:
+    """Return whether a new track began before a lost one was seen last."""
+    return track.samples[0].frame <= gone.samples[-1].frame
