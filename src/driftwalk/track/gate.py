@@ -59,14 +59,28 @@ def edge_costs(predicted: Predicted, measured: Measured, settings: TrackerSettin
         return cost
     difference = innovation(predicted.mean[track], measured.pose[detection])
     total = predicted.covariance[track, :3, :3] + measured.covariance[detection]
-    square, log_density = _position_terms(difference, total)
-    turned, log_turned = _angle_terms(difference[:, 2], total[:, 2, 2], settings.gate)
+    smooth = _position_terms(difference, total)
+    pushed = _position_terms(difference, total + bounce(predicted.unseen_for[track], settings))
+    square = np.minimum(smooth[0], pushed[0])
+    share = settings.bounce_probability
+    log_density = np.logaddexp(
+        math.log(1.0 - share) + smooth[1] - 0.5 * smooth[0],
+        math.log(share) + pushed[1] - 0.5 * pushed[0],
+    )
+    log_turned = _angle_term(difference[:, 2], total[:, 2, 2], settings.bounce_probability)
     seen = settings.detection_probability
     alone = math.log(settings.clutter_density) + math.log(1.0 - seen) - math.log(seen)
     inside = square <= settings.gate**2
-    value = 0.5 * square - log_density + turned - log_turned + alone
+    value = alone - log_density - log_turned
     cost[track[inside], detection[inside]] = value[inside]
     return cost
+
+
+def bounce(unseen_for: Floats, settings: TrackerSettings) -> Floats:
+    """Return the covariance that a collision just after the last sight adds, (n, 3, 3)."""
+    added = np.zeros((len(unseen_for), 3, 3))
+    added[:, 0, 0] = added[:, 1, 1] = (settings.speed_std * unseen_for) ** 2
+    return added
 
 
 def _position_terms(difference: Floats, total: Floats) -> tuple[Floats, Floats]:
@@ -78,12 +92,16 @@ def _position_terms(difference: Floats, total: Floats) -> tuple[Floats, Floats]:
     return square, -0.5 * np.log((2.0 * math.pi) ** 2 * determinant)
 
 
-def _angle_terms(difference: Floats, variance: Floats, gate: float) -> tuple[Floats, Floats]:
-    """Return the same for the angle, its density over that of any angle; 0 where not known."""
+def _angle_term(difference: Floats, variance: Floats, pushed: float) -> Floats:
+    """Return the logarithm of the angle's density over that of any angle; 0 where not known.
+
+    After a collision, or where a marker was read the wrong way round, any angle is possible.
+    """
     known = np.isfinite(difference) & np.isfinite(variance)
     # Beyond one radian a Gaussian on the line is none on the circle: then the angle says nothing.
     known &= np.where(known, variance, 2.0) < 1.0
     safe = np.where(known, variance, 1.0)
-    square = np.minimum(np.where(known, difference, 0.0) ** 2 / safe, gate**2)
-    log_density = 0.5 * np.log(2.0 * math.pi / safe)
-    return 0.5 * square, np.where(known, log_density, 0.0)
+    square = np.where(known, difference, 0.0) ** 2 / safe
+    smooth = 0.5 * np.log(2.0 * math.pi / safe) - 0.5 * square
+    mixed = np.logaddexp(math.log(1.0 - pushed) + smooth, math.log(pushed))
+    return np.where(known, mixed, 0.0)

@@ -29,6 +29,8 @@ class TrackerSettings:
         How many bodies there are at most. A new track then stands for one that was lost.
     detection_probability : float
         Chance that a body in view is detected in a frame.
+    bounce_probability : float
+        Chance that a body collides between two frames, and has any velocity afterwards.
     clutter_density : float
         Detections of something else [1/m^2], in each frame.
     gate : float
@@ -49,12 +51,13 @@ class TrackerSettings:
 
     max_speed: float
     max_turn_rate: float = 6.0
-    turn_time: float = 0.3
+    turn_time: float = 1.0
     lost_after: float = 1.0
     confirm_after: int = 3
     bodies: int | None = None
     detection_probability: float = 0.98
-    clutter_density: float = 5.0
+    bounce_probability: float = 0.01
+    clutter_density: float = 1.0
     gate: float = 5.0
     ambiguous_above: float = 0.001
 
@@ -62,6 +65,7 @@ class TrackerSettings:
         """Check the ranges."""
         for name in ("max_speed", "max_turn_rate", "turn_time", "lost_after", "clutter_density"):
             self._require(name, math.isfinite(getattr(self, name)) and getattr(self, name) > 0)
+        self._require("bounce_probability", 0 < self.bounce_probability < 1)
         self._require("gate", math.isfinite(self.gate) and self.gate >= 1)
         self._require("detection_probability", 0 < self.detection_probability < 1)
         self._require("ambiguous_above", 0 < self.ambiguous_above <= 1)

@@ -43,6 +43,8 @@ _COME_BACK: Final = -50.0
 _PARTED: Final = 0.5
 # Cost of taking two for one that were seen at once, one of them something else for a while.
 _TOGETHER: Final = 20.0
+# Standard deviations from the prediction at which a body was pushed rather than unlucky.
+_PUSHED: Final = 3.5
 # Measurements that tell the velocity anew, and with it whether an assignment was right.
 _SETTLES_IN: Final = 3
 
@@ -308,6 +310,7 @@ class Tracker:
         turned = np.abs(np.remainder(pose[:, 2] - mean[:, 2] + math.pi, 2 * math.pi) - math.pi)
         allowed = self.settings.gate * np.sqrt(covariance[:, 2, 2] + noise[:, 2, 2])
         pose[turned > np.maximum(allowed, 0.1), 2] = np.nan
+        covariance += self._bounced(mean, covariance, pose, noise, time, tracks)
         mean, covariance = update(mean, covariance, pose, noise)
         for place, (track, j) in enumerate(pairs):
             track.mean, track.covariance = mean[place], covariance[place]
@@ -315,6 +318,28 @@ class Tracker:
             track.measured = found[j]
             track.oriented |= bool(np.isfinite(measured.pose[j, 2]))
             track.samples.append(_sample(frame, measured, j))
+
+    def _bounced(
+        self,
+        mean: Floats,
+        covariance: Floats,
+        pose: Floats,
+        noise: Floats,
+        time: float,
+        tracks: Sequence[_Track],
+    ) -> Floats:
+        """Return what to add to the covariance of tracks that were pushed: any velocity."""
+        total = covariance[:, :2, :2] + noise[:, :2, :2]
+        off = pose[:, :2] - mean[:, :2]
+        square = np.einsum("ni,ni->n", off, np.linalg.solve(total, off[..., None])[..., 0])
+        std = self.settings.speed_std * (square > _PUSHED**2)
+        elapsed = np.array([time - track.seen for track in tracks])
+        added = np.zeros_like(covariance)
+        for axis in range(2):
+            added[:, axis, axis] = (std * elapsed) ** 2
+            added[:, axis, axis + 3] = added[:, axis + 3, axis] = std**2 * elapsed
+            added[:, axis + 3, axis + 3] = std**2
+        return added
 
     def _note_company(self, frame: int, group: npt.NDArray[np.int64]) -> None:
         """Note which tracks are near each other, and since when."""
