@@ -1,9 +1,10 @@
 """The maximum of the penalised likelihood, by Gauss-Newton, and the smoothness of the flow.
 
 Prior of the flow's coefficients: ``exp(-(lam_r c' R c + lam_s c' S c) / 2)`` per component, R and S
-the roughness and the size of `driftwalk.calibrate.fit_spline.penalties`. The two weights follow
-from the data: each step sets a weight to the degrees of freedom that the data have taken from its
-prior, over ``c' R c`` or ``c' S c`` (MacKay's fixed point of the evidence).
+the roughness and the size of `driftwalk.calibrate.fit_spline.penalties`; with several flows the
+weights are the same for all. The two weights follow from the data: each step sets a weight to the
+degrees of freedom that the data have taken from its prior, over ``c' R c`` or ``c' S c`` (MacKay's
+fixed point of the evidence).
 """
 
 from __future__ import annotations
@@ -63,15 +64,15 @@ class Prior:
         """Return the sums with the prior of the coefficients, of C_d and of the lever in them."""
         precision = self.matrix(weights)
         count = len(precision)
-        coefficients = point.coefficients.reshape(2, -1)
+        coefficients = point.coefficients.reshape(-1, count)
         score, information = sums.score.copy(), sums.information.copy()
         pull = coefficients @ precision
-        for component in range(2):
+        for component in range(len(coefficients)):
             part = slice(component * count, (component + 1) * count)
             information[part, part] += precision
             score[part] -= pull[component]
         deviance = sums.deviance + 0.5 * float((pull * coefficients).sum())
-        drag = 2 * count
+        drag = coefficients.size
         single = [(drag, point.log_drag - math.log(PRIOR_DRAG), PRIOR_LOG_DRAG_STD)]
         if point.log_lever is not None:
             single.append((drag + LEVER, point.log_lever - self.log_lever, PRIOR_LOG_LEVER_STD))
@@ -86,14 +87,15 @@ class Prior:
     def updated(self, weights: Weights, point: Point, covariance: Floats) -> Weights:
         """Return the weights after one step of the evidence's fixed point."""
         inverse = np.linalg.inv(self.matrix(weights))
-        coefficients = point.coefficients.reshape(2, -1)
         count = len(inverse)
+        coefficients = point.coefficients.reshape(-1, count)
         parts = [
-            covariance[k * count : (k + 1) * count, k * count : (k + 1) * count] for k in (0, 1)
+            covariance[k * count : (k + 1) * count, k * count : (k + 1) * count]
+            for k in range(len(coefficients))
         ]
         new = []
         for old, form in ((weights.roughness, self.roughness), (weights.size, self.size)):
-            prior = 2.0 * float((form * inverse).sum())
+            prior = len(parts) * float((form * inverse).sum())
             posterior = sum(float((form * part).sum()) for part in parts)
             value = float(np.einsum("ka,ab,kb->", coefficients, form, coefficients))
             wanted = old * (prior - posterior) / max(value, 1e-300)
@@ -163,7 +165,7 @@ def find_mode(
         held = [one for one in held if one < sums.score.size]
         covariance = inverse(sums.information)
         step = limited(newton_step(sums, covariance, held=held), drag)
-        step, last = damped(step, last, sums.information), step
+        step = last = damped(step, last, sums.information)
         point = point.moved(step)
         weights = prior.updated(weights, point, covariance)
         moves = np.abs(step) / np.sqrt(np.diag(covariance))
