@@ -3,7 +3,7 @@
     python studies/methods/run.py OUT [--motions run/likelihood/recordings] [--store FOLDER]
 
 OUT holds `results.jsonl`, a line for each recording and method, and the flows. What is in there is
-not done again; after a change of the estimator begin with another OUT. `--store` copies the results
+not done again; after a change of a method remove its lines. `--store` copies the results
 with their table and manifest.
 """
 
@@ -64,7 +64,8 @@ class Answer(NamedTuple):
     flow: xr.Dataset
     distance: float
     floor: float
-    explained: bool
+    findings: list[str]
+    """What speaks against the model."""
     seconds: float
     check_seconds: float
 
@@ -127,7 +128,7 @@ def by_likelihood(known: Known, fit: xr.Dataset, seconds: float) -> Answer:
         dw.fitted_flow(fit),
         check["ks_distance"],
         check["ks_noise_floor"],
-        check["explained"] == "yes",
+        json.loads(check["findings"]),
         seconds,
         time.process_time() - begin,
     )
@@ -140,8 +141,8 @@ def by_distance(known: Known, flow_of: Callable[[], xr.Dataset]) -> Answer:
     study = dw.apply_overrides(known.study, SEARCH)
     found = dw.calibrate(known.recording, study, flow=flow, threads=1).attrs
     distance, floor = found["ks_distance"], found["noise_floor"]
-    explained = not any("does not explain" in one for one in json.loads(found["warnings"]))
-    return Answer(found, flow, distance, floor, explained, time.process_time() - begin, 0.0)
+    findings = [one for one in json.loads(found["warnings"]) if "does not explain" in one]
+    return Answer(found, flow, distance, floor, findings, time.process_time() - begin, 0.0)
 
 
 def line_of(
@@ -154,7 +155,8 @@ def line_of(
         "estimator": VERSION,
         "ks_distance": answer.distance,
         "ks_noise_floor": answer.floor,
-        "explained": answer.explained,
+        "explained": not answer.findings,
+        "findings": answer.findings,
         "seconds": round(answer.seconds, 1),
         "check_seconds": round(answer.check_seconds, 1),
         "wall_share": fit.attrs["wall_share"],
