@@ -41,7 +41,7 @@ def in_words(seconds: float) -> str:
     >>> in_words(61.0), in_words(1234.0), in_words(30000.0)
     ('62 s', '21 min', '8.4 h')
     """
-    unit, name = (1.0, "s") if seconds < 120 else (60.0, "min") if seconds < 7200 else (3600.0, "h")
+    unit, name = (1.0, "s") if seconds < 120 else (60.0, "min") if seconds < 5400 else (3600.0, "h")
     value = seconds / unit
     grain = 10.0 ** (math.floor(math.log10(max(value, 1e-9))) - 1)
     return f"{grain * math.ceil(value / grain - 1e-9):.6g} {name}"
@@ -58,6 +58,6 @@ def length_advice(precision: float | None) -> str:
         for usual in (PRECISION_WITH_ANGLE, PRECISION_WITHOUT_ANGLE)
     )
     return (
-        f"For C_d to {precision:.2g} of its value record some {with_angle} with orientations, "
+        f"For C_d to {100 * precision:.3g} % record some {with_angle} with orientations, "
         f"{without} without, as a rule"
     )

@@ -124,9 +124,10 @@ def require_size(flows: int, coefficients: int) -> None:
     total = flows * coefficients
     if flows == 1 or total <= MOST_COEFFICIENTS:
         return
-    # Half a dozen matrices of doubles; inverse and factors take some 3 n^3 operations a step.
+    # Half a dozen matrices of doubles; inverse and factors take some 3 n^3 operations in each of
+    # about twenty steps.
     memory = 6 * 8 * total**2 / 1e9
-    minutes = 10 * 3 * float(total) ** 3 / 1e10 / 60
+    minutes = 20 * 3 * float(total) ** 3 / 3e10 / 60
     raise InputError(
         f"{flows} flows of {coefficients} coefficients are too many to fit together: they would "
         f"take about {memory:.1f} GB and {minutes:.0f} min, {MOST_COEFFICIENTS // coefficients} "

@@ -81,8 +81,8 @@ def _on_the_data(
         needed = facts["needed_duration_s"]
         length = f"about {in_words(needed)}" if math.isfinite(needed) else "another recording"
         found.append(
-            f"C_d is known to {std:.0%} only (one standard deviation) from "
-            f"{in_words(facts['duration_s'])}: for {wanted or USUAL_PRECISION:.2g} of its value "
+            f"C_d is known to {100 * std:.2g} % only (one standard deviation) from "
+            f"{in_words(facts['duration_s'])}: for {100 * (wanted or USUAL_PRECISION):.3g} % "
             f"{length} like this would be needed"
         )
     for flow, share in enumerate(visited):
