@@ -30,9 +30,6 @@ PRIOR_LOG_LEVER_STD = 1.0
 LEVER = 3
 """Place of the lever, counted from C_d on."""
 MOST_LOG_LEVER_STEP = 1.0
-LEVER_COUNTS = 0.2
-"""Share of the lever's step, in standard deviations, when convergence is judged: it hardly moves
-the others."""
 MOST_LOG_DRAG_STEP = 0.5
 MOST_FACTOR = 10.0
 """By which q, r^2 or the weight of a penalty may change in a step."""
@@ -169,7 +166,8 @@ def find_mode(
         point = point.moved(step)
         weights = prior.updated(weights, point, covariance)
         moves = np.abs(step) / np.sqrt(np.diag(covariance))
-        moves[drag + LEVER : drag + LEVER + 1] *= LEVER_COUNTS
+        # A lever that is known from its prior alone may go to and fro without moving anything else.
+        moves[drag + LEVER : drag + LEVER + 1] = 0.0
         near = max(float(moves[drag:].max()), float(np.sqrt((moves[:drag] ** 2).mean())))
         if len(held) == 0 and near < CLOSE:
             converged = True
