@@ -151,7 +151,11 @@ def still(count: int, **changed: np.ndarray) -> xr.Dataset:
         ([still(200, theta=np.full(200, np.nan))], {"angle": "given"}, "has no orientations"),
         ([still(200, theta=np.full(200, np.nan))], {"angle": "state"}, "has no orientations"),
         # Two are taken together: each has to have what is asked for.
-        ([still(200), still(200, theta=np.full(200, np.nan))], {"angle": "state"}, "a recording"),
+        (
+            [still(200), still(200, theta=np.full(200, np.nan))],
+            {"angle": "state"},
+            "has no orientations",
+        ),
         ([still(200)], {"angle": "maybe"}, "must be 'auto', 'state', 'given' or 'none'"),
         ([still(200)], {"body": "7"}, "no body '7'"),
         ([still(200, x=np.linspace(0.13, 0.14, 200))], {}, "are at the wall of the tank"),
