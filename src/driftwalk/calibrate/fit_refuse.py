@@ -49,10 +49,14 @@ def require_motion(track: Track, study: Study, *, where: str) -> None:
     InputError
         With how far it goes and where it is.
     """
+    from driftwalk.model import apply_overrides
+
     tail = 0.5 * (1.0 - KEPT)
     width = max(float(np.ptp(np.quantile(axis, (tail, 1.0 - tail)))) for axis in (track.x, track.y))
     scatter = max(float(track.x.std()), float(track.y.std()))
-    noise = recorded_camera(track, study, position_quantum=0.0).position_noise
+    # The study may say what the tracker's noise should be; this is what it is.
+    measured = apply_overrides(study, {"observation.position_noise_m": "estimate"})
+    noise = recorded_camera(track, measured, position_quantum=0.0).position_noise
     at_rest = width < LEAST_MOTION * study.block.side_m
     if at_rest or scatter < LEAST_MOTION_IN_NOISES * noise:
         place = f"({np.median(track.x):.3f}, {np.median(track.y):.3f}) m"

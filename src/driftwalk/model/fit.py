@@ -100,7 +100,8 @@ class Fit(Section):
         intervals = len(self.switching_times_s or ()) + 1
         if len(self.flow_labels) != intervals:
             raise ConfigurationError(
-                f"flow_labels has {len(self.flow_labels)} names, but switching_times_s makes "
+                f"flow_labels has {len(self.flow_labels)} name"
+                f"{'s' if len(self.flow_labels) > 1 else ''}, but switching_times_s makes "
                 f"{intervals} interval{'s' if intervals > 1 else ''}: name the flow of each"
             )
         for name in self.flow_labels:
