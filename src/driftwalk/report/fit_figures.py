@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ERROR_LABEL = "standard error (mm/s)"
+TITLE_WIDTH = 90
+"""Letters of a title over the whole figure."""
 
 
 def plot_flow_error(flow: xr.Dataset, ax: Axes | None = None) -> Axes:
@@ -146,7 +149,7 @@ def _flow_figure(flow: xr.Dataset) -> Figure:
     row[1].set_ylabel("")
     filled = bool((flow["flag"].values == FLAGS["filled"]).any())
     title = " ".join(["fitted flow", *_label(flow)])
-    if "intervals" in flow.attrs:
-        title += f", {flow.attrs['intervals']}"
     letter_panels(row, [title + (" (hatched: filled)" if filled else ""), "its standard error"])
+    if "intervals" in flow.attrs:
+        figure.suptitle(textwrap.fill(f"from {flow.attrs['intervals']}", TITLE_WIDTH))
     return figure
