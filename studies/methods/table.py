@@ -1,47 +1,79 @@
-"""The table of the results, as Markdown."""
+"""The tables of the results, as Markdown: a row for each recording, a column for each method."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from statistics import median
 from typing import Any
 
-HEAD = (
-    "recording", "method", "C_d", "σ_F", "block flow error", "D", "floor", "D / floor", "explained",
-    "s",
-)  # fmt: skip
-WORDS = {
+Line = dict[str, Any]
+
+METHODS = {
+    "fit, angle state": "fit",
+    "fit, angle given": "fit, orientation as input",
+    "fit, angle none": "fit, no orientation",
     "KS grid, own flow": "the paper's",
     "KS grid, fitted flow": "KS grid, fitted flow",
     "KS grid, true flow": "KS grid, true flow",
 }
 
 
-def markdown(lines: list[dict[str, Any]]) -> str:
-    """Return a row for each result, recordings in the order in which they were made."""
-    rows = ["| " + " | ".join(HEAD) + " |", "|" + "---|" * len(HEAD)]
-    names = list(dict.fromkeys(line["recording"] for line in lines))
-    rows += [row(line) for name in names for line in lines if line["recording"] == name]
-    return "\n".join([*rows, "", "\\* outside the 90 % interval"])
-
-
-def row(line: dict[str, Any]) -> str:
-    """Return one row."""
-    distance, floor = line["ks_distance"], line["ks_noise_floor"]
-    cells = [
-        f"{line['recording']} ({line['drag_coefficient_true']:.2f}, "
-        f"{1e3 * line['force_std_N_true']:.2f} mN)",
-        WORDS.get(line["method"], line["method"]),
-        error(line, "drag_coefficient"),
-        error(line, "force_std_N"),
-        f"{line['flow_error']:.1%}",
-        f"{distance:.3f}",
-        f"{floor:.3f}",
-        f"{distance / floor:.1f}",
-        "yes" if line["explained"] else "no",
-        f"{line['seconds']:.0f}",
+def markdown(lines: list[Line]) -> str:
+    """Return the four tables, and the time of each method."""
+    parts = [
+        table(lines, "C_d (truth)", drag_truth, lambda line: error(line, "drag_coefficient")),
+        table(lines, "σ_F (truth, mN)", force_truth, lambda line: error(line, "force_std_N")),
+        table(lines, "block flow error", no_truth, lambda line: f"{line['flow_error']:.1%}"),
+        table(lines, "D (floor)", no_truth, distance),
     ]
-    return "| " + " | ".join(cells) + " |"
+    return "\n\n".join([*parts, seconds(lines)]).replace("%", " %")
 
 
-def error(line: dict[str, Any], name: str) -> str:
+def table(
+    lines: list[Line], head: str, truth: Callable[[Line], str], cell: Callable[[Line], str]
+) -> str:
+    """Return one table; a method that has no result for a recording leaves its cell empty."""
+    rows = [f"| {head} | " + " | ".join(METHODS.values()) + " |", "|---" * 7 + "|"]
+    for name in dict.fromkeys(line["recording"] for line in lines):
+        found = {line["method"]: line for line in lines if line["recording"] == name}
+        cells = [cell(found[method]) if method in found else "" for method in METHODS]
+        first = f"{name}{truth(next(iter(found.values())))}"
+        rows.append("| " + " | ".join([first, *cells]) + " |")
+    return "\n".join(rows)
+
+
+def drag_truth(line: Line) -> str:
+    """Return the true C_d."""
+    return f" ({line['drag_coefficient_true']:.2f})"
+
+
+def force_truth(line: Line) -> str:
+    """Return the true sigma_F."""
+    return f" ({1e3 * line['force_std_N_true']:.2f})"
+
+
+def no_truth(_: Line) -> str:
+    """Return nothing."""
+    return ""
+
+
+def error(line: Line, name: str) -> str:
     """Return an error, marked where the interval does not hold the truth."""
-    return f"{line[f'{name}_error']:+.1%}" + ("" if line[f"{name}_covered"] else " \\*")
+    mark = "" if line[f"{name}_covered"] else " \\*"
+    return f"{line[f'{name}_error']:+.1%}".replace("-", "−") + mark
+
+
+def distance(line: Line) -> str:
+    """Return D and its floor, bold where the model is said not to explain the recording."""
+    words = f"{line['ks_distance']:.3f} ({line['ks_noise_floor']:.3f})"
+    return words if line["explained"] else f"**{words}**"
+
+
+def seconds(lines: list[Line]) -> str:
+    """Return the median time of each method."""
+    words = []
+    for method, name in METHODS.items():
+        times = [line["seconds"] for line in lines if line["method"] == method]
+        if times:
+            words.append(f"{name} {median(times):.0f}")
+    return "Seconds, median: " + ", ".join(words) + "."
