@@ -124,9 +124,6 @@ def test_holes_and_missing_angles_leave_the_truth_within_the_errors(
     assert ratio[[0, 1, 2, 4]] == pytest.approx(np.full(4, 1.5), abs=0.45)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="whitened innovations of missing angles are 1e-9, not 0, and are counted"
-)
 def test_missing_angles_are_no_errors_of_prediction(holed_fit: xr.Dataset) -> None:
     """Some 10,000 numbers are there; counted as zeros, missing angles would make it 0.87."""
     assert holed_fit.attrs["chi_squared_per_dof"] == pytest.approx(1.0, abs=0.06)
@@ -166,3 +163,24 @@ def test_half_of_the_angles_make_it_the_default(track: xr.Dataset) -> None:
         blind[: int(share * theta.size)] = np.nan
         recording = turned(track, blind)
         assert _use_angle([recording], [body_track(recording)], "auto") == used
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3])
+def test_a_column_that_is_only_filled_is_no_orientation(track: xr.Dataset, angle: float) -> None:
+    short = track.isel(time=slice(0, 1500)).copy(deep=True)
+    short["theta"].values[:] = angle
+    assert dw.fit_motion(short, coarse_study()).attrs["angle"] == "none"
+    with pytest.raises(dw.core.errors.InputError, match="the same in every row"):
+        dw.fit_motion(short, coarse_study(), angle="state")
+
+
+def test_an_angle_that_is_off_warns_of_the_lever(track: xr.Dataset) -> None:
+    """Five degrees: some 0.4 mm, where the true angle gives 0.06 mm."""
+    assert not any("from its centre" in one for one in warnings_in(track))
+    wrong = turned(track, track["theta"].values[:, 0] + np.deg2rad(8.0))
+    assert any("from its centre" in one for one in warnings_in(wrong))
+
+
+def warnings_in(recording: xr.Dataset) -> list[str]:
+    fit = dw.fit_motion(recording, coarse_study(), angle="state")
+    return list(json.loads(fit.attrs["warnings"]))

@@ -58,7 +58,7 @@ def fit_motion(
 ) -> xr.Dataset:
     """Fit flow, drag coefficient, stochastic force and tracking noise to a recording, together.
 
-    Nothing is differentiated: a Kalman filter predicts each recorded position from the earlier ones
+    Nothing is differentiated: a Kalman filter predicts each recorded pose from the earlier ones
     with the drag of the model, and the parameters are those that make its errors likely. C_d is the
     minimum of the restricted likelihood, which allows for the flow being estimated along with it.
     See docs/explanation/likelihood.md.
@@ -95,7 +95,7 @@ def fit_motion(
     >>> import driftwalk as dw
     >>> fit = dw.fit_motion(dw.tank30_recording())  # doctest: +SKIP
     >>> round(fit.attrs["drag_coefficient"], 2)  # doctest: +SKIP
-    0.37
+    0.39
     """
     from driftwalk.model import Study
 
@@ -152,7 +152,8 @@ def fit_motion(
     )
     shares = visited_shares(fit)
     fit.attrs["visited_share"] = min(shares)
-    fit.attrs["warnings"] = json.dumps(warnings_of(fit.attrs, whiteness, shares, intervals))
+    warnings = warnings_of(fit.attrs, whiteness, shares, intervals, side_m=chosen.block.side_m)
+    fit.attrs["warnings"] = json.dumps(warnings)
     return fit
 
 
@@ -254,17 +255,25 @@ def _use_angle(many: Sequence[xr.Dataset], tracks: Sequence[Track], wanted: str)
     """Return how orientations are used: "state", "given" or "none"."""
     if wanted not in ("auto", "state", "given", "none"):
         raise InputError(f"angle must be 'auto', 'state', 'given' or 'none', got {wanted!r}")
-    shares = [float(np.isfinite(track.theta).mean()) for track in tracks]
+    shares = [_oriented_share(track) for track in tracks]
     seen = min(shares)
     if wanted in ("state", "given") and seen == 0.0:
         where = _name_of(many[shares.index(seen)])
         raise InputError(
-            f"{where}the recording has no orientations: leave out angle = {wanted!r} (--angle), or "
-            "read the column that holds them"
+            f"{where}the recording has no orientations, or the same in every row: leave out "
+            f"angle = {wanted!r} (--angle), or read the column that holds them"
         )
     if wanted == "auto":
         return "state" if seen >= ORIENTED_SHARE else "none"
     return wanted
+
+
+def _oriented_share(track: Track) -> float:
+    """Return the share of samples with an orientation; 0 where a tracker only fills its column."""
+    seen = np.isfinite(track.theta)
+    if not seen.any() or np.ptp(track.theta[seen]) == 0.0:
+        return 0.0
+    return float(seen.mean())
 
 
 def _series(

@@ -230,9 +230,7 @@ class Passes:
         D is 3 with the angle in the state, else 2. The innovation of a missing angle is 0.
         """
         found = [self._run(series, point.in_flow(series.flow)) for series in self.series]
-        return [
-            (forward(factor(one["covariance"]), one["innovation"].T).T, _used(one)) for one in found
-        ]
+        return [(_whitened(one), _used(one)) for one in found]
 
     def _run(self, series: Series, point: Point) -> dict[str, Any]:
         return dict(self._filter(series, point).run(series.time.size))
@@ -270,6 +268,12 @@ class Passes:
             sensitivities=sensitivities,
             **pose,
         )
+
+
+def _whitened(found: dict[str, Any]) -> Floats:
+    white = forward(factor(found["covariance"]), found["innovation"].T).T
+    # To the filter a missing angle is one measured where it was predicted, with an enormous error.
+    return np.where(found["innovation"] == 0.0, 0.0, white)
 
 
 def _used(found: dict[str, Any]) -> Flags:
