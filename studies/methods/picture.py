@@ -41,6 +41,8 @@ STYLES = {
 }
 """Name, colour (Okabe and Ito) and marker of each method."""
 LEAST_SAMPLES = 3
+LEAST_RATIO = 0.23
+"""Of an estimate to the truth; an arrow at the edge stands for less."""
 
 
 def main() -> None:
@@ -64,7 +66,7 @@ def main() -> None:
 def estimates(lines: list[dict[str, Any]]) -> Figure:
     """Draw estimates over truth with their intervals, and the error of the flow."""
     names = list(dict.fromkeys(line["recording"] for line in lines))
-    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=118.0)
+    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=140.0)
     axes = figure.subplots(1, 3, sharey=True, width_ratios=(1.0, 1.0, 0.7))
     order = list(STYLES)
     for line in lines:
@@ -74,16 +76,21 @@ def estimates(lines: list[dict[str, Any]]) -> Figure:
         for ax, name in zip(axes, ("drag_coefficient", "force_std_N"), strict=False):
             truth = line[f"{name}_true"]
             low, high = line[f"{name}_low"] / truth, line[f"{name}_high"] / truth
-            ax.plot([max(low, 1e-3), high], [y, y], color=color, linewidth=1.2)
-            ax.plot(line[name] / truth, y, marker, color=color, markersize=4.0, label=label)
+            ax.plot([max(low, LEAST_RATIO), high], [y, y], color=color, linewidth=1.2)
+            ratio = max(line[name] / truth, LEAST_RATIO)
+            beyond = ratio == LEAST_RATIO
+            ax.plot(
+                ratio, y, "<" if beyond else marker, color=color, markersize=4.0,
+                label=None if beyond else label,
+            )  # fmt: skip
         if line["method"] != "KS grid, true flow":
             axes[2].plot(100.0 * line["flow_error"], y, marker, color=color, markersize=4.0)
     for ax, label in zip(axes, ("C_d / truth", "σ_F / truth"), strict=False):
         ax.axvline(1.0, color=INK, linewidth=0.7, zorder=0)
         ax.set_xscale("log")
-        ax.set_xticks([0.5, 1.0, 2.0, 4.0], ["0.5", "1", "2", "4"])
+        ax.set_xticks([0.25, 0.5, 1.0, 2.0, 4.0], ["¼", "½", "1", "2", "4"])
         ax.minorticks_off()
-        ax.set_xlim(0.25, 5.0)
+        ax.set_xlim(0.9 * LEAST_RATIO, 5.0)
         ax.set_xlabel(label)
     axes[2].set_xscale("log")
     axes[2].set_xticks([0.5, 1, 2, 5, 10, 20, 50], ["0.5", "1", "2", "5", "10", "20", "50"])
