@@ -68,7 +68,8 @@ def fit_motion(
     recordings : xarray.Dataset or sequence of xarray.Dataset
         A `trajectory`, or several of the same block in the same tank and flow.
     study : Study, optional
-        Block, tank, water, force interval and the section [fit]; default: the paper's.
+        Block, tank, water, force interval and the section [fit]; default: the paper's. With
+        switching times there each interval has a flow of its own, see `fitted_flow`.
     angle : {"auto", "state", "given", "none"}, optional
         How the recorded orientation is used; default: what the study says.
     body : str, optional
@@ -88,7 +89,8 @@ def fit_motion(
     ------
     InputError
         When a recording is too short or does not move, several bodies are there and none named, the
-        block is at the wall all the time, or angles are asked for where there are none.
+        block is at the wall all the time, angles are asked for where there are none, or switching
+        times are outside a recording or too near to each other.
 
     Examples
     --------

@@ -39,7 +39,7 @@ def in_words(seconds: float) -> str:
     Examples
     --------
     >>> in_words(61.0), in_words(1234.0), in_words(30000.0)
-    ('62 s', '21 min', '8.4 h')
+    ('61 s', '21 min', '8.4 h')
     """
     unit, name = (1.0, "s") if seconds < 120 else (60.0, "min") if seconds < 5400 else (3600.0, "h")
     value = seconds / unit
