@@ -60,7 +60,8 @@ def no_truth(_: Line) -> str:
 def error(line: Line, name: str) -> str:
     """Return an error, marked where the interval does not hold the truth."""
     mark = "" if line[f"{name}_covered"] else " \\*"
-    return f"{line[f'{name}_error']:+.1%}".replace("-", "−") + mark
+    words = f"{round(line[f'{name}_error'], 3) + 0.0:+.1%}"
+    return words.replace("+0.0%", "0.0%").replace("-", "−") + mark
 
 
 def distance(line: Line) -> str:
