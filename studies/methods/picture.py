@@ -41,8 +41,8 @@ STYLES = {
 }
 """Name, colour (Okabe and Ito) and marker of each method."""
 LEAST_SAMPLES = 3
-LEAST_RATIO = 0.23
-"""Of an estimate to the truth; an arrow at the edge stands for less."""
+RATIOS = (0.23, 5.0)
+"""Of an estimate to the truth; an arrow at the edge stands for one beyond."""
 
 
 def main() -> None:
@@ -76,12 +76,12 @@ def estimates(lines: list[dict[str, Any]]) -> Figure:
         for ax, name in zip(axes, ("drag_coefficient", "force_std_N"), strict=False):
             truth = line[f"{name}_true"]
             low, high = line[f"{name}_low"] / truth, line[f"{name}_high"] / truth
-            ax.plot([max(low, LEAST_RATIO), high], [y, y], color=color, linewidth=1.2)
-            ratio = max(line[name] / truth, LEAST_RATIO)
-            beyond = ratio == LEAST_RATIO
+            ratio = float(np.clip(line[name] / truth, *RATIOS))
+            shown = {RATIOS[0]: "<", RATIOS[1]: ">"}.get(ratio, marker)
+            ax.plot(np.clip([low, high], *RATIOS), [y, y], color=color, linewidth=1.2)
             ax.plot(
-                ratio, y, "<" if beyond else marker, color=color, markersize=4.0,
-                label=None if beyond else label,
+                ratio, y, shown, color=color, markersize=4.0,
+                label=label if shown == marker else None,
             )  # fmt: skip
         if line["method"] != "KS grid, true flow":
             axes[2].plot(100.0 * line["flow_error"], y, marker, color=color, markersize=4.0)
@@ -90,7 +90,7 @@ def estimates(lines: list[dict[str, Any]]) -> Figure:
         ax.set_xscale("log")
         ax.set_xticks([0.25, 0.5, 1.0, 2.0, 4.0], ["¼", "½", "1", "2", "4"])
         ax.minorticks_off()
-        ax.set_xlim(0.9 * LEAST_RATIO, 5.0)
+        ax.set_xlim(0.9 * RATIOS[0], 1.1 * RATIOS[1])
         ax.set_xlabel(label)
     axes[2].set_xscale("log")
     axes[2].set_xticks([0.5, 1, 2, 5, 10, 20, 50], ["0.5", "1", "2", "5", "10", "20", "50"])
