@@ -371,7 +371,11 @@ def test_a_vague_answer_says_how_long_to_record(
     std: float, wanted: dict[str, object], words: str | None
 ) -> None:
     found = warnings_of(
-        facts(std, 600.0, wanted), Whiteness(1.0, 0.0, 0.01), [0.5], Intervals((), (0,), ("A",))
+        facts(std, 600.0, wanted),
+        Whiteness(1.0, 0.0, 0.01),
+        [0.5],
+        Intervals((), (0,), ("A",)),
+        side_m=0.03,
     )
     assert bool(found) == (words is not None)
     assert words is None or re.search(words, found[0])

@@ -27,9 +27,14 @@ settle before a step of C_d or of the other noises means anything."""
 PRIOR_LEVER = 0.01
 """Centre of the weak prior of the force's lever, in sides of the block, and its first value."""
 PRIOR_LOG_LEVER_STD = 1.0
-LEVER = 3
-"""Place of the lever, counted from C_d on."""
-MOST_LOG_LEVER_STEP = 1.0
+PRIOR_ANGLE_NOISE = 0.01
+"""Centre of the prior of the angle's noise [rad], so weak that it counts only where the turning is
+so restless that nothing is known of the noise."""
+PRIOR_LOG_ANGLE_NOISE_STD = 2.3
+LEVER, ANGLE_NOISE = 3, 4
+"""Places of the lever and of the angle's noise, counted from C_d on."""
+MOST_LOG_STEP = 1.0
+"""Of the lever and of the angle's noise."""
 MOST_LOG_DRAG_STEP = 0.5
 MOST_FACTOR = 10.0
 """By which q, r^2 or the weight of a penalty may change in a step."""
@@ -73,6 +78,9 @@ class Prior:
         single = [(drag, point.log_drag - math.log(PRIOR_DRAG), PRIOR_LOG_DRAG_STD)]
         if point.log_lever is not None:
             single.append((drag + LEVER, point.log_lever - self.log_lever, PRIOR_LOG_LEVER_STD))
+        if point.log_angle_noise is not None:
+            off = point.log_angle_noise - math.log(PRIOR_ANGLE_NOISE)
+            single.append((drag + ANGLE_NOISE, off, PRIOR_LOG_ANGLE_NOISE_STD))
         for index, off, std in single:
             deviance += 0.5 * (off / std) ** 2
             # Without derivatives by the noises there is no row of the lever.
@@ -197,12 +205,12 @@ def damped(step: Floats, last: Floats, information: Floats) -> Floats:
 
 
 def limited(step: Floats, drag: int) -> Floats:
-    """Return the step, shortened where C_d or the lever would jump, with other noises as factors.
+    """Return the step, shortened where it would jump, with q and r taken as factors.
 
     The step is the same whether it is made in the logarithm of a variance or in the variance; made
-    in the variance it finds a wrong one in one step, from whatever side. The first of the noises is
-    a variance, q, the others are standard deviations. The lever is another matter: where the force
-    has none it is known from its prior alone, which is one of the logarithm.
+    in the variance it finds a wrong one in one step, from whatever side. Lever and noise of the
+    angle are another matter: they may be known from their priors alone, which are those of
+    logarithms.
 
     Parameters
     ----------
@@ -212,13 +220,10 @@ def limited(step: Floats, drag: int) -> Floats:
         Where ln C_d stands in it.
     """
     shorter = step * min(1.0, MOST_LOG_DRAG_STEP / max(abs(float(step[drag])), 1e-300))
-    for index, power in ((1, 1.0), (2, 2.0), (4, 2.0)):
-        if drag + index < step.size:
-            factor = np.clip(1.0 + power * step[drag + index], 1.0 / MOST_FACTOR, MOST_FACTOR)
-            shorter[drag + index] = math.log(factor) / power
-    if drag + LEVER < step.size:
-        wanted = float(step[drag + LEVER])
-        shorter[drag + LEVER] = np.clip(wanted, -MOST_LOG_LEVER_STEP, MOST_LOG_LEVER_STEP)
+    for index, power in ((1, 1.0), (2, 2.0)):
+        factor = np.clip(1.0 + power * step[drag + index], 1.0 / MOST_FACTOR, MOST_FACTOR)
+        shorter[drag + index] = math.log(factor) / power
+    shorter[drag + LEVER :] = np.clip(step[drag + LEVER :], -MOST_LOG_STEP, MOST_LOG_STEP)
     return np.asarray(shorter)
 
 
