@@ -28,7 +28,7 @@ def test_half_an_hour_of_another_engine(
 ) -> None:
     """Measured with the angle in the state: C_d +0.7 and -0.2 %, sigma_F 1.4 %, flow 0.7 and 2 %.
 
-    With the angle as an input: C_d +0.9 and -1.1 %, flow 2.4 and 6.1 %.
+    With the angle as an input: C_d -9 and -2 %, flow 3 and 6 %.
     """
     with np.load(FOLDER / f"{name}.npz") as stored:
         x, y, u, v = (1e-5 * stored[key] for key in ("x", "y", "u", "v"))
