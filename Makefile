@@ -61,7 +61,7 @@ bench: $(PACKAGE)
 # missing (77).
 STUDIES := run/likelihood
 STUDY_SETS := ode synthetic lengths coverage
-STUDY_ANGLES := given
+STUDY_ANGLES := state given
 
 studies: $(PACKAGE)
 	for angle in $(STUDY_ANGLES); do for name in $(STUDY_SETS); do \

@@ -348,24 +348,3 @@ def test_progress_on_a_terminal_is_a_bar_with_the_time_left(study: Path, tmp_pat
     assert "━" in seen
     assert "/100" in seen
     assert re.search(r"\d:\d\d:\d\d|-:--:--", seen)
-
-
-@pytest.mark.slow
-def test_demo_prints_the_truth_beside_the_answer(tmp_path: Path) -> None:
-    demo = ["demo", "--quick", "--out", tmp_path / "demo"]
-    done = apart(*demo)
-    assert done.code == 0, done.err
-    assert "simulated by another engine (ODE)" in done.out
-    assert "the truth              C_d = 0.3867, σ_F = 0.6123 mN drawn anew every 16 ms" in done.out
-    again = apart(*demo, "--json")
-    assert again.code == 0
-    assert "holds a finished run" in again.err
-    found = json.loads(again.out)
-    assert found["truth"] == {
-        "drag_coefficient": 0.3867,
-        "force_std_N": 0.0006123,
-        "force_interval_s": 0.016,
-    }
-    for name, error in (("drag_coefficient", 0.04), ("force_std_N", 0.1e-3)):
-        assert found[name] == pytest.approx(found["truth"][name], abs=error)
-    assert found["ks_distance"] < 2 * found["noise_floor"]

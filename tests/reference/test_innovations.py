@@ -2,32 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 import scipy.integrate
 import scipy.linalg
 import scipy.stats
+from dense_innovations import (
+    BLOCK,
+    GRADIENT,
+    LINEAR,
+    NODES,
+    NOISE_INTENSITY,
+    POSITION_NOISE,
+    WAVY,
+    Floats,
+    dense_filter,
+    difficult_track,
+    linear_coefficients,
+    make_filter,
+    make_track,
+    mean_drag,
+    run_filter,
+    slope,
+)
 from single_block import model
 
 from driftwalk import _core
 
-Floats = npt.NDArray[np.float64]
-
-COLUMNS, ROWS, SPACING = 15, 16, 0.03
-ORIGIN = np.array([-0.18, -0.2])
-NODES = COLUMNS * ROWS
-BLOCK = {"side": 0.03, "mass": 0.0116, "depth": 0.03, "strips": 8, "water_density": 1000.0}
-GRID = {
-    "origin_x": ORIGIN[0],
-    "origin_y": ORIGIN[1],
-    "spacing": SPACING,
-    "columns": COLUMNS,
-    "rows": ROWS,
-}
 STATE = np.array([0.021, -0.034, 0.045, 0.062])
 # Position known to 5 mm and velocity to 2 cm/s: large, so that every term of the mean counts.
 COVARIANCE = np.array(
@@ -39,52 +42,6 @@ COVARIANCE = np.array(
     ]
 )
 VELOCITY_ONLY = scipy.linalg.block_diag(np.zeros((2, 2)), COVARIANCE[2:, 2:])
-
-
-def linear_coefficients(gradient: Any, constant: Any = (0.0, 0.0)) -> Floats:
-    """Of u = gradient @ (x, y) + constant: a B-spline counts with the value at its centre."""
-    x = ORIGIN[0] + SPACING * (np.arange(COLUMNS) - 1)
-    y = ORIGIN[1] + SPACING * (np.arange(ROWS) - 1)
-    linear = np.tensordot(np.asarray(gradient), np.stack(np.meshgrid(x, y)), 1)
-    return np.ascontiguousarray(linear + np.reshape(constant, (2, 1, 1)))
-
-
-GRADIENT = np.array([[0.1, -0.4], [0.5, -0.2]])
-LINEAR = linear_coefficients(GRADIENT)
-WAVY = LINEAR + 0.02 * np.random.default_rng(7).standard_normal(LINEAR.shape)
-
-
-def mean_drag(
-    coefficients: Floats,
-    mean: Floats = STATE,
-    covariance: Floats | None = None,
-    *,
-    theta: float = 0.4,
-    omega: float = 1.3,
-    drag_coefficient: float = 0.5,
-    orientation: str = "given",
-    **block: Any,
-) -> dict[str, Floats]:
-    return _core.expected_drag(
-        **(BLOCK | block),
-        **GRID,
-        coefficients=np.ascontiguousarray(coefficients),
-        drag_coefficient=drag_coefficient,
-        orientation=orientation,
-        mean=np.ascontiguousarray(mean),
-        theta=theta,
-        omega=omega,
-        covariance=np.zeros((4, 4)) if covariance is None else covariance,
-    )
-
-
-def slope(function: Callable[[Floats], Floats], at: Floats, step: float) -> Floats:
-    """Central differences: derivatives along the last axis."""
-    columns = []
-    for unit in np.eye(at.size):
-        ahead, back = function(at + step * unit), function(at - step * unit)
-        columns.append((ahead - back) / (2 * step))
-    return np.stack(columns, axis=-1)
 
 
 # --- the drag ------------------------------------------------------------------------------------
@@ -103,7 +60,9 @@ def test_a_block_known_exactly_feels_the_strip_law(gradient, strips):
         force = _core.drag(
             simulated, drag_coefficient=0.5, x=x, y=y, theta=theta, vx=vx, vy=vy, omega=1.3
         )
-        got = mean_drag(linear_coefficients(gradient), theta=theta, strips=strips)["acceleration"]
+        got = mean_drag(linear_coefficients(gradient), STATE, theta=theta, strips=strips)[
+            "acceleration"
+        ]
         np.testing.assert_allclose(got, np.array(force[:2]) / BLOCK["mass"], rtol=1e-10)
 
 
@@ -136,17 +95,17 @@ def test_mean_over_the_covariance_is_the_integral():
         top = mean + 12 * tau
         if top > 0:
             total += scale * scipy.integrate.quad_vec(force, 0, top, epsrel=1e-12)[0]
-    got = mean_drag(LINEAR, covariance=COVARIANCE, theta=theta, omega=omega)["acceleration"]
+    got = mean_drag(LINEAR, STATE, COVARIANCE, theta=theta, omega=omega)["acceleration"]
     np.testing.assert_allclose(got, total, rtol=1e-9)
     # The mean is far from the drag of the mean: without the covariance this test would fail.
-    assert np.abs(mean_drag(LINEAR)["acceleration"] / total - 1).max() > 0.05
+    assert np.abs(mean_drag(LINEAR, STATE)["acceleration"] / total - 1).max() > 0.05
 
 
 def test_mean_over_the_covariance_is_the_mean_of_draws():
     """4 standard errors on each of two components: a false alarm in 8000."""
     draws = np.random.default_rng(3).multivariate_normal(STATE, COVARIANCE, 20000)
     values = np.array([mean_drag(LINEAR, draw)["acceleration"] for draw in draws])
-    got = mean_drag(LINEAR, covariance=COVARIANCE)["acceleration"]
+    got = mean_drag(LINEAR, STATE, COVARIANCE)["acceleration"]
     error = values.std(axis=0) / np.sqrt(len(values))
     assert np.all(np.abs(got - values.mean(axis=0)) < 4 * error)
     assert np.all(error < 0.02 * np.abs(got).max())
@@ -174,8 +133,8 @@ def test_derivatives_are_those_of_differences(orientation):
 
 def test_drag_is_proportional_to_the_drag_coefficient():
     """So the derivative by its logarithm is the drag itself."""
-    one = mean_drag(WAVY, covariance=COVARIANCE, drag_coefficient=1.0)
-    half = mean_drag(WAVY, covariance=COVARIANCE, drag_coefficient=0.5)
+    one = mean_drag(WAVY, STATE, COVARIANCE, drag_coefficient=1.0)
+    half = mean_drag(WAVY, STATE, COVARIANCE, drag_coefficient=0.5)
     for name, value in one.items():
         np.testing.assert_allclose(half[name], value / 2, rtol=1e-13, atol=1e-15)
 
@@ -198,128 +157,6 @@ def test_an_unknown_angle_is_an_average_without_turning():
 
 
 # --- the filter ----------------------------------------------------------------------------------
-NOISE_INTENSITY, POSITION_NOISE = 4.5e-5, 3e-4
-
-
-def make_filter(track: dict[str, Any], coefficients: Floats = WAVY, **changes: Any) -> Any:
-    settings: dict[str, Any] = {
-        "coefficients": np.ascontiguousarray(coefficients),
-        "drag_coefficient": 0.5,
-        "noise_intensity": NOISE_INTENSITY,
-        "position_noise": POSITION_NOISE,
-        **BLOCK,
-        **GRID,
-    }
-    return _core.InnovationsFilter(**track, **(settings | changes))
-
-
-def run_filter(track: dict[str, Any], coefficients: Floats = WAVY, **changes: Any) -> Any:
-    return make_filter(track, coefficients, **changes).run(track["time"].size)
-
-
-def make_track(time: Floats, seed: int = 5) -> dict[str, Any]:
-    """A block that circles and turns, with noise: no model made it."""
-    rng = np.random.default_rng(seed)
-    noise = POSITION_NOISE * rng.standard_normal((2, time.size))
-    return {
-        "time": time,
-        "x": 0.05 * np.cos(0.7 * time) + noise[0],
-        "y": 0.04 * np.sin(0.7 * time + 0.3) + noise[1],
-        "theta": 0.4 * np.sin(time) + 0.2 * time,
-        "omega": 0.4 * np.cos(time) + 0.2,
-        "excluded": np.zeros(time.size, np.uint8),
-    }
-
-
-def difficult_track() -> dict[str, Any]:
-    """Uneven clock, missing samples, a gap of 0.7 s and one of 3 s, excluded ones, an outlier."""
-    rng = np.random.default_rng(11)
-    time = np.cumsum(rng.uniform(0.02, 0.16, 160))
-    time[60:] += 0.7
-    time[110:] += 3.0
-    track = make_track(time)
-    track["x"][[0, 20, 21, 22, 75, 110]] = np.nan
-    track["y"][[0, 20, 21, 22, 90, 110]] = np.nan
-    track["excluded"][[30, 31, 32, 21, 91]] = 1
-    track["x"][45] += 0.05
-    return track
-
-
-def dense_filter(
-    track: dict[str, Any], coefficients: Floats, *, orientation: str = "given", largest: float
-) -> dict[str, Floats]:
-    """The same filter by whole matrices: Joseph's update, sensitivities as a dense recursion."""
-    time, position = track["time"], np.stack([track["x"], track["y"]], axis=1)
-    half, eye = np.eye(4), np.eye(2)
-    observe, noise = np.eye(2, 4), POSITION_NOISE**2 * np.eye(2)
-    width = 2 * NODES + 1
-    rows: dict[str, list[Any]] = {"innovation": [], "covariance": [], "used": [], "state": []}
-    rows |= {"whitened": [], "jacobian": []}
-    s = P = M = None
-    last = -np.inf
-    for k in range(time.size):
-        there = not np.isnan(position[k]).any()
-        e, S, used = np.full(2, np.nan), np.full((2, 2), np.nan), False
-        whitened, jacobian = np.zeros(2), np.zeros((2, width))
-        if time[k] - last > 1.0:
-            s = None
-        if s is not None:
-            steps = max(1, int(np.ceil((time[k] - time[k - 1]) / largest - 1e-9)))
-            h = (time[k] - time[k - 1]) / steps
-            half[:2, 2:] = h / 2 * eye
-            for i in range(steps):
-                share = (i + 0.5) / steps
-                s, P, M = half @ s, half @ P @ half.T, half @ M
-                found = mean_drag(
-                    coefficients,
-                    s,
-                    P + scipy.linalg.block_diag(0 * eye, NOISE_INTENSITY * h / 2 * eye),
-                    theta=np.interp(share, [0, 1], track["theta"][k - 1 : k + 1]),
-                    omega=np.interp(share, [0, 1], track["omega"][k - 1 : k + 1]),
-                    orientation=orientation,
-                )
-                W = np.linalg.inv(eye - h / 2 * found["by_velocity"])
-                kick = np.eye(4)
-                kick[2:] += h * W @ np.hstack([found["by_position"], found["by_velocity"]])
-                by_parameters = np.hstack(
-                    [found["by_coefficients"].reshape(2, -1), found["acceleration"][:, None]]
-                )
-                s = s + np.concatenate([np.zeros(2), h * W @ found["acceleration"]])
-                M = kick @ M
-                M[2:] += h * W @ by_parameters
-                growth = np.kron([[h**3 / 3, h**2 / 2], [h**2 / 2, h]], W @ W.T)
-                s, M = half @ s, half @ M
-                P = half @ kick @ P @ kick.T @ half.T + NOISE_INTENSITY * growth
-            if track["excluded"][k]:
-                P = P + np.diag([0, 0, 0.01, 0.01])
-        if s is not None and there:
-            e, S = position[k] - observe @ s, observe @ P @ observe.T + noise
-            outlier = e @ np.linalg.solve(S, e) >= 40
-            used = not outlier and not track["excluded"][k]
-            if used:
-                L = np.linalg.cholesky(S)
-                whitened = np.linalg.solve(L, e)
-                jacobian = np.linalg.solve(L, observe @ M)
-            if outlier and not track["excluded"][k]:
-                s, P = np.concatenate([position[k], s[2:]]), np.diag([noise[0, 0]] * 2 + [0.01] * 2)
-                M = np.zeros((4, width))
-            else:
-                K = np.linalg.solve(S, observe @ P).T
-                keep = np.eye(4) - K @ observe
-                s, P, M = s + K @ e, keep @ P @ keep.T + K @ noise @ K.T, keep @ M
-        elif there:
-            s, P = np.concatenate([position[k], [0, 0]]), np.diag([noise[0, 0]] * 2 + [0.01] * 2)
-            M = np.zeros((4, width))
-        last = time[k] if there else last
-        rows["innovation"].append(e)
-        rows["covariance"].append([S[0, 0], S[0, 1], S[1, 1]])
-        rows["used"].append(used)
-        rows["state"].append(np.full(4, np.nan) if s is None else s)
-        rows["whitened"].extend(whitened)
-        rows["jacobian"].extend(jacobian)
-    return {name: np.array(values) for name, values in rows.items()}
-
-
 @pytest.mark.parametrize("orientation", ["given", "none"])
 def test_filter_is_the_dense_one(orientation):
     track = difficult_track()
@@ -334,10 +171,11 @@ def test_filter_is_the_dense_one(orientation):
     assert np.isfinite(got["state"][20:23]).all()
     for name in ("innovation", "covariance", "state", "whitened", "jacobian"):
         scale = np.nanmax(np.abs(want[name]))
-        # Derivatives that have become as good as zero are set to zero.
-        least = 1e-8 if name == "jacobian" else 1e-11
+        # Derivatives that have become as good as zero are set to zero. The bend of the drag, which
+        # is found by differences, limits the rest: without it numbers differ by up to a third.
+        least = 1e-8 if name == "jacobian" else 1e-10
         np.testing.assert_allclose(
-            got[name], want[name], rtol=1e-9, atol=least * scale, err_msg=name
+            got[name], want[name], rtol=1e-8, atol=least * scale, err_msg=name
         )
 
 

@@ -200,7 +200,7 @@ def test_layout_cells_parts_and_speeds() -> None:
     assert layout.size == pytest.approx(0.02)
     assert (layout.x.size, layout.y.size) == (15, 15)
     assert layout.parts == 10
-    assert np.bincount(layout.recording).tolist() == [7, 3]
+    assert np.bincount(layout.series).tolist() == [7, 3]
     assert layout.end[6] == pytest.approx(599.9)
     cell = cell_of(layout, np.array([0.0, -0.145, 9.0]), np.array([0.0, 0.145, -9.0]))
     assert cell.tolist() == [7 * 15 + 7, 14 * 15, 14]

@@ -11,20 +11,20 @@ from fit_worlds import coarse_study, recording
 
 from driftwalk.calibrate.fit import _body, _series
 from driftwalk.calibrate.fit_newton import Prior, Weights, inverse, limited, newton_step
-from driftwalk.calibrate.fit_pass import Passes, Point
+from driftwalk.calibrate.fit_pass import Passes, Point, Sums
 from driftwalk.calibrate.fit_spline import lay_spline
 from driftwalk.flow.arena import outline_of
 from driftwalk.schema import body_track
 
 
-@pytest.fixture(scope="module")
-def passes() -> Passes:
+@pytest.fixture(scope="module", params=["given", "state"])
+def passes(request: pytest.FixtureRequest) -> Passes:
     study = coarse_study()
     outline = outline_of(study.tank.to_arena())
     tracks = [body_track(recording(60.0, name)) for name in ("first", "second")]
-    series, _ = _series(tracks, study, outline, "given")
+    series, _ = _series(tracks, study, outline, request.param)
     spline = lay_spline(outline, side=0.03, spacing=0.03)
-    return Passes(series, _body(study, "given"), spline)
+    return Passes(series, _body(study, request.param), spline)
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +32,10 @@ def point(passes: Passes) -> Point:
     shape = (2, passes.spline.rows, passes.spline.columns)
     noise = np.random.default_rng(1).normal(0.0, 0.01, shape)
     # So much unrest that no innovation is an outlier, which a small step could make or unmake.
-    return Point(noise, math.log(0.5), math.log(2e-3), math.log(2.5e-4))
+    point = Point(noise, math.log(0.5), math.log(2e-3), math.log(2.5e-4))
+    if passes.body.orientation == "given":
+        return point
+    return replace(point, log_lever=math.log(3e-3), log_angle_noise=math.log(0.012))
 
 
 def test_the_score_is_the_slope_of_the_likelihood(passes: Passes, point: Point) -> None:
@@ -43,7 +46,7 @@ def test_the_score_is_the_slope_of_the_likelihood(passes: Passes, point: Point) 
     """
     score = passes.sums(point).score
     size = score.size
-    for direction in (np.eye(size)[-2], np.eye(size)[-1]):
+    for direction in np.eye(size)[-len(point.noises) :]:
         step = 1e-3
         change = [passes.sums(point.moved(sign * step * direction)).deviance for sign in (1, -1)]
         slope = -(change[0] - change[1]) / (2.0 * step)
@@ -61,33 +64,45 @@ def test_two_recordings_add_up(passes: Passes, point: Point) -> None:
 
 def test_without_noise_derivatives_the_rest_is_the_same(passes: Passes, point: Point) -> None:
     whole, part = passes.sums(point), passes.sums(point, noise="without")
-    assert part.score == pytest.approx(whole.score[:-2])
-    assert part.information == pytest.approx(whole.information[:-2, :-2])
-    assert np.linalg.eigvalsh(whole.information)[-3:].min() > 0.0
+    count = whole.score.size - len(point.noises)
+    assert part.score == pytest.approx(whole.score[:count])
+    assert part.information == pytest.approx(whole.information[:count, :count])
+    assert np.linalg.eigvalsh(whole.information)[-1 - len(point.noises) :].min() > 0.0
 
 
 def test_the_products_are_those_of_the_derivatives(passes: Passes, point: Point) -> None:
     """The filter's own sums against its derivatives, multiplied at once.
 
-    Left out is what is 1e-7 of the largest derivative at that time.
+    Left out is what is 1e-4 of the largest derivative among those of some two seconds. A column
+    that is so small all along may be lost, but to the data it is as good as unknown: against what
+    is known with the prior the error is below 1e-3 in any direction, and the step is less than a
+    twentieth of a standard deviation off.
     """
     series = passes.series[0]
     sums = replace(passes, series=[series]).sums(point, noise="without")
     whole = passes._filter(series, point, sensitivities=True).run(series.time.size)
     wanted = whole["jacobian"].T @ whole["jacobian"]
-    assert sums.information == pytest.approx(wanted, rel=1e-6, abs=1e-7 * np.abs(wanted).max())
     score = whole["jacobian"].T @ whole["whitened"]
-    assert sums.score == pytest.approx(score, rel=1e-6, abs=1e-6 * np.abs(score).max())
     assert sums.used == whole["used"].sum()
+    exact = Sums(sums.deviance, score, wanted, sums.used)
+    known = Prior(passes).add(exact, point, Weights(0.7, 2e4)).information
+    root = np.linalg.cholesky(known)
+    half = np.linalg.solve(root, sums.information - wanted)
+    assert np.linalg.norm(np.linalg.solve(root, half.T), 2) < 1e-3
+    assert np.linalg.norm(np.linalg.solve(root, sums.score - score)) < 0.05
+    size = np.sqrt(np.diag(known))
+    assert np.abs((sums.information - wanted) / np.outer(size, size)).max() < 3e-4
 
 
 def test_a_held_parameter_stays_and_the_others_are_the_best(passes: Passes, point: Point) -> None:
     prior = Prior(passes)
     sums = prior.add(passes.sums(point), point, Weights(1.0, 1e4))
-    step = newton_step(sums, inverse(sums.information), held=(-3, -1))
+    drag = point.coefficients.size
+    held = (drag, drag + 2)
+    step = newton_step(sums, inverse(sums.information), held=held)
     free = np.ones(step.size, dtype=bool)
-    free[[-3, -1]] = False
-    assert step[[-3, -1]] == pytest.approx([0.0, 0.0], abs=1e-9)
+    free[list(held)] = False
+    assert step[~free] == pytest.approx([0.0, 0.0], abs=1e-9)
     expected = np.linalg.solve(sums.information[np.ix_(free, free)], sums.score[free])
     assert step[free] == pytest.approx(expected, rel=1e-6, abs=1e-9)
 
@@ -97,7 +112,7 @@ def test_the_prior_is_the_gradient_of_its_own_deviance(passes: Passes, point: Po
     sums = passes.sums(point)
     inside = prior.add(sums, point, weights)
     direction = np.random.default_rng(4).normal(size=sums.score.size)
-    direction[-2:] = 0.0
+    direction[[-4, -3, -1] if len(point.noises) == 4 else [-2, -1]] = 0.0
     moved = [point.moved(sign * 1e-4 * direction) for sign in (1, -1)]
     up, down = (prior.add(sums, at, weights).deviance for at in moved)
     slope = (down - up) / 2e-4

@@ -54,6 +54,39 @@ def test_the_motion_is_not_continued_over_a_gap() -> None:
     assert intervals(x + 0.004, np.zeros(6), time) == []
 
 
+def test_a_corner_may_swing_into_the_wall() -> None:
+    """The centre rests at x = 0.1265, where a corner can come to 0.1477 and to 0.1487 at 0.1275.
+
+    Corners by complex numbers; the turning of two intervals is taken to go on for a third.
+    """
+    turned = 0.13 * np.arange(60) + 0.5
+    for place, some in ((0.1265, False), (0.1275, True)):
+        found = intervals(np.full(60, place), np.angle(np.exp(1j * turned)))
+        for rate in (0.0, 0.13):
+            quarter = np.exp(0.5j * np.pi * np.arange(4))[:, None]
+            angle = turned[:-1] + np.where(np.arange(59) >= 2, rate, 0.0)
+            corners = place + (0.015 + 0.015j) * quarter * np.exp(1j * angle)
+            near = 1 + np.flatnonzero(np.abs(corners).max(axis=0) > 0.148)
+            assert set(near.tolist()) <= set(found)
+            # Where the block is now is not enough to tell all of them.
+            assert (near.size < len(found)) == some
+        assert bool(found) == some
+        assert len(found) < 59
+
+
+def test_turning_is_not_continued_over_a_gap() -> None:
+    """A face towards the wall, turned by 0.3 a sample: its corner is near the wall one later."""
+    turned = np.array([-0.6, -0.3, 0.0, 0.3, 0.6])
+    x = np.full(5, 0.13)
+    reach = [np.abs(0.13 + (0.015 + 0.015j) * np.exp(1j * one)) for one in turned]
+    assert reach[2] < 0.148 < reach[1]
+    time = np.array([0.0, 0.1, 0.2, 0.3, 0.4])
+    assert intervals(x, turned, time) == [1, 2, 3, 4]
+    gap = np.array([0.0, 0.1, 0.2, 5.0, 5.1])
+    # What the pose at 0.2 s may become is not asked over five seconds; nor what it was before.
+    assert intervals(x, turned, gap) == [1, 2, 4]
+
+
 def test_the_future_does_not_matter() -> None:
     generator = np.random.default_rng(5)
     time = np.cumsum(generator.uniform(0.05, 0.2, 400))

@@ -71,8 +71,9 @@ def _fields(section: str) -> dict[str, object]:
 
 
 def _companions(key: str) -> dict[str, object]:
-    """The keys that a key of a rectangle or polygon needs beside it."""
+    """The keys that a key of a rectangle, a polygon or a list of intervals needs beside it."""
     return {
+        "flow_labels": {"switching_times_s": [600.0, 1200.0]},
         "width_m": {"shape": "rectangle", "height_m": 0.3},
         "height_m": {"shape": "rectangle", "width_m": 0.3},
         "vertices_m": {"shape": "polygon"},

@@ -5,25 +5,34 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from driftwalk.calibrate.fit_agreement import NOTABLE_DISAGREEMENT, angle_given_facts
+from driftwalk.calibrate.fit_agreement import angle_given_facts
 from driftwalk.calibrate.fit_angle import no_angle, smooth_angle
+from driftwalk.calibrate.fit_intervals import Intervals, cut_track, intervals_of
 from driftwalk.calibrate.fit_newton import Mode, Prior, Tell, find_mode, silent
 from driftwalk.calibrate.fit_pass import LONGEST_GAP_S, Body, Passes, Series
+from driftwalk.calibrate.fit_refuse import (
+    FEWEST_SAMPLES,
+    require_length,
+    require_motion,
+    require_size,
+    require_usable,
+)
 from driftwalk.calibrate.fit_reml import Restricted, restricted_drag
 from driftwalk.calibrate.fit_result import (
-    Whiteness,
     build_fit,
     parameter_attrs,
     parameter_covariance,
+    visited_shares,
     whiteness_of,
 )
-from driftwalk.calibrate.fit_spline import lay_spline
+from driftwalk.calibrate.fit_spline import Spline, lay_spline
 from driftwalk.calibrate.fit_start import first_point, first_weights
 from driftwalk.calibrate.fit_wall import wall_intervals
+from driftwalk.calibrate.fit_warnings import precision_facts, warnings_of
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.schema import Track, body_track
@@ -33,13 +42,8 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
-FEWEST_SAMPLES = 100
-MOST_WALL_SHARE = 0.3
-"""Share of intervals at the wall above which C_d means little."""
 ORIENTED_SHARE = 0.5
 """Share of samples with an orientation from which on "auto" uses it."""
-NOTABLE_AUTOCORRELATION = 0.05
-NOTABLE_STDS = 4.0
 
 AngleUse = Literal["auto", "state", "given", "none"]
 
@@ -54,7 +58,7 @@ def fit_motion(
 ) -> xr.Dataset:
     """Fit flow, drag coefficient, stochastic force and tracking noise to a recording, together.
 
-    Nothing is differentiated: a Kalman filter predicts each recorded position from the earlier ones
+    Nothing is differentiated: a Kalman filter predicts each recorded pose from the earlier ones
     with the drag of the model, and the parameters are those that make its errors likely. C_d is the
     minimum of the restricted likelihood, which allows for the flow being estimated along with it.
     See docs/explanation/likelihood.md.
@@ -64,7 +68,8 @@ def fit_motion(
     recordings : xarray.Dataset or sequence of xarray.Dataset
         A `trajectory`, or several of the same block in the same tank and flow.
     study : Study, optional
-        Block, tank, water, force interval and the section [fit]; default: the paper's.
+        Block, tank, water, force interval and the section [fit]; default: the paper's. With
+        switching times there each interval has a flow of its own, see `fitted_flow`.
     angle : {"auto", "state", "given", "none"}, optional
         How the recorded orientation is used; default: what the study says.
     body : str, optional
@@ -84,49 +89,49 @@ def fit_motion(
     ------
     InputError
         When a recording is too short or does not move, several bodies are there and none named, the
-        block is at the wall all the time, or angles are asked for where there are none.
+        block is at the wall all the time, angles are asked for where there are none, or switching
+        times are outside a recording or too near to each other.
 
     Examples
     --------
     >>> import driftwalk as dw
     >>> fit = dw.fit_motion(dw.tank30_recording())  # doctest: +SKIP
     >>> round(fit.attrs["drag_coefficient"], 2)  # doctest: +SKIP
-    0.37
+    0.39
     """
     from driftwalk.model import Study
 
     chosen = study if study is not None else Study()
     many = _as_list(recordings)
-    tracks, series, used_angle, wall_share = _prepare(many, chosen, angle, body)
+    ready = _prepare(many, chosen, angle, body)
+    series, used_angle, intervals = ready.series, ready.angle, ready.intervals
     outline = outline_of(chosen.tank.to_arena())
-    spline = lay_spline(
-        outline,
-        side=chosen.block.side_m,
-        spacing=chosen.fit.spacing_m(
-            side_m=chosen.block.side_m, widest_m=max(chosen.tank.extent_m)
-        ),
-    )
-    passes = Passes(series, _body(chosen, used_angle), spline)
-    mode, restricted = _search(passes, tracks, chosen, tell or silent)
+    spline = _spline(chosen, outline)
+    flows = len(intervals.labels)
+    passes = Passes(series, _body(chosen, used_angle), spline, flows)
+    mode, restricted = _search(passes, ready, chosen, tell or silent)
     whiteness = whiteness_of(passes.innovations(restricted.point))
     facts_given: dict[str, Any] = {}
     if used_angle == "state":
-        given, _ = _series(tracks, chosen, outline, "given")
+        given, _ = _series(ready.parts, chosen, outline, "given", ready.places)
         facts_given = angle_given_facts(
-            Passes(given, _body(chosen, "given"), spline), mode, restricted, chosen
+            Passes(given, _body(chosen, "given"), spline, flows), mode, restricted, chosen
         )
+    duration = sum(float(one.time[-1] - one.time[0]) for one in series)
+    covariance = parameter_covariance(mode, restricted)
     attrs: dict[str, Any] = {
-        **parameter_attrs(restricted.point, parameter_covariance(mode, restricted), chosen),
+        **parameter_attrs(restricted.point, covariance, chosen),
         "maximum_likelihood_drag_coefficient": math.exp(mode.point.log_drag),
+        **precision_facts(math.sqrt(covariance[0, 0]), duration, chosen),
         "wetted_depth_m": chosen.wetted_depth_m,
-        "wall_share": wall_share,
+        "wall_share": ready.wall_share,
         "angle": used_angle,
         **facts_given,
         "restricted": "yes" if restricted.has_minimum else "no",
         "samples": sum(one.time.size for one in series),
         "samples_used": mode.used,
-        "duration_s": sum(float(one.time[-1] - one.time[0]) for one in series),
-        "recordings": len(series),
+        "duration_s": duration,
+        "recordings": len(ready.tracks),
         **whiteness._asdict(),
         "iterations": mode.iterations,
         "converged": "yes" if mode.converged else "no",
@@ -136,10 +141,22 @@ def fit_motion(
         "simulated_recording": "yes" if any(_simulated(one) for one in many) else "no",
         "study": chosen.to_toml(),
     }
-    attrs["warnings"] = json.dumps(_warnings(attrs, whiteness))
-    return build_fit(
-        spline, mode, restricted, series, study=chosen, oriented=used_angle != "none", attrs=attrs
+    fit = build_fit(
+        spline,
+        mode,
+        restricted,
+        series,
+        study=chosen,
+        oriented=used_angle != "none",
+        intervals=intervals,
+        first=float(ready.tracks[0].time[0]),
+        attrs=attrs,
     )
+    shares = visited_shares(fit)
+    fit.attrs["visited_share"] = min(shares)
+    warnings = warnings_of(fit.attrs, whiteness, shares, intervals, side_m=chosen.block.side_m)
+    fit.attrs["warnings"] = json.dumps(warnings)
+    return fit
 
 
 def check_fit(
@@ -180,57 +197,106 @@ def _as_list(recordings: xr.Dataset | Sequence[xr.Dataset]) -> list[xr.Dataset]:
     return many
 
 
+class _Ready(NamedTuple):
+    """Recordings, ready for the filter."""
+
+    tracks: list[Track]
+    """One for each recording."""
+    parts: list[Track]
+    """The same, cut at the switching times."""
+    places: list[tuple[int, int]]
+    """Of each part: its flow and its recording."""
+    intervals: Intervals
+    series: list[Series]
+    """The parts as the filter takes them."""
+    angle: str
+    """How orientations are used."""
+    wall_share: float
+
+
 def _prepare(
     many: Sequence[xr.Dataset], study: Study, angle: AngleUse | None, body: str | None
-) -> tuple[list[Track], list[Series], str, float]:
-    """Return tracks, what the filter takes of them, how angles are used, and the wall share."""
-    tracks = [_checked_track(recording, body) for recording in many]
-    used_angle = _use_angle(tracks, study.fit.angle if angle is None else angle)
+) -> _Ready:
+    intervals = intervals_of(study)
     outline = outline_of(study.tank.to_arena())
-    series, wall_share = _series(tracks, study, outline, used_angle)
-    return tracks, series, used_angle, wall_share
+    require_size(len(intervals.labels), 2 * _spline(study, outline).size)
+    tracks, parts, places = [], [], []
+    for index, recording in enumerate(many):
+        track, where = body_track(recording, body), _name_of(recording)
+        require_length(track, study, where=where)
+        require_motion(track, study, where=where)
+        cut = cut_track(track, intervals, fewest=FEWEST_SAMPLES, where=where)
+        for number, part in enumerate(cut):
+            if len(cut) > 1:
+                require_motion(part, study, where=f"{where}{intervals.describe(number)}: ")
+        tracks.append(track)
+        parts += cut
+        places += [(flow, index) for flow in intervals.flows]
+    used_angle = _use_angle(many, tracks, study.fit.angle if angle is None else angle)
+    series, wall_share = _series(parts, study, outline, used_angle, places)
+    for flow in range(0 if intervals.steady else len(intervals.labels)):
+        _require_usable(
+            [one for one in series if one.flow == flow],
+            study,
+            where=f"{intervals.describe_flow(flow)}: ",
+        )
+    return _Ready(tracks, parts, places, intervals, series, used_angle, wall_share)
+
+
+def _name_of(recording: xr.Dataset) -> str:
+    """Return what a message on a recording begins with."""
+    name = recording.attrs.get("source", "")
+    return f"{name}: " if name else ""
 
 
 def _simulated(recording: xr.Dataset) -> bool:
     return str(recording.attrs.get("simulated", "no")) == "yes"
 
 
-def _checked_track(recording: xr.Dataset, body: str | None) -> Track:
-    track = body_track(recording, body)
-    name = recording.attrs.get("source", "")
-    where = f"{name}: " if name else ""
-    if track.time.size < FEWEST_SAMPLES:
-        raise InputError(
-            f"{where}the recording has {track.time.size} positions of this body; the fit needs "
-            f"{FEWEST_SAMPLES} at least, and half an hour to be of use"
-        )
-    if np.ptp(track.x) == 0.0 and np.ptp(track.y) == 0.0:
-        raise InputError(f"{where}the body never moves: there is nothing to fit")
-    return track
-
-
-def _use_angle(tracks: Sequence[Track], wanted: str) -> str:
+def _use_angle(many: Sequence[xr.Dataset], tracks: Sequence[Track], wanted: str) -> str:
     """Return how orientations are used: "state", "given" or "none"."""
     if wanted not in ("auto", "state", "given", "none"):
         raise InputError(f"angle must be 'auto', 'state', 'given' or 'none', got {wanted!r}")
-    seen = min(float(np.isfinite(track.theta).mean()) for track in tracks)
+    shares = [_oriented_share(track) for track in tracks]
+    seen = min(shares)
     if wanted in ("state", "given") and seen == 0.0:
+        where = _name_of(many[shares.index(seen)])
         raise InputError(
-            f"a recording has no orientations: leave out angle = {wanted!r} (--angle), or read the "
-            "column that holds them"
+            f"{where}the recording has no orientations, or the same in every row: leave out "
+            f"angle = {wanted!r} (--angle), or read the column that holds them"
         )
     if wanted == "auto":
         return "state" if seen >= ORIENTED_SHARE else "none"
     return wanted
 
 
+def _oriented_share(track: Track) -> float:
+    """Return the share of samples with an orientation; 0 where a tracker only fills its column."""
+    seen = np.isfinite(track.theta)
+    if not seen.any() or np.ptp(track.theta[seen]) == 0.0:
+        return 0.0
+    return float(seen.mean())
+
+
 def _series(
-    tracks: Sequence[Track], study: Study, outline: Outline, used_angle: str
+    tracks: Sequence[Track],
+    study: Study,
+    outline: Outline,
+    used_angle: str,
+    places: Sequence[tuple[int, int]] | None = None,
 ) -> tuple[list[Series], float]:
-    """Return the tracks as the filter takes them, and the share of intervals at the wall."""
-    found, near_wall, intervals, usable = [], 0, 0, 0
-    for track in tracks:
-        time = track.time - track.time[0]
+    """Return the tracks as the filter takes them, and the share of intervals at the wall.
+
+    `places` are the flow and the recording of each, by default one flow and recording after
+    recording. Times begin with the recording's first sample.
+    """
+    found: list[Series] = []
+    first = 0.0
+    for number, track in enumerate(tracks):
+        flow, recording = (0, number) if places is None else places[number]
+        if not found or found[-1].recording != recording:
+            first = float(track.time[0])
+        time = track.time - first
         smooth = no_angle(time.size)
         corners = None
         if used_angle != "none":
@@ -245,10 +311,6 @@ def _series(
             side=study.block.side_m,
             longest_gap=LONGEST_GAP_S,
         )
-        near_wall += int(wall.sum())
-        intervals += time.size - 1
-        excluded = wall | ~smooth.known
-        usable += int(np.count_nonzero(~excluded[1:] & (np.diff(time) <= LONGEST_GAP_S)))
         found.append(
             Series(
                 time,
@@ -256,17 +318,37 @@ def _series(
                 np.ascontiguousarray(track.y),
                 np.ascontiguousarray(track.theta) if used_angle == "state" else smooth.theta,
                 smooth.omega,
-                excluded.astype(np.uint8),
+                (wall | ~smooth.known).astype(np.uint8),
+                flow,
+                recording,
+                int(wall.sum()),
             )
         )
-    if usable < FEWEST_SAMPLES:
-        raise InputError(
-            f"only {usable} of {intervals} intervals can be used, at least {FEWEST_SAMPLES} are "
-            f"needed: {near_wall} are at the wall of the tank (a {study.tank.describe()}), the "
-            f"others are longer than {LONGEST_GAP_S:g} s or have no orientation near; check "
-            "the tank, or record for longer"
-        )
-    return found, near_wall / intervals
+    _require_usable(found, study)
+    return found, sum(one.near_wall for one in found) / sum(one.time.size - 1 for one in found)
+
+
+def _require_usable(series: Sequence[Series], study: Study, *, where: str = "") -> None:
+    usable = sum(
+        int(np.count_nonzero((one.excluded[1:] == 0) & (np.diff(one.time) <= LONGEST_GAP_S)))
+        for one in series
+    )
+    require_usable(
+        usable,
+        intervals=sum(one.time.size - 1 for one in series),
+        near_wall=sum(one.near_wall for one in series),
+        tank=study.tank.describe(),
+        longest_gap=LONGEST_GAP_S,
+        where=where,
+    )
+
+
+def _spline(study: Study, outline: Outline) -> Spline:
+    return lay_spline(
+        outline,
+        side=study.block.side_m,
+        spacing=study.fit.spacing_m(side_m=study.block.side_m, widest_m=max(study.tank.extent_m)),
+    )
 
 
 def _body(study: Study, used_angle: str) -> Body:
@@ -280,13 +362,25 @@ def _body(study: Study, used_angle: str) -> Body:
     )
 
 
-def _search(
-    passes: Passes, tracks: Sequence[Track], study: Study, tell: Tell
-) -> tuple[Mode, Restricted]:
+def _longest_in(ready: _Ready, flow: int) -> Track:
+    """Return the longest part that is in a flow."""
+    return max(
+        (part for part, (one, _) in zip(ready.parts, ready.places, strict=True) if one == flow),
+        key=lambda part: part.time.size,
+    )
+
+
+def _search(passes: Passes, ready: _Ready, study: Study, tell: Tell) -> tuple[Mode, Restricted]:
     """Return the maximum of the likelihood and that of the restricted one."""
     prior = Prior(passes)
-    start = first_point(tracks, study, passes.spline, angle=passes.body.orientation)
-    weights = first_weights(tracks, passes.spline)
+    start = first_point(
+        ready.tracks,
+        study,
+        passes.spline,
+        angle=passes.body.orientation,
+        in_flows=[_longest_in(ready, flow) for flow in range(passes.flows)],
+    )
+    weights = first_weights(ready.tracks, passes.spline)
     try:
         mode = find_mode(passes, start, weights, prior, iterations=study.fit.iterations, tell=tell)
         tell(mode.iterations, mode.iterations, "drag")
@@ -296,41 +390,3 @@ def _search(
             "the fit has no solution for this recording: its motion does not follow the model at "
             f"all, or tank, block or units are wrong ({error})"
         ) from error
-
-
-def _warnings(facts: dict[str, Any], whiteness: Whiteness) -> list[str]:
-    """Return what the user has to know, in sentences."""
-    found = []
-    if facts["wall_share"] > MOST_WALL_SHARE:
-        found.append(
-            f"{facts['wall_share']:.0%} of the intervals are at the wall and were left out: C_d is "
-            "not to be trusted above 30 %; record where the block keeps away from the wall"
-        )
-    if facts["converged"] == "no":
-        found.append(
-            f"the search has not come to its end in {facts['iterations']} steps ([fit] iterations)"
-        )
-    if facts["restricted"] == "no":
-        found.append(
-            "the restricted likelihood has no minimum: C_d is that of the plain one, likely too "
-            "large, and the motion tells little of it or does not follow the model"
-        )
-    if facts["angle"] == "none":
-        found.append(
-            "no orientation was used: the drag is averaged over all orientations of the block"
-        )
-    apart = facts.get("angle_disagreement_std", 0.0)
-    if apart > NOTABLE_DISAGREEMENT:
-        found.append(
-            f"with the angle as an input C_d is {facts['drag_coefficient_angle_given']:.3g}, "
-            f"{apart:.1f} combined standard deviations away: the turning of the block and its "
-            "motion do not agree on one drag law, and the intervals are too narrow"
-        )
-    off = abs(whiteness.autocorrelation)
-    if off > max(NOTABLE_STDS * whiteness.autocorrelation_std, NOTABLE_AUTOCORRELATION):
-        found.append(
-            f"the errors of prediction are correlated ({whiteness.autocorrelation:+.2f} from one "
-            "sample to the next): the motion has something that the model has not, and the "
-            "intervals are too narrow"
-        )
-    return found

@@ -56,10 +56,11 @@ def angle_given_facts(
     except np.linalg.LinAlgError:
         return {"angle_disagreement_std": math.nan}
     covariance = parameter_covariance(other, found)
+    own = parameter_covariance(mode, restricted)
     apart = abs(found.point.log_drag - restricted.point.log_drag)
     attrs = parameter_attrs(found.point, covariance, study)
     return {
         "drag_coefficient_angle_given": attrs["drag_coefficient"],
         "drag_coefficient_angle_given_interval": attrs["drag_coefficient_interval"],
-        "angle_disagreement_std": apart / math.hypot(found.log_drag_std, restricted.log_drag_std),
+        "angle_disagreement_std": apart / math.sqrt(covariance[0, 0] + own[0, 0]),
     }

@@ -115,7 +115,7 @@ def check_model(
     data, coords = white_variables(found)
     parts = [place_variables(found)]
     try:
-        problems = ready_problems(fit, estimate.study, many, body=body)
+        problems = ready_problems(fit, estimate, many)
         drawn = replicates_drawn(
             fit, estimate, problems, found.leverage.spread, count=replicates, seed=seed
         )

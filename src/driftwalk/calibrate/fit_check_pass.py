@@ -19,9 +19,10 @@ import numpy.typing as npt
 
 from driftwalk.calibrate.fit import _body, _prepare
 from driftwalk.calibrate.fit_newton import Prior, Weights
-from driftwalk.calibrate.fit_pass import Passes, Point, Series, Sums
+from driftwalk.calibrate.fit_pass import Passes, Place, Point, Series, Sums
 from driftwalk.calibrate.fit_spline import DEGREE, Floats, Spline, basis
 from driftwalk.core.errors import InputError
+from driftwalk.schema import Track
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,6 +37,8 @@ MOST_KEPT_PARTS = 4
 """Parts of the recording whose derivatives are kept for the correction of the autocorrelation."""
 DRAWS = 16
 """Draws of the parameters from which that correction is computed."""
+WHOLE: tuple[Place, ...] = ((slice(None), slice(None)),)
+"""All columns, where they are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +49,8 @@ class Estimate:
     passes: Passes
     point: Point
     weights: Weights
+    tracks: Sequence[Track]
+    """What the series of the passes were made of: the recordings, cut at the switching times."""
 
 
 def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str | None) -> Estimate:
@@ -55,8 +60,8 @@ def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str 
     if fit.attrs.get("kind") != "fit":
         raise InputError(f"not a fit: its kind is {fit.attrs.get('kind')!r}; fit_motion makes one")
     study = parse_study(fit.attrs["study"])
-    _, series, used_angle, _ = _prepare(recordings, study, fit.attrs["angle"], body)
-    samples = sum(one.time.size for one in series)
+    ready = _prepare(recordings, study, fit.attrs["angle"], body)
+    samples = sum(one.time.size for one in ready.series)
     if samples != int(fit.attrs["samples"]):
         raise InputError(
             f"the recordings have {samples} positions, the fit was made of {fit.attrs['samples']}: "
@@ -65,7 +70,7 @@ def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str 
     coefficients = np.asarray(fit["coefficient"].values, dtype=np.float64)
     x, y = fit.attrs["spline_origin_m"]
     spline = Spline(
-        float(x), float(y), float(fit.attrs["spline_spacing_m"]), *coefficients.shape[:0:-1]
+        float(x), float(y), float(fit.attrs["spline_spacing_m"]), *coefficients.shape[:-3:-1]
     )
     intensity = fit.attrs["force_noise_intensity_N2_s"] / study.block.mass_kg**2
     point = Point(
@@ -74,19 +79,20 @@ def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str 
         math.log(intensity),
         math.log(fit.attrs["tracking_noise_m"]),
     )
-    if used_angle == "state":
+    if ready.angle == "state":
         point = replace(
             point,
             log_lever=math.log(fit.attrs["force_lever_m"]),
             log_angle_noise=math.log(fit.attrs["orientation_noise_rad"]),
         )
     weights = Weights(float(fit.attrs["roughness_weight"]), float(fit.attrs["size_weight"]))
-    return Estimate(study, Passes(series, _body(study, used_angle), spline), point, weights)
+    passes = Passes(ready.series, _body(study, ready.angle), spline, len(ready.intervals.labels))
+    return Estimate(study, passes, point, weights, ready.parts)
 
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """The errors of prediction of one recording, whitened, and where they were made."""
+    """The errors of prediction of one series, whitened, and where they were made."""
 
     series: Series
     white: Floats
@@ -104,23 +110,22 @@ class Errors:
 
 
 def errors_of(estimate: Estimate) -> list[Errors]:
-    """Run the filter over every recording at the estimate."""
+    """Run the filter over every series at the estimate."""
     found = []
     whitened = estimate.passes.innovations(estimate.point)
     for series, (white, used) in zip(estimate.passes.series, whitened, strict=True):
-        states = estimate.passes._filter(series, estimate.point).run(series.time.size)["state"]
+        point = estimate.point.in_flow(series.flow)
+        states = estimate.passes._filter(series, point).run(series.time.size)["state"]
         speed = np.full(series.time.size, np.nan)
         # The state before the sample: to sort errors by what they caused would bias them.
-        speed[1:] = _relative_speed(states[:-1], estimate)
+        speed[1:] = _relative_speed(states[:-1], estimate.passes.spline, point)
         outlier = np.isfinite(white).all(axis=1) & ~used & (series.excluded == 0)
         found.append(Errors(series, np.where(used[:, None], white, 0.0), used, outlier, speed))
     return found
 
 
-def _relative_speed(states: Floats, estimate: Estimate) -> Floats:
-    flow = velocity_at(
-        estimate.passes.spline, estimate.point.coefficients, states[:, 0], states[:, 1]
-    )
+def _relative_speed(states: Floats, spline: Spline, point: Point) -> Floats:
+    flow = velocity_at(spline, point.coefficients, states[:, 0], states[:, 1])
     # Coordinates come first, as many as velocities.
     velocity = states[:, states.shape[1] // 2 :]
     return np.asarray(np.hypot(flow[0] - velocity[:, 0], flow[1] - velocity[:, 1]))
@@ -152,7 +157,7 @@ class Contrast:
     Attributes
     ----------
     groups : sequence of ndarray, shapes (n, D)
-        Of each recording: the group of each innovation, -1 for none.
+        Of each series: the group of each innovation, -1 for none.
     size : int
         Number of groups.
     by : {"one", "flow", "drag"}
@@ -174,8 +179,15 @@ class Contrast:
         self.score, self.power = np.zeros(self.size), np.zeros(self.size)
         self.slope = np.zeros((self.size, parameters))
 
-    def add(self, group: Integers, weight: Floats, white: Floats, jacobian: Floats) -> None:
-        """Add the rows of one part."""
+    def add(
+        self,
+        group: Integers,
+        weight: Floats,
+        white: Floats,
+        jacobian: Floats,
+        places: Sequence[Place] = WHOLE,
+    ) -> None:
+        """Add the rows of one part; `places` says where its columns stand among all parameters."""
         from scipy.sparse import csr_matrix
 
         kept = np.flatnonzero(group >= 0)
@@ -185,7 +197,9 @@ class Contrast:
         matrix = csr_matrix((weight[kept], (local, kept)), shape=(present.size, group.size))
         self.score[present] += np.asarray(matrix @ white)
         self.power[present] += np.bincount(local, weight[kept] ** 2)
-        self.slope[present] += np.asarray(matrix @ jacobian)
+        slope = np.asarray(matrix @ jacobian)
+        for own, columns in places:
+            self.slope[present, columns] += slope[:, own]
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,13 +220,17 @@ class Leverage:
 
 
 class _Part(NamedTuple):
-    """Some samples of one recording."""
+    """Some samples of one series."""
 
-    recording: int
+    series: int
+    flow: int
     start: int
     jacobian: Floats
-    """Shape (rows, parameters): the components of a sample one after the other."""
+    """By the coefficients of the part's flow and ln C_d, shape (rows, columns): the components of
+    a sample one after the other."""
     white: Floats
+    places: tuple[Place, Place]
+    """Where its columns stand among the parameters of all flows."""
 
 
 def collect(
@@ -222,29 +240,37 @@ def collect(
     from scipy.linalg import solve_triangular
     from scipy.linalg.blas import dsyrk
 
-    flow = estimate.point.coefficients.ravel()
+    size = estimate.point.coefficients.size + 1
     count = sum(math.ceil(one.used.size / SAMPLES_AT_ONCE) for one in errors)
     chosen = set(np.linspace(0, count - 1, MOST_KEPT_PARTS).astype(int).tolist())
     kept = []
-    lower: Any = None
+    for contrast in contrasts:
+        contrast.begin(size)
+    lower: dict[int, Any] = {}
     for number, part in enumerate(_parts(estimate, errors)):
         jacobian = part.jacobian
-        if lower is None:
-            lower = np.zeros((jacobian.shape[1],) * 2, order="F")
-            for contrast in contrasts:
-                contrast.begin(len(lower))
-        lower = dsyrk(1.0, jacobian.T, beta=1.0, c=lower, overwrite_c=1, lower=1)
+        if part.flow not in lower:
+            lower[part.flow] = np.zeros((jacobian.shape[1],) * 2, order="F")
+        lower[part.flow] = dsyrk(
+            1.0, jacobian.T, beta=1.0, c=lower[part.flow], overwrite_c=1, lower=1
+        )
         weights = {
             "one": np.ones(part.white.size),
-            "flow": jacobian[:, : flow.size] @ flow,
-            "drag": jacobian[:, flow.size],
+            "flow": jacobian[:, :-1] @ estimate.point.in_flow(part.flow).coefficients.ravel(),
+            "drag": jacobian[:, -1],
         }
         for contrast in contrasts:
-            group = contrast.groups[part.recording][part.start : part.start + SAMPLES_AT_ONCE]
-            contrast.add(group.ravel(), weights[contrast.by], part.white, jacobian)
+            group = contrast.groups[part.series][part.start : part.start + SAMPLES_AT_ONCE]
+            contrast.add(group.ravel(), weights[contrast.by], part.white, jacobian, part.places)
         if number in chosen:
             kept.append(part)
-    data = np.tril(lower) + np.tril(lower, -1).T
+    data = np.zeros((size, size))
+    for flow, part_of in lower.items():
+        whole = np.tril(part_of) + np.tril(part_of, -1).T
+        places = estimate.passes.columns_of(flow, 1)
+        for own, row in places:
+            for own_column, column in places:
+                data[row, column] += whole[own, own_column]
     prior = Prior(estimate.passes)
     sums = Sums(0.0, np.zeros(len(data)), data, 0)
     full = prior.add(sums, estimate.point, estimate.weights).information
@@ -257,13 +283,16 @@ def collect(
 
 
 def _parts(estimate: Estimate, errors: Sequence[Errors]) -> Iterator[_Part]:
-    """Run the filter with derivatives over every recording, some samples at a time."""
+    """Run the filter with derivatives over every series, some samples at a time."""
     for index, one in enumerate(errors):
-        running = estimate.passes._filter(one.series, estimate.point, sensitivities=True)
+        flow = one.series.flow
+        places = estimate.passes.columns_of(flow, 1)
+        point = estimate.point.in_flow(flow)
+        running = estimate.passes._filter(one.series, point, sensitivities=True)
         for start in range(0, one.used.size, SAMPLES_AT_ONCE):
             found = running.run(SAMPLES_AT_ONCE)
             white = np.asarray(found["whitened"]).ravel()
-            yield _Part(index, start, np.asarray(found["jacobian"]), white)
+            yield _Part(index, flow, start, np.asarray(found["jacobian"]), white, places)
 
 
 def _autocovariance(
@@ -275,8 +304,9 @@ def _autocovariance(
     draws = spread @ generator.normal(size=(len(spread), DRAWS))
     total, pairs = np.zeros((components, lags + 1)), np.zeros(lags + 1)
     for part in kept:
-        moved = (part.jacobian @ draws).reshape(-1, components, DRAWS)
-        used = errors[part.recording].used[part.start : part.start + len(moved)]
+        own = np.concatenate([draws[columns] for _, columns in part.places])
+        moved = (part.jacobian @ own).reshape(-1, components, DRAWS)
+        used = errors[part.series].used[part.start : part.start + len(moved)]
         for lag in range(lags + 1):
             both = used[lag:] & used[: used.size - lag]
             products = moved[lag:][both] * moved[: used.size - lag][both]

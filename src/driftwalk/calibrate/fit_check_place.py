@@ -42,13 +42,29 @@ class Layout:
     y: Floats
     size: float
     """Side of a cell [m]."""
-    recording: Integers
-    """Which recording each part belongs to."""
+    series: Integers
+    """Which series each part belongs to: a recording, or what is between two switching times."""
     start: Floats
     """When each part begins, from the first sample of its recording [s]."""
     end: Floats
     speed: Floats
     """Edges of the ranges of the speed of the water past the block [m/s]."""
+    sources: tuple[tuple[int, int], ...] = ()
+    """Recording and flow of each series; without them every series is a recording in one flow."""
+
+    def recording(self, part: int) -> int:
+        """Return the recording that a part belongs to."""
+        series = int(self.series[part])
+        return self.sources[series][0] if self.sources else series
+
+    def flow(self, part: int) -> int:
+        """Return the flow that a part is in."""
+        return self.sources[int(self.series[part])][1] if self.sources else 0
+
+    @property
+    def recordings(self) -> int:
+        """Number of recordings."""
+        return len({self.recording(part) for part in range(self.parts)})
 
     @property
     def cells(self) -> int:
@@ -75,13 +91,13 @@ def lay_out(
         axes.append(0.5 * (low + high) + middle)
     samples = sum(int(one.used.sum()) for one in errors)
     parts = int(np.clip(samples // FEWEST_IN_BIN, 1, TIME_BINS))
-    recording, start, end = [], [], []
-    duration = sum(float(one.series.time[-1]) for one in errors)
+    numbers, start, end = [], [], []
+    duration = sum(float(one.series.time[-1] - one.series.time[0]) for one in errors)
     for index, one in enumerate(errors):
-        length = float(one.series.time[-1])
-        count = max(1, round(parts * length / duration))
-        edges = np.linspace(0.0, length, count + 1)
-        recording += [index] * count
+        first, last = float(one.series.time[0]), float(one.series.time[-1])
+        count = max(1, round(parts * (last - first) / duration))
+        edges = np.linspace(first, last, count + 1)
+        numbers += [index] * count
         start += edges[:-1].tolist()
         end += edges[1:].tolist()
     speeds = np.concatenate([one.speed[one.used] for one in errors])
@@ -93,15 +109,16 @@ def lay_out(
         axes[0],
         axes[1],
         size,
-        np.array(recording),
+        np.array(numbers),
         np.array(start),
         np.array(end),
         np.unique(edges),
+        tuple((one.series.recording, one.series.flow) for one in errors),
     )
 
 
 class Groups(NamedTuple):
-    """The groups of every sample of one recording, -1 for none."""
+    """The groups of every sample of one series, -1 for none."""
 
     cell: Integers
     part: Integers
@@ -109,12 +126,12 @@ class Groups(NamedTuple):
 
 
 def groups_of(layout: Layout, errors: Sequence[Errors]) -> list[Groups]:
-    """Return the groups of the samples of every recording."""
+    """Return the groups of the samples of every series."""
     found = []
     for index, one in enumerate(errors):
         # Where the body was at the sample before: known when the prediction was made.
         x, y = (np.concatenate([axis[:1], axis[:-1]]) for axis in (one.series.x, one.series.y))
-        parts = np.flatnonzero(layout.recording == index)
+        parts = np.flatnonzero(layout.series == index)
         part = parts[0] + np.searchsorted(layout.start[parts][1:], one.series.time, side="right")
         speed = np.searchsorted(layout.speed[1:-1], np.nan_to_num(one.speed), side="right")
         known = one.used & np.isfinite(one.speed) & (layout.speed.size > 1)

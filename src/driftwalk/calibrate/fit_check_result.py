@@ -89,7 +89,7 @@ def place_variables(found: Residuals) -> Parts:
     coords = {
         "x": ("x", layout.x, {"units": "m"}),
         "y": ("y", layout.y, {"units": "m"}),
-        "part_recording": ("part", layout.recording),
+        "part_recording": ("part", [layout.recording(part) for part in range(layout.parts)]),
         "part_start": ("part", layout.start, second),
         "part_end": ("part", layout.end, second),
         "speed_low": ("speed_range", edges[:-1], speed),

@@ -88,12 +88,13 @@ def scan_of(
 
 
 def _stretches(layout: Layout) -> list[tuple[int, int]]:
-    """Return the first and last part of every stretch of one recording, but not of the whole."""
+    """Return the first and last part of every stretch of one series, but not of a whole flow."""
     found = []
+    in_flow = np.bincount([layout.flow(part) for part in range(layout.parts)])
     for first in range(layout.parts):
         for last in range(first, layout.parts):
-            same = layout.recording[first] == layout.recording[last]
-            if same and last - first + 1 < layout.parts:
+            same = layout.series[first] == layout.series[last]
+            if same and last - first + 1 < in_flow[layout.flow(first)]:
                 found.append((first, last))
     return found
 
@@ -101,13 +102,18 @@ def _stretches(layout: Layout) -> list[tuple[int, int]]:
 def _differences(
     paths: Sequence[Path], stretches: Sequence[tuple[int, int]], layout: Layout
 ) -> Floats:
-    """Return the root mean square difference of each stretch to the rest [m/s], 0 for none."""
+    """Return the root mean square difference of each stretch to the rest [m/s], 0 for none.
+
+    The rest is that in the same flow.
+    """
     sums = np.concatenate([_sums(path, index, layout) for index, path in enumerate(paths)])
+    flows = np.array([layout.flow(part) for part in range(layout.parts)])
+    whole = {int(flow): sums[flows == flow].sum(axis=0) for flow in np.unique(flows)}
     running = np.concatenate([np.zeros((1, *sums.shape[1:])), np.cumsum(sums, axis=0)])
     found = np.zeros(len(stretches))
     for k, (first, last) in enumerate(stretches):
         inside = running[last + 1] - running[first]
-        rest = running[-1] - inside
+        rest = whole[int(flows[first])] - inside
         both = (inside[0] >= FEWEST_IN_CELL) & (rest[0] >= FEWEST_IN_CELL)
         if both.any():
             inside, rest = inside[:, both], rest[:, both]
@@ -117,11 +123,11 @@ def _differences(
     return found
 
 
-def _sums(path: Path, recording: int, layout: Layout) -> Floats:
+def _sums(path: Path, series: int, layout: Layout) -> Floats:
     """Return number and sums of the velocities by part and cell, (parts, 3, cells)."""
     time, x, y = path
     step = np.diff(time)
-    parts = np.flatnonzero(layout.recording == recording)
+    parts = np.flatnonzero(layout.series == series)
     part = np.searchsorted(layout.start[parts][1:], time[:-1], side="right")
     cell = cell_of(layout, 0.5 * (x[:-1] + x[1:]), 0.5 * (y[:-1] + y[1:]))
     kept = step <= LONGEST_INTERVALS * np.median(step)

@@ -56,7 +56,7 @@ def criteria_of(
     angle: str,
 ) -> list[Criterion]:
     """Ask everything."""
-    where = Where(found.layout, len(errors))
+    where = Where(found.layout)
     names = components_of(errors[0].components)
     return [
         autocorrelation_criterion(found.white, names),
@@ -85,7 +85,6 @@ class Where(NamedTuple):
     """All that is needed to name places and times."""
 
     layout: Layout
-    recordings: int
 
     def place(self, cell: int) -> str:
         """Return "x = 0.060 m, y = -0.100 m"."""
@@ -96,8 +95,8 @@ class Where(NamedTuple):
         """Return "between 600 s and 1200 s", from the start of a part to its or another's end."""
         end = self.layout.end[part if last is None else last]
         found = f"between {self.layout.start[part]:.0f} s and {end:.0f} s"
-        if self.recordings > 1:
-            found += f" of recording {self.layout.recording[part] + 1}"
+        if self.layout.recordings > 1:
+            found += f" of recording {self.layout.recording(part) + 1}"
         return found
 
 

@@ -12,12 +12,14 @@ import numpy.typing as npt
 
 from driftwalk import _core
 from driftwalk.calibrate.fit_check_pass import Estimate
+from driftwalk.calibrate.fit_intervals import fitted_intervals
+from driftwalk.calibrate.fit_pass import Series
 from driftwalk.calibrate.fit_result import fitted_flow
 from driftwalk.calibrate.fit_spline import Floats
 from driftwalk.calibrate.problem import Problem, prepare_problem
 from driftwalk.compare import apply_steps, plan_steps
 from driftwalk.core.seeds import world_keys
-from driftwalk.schema import Track, body_track
+from driftwalk.schema import Track
 from driftwalk.simulate import recorded_camera
 from driftwalk.simulate.backend import world_table
 from driftwalk.simulate.initial import world_orientations
@@ -51,9 +53,9 @@ class Replicates(NamedTuple):
 
 
 def ready_problems(
-    fit: xr.Dataset, study: Study, recordings: Sequence[xr.Dataset], *, body: str | None
+    fit: xr.Dataset, estimate: Estimate, recordings: Sequence[xr.Dataset]
 ) -> list[Problem]:
-    """Return the recordings ready for comparison, in the fitted flow, with one step interval.
+    """Return the series ready for comparison, each in its fitted flow, with one step interval.
 
     Raises
     ------
@@ -62,14 +64,24 @@ def ready_problems(
     """
     from driftwalk.model import apply_overrides
 
-    flow = fitted_flow(fit)
-    tracks = [body_track(recording, body) for recording in recordings]
+    study, tracks, series = estimate.study, estimate.tracks, estimate.passes.series
+    intervals = fitted_intervals(fit)
+    flows = [
+        fitted_flow(fit, interval=intervals.of_flow(flow)[0])
+        for flow in range(len(intervals.labels))
+    ]
     if study.steps.step_interval_s == "auto":
         interval = max(plan_steps(track.time).step_interval for track in tracks)
         study = apply_overrides(study, {"steps.step_interval_s": interval})
     return [
-        _problem(track, study, flow, noise=fit.attrs["tracking_noise_m"], recording=recording)
-        for track, recording in zip(tracks, recordings, strict=True)
+        _problem(
+            track,
+            study,
+            flows[one.flow],
+            noise=fit.attrs["tracking_noise_m"],
+            recording=recordings[one.recording],
+        )
+        for track, one in zip(tracks, series, strict=True)
     ]
 
 
@@ -117,7 +129,7 @@ def replicates_drawn(
     fit, estimate : xarray.Dataset, Estimate
         The fit.
     problems : sequence of Problem
-        The recordings.
+        The recordings, cut at the switching times.
     spread : ndarray
         Root of the covariance of the flow's coefficients and ln C_d.
     count, seed : int
@@ -131,17 +143,20 @@ def replicates_drawn(
     parts: list[list[_World]] = []
     for index, problem in enumerate(problems):
         keys = _keys(seed, DRAWN, index, count)
-        x, y = problem.flow["x"].values, problem.flow["y"].values
+        series = estimate.passes.series[index]
 
         def simulated(
-            k: int, problem: Problem = problem, keys: Keys = keys, x: Floats = x, y: Floats = y
+            k: int, problem: Problem = problem, keys: Keys = keys, series: Series = series
         ) -> list[_World]:
-            u, v = estimate.passes.spline.values(coefficients[k], x, y)
+            x, y = problem.flow["x"].values, problem.flow["y"].values
+            point = replace(estimate.point, coefficients=coefficients[k]).in_flow(series.flow)
+            u, v = estimate.passes.spline.values(point.coefficients, x, y)
             flow = problem.flow.assign(u=(("y", "x"), u), v=(("y", "x"), v))
             noise = problem.camera.position_noise * float(factors[k, 2])
             camera = replace(problem.camera, position_noise=noise)
             own = replace(problem, flow=flow, camera=camera, threads=1)
-            return _simulated(own, keys[flow_of == k], float(drag[k]), float(force[k]))
+            begin = float(series.time[0])
+            return _simulated(own, keys[flow_of == k], float(drag[k]), float(force[k]), begin)
 
         with ThreadPoolExecutor(problem.threads) as pool:
             found = list(pool.map(simulated, range(flows)))
@@ -179,7 +194,9 @@ def _keys(seed: int, kind: int, index: int, count: int) -> Keys:
     return world_keys(seed, trial=2 * index + kind, replicate=np.arange(count))
 
 
-def _simulated(problem: Problem, keys: Keys, drag: float, force: float) -> list[_World]:
+def _simulated(
+    problem: Problem, keys: Keys, drag: float, force: float, begin: float = 0.0
+) -> list[_World]:
     start = problem.start
     table = world_table(
         **{**start._asdict(), "theta": world_orientations(start.theta, keys)},
@@ -193,7 +210,7 @@ def _simulated(problem: Problem, keys: Keys, drag: float, force: float) -> list[
     for k in range(keys.size):
         found = apply_steps(problem.plan, x[k], y[k])
         steps = np.column_stack([found.step_length, found.turning_angle])
-        path = (problem.sample_time, x[k].astype(np.float64), y[k].astype(np.float64))
+        path = (begin + problem.sample_time, x[k].astype(np.float64), y[k].astype(np.float64))
         worlds.append(_World(steps, path, bool(status[k] == 0 and len(steps) > 0)))
     return worlds
 

@@ -1,9 +1,10 @@
 """The maximum of the penalised likelihood, by Gauss-Newton, and the smoothness of the flow.
 
 Prior of the flow's coefficients: ``exp(-(lam_r c' R c + lam_s c' S c) / 2)`` per component, R and S
-the roughness and the size of `driftwalk.calibrate.fit_spline.penalties`. The two weights follow
-from the data: each step sets a weight to the degrees of freedom that the data have taken from its
-prior, over ``c' R c`` or ``c' S c`` (MacKay's fixed point of the evidence).
+the roughness and the size of `driftwalk.calibrate.fit_spline.penalties`; with several flows the
+weights are the same for all. The two weights follow from the data: each step sets a weight to the
+degrees of freedom that the data have taken from its prior, over ``c' R c`` or ``c' S c`` (MacKay's
+fixed point of the evidence).
 """
 
 from __future__ import annotations
@@ -26,12 +27,14 @@ settle before a step of C_d or of the other noises means anything."""
 PRIOR_LEVER = 0.01
 """Centre of the weak prior of the force's lever, in sides of the block, and its first value."""
 PRIOR_LOG_LEVER_STD = 1.0
-LEVER = 3
-"""Place of the lever, counted from C_d on."""
-MOST_LOG_LEVER_STEP = 1.0
-LEVER_COUNTS = 0.2
-"""Share of the lever's step, in standard deviations, when convergence is judged: it hardly moves
-the others."""
+PRIOR_ANGLE_NOISE = 0.01
+"""Centre of the prior of the angle's noise [rad], so weak that it counts only where the turning is
+so restless that nothing is known of the noise."""
+PRIOR_LOG_ANGLE_NOISE_STD = 2.3
+LEVER, ANGLE_NOISE = 3, 4
+"""Places of the lever and of the angle's noise, counted from C_d on."""
+MOST_LOG_STEP = 1.0
+"""Of the lever and of the angle's noise."""
 MOST_LOG_DRAG_STEP = 0.5
 MOST_FACTOR = 10.0
 """By which q, r^2 or the weight of a penalty may change in a step."""
@@ -63,18 +66,21 @@ class Prior:
         """Return the sums with the prior of the coefficients, of C_d and of the lever in them."""
         precision = self.matrix(weights)
         count = len(precision)
-        coefficients = point.coefficients.reshape(2, -1)
+        coefficients = point.coefficients.reshape(-1, count)
         score, information = sums.score.copy(), sums.information.copy()
         pull = coefficients @ precision
-        for component in range(2):
+        for component in range(len(coefficients)):
             part = slice(component * count, (component + 1) * count)
             information[part, part] += precision
             score[part] -= pull[component]
         deviance = sums.deviance + 0.5 * float((pull * coefficients).sum())
-        drag = 2 * count
+        drag = coefficients.size
         single = [(drag, point.log_drag - math.log(PRIOR_DRAG), PRIOR_LOG_DRAG_STD)]
         if point.log_lever is not None:
             single.append((drag + LEVER, point.log_lever - self.log_lever, PRIOR_LOG_LEVER_STD))
+        if point.log_angle_noise is not None:
+            off = point.log_angle_noise - math.log(PRIOR_ANGLE_NOISE)
+            single.append((drag + ANGLE_NOISE, off, PRIOR_LOG_ANGLE_NOISE_STD))
         for index, off, std in single:
             deviance += 0.5 * (off / std) ** 2
             # Without derivatives by the noises there is no row of the lever.
@@ -86,14 +92,15 @@ class Prior:
     def updated(self, weights: Weights, point: Point, covariance: Floats) -> Weights:
         """Return the weights after one step of the evidence's fixed point."""
         inverse = np.linalg.inv(self.matrix(weights))
-        coefficients = point.coefficients.reshape(2, -1)
         count = len(inverse)
+        coefficients = point.coefficients.reshape(-1, count)
         parts = [
-            covariance[k * count : (k + 1) * count, k * count : (k + 1) * count] for k in (0, 1)
+            covariance[k * count : (k + 1) * count, k * count : (k + 1) * count]
+            for k in range(len(coefficients))
         ]
         new = []
         for old, form in ((weights.roughness, self.roughness), (weights.size, self.size)):
-            prior = 2.0 * float((form * inverse).sum())
+            prior = len(parts) * float((form * inverse).sum())
             posterior = sum(float((form * part).sum()) for part in parts)
             value = float(np.einsum("ka,ab,kb->", coefficients, form, coefficients))
             wanted = old * (prior - posterior) / max(value, 1e-300)
@@ -163,11 +170,12 @@ def find_mode(
         held = [one for one in held if one < sums.score.size]
         covariance = inverse(sums.information)
         step = limited(newton_step(sums, covariance, held=held), drag)
-        step, last = damped(step, last, sums.information), step
+        step = last = damped(step, last, sums.information)
         point = point.moved(step)
         weights = prior.updated(weights, point, covariance)
         moves = np.abs(step) / np.sqrt(np.diag(covariance))
-        moves[drag + LEVER : drag + LEVER + 1] *= LEVER_COUNTS
+        # A lever that is known from its prior alone may go to and fro without moving anything else.
+        moves[drag + LEVER : drag + LEVER + 1] = 0.0
         near = max(float(moves[drag:].max()), float(np.sqrt((moves[:drag] ** 2).mean())))
         if len(held) == 0 and near < CLOSE:
             converged = True
@@ -197,12 +205,12 @@ def damped(step: Floats, last: Floats, information: Floats) -> Floats:
 
 
 def limited(step: Floats, drag: int) -> Floats:
-    """Return the step, shortened where C_d or the lever would jump, with other noises as factors.
+    """Return the step, shortened where it would jump, with q and r taken as factors.
 
     The step is the same whether it is made in the logarithm of a variance or in the variance; made
-    in the variance it finds a wrong one in one step, from whatever side. The first of the noises is
-    a variance, q, the others are standard deviations. The lever is another matter: where the force
-    has none it is known from its prior alone, which is one of the logarithm.
+    in the variance it finds a wrong one in one step, from whatever side. Lever and noise of the
+    angle are another matter: they may be known from their priors alone, which are those of
+    logarithms.
 
     Parameters
     ----------
@@ -212,13 +220,10 @@ def limited(step: Floats, drag: int) -> Floats:
         Where ln C_d stands in it.
     """
     shorter = step * min(1.0, MOST_LOG_DRAG_STEP / max(abs(float(step[drag])), 1e-300))
-    for index, power in ((1, 1.0), (2, 2.0), (4, 2.0)):
-        if drag + index < step.size:
-            factor = np.clip(1.0 + power * step[drag + index], 1.0 / MOST_FACTOR, MOST_FACTOR)
-            shorter[drag + index] = math.log(factor) / power
-    if drag + LEVER < step.size:
-        wanted = float(step[drag + LEVER])
-        shorter[drag + LEVER] = np.clip(wanted, -MOST_LOG_LEVER_STEP, MOST_LOG_LEVER_STEP)
+    for index, power in ((1, 1.0), (2, 2.0)):
+        factor = np.clip(1.0 + power * step[drag + index], 1.0 / MOST_FACTOR, MOST_FACTOR)
+        shorter[drag + index] = math.log(factor) / power
+    shorter[drag + LEVER :] = np.clip(step[drag + LEVER :], -MOST_LOG_STEP, MOST_LOG_STEP)
     return np.asarray(shorter)
 
 

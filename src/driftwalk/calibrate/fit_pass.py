@@ -7,7 +7,8 @@ ln C_d, and the noises: ln q (intensity of the stochastic acceleration), ln r (t
 where the angle is a part of the state, the logarithms of the force's lever and of the angle's
 noise. For the first two the filter itself adds up the products of the derivatives of its
 predictions; for the noises it is run again with slightly larger values, and the derivatives of S_k
-enter as well.
+enter as well. Where the pumps were switched each flow has coefficients of its own; a series is in
+one flow and adds to the block of that flow alone, and to the parameters that all share.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from driftwalk import _core
 from driftwalk.calibrate.fit_spline import Floats, Spline
 
 Flags = npt.NDArray[np.bool_]
+Place = tuple[slice, slice]
 
 LARGEST_STEP_S = 0.05
 """Longest step of the filter's integrator."""
@@ -44,6 +46,12 @@ class Series:
     omega: Floats
     excluded: npt.NDArray[np.uint8]
     """Samples that end an interval which is left out."""
+    flow: int = 0
+    """Number of the flow that the water has meanwhile."""
+    recording: int = 0
+    """Number of the recording, which may be cut into several series."""
+    near_wall: int = 0
+    """Intervals that are left out because the block may touch the wall."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +73,7 @@ class Point:
     """Values of everything that is estimated."""
 
     coefficients: Floats
-    """Of the flow, shape (2, rows, columns) [m/s]."""
+    """Of the flow, shape (2, rows, columns) [m/s]; (flows, 2, rows, columns) with several flows."""
     log_drag: float
     """ln C_d."""
     log_intensity: float
@@ -84,6 +92,12 @@ class Point:
         names = ("log_intensity", "log_noise", "log_lever", "log_angle_noise")
         found = {name: getattr(self, name) for name in names}
         return {name: value for name, value in found.items() if value is not None}
+
+    def in_flow(self, flow: int) -> Point:
+        """Return the point with the coefficients of one flow alone."""
+        if self.coefficients.ndim == 3:
+            return self
+        return replace(self, coefficients=self.coefficients[flow])
 
     def moved(self, step: Floats) -> Point:
         """Return the point after a step in (coefficients, ln C_d, noises)."""
@@ -123,11 +137,36 @@ class Passes:
         The block.
     spline : Spline
         Knots of the flow.
+    flows : int
+        Number of flows.
     """
 
     series: Sequence[Series]
     body: Body
     spline: Spline
+    flows: int = 1
+
+    def columns_of(self, flow: int, others: int) -> tuple[Place, Place]:
+        """Return where the derivatives in one flow stand among those in all.
+
+        Parameters
+        ----------
+        flow : int
+            The flow.
+        others : int
+            Number of parameters that are not coefficients of a flow.
+
+        Returns
+        -------
+        tuple
+            For the coefficients and for the others: their place in one flow, and among all.
+        """
+        count = 2 * self.spline.size
+        shared = self.flows * count
+        return (
+            (slice(0, count), slice(flow * count, (flow + 1) * count)),
+            (slice(count, count + others), slice(shared, shared + others)),
+        )
 
     def sums(self, point: Point, *, noise: str = "with") -> Sums:
         """Return likelihood, score and information at a point.
@@ -141,11 +180,19 @@ class Passes:
             ln C_d.
         """
         names = list(point.noises) if noise == "with" else []
-        size = 2 * self.spline.size + 1 + len(names)
-        total = Sums(0.0, np.zeros(size), np.zeros((size, size)), 0)
+        others = 1 + len(names)
+        size = 2 * self.spline.size * self.flows + others
+        deviance, used = 0.0, 0
+        score, information = np.zeros(size), np.zeros((size, size))
         for series in self.series:
-            total = _added(total, self._sums_of(series, point, names))
-        return total
+            one = self._sums_of(series, point.in_flow(series.flow), names)
+            places = self.columns_of(series.flow, others)
+            for own, row in places:
+                score[row] += one.score[own]
+                for own_column, column in places:
+                    information[row, column] += one.information[own, own_column]
+            deviance, used = deviance + one.deviance, used + one.used
+        return Sums(deviance, score, information, used)
 
     def _sums_of(self, series: Series, point: Point, names: list[str]) -> Sums:
         base = self._run(series, point)
@@ -182,10 +229,8 @@ class Passes:
 
         D is 3 with the angle in the state, else 2. The innovation of a missing angle is 0.
         """
-        found = [self._run(series, point) for series in self.series]
-        return [
-            (forward(factor(one["covariance"]), one["innovation"].T).T, _used(one)) for one in found
-        ]
+        found = [self._run(series, point.in_flow(series.flow)) for series in self.series]
+        return [(_whitened(one), _used(one)) for one in found]
 
     def _run(self, series: Series, point: Point) -> dict[str, Any]:
         return dict(self._filter(series, point).run(series.time.size))
@@ -225,17 +270,14 @@ class Passes:
         )
 
 
+def _whitened(found: dict[str, Any]) -> Floats:
+    white = forward(factor(found["covariance"]), found["innovation"].T).T
+    # To the filter a missing angle is one measured where it was predicted, with an enormous error.
+    return np.where(found["innovation"] == 0.0, 0.0, white)
+
+
 def _used(found: dict[str, Any]) -> Flags:
     return np.asarray(found["used"], dtype=bool)
-
-
-def _added(one: Sums, other: Sums) -> Sums:
-    return Sums(
-        one.deviance + other.deviance,
-        one.score + other.score,
-        one.information + other.information,
-        one.used + other.used,
-    )
 
 
 def _noise_derivatives(

@@ -3,7 +3,8 @@
 On (y, x), the nodes of a flow field: ``u``, ``v`` and their standard errors [m/s] at every node,
 ``flag`` and ``count`` (samples with the block over the node); on (component, knot_y, knot_x) the
 coefficients of the spline; ``covariance`` of (ln C_d, ln q, ln r); the profile of the likelihood
-along C_d.
+along C_d. With switching times all that belongs to a flow has the dimension ``flow`` in front, and
+``interval_flow`` on (interval) says which flow each interval has.
 """
 
 from __future__ import annotations
@@ -15,10 +16,12 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.calibrate.fit_intervals import Intervals, fitted_intervals, switched_frames
 from driftwalk.calibrate.fit_newton import Mode
 from driftwalk.calibrate.fit_pass import Series
 from driftwalk.calibrate.fit_reml import Restricted
 from driftwalk.calibrate.fit_spline import Floats, Spline
+from driftwalk.calibrate.fit_widening import widened
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.flow.grid import Grid, make_grid
@@ -79,12 +82,15 @@ def whiteness_of(innovations: list[tuple[Floats, npt.NDArray[np.bool_]]]) -> Whi
 
 
 def parameter_covariance(mode: Mode, restricted: Restricted) -> Floats:
-    """Return the covariance of ln C_d and the noises, C_d's variance from its own criterion."""
+    """Return the covariance of ln C_d and the noises, C_d's variance from its own criterion.
+
+    It is that of theory, with the factors that were measured.
+    """
     drag = mode.point.coefficients.size
     covariance = mode.covariance[drag:, drag:].copy()
     scale = np.ones(len(covariance))
     scale[0] = restricted.log_drag_std / math.sqrt(covariance[0, 0])
-    return np.asarray(covariance * np.outer(scale, scale))
+    return widened(covariance * np.outer(scale, scale), mode.point)
 
 
 def parameter_attrs(point: Any, covariance: Floats, study: Study) -> dict[str, Any]:
@@ -120,38 +126,35 @@ def build_fit(
     *,
     study: Study,
     oriented: bool,
+    intervals: Intervals,
+    first: float,
     attrs: dict[str, Any],
 ) -> xr.Dataset:
-    """Assemble the dataset of a fit."""
+    """Assemble the dataset of a fit; `first` is the first recording's first time stamp [s]."""
     import xarray as xr
 
     outline = outline_of(study.tank.to_arena())
     grid = make_grid(outline, cells=study.flow.cells, cell_size=study.flow.cell_size_m)
-    coefficients = restricted.point.coefficients
-    count = footprint_count(grid, series, side=study.block.side_m, oriented=oriented)
-    speed = {"units": "m s-1"}
-    values = spline.values(coefficients, grid.x, grid.y)
-    errors = spline.standard_errors(
-        mode.covariance[: 2 * spline.size, : 2 * spline.size], grid.x, grid.y
-    )
+    flows = [
+        _flow_variables(
+            spline,
+            restricted.point.in_flow(flow).coefficients,
+            mode.covariance[_block(spline, flow), _block(spline, flow)],
+            [one for one in series if one.flow == flow],
+            grid=grid,
+            outline=outline,
+            study=study,
+            oriented=oriented,
+        )
+        for flow in range(len(intervals.labels))
+    ]
     profiles = restricted.profiles
     least = min(one.deviance for one in profiles)
     flat = profiles[0].half_log_determinant
     uncertainty = parameter_covariance(mode, restricted)
     names = np.array(PARAMETERS[: len(uncertainty)], dtype=object)
-    plane, knots = ("y", "x"), ("component", "knot_y", "knot_x")
     data: dict[str, Any] = {
-        "u": (plane, values[0], speed),
-        "v": (plane, values[1], speed),
-        "u_standard_error": (plane, errors[0], speed),
-        "v_standard_error": (plane, errors[1], speed),
-        "count": (
-            plane,
-            count,
-            {"units": "1", "long_name": "samples with the block over the node"},
-        ),
-        "flag": (plane, _flags(grid, outline, count), {"long_name": "origin of the node's value"}),
-        "coefficient": (knots, coefficients, speed),
+        **(flows[0] if intervals.steady else _stacked(flows)),
         "covariance": (
             ("parameter", "other_parameter"),
             uncertainty,
@@ -181,16 +184,85 @@ def build_fit(
         "arena": json.dumps(study.tank.to_arena()),
         **attrs,
     }
+    if not intervals.steady:
+        coords["flow"] = ("flow", np.array(intervals.labels, dtype=object))
+        data["interval_flow"] = (
+            "interval",
+            np.array(intervals.flows, dtype=np.int32),
+            {"long_name": "number of the flow in each interval between the switching times"},
+        )
+        facts["switching_times_s"] = list(intervals.times)
+        facts["recording_start_s"] = first
     return xr.Dataset(data, coords=coords, attrs=facts)
 
 
-def fitted_flow(fit: xr.Dataset) -> xr.Dataset:
+def _block(spline: Spline, flow: int) -> slice:
+    """Return where the coefficients of a flow are among all parameters."""
+    count = 2 * spline.size
+    return slice(flow * count, (flow + 1) * count)
+
+
+def _flow_variables(
+    spline: Spline,
+    coefficients: Floats,
+    covariance: Floats,
+    series: list[Series],
+    *,
+    grid: Grid,
+    outline: Outline,
+    study: Study,
+    oriented: bool,
+) -> dict[str, Any]:
+    """Return the variables of one flow, with their dimensions and attributes."""
+    count = footprint_count(grid, series, side=study.block.side_m, oriented=oriented)
+    speed = {"units": "m s-1"}
+    values = spline.values(coefficients, grid.x, grid.y)
+    errors = spline.standard_errors(covariance, grid.x, grid.y)
+    plane, knots = ("y", "x"), ("component", "knot_y", "knot_x")
+    return {
+        "u": (plane, values[0], speed),
+        "v": (plane, values[1], speed),
+        "u_standard_error": (plane, errors[0], speed),
+        "v_standard_error": (plane, errors[1], speed),
+        "count": (
+            plane,
+            count,
+            {"units": "1", "long_name": "samples with the block over the node"},
+        ),
+        "flag": (plane, _flags(grid, outline, count), {"long_name": "origin of the node's value"}),
+        "coefficient": (knots, coefficients, speed),
+    }
+
+
+def _stacked(flows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the variables of several flows along a dimension of their own."""
+    return {
+        name: (("flow", *dims), np.stack([one[name][1] for one in flows]), attrs)
+        for name, (dims, _, attrs) in flows[0].items()
+    }
+
+
+def visited_shares(fit: xr.Dataset) -> list[float]:
+    """Return for each flow of a fit the share of the tank's nodes that the block has been over."""
+    flags = fit["flag"].values.reshape(-1, *fit["flag"].shape[-2:])
+    return [
+        float((one == FLAGS["measured"]).sum() / max((one != FLAGS["outside"]).sum(), 1))
+        for one in flags
+    ]
+
+
+def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
     """Return the flow of a fit as a flow field, for everything that takes one.
 
     Parameters
     ----------
     fit : xarray.Dataset
         What `fit_motion` returns.
+    interval : int, optional
+        With switching times: the interval, counted from 0, whose steady flow is wanted. Without
+        it the flow that changes is returned: its frames are a microsecond before and after each
+        switch, as fields are linear in time between frames; times count from the first sample of
+        the first recording, as those of a simulation do.
 
     Returns
     -------
@@ -202,7 +274,7 @@ def fitted_flow(fit: xr.Dataset) -> xr.Dataset:
     Raises
     ------
     InputError
-        When the dataset is no fit.
+        When the dataset is no fit, or has no such interval.
 
     Examples
     --------
@@ -211,25 +283,39 @@ def fitted_flow(fit: xr.Dataset) -> xr.Dataset:
     """
     if fit.attrs.get("kind") != "fit":
         raise InputError(f"not a fit: its kind is {fit.attrs.get('kind')!r}; fit_motion makes one")
+    intervals = fitted_intervals(fit)
+    if interval is not None and not 0 <= interval < len(intervals.flows):
+        raise InputError(
+            f"no interval {interval}: the fit has {len(intervals.flows)}, counted from 0"
+        )
+    kept = ("cell_size_m", "arena", "source")
+    attrs: dict[str, Any] = {
+        "method": "bicubic spline, fitted with drag and noise by the innovations' likelihood",
+        **{key: fit.attrs[key] for key in kept},
+    }
+    if intervals.steady:
+        return build_flow_field(
+            fit["x"].values, fit["y"].values, attrs=attrs, **_field_variables(fit)
+        )
+    fields = [_field_variables(fit.isel(flow=index)) for index in range(fit.sizes["flow"])]
+    if interval is not None:
+        flow = intervals.flows[interval]
+        attrs["flow_label"] = intervals.labels[flow]
+        attrs["intervals"] = ", ".join(intervals.describe(one) for one in intervals.of_flow(flow))
+        return build_flow_field(fit["x"].values, fit["y"].values, attrs=attrs, **fields[flow])
+    by_name = {name: [one[name] for one in fields] for name in fields[0]}
+    time, frames = switched_frames(intervals, by_name, first=float(fit.attrs["recording_start_s"]))
+    return build_flow_field(fit["x"].values, fit["y"].values, time=time, attrs=attrs, **frames)
+
+
+def _field_variables(fit: xr.Dataset) -> dict[str, Any]:
+    """Return the variables of a flow field: standard errors at measured nodes only."""
     measured = fit["flag"].values == FLAGS["measured"]
     errors = {
-        f"{name}_standard_error": np.where(measured, fit[f"{name}_standard_error"].values, np.nan)
-        for name in ("u", "v")
+        name: np.where(measured, fit[name].values, np.nan)
+        for name in ("u_standard_error", "v_standard_error")
     }
-    kept = ("cell_size_m", "arena", "source")
-    return build_flow_field(
-        fit["x"].values,
-        fit["y"].values,
-        u=fit["u"].values,
-        v=fit["v"].values,
-        flag=fit["flag"].values,
-        count=fit["count"].values,
-        attrs={
-            "method": "bicubic spline, fitted with drag and noise by the innovations' likelihood",
-            **{key: fit.attrs[key] for key in kept},
-        },
-        **errors,
-    )
+    return {**{name: fit[name].values for name in ("u", "v", "flag", "count")}, **errors}
 
 
 def footprint_count(

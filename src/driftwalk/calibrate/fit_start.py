@@ -29,13 +29,36 @@ SMALLEST_NOISE = 1e-3
 """Least tracking noise at the start, of the step between samples."""
 
 
-def first_point(tracks: Sequence[Track], study: Study, spline: Spline, *, angle: str) -> Point:
-    """Return the first values: C_d = 0.5, the flow of Eq. 4, the noise of `driftwalk info`."""
+def first_point(
+    tracks: Sequence[Track],
+    study: Study,
+    spline: Spline,
+    *,
+    angle: str,
+    in_flows: Sequence[Track] = (),
+) -> Point:
+    """Return the first values: C_d = 0.5, the flow of Eq. 4, the noise of `driftwalk info`.
+
+    Parameters
+    ----------
+    tracks : sequence of Track
+        The recordings.
+    study, spline
+        Block and tank, and the knots of the flow.
+    angle : {"state", "given", "none"}
+        How orientations are used.
+    in_flows : sequence of Track
+        With several flows: a track in each of them.
+    """
     cameras = [recorded_camera(track, study, position_quantum=0.0) for track in tracks]
     steps = np.concatenate([np.hypot(np.diff(track.x), np.diff(track.y)) for track in tracks])
     least = max(SMALLEST_NOISE * float(np.median(steps[steps > 0.0])), 1e-9)
     point = Point(
-        coefficients=_flow_coefficients(tracks[0], study, spline),
+        coefficients=(
+            np.stack([_flow_coefficients(one, study, spline) for one in in_flows])
+            if len(in_flows) > 1
+            else _flow_coefficients(tracks[0], study, spline)
+        ),
         log_drag=math.log(PRIOR_DRAG),
         log_intensity=math.log(UNREST * typical_speed(tracks) ** 3 / study.block.side_m),
         log_noise=_log_noise([camera.position_noise for camera in cameras], least),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.calibrate.fit import MOST_WALL_SHARE
+from driftwalk.calibrate.fit_warnings import MOST_WALL_SHARE
 from driftwalk.calibrate.recover_check import angles_of, check_recovery
 from driftwalk.calibrate.recover_one import (
     FACTS,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.calibrate.fit import FEWEST_SAMPLES
+from driftwalk.calibrate.fit_refuse import FEWEST_SAMPLES
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import outline_of
 from driftwalk.model.recover import RANDOM

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.calibrate.fit_intervals import fitted_intervals
 from driftwalk.calibrate.fit_result import fitted_flow
 from driftwalk.calibrate.fit_wall import MARGIN
 from driftwalk.core.errors import InputError
@@ -39,6 +40,7 @@ def score_fit(
     tracking_noise: float,
     flow: xr.Dataset,
     recordings: xr.Dataset | Sequence[xr.Dataset] | None = None,
+    interval: int | None = None,
 ) -> dict[str, Any]:
     """Hold a fit beside the truth that made its recording.
 
@@ -57,6 +59,8 @@ def score_fit(
     recordings : xarray.Dataset or sequence of xarray.Dataset, optional
         What was fitted: says where the block has been. Without them, it has been where all of the
         circle inside it lies over measured nodes, which is a little more.
+    interval : int, optional
+        With switching times: the interval, counted from 0, that the true flow belongs to.
 
     Returns
     -------
@@ -73,7 +77,8 @@ def score_fit(
     Raises
     ------
     InputError
-        When a truth is not positive, or a dataset is no fit or no flow field without frames.
+        When a truth is not positive, or a dataset is no fit or no flow field without frames, or
+        the fit has several flows and no interval is given.
 
     Examples
     --------
@@ -89,14 +94,19 @@ def score_fit(
     >>> round(score["drag_coefficient_error"], 2)  # doctest: +SKIP
     -0.03
     """
-    estimated = fitted_flow(fit)
+    if "flow" in fit.dims and interval is None:
+        raise InputError(
+            f"the fit has {fit.sizes['flow']} flows: name the interval that the true flow belongs "
+            f"to, 0 to {fit.sizes['interval'] - 1}"
+        )
+    estimated = fitted_flow(fit, interval=interval)
     if "time" in flow.dims:
         raise InputError("the true flow has frames: a steady one is needed to score a fit")
     truth = dict(zip(SCORED, (drag_coefficient, force_std, tracking_noise), strict=True))
     score: dict[str, Any] = {}
     for name, value in truth.items():
         score.update(_parameter_score(fit, name, value))
-    cells = _visited_cells(estimated, fit, recordings)
+    cells = _visited_cells(estimated, fit, recordings, interval=interval or 0)
     return {**score, **_flow_score(estimated, flow, cells, side=_side(fit))}
 
 
@@ -163,7 +173,11 @@ def _side(fit: xr.Dataset) -> float:
 
 
 def _visited_cells(
-    flow: xr.Dataset, fit: xr.Dataset, recordings: xr.Dataset | Sequence[xr.Dataset] | None
+    flow: xr.Dataset,
+    fit: xr.Dataset,
+    recordings: xr.Dataset | Sequence[xr.Dataset] | None,
+    *,
+    interval: int,
 ) -> npt.NDArray[np.bool_]:
     """Return the cells around the nodes of a fitted flow in which the block has been."""
     import xarray as xr
@@ -173,10 +187,13 @@ def _visited_cells(
     many = [recordings] if isinstance(recordings, xr.Dataset) else list(recordings)
     outline = outline_of(json.loads(fit.attrs["arena"]))
     reach = _side(fit) / math.sqrt(2.0) + MARGIN
+    intervals = fitted_intervals(fit)
+    flows = np.array(intervals.flows)
     count = np.zeros(flow["flag"].shape)
     for one in many:
         track = body_track(one)
         known = np.isfinite(track.x) & np.isfinite(track.y)
+        known &= flows[intervals.index_of(track.time)] == flows[interval]
         x, y = track.x[known], track.y[known]
         free = outline.depth(x, y) > reach
         edges = tuple(_edges(flow[axis].values) for axis in ("y", "x"))

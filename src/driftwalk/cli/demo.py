@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from driftwalk.cli.calibrate import Overwrite, Threads, print_answer, summary
+from driftwalk.cli.calibrate import Overwrite, Threads
+from driftwalk.cli.demo_answer import Found, in_json, print_beside_truth
 from driftwalk.cli.options import Json
 from driftwalk.cli.output import print_json, print_note
 
@@ -28,12 +29,14 @@ QUICK = {
     "calibration.refined_replicates": 2,
     "calibration.bootstrap": 20,
 }
+FIT, CALIBRATION = "fit", "calibrate"
+"""The run directories inside that of the demo, one for each command."""
 
 
 def demo(
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Run directory.")] = Path(
-        "demo"
-    ),
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="DIR", help="Directory of both runs.")
+    ] = Path("demo"),
     quick: Annotated[
         bool, typer.Option("--quick", help="A small part of the search: seconds, not minutes.")
     ] = False,
@@ -41,40 +44,25 @@ def demo(
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
-    """Calibrate a bundled recording, from file to figures.
+    """Fit a bundled recording, check the model, and calibrate on the fitted flow.
 
-    The recording was simulated by another engine (ODE), so that the truth is known; its true flow
-    field is used. The result is printed beside the truth.
+    The recording was simulated by another engine (ODE), so that the truth is known. First comes
+    the likelihood fit of flow, drag, force and tracking noise (DIR/fit), then the paper's map of KS
+    distances in the fitted flow (DIR/calibrate). Both are printed beside the truth.
     """
-    from driftwalk.cli.calibration_run import Work, run_calibration
-    from driftwalk.core.run_layout import state_of
-    from driftwalk.datasets import tank30_flow, tank30_recording
+    from driftwalk.datasets import tank30_recording
 
-    if out.is_dir() and state_of(out) == "finished" and not overwrite:
-        print_note(f"{out} holds a finished run (--overwrite starts anew); this is what it found")
-        found = _read(out / "calibration.nc")
-    else:
-        folder = files("driftwalk.datasets") / "tank30_ode_a"
-        with as_file(folder / "recording.csv") as path, as_file(folder / "flow_true.csv") as flow:
-            work = Work(
-                tank30_recording(),
-                demo_study(quick=quick),
-                tank30_flow(),
-                None,
-                {"recording": path, "flow": flow},
-                threads,
-            )
-            found = run_calibration(work, out, overwrite=overwrite)
+    _require_own(out)
+    recording, study = tank30_recording(), demo_study(quick=quick)
+    folder = files("driftwalk.datasets") / "tank30_ode_a"
+    with as_file(folder / "recording.csv") as path:
+        fit, check = _fit(recording, study, path, out / FIT, overwrite=overwrite)
+        calibration = _calibrate(recording, study, path, out, overwrite=overwrite, threads=threads)
+    found = Found(fit, check, calibration, recording)
     if json:
-        print_json({**summary(found), "truth": _truth()})
-        return
-    print_answer(found, out)
-    truth = _truth()
-    print(
-        f"the truth              C_d = {truth['drag_coefficient']:g}, σ_F = "
-        f"{1e3 * truth['force_std_N']:g} mN drawn anew every "
-        f"{1e3 * truth['force_interval_s']:g} ms"
-    )
+        print_json(in_json(found))
+    else:
+        print_beside_truth(found, out)
 
 
 def demo_study(*, quick: bool) -> Study:
@@ -91,11 +79,60 @@ def demo_study(*, quick: bool) -> Study:
     return apply_overrides(Study(), {**known, **(QUICK if quick else {})})
 
 
-def _truth() -> dict[str, float]:
-    from driftwalk.datasets import tank30_truth
+def _fit(
+    recording: xr.Dataset, study: Study, path: Path, folder: Path, *, overwrite: bool
+) -> tuple[xr.Dataset, xr.Dataset]:
+    """Fit and check, or read what a finished run found."""
+    from driftwalk.cli.fit_run import FitWork, run_fit
 
-    truth = tank30_truth()
-    return {key: truth[key] for key in ("drag_coefficient", "force_std_N", "force_interval_s")}
+    if not _finished(folder, overwrite):
+        run_fit(FitWork([recording], study, None, {"recording": path}), folder, overwrite=overwrite)
+    return _read(folder / "fit.nc"), _read(folder / "check.nc")
+
+
+def _calibrate(
+    recording: xr.Dataset,
+    study: Study,
+    path: Path,
+    out: Path,
+    *,
+    overwrite: bool,
+    threads: int | None,
+) -> xr.Dataset:
+    """Calibrate on the fitted flow, or read what a finished run found."""
+    from driftwalk.cli.calibration_run import Work, run_calibration
+    from driftwalk.flow import load_flow
+
+    folder, flow = out / CALIBRATION, out / FIT / "flow.nc"
+    if _finished(folder, overwrite):
+        return _read(folder / "calibration.nc")
+    given = load_flow(flow, arena=study.tank.to_arena(), own_flags="keep")
+    work = Work(recording, study, given, None, {"recording": path, "flow": flow}, threads)
+    return run_calibration(work, folder, overwrite=overwrite)
+
+
+def _require_own(out: Path) -> None:
+    """Refuse a directory with anything in it that no demo made, before any work."""
+    from driftwalk.core.errors import RunDirectoryError
+    from driftwalk.core.run_layout import visible
+    from driftwalk.core.shards import make_folder
+
+    make_folder(out)
+    foreign = [entry for entry in visible(out) if entry.name not in (FIT, CALIBRATION)]
+    if foreign:
+        raise RunDirectoryError(
+            f"{out} holds files but no run of this demo ({foreign[0].name}, ...); choose an empty "
+            "or a new directory"
+        )
+
+
+def _finished(folder: Path, overwrite: bool) -> bool:
+    from driftwalk.core.run_layout import state_of
+
+    if overwrite or not folder.is_dir() or state_of(folder) != "finished":
+        return False
+    print_note(f"{folder} holds a finished run (--overwrite starts anew); this is what it found")
+    return True
 
 
 def _read(path: Path) -> xr.Dataset:

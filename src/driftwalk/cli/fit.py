@@ -36,6 +36,9 @@ FIT_KEYS: Final[dict[str, str]] = {
     "angle": "fit.angle",
     "spline_spacing": "fit.spline_spacing_m",
     "confidence": "fit.confidence",
+    "switching_times": "fit.switching_times_s",
+    "flow_labels": "fit.flow_labels",
+    "precision": "fit.drag_coefficient_precision",
 }
 MOST_FINDINGS: Final = 2
 """Findings that are printed; all are in the file."""
@@ -61,7 +64,7 @@ def fit(
         str | None,
         typer.Option(
             "--angle",
-            metavar="auto|given|none",
+            metavar="auto|state|given|none",
             help="Whether the recorded orientation is used.",
             rich_help_panel=PANEL,
             show_default=False,
@@ -73,6 +76,30 @@ def fit(
     ] = None,
     confidence: Annotated[
         float | None, quantity_option("--confidence", "1", "Confidence of the intervals.")
+    ] = None,
+    switching_times: Annotated[
+        str | None,
+        typer.Option(
+            "--switching-times",
+            metavar="<s,s,...>",
+            help="When the pumps were switched, on each recording's clock: a flow between each.",
+            rich_help_panel=PANEL,
+            show_default=False,
+        ),
+    ] = None,
+    flow_labels: Annotated[
+        str | None,
+        typer.Option(
+            "--flow-labels",
+            metavar="A,B,...",
+            help="Names of the flows between switching times; the same where one comes back.",
+            rich_help_panel=PANEL,
+            show_default=False,
+        ),
+    ] = None,
+    precision: Annotated[
+        float | None,
+        quantity_option("--precision", "1", "Relative standard error of C_d that is wanted."),
     ] = None,
     no_check: Annotated[
         bool,
@@ -104,6 +131,9 @@ def fit(
         angle=angle,
         spline_spacing=spline_spacing,
         confidence=confidence,
+        switching_times=_items(switching_times),
+        flow_labels=_items(flow_labels),
+        precision=precision,
     )
     chosen = resolve_study(study, overrides, keys=FIT_KEYS)
     unsaid = study is None and tank_diameter is None and how.arena is None
@@ -127,6 +157,11 @@ def fit(
     else:
         print_answer(found.fit, out)
         print_verdict(found.check)
+
+
+def _items(text: str | None) -> list[str] | None:
+    """Return what stands between the commas; what it means the study says."""
+    return None if text is None else [item.strip() for item in text.split(",")]
 
 
 _KEYS = (
@@ -153,13 +188,19 @@ _KEYS = (
     "recordings",
     "iterations",
     "converged",
+    "visited_share",
+    "drag_coefficient_relative_std",
+    "drag_coefficient_precision",
+    "needed_duration_s",
+    "switching_times_s",
 )
+"""The last ones where they are in the fit."""
 
 
 def summary(found: xr.Dataset) -> dict[str, Any]:
     """Return what ``--json`` prints: the answer with units in its keys."""
     return {
-        **{key: found.attrs[key] for key in _KEYS},
+        **{key: found.attrs[key] for key in _KEYS if key in found.attrs},
         "recording": found.attrs["source"],
         "warnings": json_module.loads(found.attrs["warnings"]),
     }
@@ -184,6 +225,10 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
         )
     print(f"noise intensity σ_F²·τ {facts['force_noise_intensity_N2_s']:.4g} N² s")
     print(f"intervals at the wall  {facts['wall_share']:.1%}, left out")
+    if "flow" in found.dims:
+        names = found["flow"].values[found["interval_flow"].values]
+        times = ", ".join(f"{time:g} s" for time in facts["switching_times_s"])
+        print(f"flows                  {', '.join(names)}, switched at {times}")
     for warning in json_module.loads(facts["warnings"]):
         print_note(f"warning: {warning}")
     print(f"flow                   {folder / 'flow.nc'}")

@@ -100,7 +100,7 @@ def run_fit(work: FitWork, folder: Path, *, overwrite: bool) -> Fitted:
                 run.write(name, netcdf_bytes(recording))
             write_fit_figures(
                 run.folder("figures"),
-                flow=flow,
+                flow=steady_flows(found),
                 trajectory=work.recordings[0],
                 body=work.body,
                 simulated=found.attrs["simulated_recording"] == "yes",
@@ -112,6 +112,18 @@ def run_fit(work: FitWork, folder: Path, *, overwrite: bool) -> Fitted:
                 run.write("check.nc", netcdf_bytes(check))
                 write_check_figures(run.folder("figures"), check=check)
     return Fitted(found, check)
+
+
+def steady_flows(fit: xr.Dataset) -> list[xr.Dataset]:
+    """Return the flows of a fit, one for all of it or one for each name."""
+    from driftwalk.calibrate import fitted_flow
+
+    if "flow" not in fit.dims:
+        return [fitted_flow(fit)]
+    interval_flow = fit["interval_flow"].values.tolist()
+    return [
+        fitted_flow(fit, interval=interval_flow.index(flow)) for flow in range(fit.sizes["flow"])
+    ]
 
 
 def _specification(work: FitWork) -> dict[str, Any]:

@@ -48,7 +48,7 @@ COMMANDS: Final[dict[str, Command]] = {
     "classify": Command(
         "classify", "classify", "Say what the blocks of a recording assembled into."
     ),
-    "demo": Command("demo", "demo", "Calibrate a bundled recording, from file to report."),
+    "demo": Command("demo", "demo", "Fit a bundled recording, and calibrate on the fitted flow."),
 }
 
 

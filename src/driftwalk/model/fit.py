@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
+import re
 from typing import Annotated, ClassVar, Final, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator, model_validator
 
+from driftwalk.core.errors import ConfigurationError
 from driftwalk.model.section import Quantity, Section
+
+Time = Annotated[float, Quantity("s", ge=-1e12, le=1e12)]
 
 MOST_CELLS: Final = 24
 """Most cells of knots across a tank with spacing "auto": the work grows with their fourth power."""
@@ -47,6 +52,70 @@ class Fit(Section):
     confidence: Annotated[float, Quantity("1", gt=0, lt=1)] = Field(
         default=0.9, description="Confidence of the intervals."
     )
+    switching_times_s: tuple[Time, ...] | None = Field(
+        default=None,
+        description=(
+            "Times, on the clock of each recording, at which the pumps were switched: between "
+            "them each interval has a flow of its own, and all share drag and noises. Without "
+            "them the flow is steady."
+        ),
+        examples=["[600.0, 1200.0]"],
+    )
+    flow_labels: tuple[str, ...] | None = Field(
+        default=None,
+        description=(
+            "Names of the flows in the intervals between the switching times, where one comes "
+            "back: intervals of the same name have the same flow. Without them all differ."
+        ),
+        examples=['["A", "B", "A"]'],
+    )
+    drag_coefficient_precision: Annotated[float | None, Quantity("1", gt=0, lt=1)] = Field(
+        default=None,
+        description=(
+            "Relative standard error of C_d that is wanted: the fit says whether it is reached, "
+            "and if not how long a recording would have to be. Without it, 0.1 is warned of."
+        ),
+        examples=[0.05],
+    )
+
+    @field_validator("switching_times_s")
+    @classmethod
+    def _times(cls, values: tuple[float, ...] | None) -> tuple[float, ...] | None:
+        if values is None:
+            return None
+        if not values:
+            raise ConfigurationError("the list is empty; leave the key out or name a time")
+        for earlier, later in itertools.pairwise(values):
+            if not later > earlier:
+                raise ConfigurationError(
+                    f"the times must increase, got {later:g} s after {earlier:g} s"
+                )
+        return values
+
+    @model_validator(mode="after")
+    def _one_label_each(self) -> Fit:
+        """Refuse labels that do not go with the intervals."""
+        if self.flow_labels is None:
+            return self
+        intervals = len(self.switching_times_s or ()) + 1
+        if len(self.flow_labels) != intervals:
+            raise ConfigurationError(
+                f"flow_labels has {len(self.flow_labels)} name"
+                f"{'s' if len(self.flow_labels) > 1 else ''}, but switching_times_s makes "
+                f"{intervals} interval{'s' if intervals > 1 else ''}: name the flow of each"
+            )
+        for name in self.flow_labels:
+            if not re.fullmatch(r"[A-Za-z0-9_-]{1,20}", name):
+                raise ConfigurationError(
+                    f"flow_labels: {name!r} is no name of a flow: up to 20 letters, digits, - or _"
+                )
+        for earlier, later in itertools.pairwise(self.flow_labels):
+            if earlier == later:
+                raise ConfigurationError(
+                    f"flow_labels: {later!r} stands twice in a row: leave out the switching time "
+                    "between"
+                )
+        return self
 
     def spacing_m(self, *, side_m: float, widest_m: float) -> float:
         """Return the distance between knots [m] for a block and the larger side of a tank."""

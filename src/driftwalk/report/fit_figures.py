@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ERROR_LABEL = "standard error (mm/s)"
+TITLE_WIDTH = 90
+"""Letters of a title over the whole figure."""
 
 
 def plot_flow_error(flow: xr.Dataset, ax: Axes | None = None) -> Axes:
@@ -81,7 +85,7 @@ def plot_flow_error(flow: xr.Dataset, ax: Axes | None = None) -> Axes:
 def write_fit_figures(
     folder: str | Path,
     *,
-    flow: xr.Dataset,
+    flow: xr.Dataset | Sequence[xr.Dataset],
     trajectory: xr.Dataset,
     body: str | None = None,
     simulated: bool = False,
@@ -93,8 +97,9 @@ def write_fit_figures(
     ----------
     folder : path-like
         Where to write; made when absent.
-    flow : xarray.Dataset
-        The fitted `flow_field`.
+    flow : xarray.Dataset or sequence of xarray.Dataset
+        The fitted `flow_field`; several where the pumps were switched, each with its name in the
+        attribute ``flow_label`` and its times in ``intervals``.
     trajectory : xarray.Dataset
         The recording.
     body : str, optional
@@ -107,7 +112,8 @@ def write_fit_figures(
     Returns
     -------
     list of pathlib.Path
-        The files: ``flow`` and ``trajectory`` in every format.
+        The files: ``flow`` and ``trajectory`` in every format; ``flow_A`` and so on by name of
+        the flow where there are several.
 
     Raises
     ------
@@ -120,11 +126,19 @@ def write_fit_figures(
     --------
     ``write_fit_figures("fit/figures", flow=flow, trajectory=recording)``
     """
+    import xarray as xr
+
+    flows = [flow] if isinstance(flow, xr.Dataset) else list(flow)
     makers: dict[str, Callable[[], Figure]] = {
-        "flow": lambda: _flow_figure(flow),
-        "trajectory": lambda: trajectory_figure(trajectory, body=body),
+        "_".join(["flow", *_label(one)]): partial(_flow_figure, one) for one in flows
     }
+    makers["trajectory"] = lambda: trajectory_figure(trajectory, body=body)
     return write_each(makers, folder, formats, footer=FOOTER if simulated else "")
+
+
+def _label(flow: xr.Dataset) -> list[str]:
+    """Return the name of a flow, nothing where it has none."""
+    return [str(flow.attrs["flow_label"])] if "flow_label" in flow.attrs else []
 
 
 def _flow_figure(flow: xr.Dataset) -> Figure:
@@ -134,7 +148,8 @@ def _flow_figure(flow: xr.Dataset) -> Figure:
     plot_flow_error(flow, row[1])
     row[1].set_ylabel("")
     filled = bool((flow["flag"].values == FLAGS["filled"]).any())
-    letter_panels(
-        row, ["fitted flow" + (" (hatched: filled)" if filled else ""), "its standard error"]
-    )
+    title = " ".join(["fitted flow", *_label(flow)])
+    letter_panels(row, [title + (" (hatched: filled)" if filled else ""), "its standard error"])
+    if "intervals" in flow.attrs:
+        figure.suptitle(textwrap.fill(f"from {flow.attrs['intervals']}", TITLE_WIDTH))
     return figure

@@ -1,0 +1,184 @@
+"""The intervals of a recording between the switching times of the pumps, each with its flow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from driftwalk.core.errors import InputError
+from driftwalk.schema import Track
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+HALF_SWITCH_S = 1e-6
+"""A flow field is linear between its frames: those before and after a switch are so far from it."""
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """When the flow changes, and to which one.
+
+    Attributes
+    ----------
+    times : tuple of float
+        Switching times on the clock of each recording [s], increasing; empty for a steady flow.
+    flows : tuple of int
+        Number of the flow in each interval, one more than times.
+    labels : tuple of str
+        Names of the flows.
+
+    Examples
+    --------
+    >>> Intervals((600.0, 1200.0), (0, 1, 0), ("A", "B")).of_flow(0)
+    [0, 2]
+    """
+
+    times: tuple[float, ...]
+    flows: tuple[int, ...]
+    labels: tuple[str, ...]
+
+    @property
+    def steady(self) -> bool:
+        """Whether there is but one flow."""
+        return len(self.labels) == 1
+
+    def of_flow(self, flow: int) -> list[int]:
+        """Return the intervals in which the water flows so."""
+        return [index for index, one in enumerate(self.flows) if one == flow]
+
+    def describe(self, index: int) -> str:
+        """Return "600 s to 1200 s"."""
+        low = "the start" if index == 0 else f"{self.times[index - 1]:g} s"
+        high = "the end" if index == len(self.times) else f"{self.times[index]:g} s"
+        return f"{low} to {high}"
+
+    def describe_flow(self, flow: int) -> str:
+        """Return "flow A (the start to 600 s)"."""
+        spans = ", ".join(self.describe(index) for index in self.of_flow(flow))
+        return f"flow {self.labels[flow]} ({spans})"
+
+    def index_of(self, time: np.ndarray) -> np.ndarray:
+        """Return the interval of each time; a switching time begins the next one."""
+        return np.searchsorted(self.times, time, side="right")
+
+
+def intervals_of(study: Study) -> Intervals:
+    """Return the intervals that the section [fit] of a study names.
+
+    Examples
+    --------
+    >>> from driftwalk.model import Study
+    >>> intervals_of(Study(fit={"switching_times_s": [600, 1200]})).labels
+    ('A', 'B', 'C')
+    """
+    times = study.fit.switching_times_s or ()
+    names = study.fit.flow_labels or tuple(_letter(index) for index in range(len(times) + 1))
+    labels = tuple(dict.fromkeys(names))
+    return Intervals(tuple(times), tuple(labels.index(name) for name in names), labels)
+
+
+def fitted_intervals(fit: xr.Dataset) -> Intervals:
+    """Return the intervals of a fit."""
+    if "flow" not in fit.dims:
+        return Intervals((), (0,), ("A",))
+    times = np.atleast_1d(fit.attrs["switching_times_s"])
+    flows = fit["interval_flow"].values
+    labels = fit["flow"].values
+    return Intervals(
+        tuple(float(time) for time in times),
+        tuple(int(flow) for flow in flows),
+        tuple(str(label) for label in labels),
+    )
+
+
+def _letter(index: int) -> str:
+    """Return A, B, ..., Z, A1, B1, ..."""
+    turn, place = divmod(index, 26)
+    return chr(ord("A") + place) + (str(turn) if turn else "")
+
+
+def cut_track(track: Track, intervals: Intervals, *, fewest: int, where: str) -> list[Track]:
+    """Cut a track at the switching times, one part for each interval.
+
+    Parameters
+    ----------
+    track : Track
+        The recorded body.
+    intervals : Intervals
+        Where to cut.
+    fewest : int
+        Positions that every part needs.
+    where : str
+        The recording, to begin a message with.
+
+    Raises
+    ------
+    InputError
+        When a switching time is outside the recording, or an interval too short.
+    """
+    if not intervals.times:
+        return [track]
+    first, last = float(track.time[0]), float(track.time[-1])
+    for time in intervals.times:
+        if not first < time <= last:
+            raise InputError(
+                f"{where}the switching time {time:g} s is outside the recording, which goes from "
+                f"{first:g} s to {last:g} s: switching times are those of its own clock "
+                "([fit] switching_times_s, --switching-times)"
+            )
+    index = intervals.index_of(track.time)
+    parts = [Track(*(column[index == one] for column in track)) for one in range(index[-1] + 1)]
+    for one, part in enumerate(parts):
+        if part.time.size < fewest:
+            usual = float(np.median(np.diff(track.time)))
+            raise InputError(
+                f"{where}the interval from {intervals.describe(one)} has {part.time.size} "
+                f"positions; the fit needs {fewest} at least ({fewest * usual:.3g} s at this "
+                "rate), and ten minutes to be of use: leave out a switching time, or what is "
+                "before or after it (--from, --to)"
+            )
+    return parts
+
+
+def switched_frames(
+    intervals: Intervals, fields: Mapping[str, Sequence[np.ndarray]], *, first: float
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return frames of a flow that jumps at the switches, where frames are joined by lines.
+
+    Parameters
+    ----------
+    intervals : Intervals
+        When the flow changes.
+    fields : mapping
+        By name the field of each flow.
+    first : float
+        First sample of the recording on its own clock [s].
+
+    Returns
+    -------
+    time : ndarray
+        Times of the frames [s] from the first sample on: one just before and one just after each
+        switch.
+    frames : dict
+        By name the fields at these times.
+
+    Examples
+    --------
+    >>> steps = Intervals((5.0,), (0, 1), ("A", "B"))
+    >>> time, frames = switched_frames(steps, {"u": [np.zeros(1), np.ones(1)]}, first=2.0)
+    >>> time.tolist(), frames["u"].tolist()
+    ([2.999999, 3.000001], [[0.0], [1.0]])
+    """
+    time, flow = [], []
+    for index, switch in enumerate(intervals.times):
+        time += [switch - first - HALF_SWITCH_S, switch - first + HALF_SWITCH_S]
+        flow += [intervals.flows[index], intervals.flows[index + 1]]
+    return np.array(time), {
+        name: np.stack([values[one] for one in flow]) for name, values in fields.items()
+    }

@@ -1,0 +1,77 @@
+"""`driftwalk demo`: two runs of the bundled recording, which another engine simulated."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from command_line import Done, apart, contents, here, refusal
+
+TRUTH = {
+    "drag_coefficient": 0.3867,
+    "force_std_N": 0.0006123,
+    "force_interval_s": 0.016,
+    "tracking_noise_m": 0.0003,
+}
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Done]:
+    """Return a whole demo, with the short search."""
+    folder = tmp_path_factory.mktemp("demo") / "demo"
+    return folder, apart("demo", "--quick", "--out", folder)
+
+
+@pytest.mark.slow
+def test_both_answers_stand_beside_the_truth(finished: tuple[Path, Done]) -> None:
+    folder, done = finished
+    assert done.code == 0, done.err
+    assert "simulated by another engine (ODE)" in done.out
+    rows = {line[:27].strip(): line[27:].split() for line in done.out.splitlines()}
+    assert rows["drag coefficient C_d"][0] == "0.3867"
+    assert rows["stochastic force σ_F [mN]"][0] == "0.6123"
+    assert rows["tracking noise [mm]"][0] == "0.3"
+    assert rows["model explains it"] == ["yes", "yes"]
+    for figure in ("fit/figures/check_steps.png", "calibrate/figures/ks_map.png"):
+        assert (folder / figure).stat().st_size > 1000
+
+
+@pytest.mark.slow
+def test_a_finished_demo_is_read(finished: tuple[Path, Done]) -> None:
+    folder = finished[0]
+    before = contents(folder)
+    again = apart("demo", "--quick", "--out", folder, "--json")
+    assert again.code == 0
+    assert again.err.count("holds a finished run") == 2
+    assert contents(folder) == before
+    found = json.loads(again.out)
+    assert found["truth"] == TRUTH
+    # Half an hour with the orientation as a state: C_d within 5 %, sigma_F 3 %, flow 2 %.
+    assert found["fit"]["drag_coefficient"] == pytest.approx(TRUTH["drag_coefficient"], rel=0.05)
+    assert found["fit"]["force_std_N"] == pytest.approx(TRUTH["force_std_N"], rel=0.03)
+    assert found["fit"]["tracking_noise_m"] == pytest.approx(TRUTH["tracking_noise_m"], rel=0.03)
+    assert 0.0 < found["fit"]["flow_error"] < 0.02
+    assert found["fit"]["explained"]
+    for name, error in (("drag_coefficient", 0.04), ("force_std_N", 0.1e-3)):
+        assert found["calibration"][name] == pytest.approx(TRUTH[name], abs=error)
+    assert found["calibration"]["ks_distance"] < 2 * found["calibration"]["noise_floor"]
+
+
+@pytest.mark.slow
+def test_a_demo_goes_on_after_its_fit(finished: tuple[Path, Done], tmp_path: Path) -> None:
+    folder = tmp_path / "demo"
+    shutil.copytree(finished[0] / "fit", folder / "fit")
+    before = contents(folder / "fit")
+    done = apart("demo", "--quick", "--out", folder)
+    assert done.code == 0, done.err
+    assert contents(folder / "fit") == before
+    assert done.out.replace(str(folder), "") == finished[1].out.replace(str(finished[0]), "")
+
+
+def test_a_folder_with_other_files_is_refused_before_any_work(tmp_path: Path) -> None:
+    (tmp_path / "thesis.txt").write_text("done", encoding="utf-8")
+    line = refusal(here("demo", "--out", tmp_path))
+    assert "thesis.txt" in line
+    assert set(contents(tmp_path)) == {"thesis.txt"}

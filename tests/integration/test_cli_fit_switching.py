@@ -1,0 +1,114 @@
+"""`driftwalk fit --switching-times`: from the recording to the figures of every flow, and back."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import Done, here, refusal
+from switching_worlds import DRAG, START_S, SWITCH_S, true_flows, two_flows
+
+import driftwalk as dw
+
+COARSE = ("--force-interval", "10ms", "--spline-spacing", "3cm", "--angle", "given")
+SWITCH = ("--switching-times", f"{START_S + SWITCH_S:g}s")
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("recording") / "switched.csv"
+    track = two_flows()
+    columns = [track["time"].values, *(track[name].values[:, 0] for name in ("x", "y", "theta"))]
+    np.savetxt(path, np.column_stack(columns), "%.7f", ",", header="t,x,y,theta", comments="")
+    return path
+
+
+@pytest.fixture(scope="module")
+def finished(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Done]:
+    folder = tmp_path_factory.mktemp("fit") / "run"
+    return folder, here("fit", recording, *COARSE, *SWITCH, "-o", folder, "--json")
+
+
+def answer(done: Done) -> dict[str, Any]:
+    assert done.code == 0, done.err
+    found: dict[str, Any] = json.loads(done.out)
+    return found
+
+
+def test_the_model_with_the_switch_explains_the_recording(finished: tuple[Path, Done]) -> None:
+    """A right model fails once in fifty; C_d within 4 of its standard deviations."""
+    found = answer(finished[1])
+    assert found["explained"], found["findings"]
+    assert found["switching_times_s"] == [START_S + SWITCH_S]
+    assert found["recordings"] == 1
+    sd = found["drag_coefficient_relative_std"]
+    assert abs(np.log(found["drag_coefficient"] / DRAG)) < 4.0 * sd
+
+
+def test_without_the_switch_it_does_not(
+    recording: Path, finished: tuple[Path, Done], tmp_path: Path
+) -> None:
+    found = answer(here("fit", recording, *COARSE, "-o", tmp_path / "steady", "--json"))
+    assert not found["explained"]
+    assert any("the motion changes" in finding for finding in found["findings"])
+    assert found["ks_distance"] > 2.0 * answer(finished[1])["ks_distance"]
+
+
+def test_the_run_directory_holds_every_flow(finished: tuple[Path, Done]) -> None:
+    folder = finished[0]
+    for name in ("flow_A", "flow_B", "trajectory", "check_map"):
+        assert (folder / "figures" / f"{name}.png").stat().st_size > 1000
+    assert not (folder / "figures" / "flow.png").exists()
+    flow = dw.load_flow(folder / "flow.nc")
+    assert flow["time"].values == pytest.approx([SWITCH_S, SWITCH_S], abs=1e-5)
+    for frame, truth in zip((0, 1), true_flows(), strict=True):
+        measured = flow["flag"].values[frame] == 1
+        assert measured.sum() > 200
+        there = truth.interp(x=flow["x"], y=flow["y"])
+        off = (flow["u"].values[frame] - there["u"].values)[measured]
+        assert np.sqrt((off**2).mean()) < 0.2 * np.sqrt((there["u"].values[measured] ** 2).mean())
+    with xr.open_dataset(folder / "fit.nc", engine="h5netcdf") as stored:
+        assert dw.fitted_flow(stored, interval=1)["u"].values == pytest.approx(flow["u"].values[1])
+        assert dw.check_model(stored, dw.load(folder / "recording.nc")).attrs["explained"] == "yes"
+
+
+def test_others_take_the_flow(finished: tuple[Path, Done], tmp_path: Path) -> None:
+    flow = finished[0] / "flow.nc"
+    done = here("simulate", "--flow", flow, "--duration", "5s", "-o", tmp_path / "run.nc")
+    assert done.code == 0, done.err
+
+
+def test_people_read_which_flow_was_when(recording: Path, tmp_path: Path) -> None:
+    middle = START_S + SWITCH_S
+    times = f"{middle - 100:g},{middle:g}"
+    words = (*COARSE, "--switching-times", times, "--flow-labels", "first,first2,last")
+    precision = ("--precision", "0.001", "--no-check")
+    done = here("fit", recording, *words, *precision, "-o", tmp_path / "run")
+    assert done.code == 0, done.err
+    assert f"first, first2, last, switched at {middle - 100:g} s, {middle:g} s" in done.out
+    assert "for 0.1 % about" in done.err
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--switching-times", "600,10"), "must increase"),
+        (("--switching-times", "soon"), "--switching-times"),
+        (("--switching-times", "9000"), "switching time 9000 s is outside the recording"),
+        (("--switching-times", "100,101"), "the interval from 100 s to 101 s has 10 positions"),
+        (("--switching-times", "100", "--flow-labels", "A"), "flow_labels has 1 name"),
+        (("--flow-labels", "A,B"), "flow_labels has 2 names"),
+        (("--precision", "2"), "drag_coefficient_precision"),
+        (("--to", "55"), "10 to 30 min give C_d to 10 %"),
+    ],
+)
+def test_mistakes_are_one_line(
+    options: tuple[str, ...], words: str, recording: Path, tmp_path: Path
+) -> None:
+    done = here("fit", recording, "-o", tmp_path / "run", *options)
+    assert words in refusal(done)
+    assert not (tmp_path / "run").exists()
