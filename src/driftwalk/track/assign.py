@@ -64,7 +64,7 @@ def assign(cost: Floats) -> Assignment:
         part = cost[np.ix_(rows, columns)]
         taken = _solve(part)
         detection[rows] = np.where(taken >= 0, columns[taken], -1)
-        if part.size > 1:
+        if part.size > 1 or taken[0] < 0:
             score[rows] = _alternatives(part, taken)
     return Assignment(detection, score, group)
 
