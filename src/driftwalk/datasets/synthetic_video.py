@@ -33,6 +33,7 @@ _FINE: Final = 3
 _STREAM: Final = 3
 _STEP_PX: Final = 0.4
 _MOST_EXPOSURES: Final = 16
+_NOISE_FRAMES: Final = 4
 _BAR: Final[Colour] = (44, 40, 40)
 
 
@@ -197,7 +198,12 @@ class _Painter:
         self.world = self._world_map(_FINE)
         self.pixel_world = self._world_map(1)
         self.tank = self._empty_tank()
-        self.light = shading(settings)[..., None]
+        self.light = np.repeat(shading(settings)[..., None], 3, axis=2)
+        # Drawing new noise for each frame would take longer than all the rest.
+        generator = np.random.default_rng([settings.seed, _STREAM])
+        count = _NOISE_FRAMES * self.tank.size if settings.noise_std > 0.0 else 0
+        self.noise: Grid = generator.standard_normal(count, dtype=np.float32)
+        self.noise *= np.float32(settings.noise_std)
 
     def frame(self, index: int, time: float) -> Image:
         """Return one frame."""
@@ -216,11 +222,16 @@ class _Painter:
         if settings.blur_px > 0.0:
             image = self.cv2.GaussianBlur(image, (0, 0), settings.blur_px)
         if settings.noise_std > 0.0:
-            generator = np.random.default_rng([settings.seed, _STREAM, index])
-            image = image + settings.noise_std * generator.standard_normal(
-                image.shape, dtype=np.float32
-            )
-        return np.asarray(np.clip(np.rint(image), 0, 255), dtype=np.uint8)
+            image = image + self._noise_of(index)
+        # Rounds, and stops at 255; what is below zero is stopped before.
+        return np.asarray(self.cv2.convertScaleAbs(self.cv2.max(image, 0.0)), dtype=np.uint8)
+
+    def _noise_of(self, index: int) -> Grid:
+        """Return the noise of a frame: a stretch of the drawn noise, from a place of its own."""
+        size = self.tank.size
+        generator = np.random.default_rng([self.settings.seed, _STREAM, index])
+        start = int(generator.integers(self.noise.size - size))
+        return self.noise[start : start + size].reshape(self.tank.shape)
 
     def visible(self, index: int) -> Array:
         """Return the share of each marker that can be seen in a frame, shape (bodies,)."""
@@ -276,7 +287,7 @@ class _Painter:
 
     def _shapes(self, index: int, body: int, world: Grid, pose: Array, scale: float) -> Grid:
         settings = self.settings
-        own = self._to_marker(pose[:, None, :], world)
+        own = self._to_marker(pose[:, None, :].astype(np.float32), world)
         turn = settings.marker_angle_rad
         u = own[..., 0] * np.cos(turn) - own[..., 1] * np.sin(turn)
         v = own[..., 0] * np.sin(turn) + own[..., 1] * np.cos(turn)
@@ -308,7 +319,8 @@ class _Painter:
         """Return the rows and columns that a block and its bar can touch; None outside."""
         settings, rate = self.settings, self.rates[index, body]
         late = settings.exposure_s / 2 + settings.rolling_s / 2
-        reach = 1.1 * settings.block_side_m + np.hypot(rate[0], rate[1]) * late
+        size = 1.1 if np.isfinite(self.bars.offset[index, body]) else 0.75
+        reach = size * settings.block_side_m + np.hypot(rate[0], rate[1]) * late
         corners = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]]) * reach
         pixels = world_to_image(settings, self.poses[index, body, :2] + corners)
         low = np.floor(pixels.min(axis=0)).astype(int)

@@ -48,9 +48,9 @@ class ChromaTables:
     def codes(self, cv2: Any, image: Image) -> npt.NDArray[np.uint16]:
         """Return a* and b* of every pixel as one number, the index into the tables."""
         lab = cv2.cvtColor(image, cv2.COLOR_BGR2Lab)
-        # a* and b* are neighbours in memory: read together, they are the number that is wanted.
-        pair = np.ascontiguousarray(lab[..., 1:])
-        return pair.view("<u2")[..., 0]
+        # a* and b* as neighbours in memory, read together, are the number that is wanted.
+        pair = cv2.merge([cv2.extractChannel(lab, 1), cv2.extractChannel(lab, 2)])
+        return np.asarray(pair.view("<u2")[..., 0], dtype=np.uint16)
 
 
 def _table(colour: MarkerColour, between: float) -> Weights:

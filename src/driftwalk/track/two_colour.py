@@ -18,6 +18,7 @@ from driftwalk.track.types import Array, Detection, Image, PixelToWorld, Rejecte
 
 _LEAST_DIAMETER_PX: Final = 3.0
 _COARSE_DIAMETER_PX: Final = 6.0
+_FINE_DIAMETER_PX: Final = 12.0
 _MOST_FACTOR: Final = 4
 _WHOLE: Final = 0.93
 _LEAST_VISIBLE: Final = 0.35
@@ -101,7 +102,7 @@ class TwoColourDetector:
             size = (columns // factor, rows // factor)
             cut = image[: size[1] * factor, : size[0] * factor]
             small = cv2.resize(cut, size, interpolation=cv2.INTER_AREA)
-        label = self._tables.label[self._tables.codes(cv2, small)]
+        label = self._tables.label.take(self._tables.codes(cv2, small))
         both, rejected = [], []
         for colour in (1, 2):
             regions = find_regions(cv2, label, colour, factor)
@@ -144,11 +145,12 @@ class TwoColourDetector:
             min(int(centre[0] + reach) + 2, columns),
             min(int(centre[1] + reach) + 2, rows),
         )
-        patch = self._cv2.GaussianBlur(image[top:bottom, left:right], (3, 3), 0.6)
+        patch, factor = self._reduce(image[top:bottom, left:right], diameter)
         codes = self._tables.codes(self._cv2, patch)
-        weights = [table[codes] for table in self._tables.soft]
-        corner = np.array([left, top])
+        weights = [table.take(codes) for table in self._tables.soft]
+        corner = np.array([left, top]) + (factor - 1) / 2
         start = np.array([[first.column, first.row], [second.column, second.row]]) - corner
+        start, diameter, spacing = start / factor, diameter / factor, spacing / factor
         noise = noise_of(weights)
         result = weighted_centres(weights, start, diameter=diameter, noise=noise)
         apart = float(np.hypot(*(result.centres[1] - result.centres[0]))) / spacing
@@ -156,8 +158,21 @@ class TwoColourDetector:
             outlined = outlined_centres(weights, result.centres, diameter=diameter, spacing=spacing)
             result = outlined if outlined is not None else result
         return Measured(
-            result.centres + corner, result.covariance, result.visible, result.explained
+            result.centres * factor + corner,
+            result.covariance * factor**2,
+            result.visible,
+            result.explained,
         )
+
+    def _reduce(self, patch: Image, diameter: float) -> tuple[Any, int]:
+        """Return a patch with less noise, reduced where its discs are large, and by how much."""
+        cv2 = self._cv2
+        factor = int(np.clip(diameter / _FINE_DIAMETER_PX, 1, _MOST_FACTOR))
+        if factor > 1:
+            size = (patch.shape[1] // factor, patch.shape[0] // factor)
+            cut = patch[: size[1] * factor, : size[0] * factor]
+            patch = cv2.resize(cut, size, interpolation=cv2.INTER_AREA)
+        return cv2.GaussianBlur(patch, (3, 3), 0.6), factor
 
     def _place(self, measured: list[tuple[Pair, Measured]]) -> list[Detection]:
         """Return the detections in the world."""
