@@ -22,7 +22,7 @@ from driftwalk.cli.tracking_parts import TrackingParts
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.track import Frame, LiveServer, AssemblySeen, OverlayWriter, TrackState
+    from driftwalk.track import AssemblySeen, Frame, LiveServer, OverlayWriter, TrackState
 
 Look = Callable[["Frame", "Sequence[TrackState]", "AssemblySeen | None"], None]
 

@@ -14,7 +14,7 @@ from driftwalk.cli.tracking_options import TrackingOptions
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
-    from driftwalk.track import Frame, AssemblySeen, TrackState
+    from driftwalk.track import AssemblySeen, Frame, TrackState
 
 _MOST_CLASSES = 6
 
