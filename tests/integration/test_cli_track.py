@@ -18,6 +18,7 @@ from driftwalk.schema import build_trajectory
 pytest.importorskip("cv2")
 
 FRAMES = 40
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "reference"
 TANK = ("--tank-diameter", "30cm")
 
 
@@ -99,6 +100,13 @@ def test_watching_tells_the_join(folder: Path) -> None:
     assert [line.split()[-1] for line in lines if "  class  " in line][-2:] == ["1+1", "2"]
 
 
+def keys(value: object) -> set[str]:
+    """Return all keys in a message, at any depth."""
+    if isinstance(value, dict):
+        return set(value) | {key for inner in value.values() for key in keys(inner)}
+    return {key for inner in value for key in keys(inner)} if isinstance(value, list) else set()
+
+
 def test_live_client_gets_poses_and_joins(folder: Path, tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
@@ -124,14 +132,29 @@ def test_live_client_gets_poses_and_joins(folder: Path, tmp_path: Path) -> None:
     done = tracked(folder, tmp_path / "r.nc", *words)
     reader.join(timeout=30)
     assert done.code == 0, done.err
-    messages = [json.loads(line) for line in lines]
-    assert messages
+    hello, *messages, over = [json.loads(line) for line in lines]
+    assert over == {"type": "end", "interrupted": None, "frames_lost_by_client": 0}
     last = messages[-1]
     assert last["frame"] == FRAMES - 1
     assert last["outcome"] == "2"
+    assert last["possible"] == ["2"]
+    assert last["hidden"] == []
     assert len(last["joined"]) == 1
     assert {body["id"] for body in last["bodies"]} == {"0", "1"}
     assert all(0 < message["latency_s"] < 10 for message in messages)
+    assert all(message["type"] == "frame" for message in messages)
+    assert hello["tank"] == {"shape": "circle", "diameter_m": 0.3, "center_m": [0.0, 0.0]}
+    assert hello["block_side_m"] == 0.03
+    assert (hello["body_count"], hello["source"], hello["observed"]) == (2, "video.mkv", True)
+    assert (hello["image"]["width_px"], hello["image"]["height_px"]) == (480, 360)
+    # The homography puts a body where the frame says that it is.
+    body = last["bodies"][0]
+    plane = np.array(hello["image"]["homography_px_to_m"]).reshape(3, 3)
+    x, y, w = plane @ [body["column_px"], body["row_px"], 1.0]
+    assert (x / w, y / w) == pytest.approx((body["x_m"], body["y_m"]), abs=1e-9)
+    page = DOCS.joinpath("live-stream.md").read_text(encoding="utf-8")
+    missing = {key for message in (hello, *messages, over) for key in keys(message)}
+    assert {key for key in missing if f"`{key}`" not in page} == set()
 
 
 def test_interrupted_run_keeps_what_it_had(folder: Path, tmp_path: Path) -> None:

@@ -29,6 +29,8 @@ class TrackingParts(NamedTuple):
     observer: AssemblyObserver | None
     diameter: float | None
     """Diameter of the tank [m]."""
+    block_side: float | None
+    """Side of a block [m]."""
 
 
 def build_parts(options: TrackingOptions) -> TrackingParts:
@@ -48,7 +50,8 @@ def build_parts(options: TrackingOptions) -> TrackingParts:
     detector, side = _detector(options, camera, images)
     diameter = options.tank_diameter or camera.tank_diameter_m
     tracker = _tracker(options, camera, diameter)
-    return TrackingParts(camera, detector, tracker, _observer(options, side), diameter)
+    side = options.side if options.side is not None else side
+    return TrackingParts(camera, detector, tracker, _observer(options, side), diameter, side)
 
 
 def find_camera(options: TrackingOptions, images: Sequence[Any]) -> Camera:
@@ -130,7 +133,6 @@ def _width(camera: Camera, diameter: float | None) -> float:
 def _observer(options: TrackingOptions, side: float | None) -> AssemblyObserver | None:
     from driftwalk.track import AssemblyObserver
 
-    side = options.side if options.side is not None else side
     if options.side is not None and options.bodies is None:
         print_note("who is joined is not said: --side needs --bodies, the number of blocks")
     if side is None or options.bodies is None or options.markers == "blob":

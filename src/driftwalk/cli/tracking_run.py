@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.cli.output import print_note
 from driftwalk.cli.progress import ProgressReporter
+from driftwalk.cli.tracking_live import LiveOutputs
 from driftwalk.cli.tracking_options import TrackingOptions
 from driftwalk.cli.tracking_parts import TrackingParts
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.track import AssemblySeen, Frame, LiveServer, OverlayWriter, TrackState
+    from driftwalk.track import AssemblySeen, Frame, OverlayWriter, TrackState
 
 Look = Callable[["Frame", "Sequence[TrackState]", "AssemblySeen | None"], None]
 
@@ -78,13 +78,13 @@ class TrackingRun:
         with contextlib.ExitStack() as open_things:
             open_things.callback(source.close)
             open_things.enter_context(_termination_as_interrupt())
-            servers = self._open_servers(open_things)
+            live = LiveOutputs(self.options, self.parts, open_things)
             overlay = self._open_overlay(open_things)
             progress = open_things.enter_context(ProgressReporter("track"))
             try:
                 for frame in source:
                     self._source_counts = source.counts.to_dict()
-                    self._take(frame, servers, overlay)
+                    self._take(frame, source.waited_s, live, overlay)
                     if total:
                         progress(min(frame.index + 1, total), total)
                     self._save_now_and_then()
@@ -97,6 +97,7 @@ class TrackingRun:
                 self.interrupted = str(error)
                 raise
             finally:
+                live.end(self.interrupted)
                 self._source_counts = source.counts.to_dict()
                 self._save(complete=self.interrupted is None or self.options.is_camera)
 
@@ -116,7 +117,9 @@ class TrackingRun:
         counts = {**self._source_counts, "rejected": dict(self.rejected)}
         return self.parts.tracker.finish(attrs=attrs, counts=counts)
 
-    def _take(self, frame: Frame, servers: _Servers, overlay: OverlayWriter | None) -> None:
+    def _take(
+        self, frame: Frame, waited_s: float, live: LiveOutputs, overlay: OverlayWriter | None
+    ) -> None:
         from driftwalk.track import draw_states
 
         began = clock.perf_counter()
@@ -126,7 +129,8 @@ class TrackingRun:
         observed = self._observe(frame.time, states)
         self.working_s += clock.perf_counter() - began
         self.frames += 1
-        servers.publish(frame, states, observed, self._source_counts, began)
+        dropped = self._source_counts.get("dropped", 0)
+        live.publish(frame, states, observed, dropped=dropped, arrived=began - waited_s)
         if overlay is not None:
             overlay.write(draw_states(frame.image, states, self.parts.camera))
         if self._look is not None:
@@ -141,21 +145,6 @@ class TrackingRun:
             if (one := state.measured) is not None and one.x is not None and one.y is not None
         }
         return self.parts.observer.step(time, seen)
-
-    def _open_servers(self, open_things: contextlib.ExitStack) -> _Servers:
-        from driftwalk.track import LiveServer, nmea_frame
-
-        servers = _Servers(self.parts)
-        host = self.options.live_host
-        if self.options.live is not None:
-            servers.json = open_things.enter_context(LiveServer(self.options.live, host=host))
-            print_note(f"JSON lines on {host}, port {servers.json.port}")
-        if self.options.live_nmea is not None:
-            servers.nmea = open_things.enter_context(
-                LiveServer(self.options.live_nmea, host=host, encode=lambda c: nmea_frame(*c))
-            )
-            print_note(f"NMEA sentences on {host}, port {servers.nmea.port}")
-        return servers
 
     def _open_overlay(self, open_things: contextlib.ExitStack) -> OverlayWriter | None:
         from driftwalk.track import OverlayWriter
@@ -182,84 +171,6 @@ class TrackingRun:
                 save_trajectory(recording, self.out, existing="replace")
         self._saved = clock.monotonic()
         self._pause = max(_SAVE_EVERY_S, (self._saved - began) / _SAVING_SHARE)
-
-
-class _Servers:
-    """The servers that are open, and what they send."""
-
-    def __init__(self, parts: TrackingParts) -> None:
-        self.parts = parts
-        self.json: LiveServer | None = None
-        self.nmea: LiveServer | None = None
-        self._numbers: dict[str, int] = {}
-
-    def publish(
-        self,
-        frame: Frame,
-        states: Sequence[TrackState],
-        observed: AssemblySeen | None,
-        counts: dict[str, int],
-        began: float,
-    ) -> None:
-        if self.json is not None:
-            message = self._message(frame, states, observed)
-            message["dropped_frames"] = counts.get("dropped", 0)
-            message["latency_s"] = clock.perf_counter() - began
-            self.json.publish(message, frame.image)
-        if self.nmea is not None:
-            self.nmea.publish((frame.index, self._particles(states)))
-
-    def _message(
-        self, frame: Frame, states: Sequence[TrackState], observed: AssemblySeen | None
-    ) -> dict[str, Any]:
-        message: dict[str, Any] = {
-            "frame": frame.index,
-            "time_s": frame.time,
-            "bodies": [_body(state) for state in states],
-        }
-        if observed is not None:
-            message["joined"] = [list(faces) for faces in observed.joined]
-            message["outcome"] = observed.outcome or None
-            message["possible"] = sorted(observed.possible)
-            message["events"] = [
-                {
-                    "time_s": event.time,
-                    "kind": event.kind,
-                    "bodies": list(event.bodies),
-                    "faces": list(event.faces),
-                    "outcome": event.outcome,
-                }
-                for event in observed.events
-            ]
-        return message
-
-    def _particles(self, states: Sequence[TrackState]) -> list[Any]:
-        from driftwalk.track import Particle
-
-        found = []
-        for state in states:
-            number = self._numbers.setdefault(state.id, len(self._numbers))
-            one = state.measured
-            if one is not None and one.x is not None and one.y is not None:
-                found.append(Particle(number, one.column, one.row, one.theta, one.x, one.y))
-        return found
-
-
-def _body(state: TrackState) -> dict[str, Any]:
-    seen = state.measured
-    return {
-        "id": state.id,
-        "seen": seen is not None,
-        "x_m": state.x if seen is None else seen.x,
-        "y_m": state.y if seen is None else seen.y,
-        "theta_rad": state.theta if seen is None else seen.theta,
-        "column_px": None if seen is None else seen.column,
-        "row_px": None if seen is None else seen.row,
-        "vx_m_s": state.vx,
-        "vy_m_s": state.vy,
-        "omega_rad_s": state.omega,
-        "ambiguous": state.ambiguous,
-    }
 
 
 @contextlib.contextmanager

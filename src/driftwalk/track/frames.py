@@ -65,6 +65,8 @@ class FrameSource(Protocol):
     name: str
     counts: FrameCounts
     interrupted: str | None
+    waited_s: float
+    """How long the last frame lay there before it was handed on [s]; 0 for files."""
 
     def __iter__(self) -> Iterator[Frame]:
         """Yield the frames in the order of their times."""
@@ -146,6 +148,7 @@ class VideoFile:
         self.name = str(path)
         self.counts = FrameCounts()
         self.interrupted: str | None = None
+        self.waited_s = 0.0
         self._keep_stale = keep_stale
         if not Path(path).exists():
             raise FormatError("no such video", path=path)
@@ -219,6 +222,7 @@ class ImageSequence:
         self.name = str(folder)
         self.counts = FrameCounts()
         self.interrupted: str | None = None
+        self.waited_s = 0.0
         self._keep_stale = keep_stale
         self._files = _timed_images(Path(folder), rate)
 

@@ -50,6 +50,8 @@ class LiveServer:
     encode : callable, optional
         From what is published to the text to send; default: a line of JSON. Requests for images
         are answered in JSON alone.
+    hello : mapping, optional
+        A line of JSON that every client gets first, whenever it connects.
 
     Raises
     ------
@@ -68,9 +70,15 @@ class LiveServer:
     """
 
     def __init__(
-        self, port: int, *, host: str = LOOPBACK, encode: Callable[[Any], str] | None = None
+        self,
+        port: int,
+        *,
+        host: str = LOOPBACK,
+        encode: Callable[[Any], str] | None = None,
+        hello: Mapping[str, Any] | None = None,
     ) -> None:
         self._encode = encode
+        self._hello = "" if hello is None else json_line(hello)
         self._listener = _listen(host, port)
         self.host, self.port = self._listener.getsockname()[:2]
         self._changed = threading.Condition()
@@ -137,7 +145,7 @@ class LiveServer:
                 if len(self._clients) >= MOST_CLIENTS:
                     connection.close()
                     continue
-                self._clients.append(_Client(connection, self._encode, self._leave))
+                self._clients.append(_Client(connection, self._hello, self._encode, self._leave))
                 self._changed.notify_all()
 
     def _leave(self, client: _Client) -> None:
@@ -153,10 +161,12 @@ class _Client:
     def __init__(
         self,
         connection: socket.socket,
+        hello: str,
         encode: Callable[[Any], str] | None,
         leave: Callable[[_Client], None],
     ) -> None:
         self._connection, self._encode, self._leave = connection, encode, leave
+        self._hello = hello
         self._waiting: deque[_Message] = deque()
         self._changed = threading.Condition()
         self._lost = 0
@@ -187,6 +197,7 @@ class _Client:
 
     def _send(self) -> None:
         with contextlib.suppress(OSError):
+            self._connection.sendall(self._hello.encode("utf-8"))
             while (text := self._next()) is not None:
                 self._connection.sendall(text.encode("utf-8"))
         self._hang_up()

@@ -56,6 +56,7 @@ class LiveCamera:
     ) -> None:
         self.name, self.counts = name, FrameCounts()
         self.interrupted: str | None = None
+        self.waited_s = 0.0
         self._capture, self._patience, self._now = capture, patience, now
         self._changed = threading.Condition()
         self._newest: tuple[int, float, Any] | None = None
@@ -92,6 +93,7 @@ class LiveCamera:
                 first = time if first is None else first
                 frame = keep.accept(index, time - first, image)
                 if frame is not None:
+                    self.waited_s = self._now() - time
                     yield frame
         finally:
             self._stop = True

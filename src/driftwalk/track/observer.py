@@ -58,7 +58,10 @@ class AssemblySeen(NamedTuple):
     outcome: str
     """Outcome class; empty while a block is hidden."""
     possible: frozenset[str]
-    """Classes that are possible: one, or several while a block is hidden."""
+    """Classes that are possible: one, or several while a block is hidden. Empty: nothing is known,
+    as of more than eight blocks with more than three hidden."""
+    hidden: list[str]
+    """Blocks that have not been seen for longer than a gap is bridged."""
     events: list[SeenEvent]
     """What has become known with this frame."""
 
@@ -176,6 +179,7 @@ class AssemblyObserver:
             [(names[j.blocks[0]], j.faces[0], names[j.blocks[1]], j.faces[1]) for j in active],
             outcome,
             frozenset({outcome}) if not hidden else self._possible(active, hidden),
+            [names[block] for block in hidden],
             events,
         )
 

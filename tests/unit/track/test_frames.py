@@ -108,15 +108,18 @@ class Camera:
 
 def test_a_camera_hands_out_the_newest_and_may_disappear() -> None:
     camera = Camera(frames=6)
-    ticks = iter(np.arange(100.0, 200.0))
-    live = dw.LiveCamera(camera, "camera:0", patience=2.0, now=lambda: float(next(ticks)))
-    frames = []
+    # A clock that goes on by a second with each frame that is read.
+    live = dw.LiveCamera(camera, "camera:0", patience=2.0, now=lambda: 100.0 - camera.left)
+    frames, waited = [], []
     for frame in live:
         frames.append(frame)
+        waited.append(live.waited_s)
         camera.gate.set()
     assert frames
     assert frames[-1].index == 5
     assert len(frames) + live.counts.dropped == 6
     assert frames[-1].time - frames[0].time == frames[-1].index - frames[0].index
+    # What is handed on is at most as old as the frames that were read since.
+    assert all(0.0 <= age <= 6.0 for age in waited)
     assert live.interrupted == "camera:0 stopped after 6 frames"
     assert camera.released

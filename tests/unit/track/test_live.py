@@ -56,6 +56,18 @@ def test_each_client_gets_every_frame_in_order(connect) -> None:
             assert lines[0] == {"frame": 0, "theta_rad": None, "frames_lost_by_client": 0}
 
 
+def test_hello_comes_first_however_late_a_client_connects(connect) -> None:
+    with LiveServer(0, hello={"type": "hello", "tank": None}) as server:
+        for frame in range(3):
+            server.publish({"frame": frame})
+        for number in (1, 2):
+            _, reader = connect(server)
+            assert json.loads(reader.readline()) == {"type": "hello", "tank": None}
+            assert server.wait_for_clients(number)
+            server.publish({"frame": 3})
+            assert json.loads(reader.readline())["frame"] == 3
+
+
 def test_slow_client_loses_frames_and_the_tracker_does_not_wait(connect) -> None:
     """One client never reads 400 messages of 100 kB; another one reads them all the while."""
     payload = "x" * 100_000
