@@ -22,7 +22,7 @@ def teach(
     tank_diameter: given.Diameter = None,
     px_per_m: given.PxPerM = None,
     image_rate: given.ImageRate = None,
-    side: given.BlockSide = None,
+    side: given.TaughtSide = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace files that exist.")
     ] = False,

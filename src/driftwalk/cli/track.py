@@ -19,7 +19,13 @@ def track(
     markers: given.Markers,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", metavar="FILE.nc", help="Recording to write."),
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="FILE.nc",
+            help="Recording to write; needed without --explain.",
+            show_default=False,
+        ),
     ] = None,
     camera: given.CameraFile = None,
     tank_diameter: given.Diameter = None,
@@ -42,7 +48,7 @@ def track(
             "--explain",
             metavar="FRAME",
             min=0,
-            help="Only draw what is found in this frame, and why each other candidate is not.",
+            help="Only draw this frame with what is found, and why all else is not, as a PNG.",
             show_default=False,
         ),
     ] = None,
@@ -89,12 +95,7 @@ def track(
     if overlay is not None:
         require_free(overlay, existing=existing)
     run = TrackingRun(options, build_parts(options), out)
-    try:
-        run.run()
-    except KeyboardInterrupt:
-        if out.exists():
-            print_note(f"wrote {out}: {run.frames} frames up to here")
-        raise
+    run.run()
     found = summary(run)
     if json:
         print_json({"out": out, **found})

@@ -31,12 +31,18 @@ class LiveOutputs:
         Which ports, and on what address.
     parts : TrackingParts
         What the first line tells about.
+    source : str
+        Name of the source.
     open_things : contextlib.ExitStack
         Closes the servers.
     """
 
     def __init__(
-        self, options: TrackingOptions, parts: TrackingParts, open_things: contextlib.ExitStack
+        self,
+        options: TrackingOptions,
+        parts: TrackingParts,
+        source: str,
+        open_things: contextlib.ExitStack,
     ) -> None:
         from driftwalk.track import LiveServer, nmea_frame
 
@@ -46,7 +52,7 @@ class LiveOutputs:
         self._numbers: dict[str, int] = {}
         if options.live is not None:
             self._json = open_things.enter_context(
-                LiveServer(options.live, host=host, hello=hello(options, parts))
+                LiveServer(options.live, host=host, hello=hello(options, parts, source))
             )
             print_note(f"JSON lines on {host}, port {self._json.port}")
         if options.live_nmea is not None:
@@ -104,7 +110,7 @@ class LiveOutputs:
         return found
 
 
-def hello(options: TrackingOptions, parts: TrackingParts) -> dict[str, Any]:
+def hello(options: TrackingOptions, parts: TrackingParts, source: str) -> dict[str, Any]:
     """Return the first line that each client gets: what it takes to draw the tank."""
     tank = None
     if parts.diameter is not None:
@@ -113,7 +119,7 @@ def hello(options: TrackingOptions, parts: TrackingParts) -> dict[str, Any]:
         "type": "hello",
         "format": "driftwalk live",
         "version": VERSION,
-        "source": options.source if options.is_camera else Path(options.source).name,
+        "source": source,
         "markers": Path(options.markers).name,
         "tank": tank,
         "block_side_m": parts.block_side,

@@ -44,32 +44,44 @@ CameraFile = Annotated[
         _FINDING,
         "--camera",
         metavar="FILE.toml",
-        help="Lens and plane (driftwalk camera calibrate).",
+        help="Lens and scale (from driftwalk camera calibrate).",
     ),
 ]
 Diameter = Annotated[
     float | None,
-    _option(_FINDING, "--tank-diameter", unit="m", help="Diameter of the tank: its rim is found."),
+    _option(_FINDING, "--tank-diameter", unit="m", help="Inner diameter: the rim gives the scale."),
 ]
 PxPerM = Annotated[
     float | None,
-    _option(_FINDING, "--px-per-m", metavar="<number>", help="Scale, where no rim is seen [px/m]."),
+    _option(
+        _FINDING,
+        "--px-per-m",
+        metavar="<number>",
+        help="Scale in pixels per metre, where no rim is seen.",
+    ),
 ]
 Polarity = Annotated[
     str | None,
-    _option(_FINDING, "--polarity", metavar="dark|bright|both", help="What blobs are like."),
+    _option(
+        _FINDING,
+        "--polarity",
+        metavar="dark|bright|both",
+        help="Of --markers blob: what they are like.",
+    ),
 ]
 LeastArea = Annotated[
     float | None,
-    _option(_FINDING, "--least-area-px", metavar="<px2>", help="Smallest area of a blob."),
+    _option(_FINDING, "--least-area-px", metavar="<px2>", help="Of --markers blob: smallest area."),
 ]
 MostArea = Annotated[
     float | None,
-    _option(_FINDING, "--most-area-px", metavar="<px2>", help="Largest area of a blob."),
+    _option(_FINDING, "--most-area-px", metavar="<px2>", help="Of --markers blob: largest area."),
 ]
 ImageRate = Annotated[
     float | None,
-    _option(_FINDING, "--image-rate", unit="Hz", help="Images per second of a folder."),
+    _option(
+        _FINDING, "--image-rate", unit="Hz", help="Images per second of a folder without times.csv."
+    ),
 ]
 Bodies = Annotated[
     int | None, _option(_MOTION, "--bodies", metavar="<number>", help="How many there are at most.")
@@ -77,18 +89,27 @@ Bodies = Annotated[
 MaxSpeed = Annotated[
     float | None,
     _option(
-        _MOTION, "--max-speed", unit="m/s", help="None is faster (default: a tank's width in 1 s)."
+        _MOTION,
+        "--max-speed",
+        unit="m/s",
+        help="What jumps faster is another one (default: tank width in 1 s).",
     ),
 ]
 LostAfter = Annotated[
     float | None,
-    _option(_MOTION, "--lost-after", unit="s", help="A track not seen so long ends (default: 1s)."),
+    _option(
+        _MOTION, "--lost-after", unit="s", help="Not seen for so long, a track ends (default: 1s)."
+    ),
 ]
 BlockSide = Annotated[
     float | None,
     _option(
-        _MOTION, "--side", unit="m", help="Side of a block: says who is joined (with --bodies)."
+        _MOTION, "--side", unit="m", help="Side of a block, to say who is joined (takes --bodies)."
     ),
+]
+TaughtSide = Annotated[
+    float | None,
+    _option(_FINDING, "--side", unit="m", help="Side of a block: it is written into the file."),
 ]
 Live = Annotated[
     int | None, _option(_LIVE, "--live", metavar="PORT", help="Send JSON lines to TCP clients.")

@@ -13,11 +13,13 @@ from driftwalk.cli.tracking_options import TrackingOptions
 from driftwalk.core.errors import ConfigurationError, InputError
 
 if TYPE_CHECKING:
-    from driftwalk.track import AssemblyObserver, Camera, Detector, Tracker
+    from driftwalk.track import AssemblyObserver, Camera, Detector, Tracker, TwoColourMarker
 
 # Images that are looked at before: the median of many hides what moves, that of a few glare.
 _FOR_BACKGROUND: Final = 25
 _FOR_RIM: Final = 7
+_FOR_COLOURS: Final = 60
+_LEAST_DISC_PX: Final = 2.0
 
 
 class TrackingParts(NamedTuple):
@@ -43,6 +45,7 @@ def build_parts(options: TrackingOptions) -> TrackingParts:
     """
     from driftwalk.track import sample_images
 
+    _check(options)
     number = _FOR_BACKGROUND if options.markers == "blob" else _FOR_RIM
     images = sample_images(options.source, number, rate=options.image_rate)
     camera = find_camera(options, images)
@@ -52,6 +55,18 @@ def build_parts(options: TrackingOptions) -> TrackingParts:
     tracker = _tracker(options, camera, diameter)
     side = options.side if options.side is not None else side
     return TrackingParts(camera, detector, tracker, _observer(options, side), diameter, side)
+
+
+def _check(options: TrackingOptions) -> None:
+    """Check what is said about the motion before a long run begins."""
+    if options.bodies is not None and options.bodies < 1:
+        raise InputError(f"--bodies is the number of objects, 1 or more; got {options.bodies}")
+    for name in ("max_speed", "lost_after", "side", "tank_diameter", "px_per_m", "image_rate"):
+        value = getattr(options, name)
+        if value is not None and not (math.isfinite(value) and value > 0):
+            raise InputError(f"--{name.replace('_', '-')} must be above zero, got {value:g}")
+    if options.live is not None and options.live == options.live_nmea != 0:
+        raise InputError(f"--live and --live-nmea take two ports, got {options.live} for both")
 
 
 def find_camera(options: TrackingOptions, images: Sequence[Any]) -> Camera:
@@ -86,7 +101,6 @@ def _detector(
         TwoColourDetector,
         load_markers,
         median_background,
-        missing_colours,
     )
 
     blob = {
@@ -104,17 +118,46 @@ def _detector(
     if options.markers.startswith("aruco:"):
         return TagDetector(options.markers.partition(":")[2], camera), None
     marker = load_markers(options.markers)
-    missing = missing_colours(marker, images)
-    if missing is not None:
-        raise InputError(f"{options.markers}: {missing} (driftwalk markers teach)")
+    _check_size(marker, camera, options)
+    _check_colours(marker, images, options)
     return TwoColourDetector(marker, camera), marker.block_side_m
+
+
+def _check_size(marker: TwoColourMarker, camera: Camera, options: TrackingOptions) -> None:
+    """Check that a disc is large enough to be seen: a scale is easily wrong by a hundred."""
+    middle = np.array([[camera.width_px / 2, camera.height_px / 2]])
+    per_px = math.sqrt(abs(float(np.linalg.det(camera.jacobian(middle)[0]))))
+    width = marker.size_m / per_px
+    if width < _LEAST_DISC_PX or width > camera.width_px:
+        raise InputError(
+            f"{options.markers}: a disc of {1e3 * marker.size_m:.3g} mm would be {width:.3g} "
+            "pixels wide at this scale: check --tank-diameter, --px-per-m or the camera file "
+            "(a length without a unit is in metres)"
+        )
+
+
+def _check_colours(
+    marker: TwoColourMarker, images: Sequence[Any], options: TrackingOptions
+) -> None:
+    """Check that both colours appear: before a camera perhaps later, in a file never."""
+    from driftwalk.track import missing_colours, sample_images
+
+    missing = missing_colours(marker, images)
+    if missing is not None and options.is_camera:
+        print_note(f"warning: {options.markers}: {missing} up to now (driftwalk markers teach)")
+    elif missing is not None:
+        more = sample_images(options.source, _FOR_COLOURS, rate=options.image_rate)
+        missing = missing_colours(marker, more)
+        if missing is not None:
+            raise InputError(f"{options.markers}: {missing} (driftwalk markers teach)")
 
 
 def _tracker(options: TrackingOptions, camera: Camera, diameter: float | None) -> Tracker:
     from driftwalk.track import Tracker, TrackerSettings
 
+    wide = _width(camera, diameter)
     given = {
-        "max_speed": options.max_speed or _width(camera, diameter),
+        "max_speed": options.max_speed if options.max_speed is not None else wide,
         "bodies": options.bodies,
         "lost_after": options.lost_after,
     }

@@ -14,22 +14,25 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from driftwalk.cli.output import print_note
 from driftwalk.cli.progress import ProgressReporter
 from driftwalk.cli.tracking_live import LiveOutputs
 from driftwalk.cli.tracking_options import TrackingOptions
 from driftwalk.cli.tracking_parts import TrackingParts
+from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.track import AssemblySeen, Frame, OverlayWriter, TrackState
+    from driftwalk.track import AssemblySeen, Frame, FrameSource, OverlayWriter, TrackState
 
+Pose = tuple[float, float, float]
 Look = Callable[["Frame", "Sequence[TrackState]", "AssemblySeen | None"], None]
 
 _SAVE_EVERY_S: Final = 10.0
 # A save may take this share of the time, so that those of a long recording become rarer.
 _SAVING_SHARE: Final = 0.05
-_OVERLAY_RATE: Final = 25.0
+_MOST_KINDS: Final = 4
 
 
 class TrackingRun:
@@ -59,8 +62,12 @@ class TrackingRun:
         self.interrupted: str | None = None
         self.frames = 0
         self.working_s = 0.0
+        self.source_name = options.source
+        self._names: set[str] = set()
+        self._left_out: set[str] = set()
         self._source_counts: dict[str, int] = {}
         self._saved = clock.monotonic()
+        self._saved_once = False
         self._pause = _SAVE_EVERY_S
 
     def run(self) -> None:
@@ -75,36 +82,47 @@ class TrackingRun:
 
         total = frame_count(self.options.source) or 0
         source = open_source(self.options.source, rate=self.options.image_rate)
+        self.source_name = source.name if self.options.is_camera else Path(source.name).name
         with contextlib.ExitStack() as open_things:
             open_things.callback(source.close)
             open_things.enter_context(_termination_as_interrupt())
-            live = LiveOutputs(self.options, self.parts, open_things)
+            live = LiveOutputs(self.options, self.parts, self.source_name, open_things)
             overlay = self._open_overlay(open_things)
             progress = open_things.enter_context(ProgressReporter("track"))
             try:
                 for frame in source:
                     self._source_counts = source.counts.to_dict()
                     self._take(frame, source.waited_s, live, overlay)
-                    if total:
-                        progress(min(frame.index + 1, total), total)
+                    _tell_progress(progress, frame.index + 1, total)
                     self._save_now_and_then()
                 self.interrupted = source.interrupted
             except KeyboardInterrupt:
                 self.interrupted = f"stopped by hand after {self.frames} frames"
                 if not self.options.is_camera:
+                    self._keep_what_there_is(live, source)
                     raise
             except BaseException as error:
                 self.interrupted = str(error)
+                self._keep_what_there_is(live, source)
                 raise
-            finally:
-                live.end(self.interrupted)
-                self._source_counts = source.counts.to_dict()
-                self._save(complete=self.interrupted is None or self.options.is_camera)
+            live.end(self.interrupted)
+            self._source_counts = source.counts.to_dict()
+            self._save(complete=self.interrupted is None or self.options.is_camera)
+
+    def _keep_what_there_is(self, live: LiveOutputs, source: FrameSource) -> None:
+        """Save what was tracked before an end that nobody wanted."""
+        live.end(self.interrupted)
+        self._source_counts = source.counts.to_dict()
+        self._save(complete=False)
+        if self._saved_once:
+            print_note(f"wrote {self.out}: {self.frames} frames up to here")
 
     def recording(self, *, complete: bool = True) -> xr.Dataset:
         """Return what was tracked up to now."""
         attrs: dict[str, Any] = {
-            "source": Path(self.options.source).name,
+            "source": self.source_name,
+            # `source` is the recording's own name once it is read from a file.
+            "tracked_from": self.source_name,
             "markers": Path(self.options.markers).name,
             "complete": "yes" if complete else "no",
         }
@@ -115,7 +133,16 @@ class TrackingRun:
             arena = {"shape": "circle", "diameter_m": diameter, "center_m": [0.0, 0.0]}
             attrs["arena"] = json.dumps(arena)
         counts = {**self._source_counts, "rejected": dict(self.rejected)}
-        return self.parts.tracker.finish(attrs=attrs, counts=counts)
+        try:
+            return self.parts.tracker.finish(attrs=attrs, counts=counts)
+        except InputError as error:
+            raise InputError(f"{error}{self._what_was_there()}") from error
+
+    def _what_was_there(self) -> str:
+        """Return what was turned down, most of it first, and how to look at it."""
+        kinds = [f"{kind} {number}" for kind, number in self.rejected.most_common(_MOST_KINDS)]
+        turned_down = f"; turned down: {', '.join(kinds)}" if kinds else ""
+        return f"{turned_down} (look at a frame with track ... --explain {self.frames // 2})"
 
     def _take(
         self, frame: Frame, waited_s: float, live: LiveOutputs, overlay: OverlayWriter | None
@@ -132,7 +159,7 @@ class TrackingRun:
         dropped = self._source_counts.get("dropped", 0)
         live.publish(frame, states, observed, dropped=dropped, arrived=began - waited_s)
         if overlay is not None:
-            overlay.write(draw_states(frame.image, states, self.parts.camera))
+            overlay.write(draw_states(frame.image, states, self.parts.camera), frame.time)
         if self._look is not None:
             self._look(frame, states, observed)
 
@@ -144,14 +171,26 @@ class TrackingRun:
             for state in states
             if (one := state.measured) is not None and one.x is not None and one.y is not None
         }
-        return self.parts.observer.step(time, seen)
+        return self.parts.observer.step(time, self._watched(seen))
+
+    def _watched(self, seen: dict[str, Pose]) -> dict[str, Pose]:
+        """Leave out tags beyond the number of blocks: a misread one is not to end the run."""
+        for name in seen:
+            if name in self._names or name in self._left_out:
+                continue
+            if len(self._names) < (self.options.bodies or 0):
+                self._names.add(name)
+                continue
+            self._left_out.add(name)
+            print_note(f"warning: {name} is one more than --bodies; who is joined is said without")
+        return {name: pose for name, pose in seen.items() if name in self._names}
 
     def _open_overlay(self, open_things: contextlib.ExitStack) -> OverlayWriter | None:
         from driftwalk.track import OverlayWriter
 
         if self.options.overlay is None:
             return None
-        writer = OverlayWriter(self.options.overlay, rate=self.options.image_rate or _OVERLAY_RATE)
+        writer = OverlayWriter(self.options.overlay)
         open_things.callback(writer.close)
         return writer
 
@@ -160,7 +199,6 @@ class TrackingRun:
             self._save(complete=False)
 
     def _save(self, *, complete: bool) -> None:
-        from driftwalk.core.errors import InputError
         from driftwalk.record import save_trajectory
 
         began = clock.monotonic()
@@ -169,8 +207,17 @@ class TrackingRun:
             with contextlib.suppress(InputError):
                 recording = self.recording(complete=complete)
                 save_trajectory(recording, self.out, existing="replace")
+                self._saved_once = True
         self._saved = clock.monotonic()
         self._pause = max(_SAVE_EVERY_S, (self._saved - began) / _SAVING_SHARE)
+
+
+def _tell_progress(progress: ProgressReporter, done: int, total: int) -> None:
+    """Say how far it is; a file may hold more frames than it states."""
+    if 0 < total < done:
+        progress.update(done, done, f"the source stated {total}, there are more")
+    elif total:
+        progress.update(done, total)
 
 
 @contextlib.contextmanager

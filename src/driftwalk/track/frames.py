@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import math
+import os
 import statistics
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -24,6 +26,9 @@ _GAP: Final = 1.5
 _STALE_STRIDE: Final = 16
 _IMAGES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 _TIMES: Final = "times.csv"
+# A file whose pictures end so long before its stated end was cut off; sound may go on a little.
+_CUT_OFF_S: Final = 0.5
+_FFMPEG_LOG: Final = "OPENCV_FFMPEG_LOGLEVEL"
 
 
 @dataclass
@@ -119,10 +124,15 @@ class FrameFilter:
         self._counts.frames += 1
         return Frame(index, time, picture)
 
+    @property
+    def usual_gap(self) -> float:
+        """The usual time between two frames [s]; 0 for less than two."""
+        return statistics.median(self._gaps) if self._gaps else 0.0
+
     def count_gaps(self) -> None:
         """Count the frames that are missing, by the usual time between two."""
         if len(self._gaps) > 1:
-            usual = statistics.median(self._gaps)
+            usual = self.usual_gap
             long = [gap for gap in self._gaps if gap > _GAP * usual]
             self._counts.dropped += sum(round(gap / usual) - 1 for gap in long)
 
@@ -155,7 +165,7 @@ class VideoFile:
         if Path(path).is_dir() or Path(path).stat().st_size == 0:
             raise FormatError("is not a video: nothing to read in it", path=path)
         self._position = cv2.CAP_PROP_POS_MSEC
-        self._capture = _quiet_open(cv2, str(path))
+        self._capture = open_capture(str(path))
         if not self._capture.isOpened():
             raise FormatError("is not a video that OpenCV can read", path=path)
         self._rate = float(self._capture.get(cv2.CAP_PROP_FPS))
@@ -170,7 +180,7 @@ class VideoFile:
             When there is no frame, the size changes, or the stream has no times.
         """
         keep = FrameFilter(self.name, self.counts, keep_stale=self._keep_stale)
-        index = 0
+        index, time = 0, 0.0
         try:
             while self._capture.grab():
                 time = float(self._capture.get(self._position)) / 1000.0
@@ -189,12 +199,22 @@ class VideoFile:
             raise FormatError(
                 "has no presentation times: write it again with another program", path=self.name
             )
-        if 0 < index < self._promised - 1:
-            self.interrupted = f"{self.name} ends after {index} of {self._promised} frames"
+        self.interrupted = self._cut_off(index, time + keep.usual_gap)
 
     def close(self) -> None:
         """Let go of the file."""
         self._capture.release()
+
+    def _cut_off(self, frames: int, end: float) -> str | None:
+        """Return that the file ends early, None when it does not.
+
+        Where the rate varies, the number of frames that a file states is often its duration times
+        a rate: only the duration tells.
+        """
+        duration = self._promised / self._rate if self._rate > 0 else 0.0
+        if frames >= self._promised - 1 or duration - end < max(_CUT_OFF_S, 2 / self._rate):
+            return None
+        return f"{self.name} ends after {frames} frames, at {end:.1f} s of {duration:.1f} s"
 
 
 class ImageSequence:
@@ -285,18 +305,42 @@ def open_source(
     return VideoFile(source, keep_stale=keep_stale)
 
 
+def open_capture(source: str | int) -> Any:
+    """Return OpenCV's reader; what its libraries would print on failure, our own error says."""
+    cv2 = require_opencv()
+    log = cv2.utils.logging
+    level = log.setLogLevel(log.LOG_LEVEL_SILENT)
+    # Read by OpenCV when it opens the first video; who has set it wants to see more.
+    quiet = _FFMPEG_LOG not in os.environ
+    if quiet:
+        os.environ[_FFMPEG_LOG] = "-8"
+    try:
+        return cv2.VideoCapture(source)
+    finally:
+        if quiet:
+            del os.environ[_FFMPEG_LOG]
+        log.setLogLevel(level)
+
+
 def _timed_images(folder: Path, rate: float | None) -> list[tuple[Path, float]]:
     if (folder / _TIMES).exists():
         return _listed_images(folder)
-    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in _IMAGES)
+    files = images_in(folder)
     if not files:
         raise InputError(f"{folder}: no images ({', '.join(_IMAGES)}) in this folder")
-    if rate is None or not rate > 0:
+    if rate is None:
         raise InputError(
-            f"{folder}: images have no times: state their rate in Hz, or put a {_TIMES} with the "
-            "columns file, time_s beside them"
+            f"{folder}: images have no times: state their rate in Hz (--image-rate), or put a "
+            f"{_TIMES} with the columns file, time_s beside them"
         )
+    if not (math.isfinite(rate) and rate > 0):
+        raise InputError(f"the rate of images must be above zero, got {rate:g} Hz")
     return [(file, index / rate) for index, file in enumerate(files)]
+
+
+def images_in(folder: Path) -> list[Path]:
+    """Return the images in a folder, in the order of their names."""
+    return sorted(file for file in folder.iterdir() if file.suffix.lower() in _IMAGES)
 
 
 def _listed_images(folder: Path) -> list[tuple[Path, float]]:
@@ -313,18 +357,6 @@ def _listed_images(folder: Path) -> list[tuple[Path, float]]:
     if not found:
         raise FormatError("lists no image", path=path)
     return found
-
-
-def _quiet_open(cv2: Any, path: str) -> Any:
-    """Open a file; what OpenCV would print on failure is said by our own error."""
-    level = cv2.getLogLevel() if hasattr(cv2, "getLogLevel") else None
-    if level is not None:
-        cv2.setLogLevel(0)
-    try:
-        return cv2.VideoCapture(path)
-    finally:
-        if level is not None:
-            cv2.setLogLevel(level)
 
 
 def _three_channels(image: Any) -> Image:

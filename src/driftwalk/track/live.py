@@ -347,5 +347,6 @@ def _listen(host: str, port: int) -> socket.socket:
             raise InputError(
                 f"port {port} on {host} is in use: choose another one, or 0 for any that is free"
             ) from error
-        reason = error.strerror or str(error)
+        # Python adds what it tried, which the message says already.
+        reason = (error.strerror or str(error)).partition(" (while")[0]
         raise InputError(f"cannot listen on {host}, port {port}: {reason}") from error

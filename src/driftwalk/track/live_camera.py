@@ -6,10 +6,11 @@ import threading
 import time as clock
 from collections.abc import Callable, Iterator
 from typing import Any, Final
+from urllib.parse import urlsplit, urlunsplit
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.opencv import require_opencv
-from driftwalk.track.frames import FrameCounts, FrameFilter
+from driftwalk.track.frames import FrameCounts, FrameFilter, open_capture
 from driftwalk.track.types import Frame
 
 _PATIENCE_S: Final = 5.0
@@ -62,6 +63,7 @@ class LiveCamera:
         self._newest: tuple[int, float, Any] | None = None
         self._taken = self._read = 0
         self._gone = self._stop = False
+        self._thread = threading.Thread(target=self._reading, name=f"reads {name}", daemon=True)
 
     @classmethod
     def open(cls, text: str) -> LiveCamera:
@@ -74,19 +76,18 @@ class LiveCamera:
         """
         cv2 = require_opencv()
         _, _, which = text.partition(":")
-        capture = cv2.VideoCapture(int(which) if which.isdigit() else which)
+        capture = open_capture(int(which) if which.isdigit() else which)
         if not capture.isOpened():
-            raise InputError(f"{text}: no such camera, or another program holds it")
+            raise InputError(f"{public_name(text)}: no such camera, or another program holds it")
         # A queue in the driver would hand out old frames.
         capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
-        return cls(capture, text)
+        return cls(capture, public_name(text))
 
     def __iter__(self) -> Iterator[Frame]:
         """Yield the newest frame each time."""
-        thread = threading.Thread(target=self._reading, name=f"reads {self.name}", daemon=True)
         keep = FrameFilter(self.name, self.counts)
         first: float | None = None
-        thread.start()
+        self._thread.start()
         try:
             while (newest := self._next()) is not None:
                 index, time, image = newest
@@ -96,8 +97,6 @@ class LiveCamera:
                     self.waited_s = self._now() - time
                     yield frame
         finally:
-            self._stop = True
-            thread.join(timeout=self._patience)
             self.close()
         number = f"{self._read} frame{'' if self._read == 1 else 's'}"
         self.interrupted = f"{self.name} stopped after {number}"
@@ -105,7 +104,11 @@ class LiveCamera:
     def close(self) -> None:
         """Let go of the camera."""
         self._stop = True
-        self._capture.release()
+        if self._thread.is_alive():
+            self._thread.join(timeout=self._patience)
+        # To release a camera that a thread still reads from could end the whole program.
+        if not self._thread.is_alive():
+            self._capture.release()
 
     def _reading(self) -> None:
         while not self._stop:
@@ -130,3 +133,21 @@ class LiveCamera:
             )
             newest, self._newest = self._newest, None
             return newest
+
+
+def public_name(text: str) -> str:
+    """Return the name of a camera without the password that its address may hold.
+
+    Examples
+    --------
+    >>> public_name("camera:rtsp://me:secret@192.0.2.7:554/stream?key=1")
+    'camera:rtsp://192.0.2.7:554/stream'
+    >>> public_name("camera:0")
+    'camera:0'
+    """
+    kind, _, address = text.partition(":")
+    parts = urlsplit(address)
+    if not parts.netloc:
+        return text
+    host = parts.netloc.rpartition("@")[2]
+    return f"{kind}:{urlunsplit((parts.scheme, host, parts.path, '', ''))}"

@@ -26,6 +26,9 @@ _COLOURS: Final = (
 )
 _DARK, _LIGHT, _WARNING = (0, 0, 0), (255, 255, 255), (0, 0, 255)
 _ARM_PX: Final = 18
+_FOR_RATE: Final = 12
+_ONE_PICTURE_RATE: Final = 10.0
+_SLOWEST, _FASTEST = 0.5, 240.0
 _CODECS: Final = {".mp4": "mp4v", ".avi": "MJPG", ".mkv": "FFV1"}
 
 
@@ -75,14 +78,15 @@ def draw_states(image: Image, states: Iterable[TrackState], camera: PixelToWorld
 
 
 class OverlayWriter:
-    """Writes pictures as a video, as they come.
+    """Writes pictures as a video that plays as fast as what it shows.
+
+    A video file has one rate; it is that of the first pictures. Where pictures are missing the one
+    before stays, and pictures that come faster are left out.
 
     Parameters
     ----------
     path : path-like
         ``.mp4``, ``.avi`` or ``.mkv``.
-    rate : float
-        Pictures per second [Hz].
 
     Raises
     ------
@@ -91,32 +95,72 @@ class OverlayWriter:
 
     Examples
     --------
-    >>> OverlayWriter("overlay.gif", rate=10.0)
+    >>> OverlayWriter("overlay.gif")
     Traceback (most recent call last):
     driftwalk.core.errors.InputError: overlay.gif: an overlay is written as .mp4, .avi or .mkv
     """
 
-    def __init__(self, path: str | Path, *, rate: float) -> None:
-        self._path, self._rate = Path(path), rate
+    def __init__(self, path: str | Path) -> None:
+        self._path = Path(path)
         if self._path.suffix.lower() not in _CODECS:
             raise InputError(f"{path}: an overlay is written as .mp4, .avi or .mkv")
         self._cv2 = require_opencv()
         self._writer: Any = None
+        self._first: list[tuple[float, Image]] = []
+        self._rate, self._began, self._written = _ONE_PICTURE_RATE, 0.0, 0
+        self._last: Image | None = None
 
-    def write(self, picture: Image) -> None:
-        """Add a picture."""
-        if self._writer is None:
-            code = self._cv2.VideoWriter_fourcc(*_CODECS[self._path.suffix.lower()])
-            size = picture.shape[1], picture.shape[0]
-            self._writer = self._cv2.VideoWriter(str(self._path), code, self._rate, size)
-            if not self._writer.isOpened():
-                raise InputError(f"{self._path}: cannot be written as a video")
-        self._writer.write(picture)
+    def write(self, picture: Image, time: float) -> None:
+        """Add a picture.
+
+        Parameters
+        ----------
+        picture : array, shape (rows, columns, 3)
+            Blue, green, red.
+        time : float
+            When it was taken [s].
+        """
+        if self._writer is not None:
+            self._add(picture, time)
+            return
+        self._first.append((time, picture))
+        if len(self._first) == _FOR_RATE:
+            self._open()
 
     def close(self) -> None:
         """Finish the file."""
+        if self._writer is None and self._first:
+            self._open()
         if self._writer is not None:
             self._writer.release()
+
+    def _open(self) -> None:
+        """Open the file with the rate of the first pictures, and write these."""
+        times = [time for time, _ in self._first]
+        if len(times) > 1:
+            gap = float(np.median(np.diff(times)))
+            self._rate = min(max(1.0 / gap, _SLOWEST), _FASTEST)
+        self._began = times[0]
+        code = self._cv2.VideoWriter_fourcc(*_CODECS[self._path.suffix.lower()])
+        rows, columns = self._first[0][1].shape[:2]
+        self._writer = self._cv2.VideoWriter(str(self._path), code, self._rate, (columns, rows))
+        if not self._writer.isOpened():
+            raise InputError(f"{self._path}: cannot be written as a video")
+        waiting, self._first = self._first, []
+        for time, picture in waiting:
+            self._add(picture, time)
+
+    def _add(self, picture: Image, time: float) -> None:
+        place = round((time - self._began) * self._rate)
+        while self._last is not None and self._written < place:
+            self._put(self._last)
+        if self._written == place:
+            self._put(picture)
+        self._last = picture
+
+    def _put(self, picture: Image) -> None:
+        self._writer.write(picture)
+        self._written += 1
 
 
 def save_picture(path: str | Path, picture: Image) -> Path:

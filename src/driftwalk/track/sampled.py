@@ -9,7 +9,7 @@ from typing import Final
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.opencv import require_opencv
-from driftwalk.track.frames import open_source
+from driftwalk.track.frames import images_in, open_capture, open_source
 from driftwalk.track.types import Image
 
 _CAMERA_STRIDE: Final = 5
@@ -90,12 +90,12 @@ def frame_count(source: str | Path) -> int | None:
         listed = path / "times.csv"
         if listed.exists():
             return sum(1 for _ in listed.open(encoding="utf-8-sig")) - 1
-        return sum(1 for file in path.iterdir() if file.is_file())
+        return len(images_in(path))
     if not path.is_file():
         return None
     cv2 = require_opencv()
     open_source(source).close()
-    capture = cv2.VideoCapture(str(path))
+    capture = open_capture(str(path))
     count = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
     capture.release()
     return count if count > 0 else None
@@ -103,7 +103,7 @@ def frame_count(source: str | Path) -> int | None:
 
 def _by_seeking(source: str | Path, total: int, number: int) -> list[Image]:
     cv2 = require_opencv()
-    capture = cv2.VideoCapture(str(source))
+    capture = open_capture(str(source))
     images = []
     for place in range(number):
         capture.set(cv2.CAP_PROP_POS_FRAMES, place * total // number)
