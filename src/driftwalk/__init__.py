@@ -25,6 +25,7 @@ _STAGES = (
     "track",
     "datasets",
     "report",
+    "viewer",
 )
 
 

@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-HEAVY = {"xarray", "scipy", "pandas", "cv2", "matplotlib", "dask", "h5netcdf", "optuna"}
+HEAVY = {"xarray", "scipy", "pandas", "cv2", "matplotlib", "dask", "h5netcdf", "optuna", "fastapi"}
 HELP = "from driftwalk.cli.main import main; assert main(['--help']) == 0"
 IMPORT = "import driftwalk; driftwalk.__version__"
 

@@ -24,6 +24,7 @@ STAGES = (
     "track",
     "datasets",
     "report",
+    "viewer",
 )
 
 

@@ -29,7 +29,9 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "track": GROUND | {"record", "model", "assemble"},
     "datasets": GROUND | {"record", "flow", "model", "compare", "sweep", "simulate"},
     "report": GROUND,
-    "viewer": GROUND,
+    # `track` for its live server, through which the playground's tank can be watched.
+    "viewer": GROUND
+    | {"record", "flow", "model", "compare", "simulate", "assemble", "track", "report"},
     "cli": GROUND
     | {"record", "flow", "model", "compare", "sweep", "simulate", "calibrate", "assemble"}
     | {"track", "datasets", "report", "viewer"},
@@ -37,6 +39,9 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
 HEAVY = frozenset(
     {"xarray", "scipy", "pandas", "cv2", "matplotlib", "dask", "optuna", "h5netcdf", "SALib"}
 )
+# The extra of the server: in one module alone, which is imported when a server is started.
+SERVER = frozenset({"fastapi", "starlette", "uvicorn", "websockets"})
+SERVER_MODULE = SOURCE / "viewer" / "app.py"
 # `driftwalk.core` and `driftwalk.schema` are used by module; a stage by the names in its `__all__`.
 BY_MODULE = GROUND
 
@@ -151,6 +156,11 @@ def test_heavy_packages_are_imported_inside_functions() -> None:
         and not found.for_types_only
     ]
     assert not wrong
+
+
+def test_the_server_is_imported_by_one_module() -> None:
+    found = [e for e in ALL_IMPORTS if e.module.split(".")[0] in SERVER and e.at_module_level]
+    assert {entry.file for entry in found} == {SERVER_MODULE}
 
 
 def test_stages_do_not_import_the_command_line_or_each_other_in_a_ring() -> None:

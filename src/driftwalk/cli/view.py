@@ -1,0 +1,107 @@
+"""`driftwalk view`: a run or a tracker's stream in the browser."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from driftwalk.cli.output import print_note
+from driftwalk.core.errors import InputError
+
+if TYPE_CHECKING:
+    from driftwalk.viewer import Source
+
+Port = Annotated[int, typer.Option("--port", help="Port to serve on; 0 for any that is free.")]
+Host = Annotated[
+    str,
+    typer.Option(
+        "--host",
+        metavar="ADDRESS",
+        help="Address to serve on; away from this machine the page asks for a token.",
+    ),
+]
+Open = Annotated[
+    bool | None,
+    typer.Option(
+        "--open/--no-open", help="Open the browser; on a terminal it is opened.", show_default=False
+    ),
+]
+LAST_PORT = 65535
+
+
+def view(
+    run: Annotated[
+        Path | None,
+        typer.Argument(metavar="[RUN]", help="Run directory, finished or not.", show_default=False),
+    ] = None,
+    live: Annotated[
+        str | None,
+        typer.Option(
+            "--live",
+            metavar="ADDRESS:PORT",
+            help="Watch the stream of a tracker or of the playground.",
+            show_default=False,
+        ),
+    ] = None,
+    port: Port = 8765,
+    host: Host = "127.0.0.1",
+    open: Open = None,
+) -> None:
+    """Explore a run in the browser, or watch a tracker's stream.
+
+    The page of a run that is under way fills as its results come in. Ctrl-C ends it.
+    """
+    from driftwalk.viewer import LiveSource, RunSource, require_server
+
+    if (run is None) == (live is None):
+        raise InputError("name a run directory, or a stream to watch (--live ADDRESS:PORT)")
+    require_server()
+    source: Source = LiveSource(*address_of(live)) if live is not None else RunSource(run or "")
+    show(source, host=host, port=port, open=open)
+
+
+def show(source: Source, *, host: str, port: int, open: bool | None) -> None:
+    """Serve a page, say where it is, and open the browser if that is wanted."""
+    from driftwalk.viewer import serve
+
+    wanted = sys.stdout.isatty() if open is None else open
+
+    def ready(address: str) -> None:
+        print(address, flush=True)
+        print_note("Ctrl-C ends it")
+        if wanted:
+            open_browser(address)
+
+    serve(source, host=host, port=port, ready=ready)
+
+
+def open_browser(address: str, opener: Callable[[str], bool] | None = None) -> None:
+    """Open the browser in a thread of its own: some systems wait until it is closed."""
+    import threading
+    import webbrowser
+
+    target = webbrowser.open if opener is None else opener
+    threading.Thread(target=target, args=(address,), daemon=True).start()
+
+
+def address_of(text: str) -> tuple[str, int]:
+    """Return host and port of a stream; loopback when only the port is given.
+
+    Raises
+    ------
+    InputError
+        When it is no address.
+
+    Examples
+    --------
+    >>> address_of("192.168.1.5:5000"), address_of("5000"), address_of("[::1]:5000")
+    (('192.168.1.5', 5000), ('127.0.0.1', 5000), ('::1', 5000))
+    """
+    name, _, port = text.rpartition(":")
+    if not (port.isascii() and port.isdigit() and 0 < int(port) <= LAST_PORT):
+        raise InputError(f"--live {text}: expected an address and a port, such as 127.0.0.1:5000")
+    return name.strip("[]") or "127.0.0.1", int(port)

@@ -1,0 +1,11 @@
+"""Live pages: a run, a tracker's stream or a playground in the browser, over a small server.
+
+FastAPI and uvicorn, the extra ``[view]``, are imported when a server is started.
+"""
+
+from driftwalk.viewer.hub import Source
+from driftwalk.viewer.live_client import LiveSource
+from driftwalk.viewer.server import require_server, serve
+from driftwalk.viewer.watch_run import RunSource
+
+__all__ = ["LiveSource", "RunSource", "Source", "require_server", "serve"]

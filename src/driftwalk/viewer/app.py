@@ -1,0 +1,193 @@
+"""The routes: the page, its front end, the files of a run, and the WebSocket.
+
+FastAPI is imported here, so this module is imported when a server is started.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+from collections.abc import AsyncIterator, Callable
+from typing import Any, Final
+
+from fastapi import FastAPI, HTTPException
+from fastapi.responses import FileResponse, HTMLResponse, PlainTextResponse, Response
+from starlette.datastructures import Headers, QueryParams
+from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import Message as AsgiMessage
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from driftwalk.viewer.hub import Content, Hub, Source
+from driftwalk.viewer.messages import Outbox, make_message
+from driftwalk.viewer.security import HEADERS, Gate
+from driftwalk.viewer.shell import BUNDLE, bundle_file, html_shell, page_frame
+
+TRY_LATER: Final = 1013
+"""Close code of a WebSocket: too many browsers."""
+
+Failed = Callable[[BaseException], None]
+
+
+def make_app(source: Source, gate: Gate, *, failed: Failed) -> ASGIApp:
+    """Return the application of a server.
+
+    Parameters
+    ----------
+    source : Source
+        What the page shows.
+    gate : Gate
+        Who may come in.
+    failed : callable
+        Told the error with which the source ended.
+    """
+    hub = Hub()
+
+    @contextlib.asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:  # noqa: ARG001
+        task = asyncio.create_task(source.run(hub.publish))
+        task.add_done_callback(
+            lambda done: (
+                None if done.cancelled() or (error := done.exception()) is None else failed(error)
+            )
+        )
+        yield
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError, Exception):
+            await task
+
+    app = FastAPI(lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
+
+    @app.get("/")
+    def page() -> HTMLResponse:
+        return HTMLResponse(html_shell(page_frame(source.view, source.title), token=gate.token))
+
+    @app.get("/{name}")
+    def whole_file(name: str) -> Response:
+        if name in BUNDLE:
+            return Response(bundle_file(name), media_type=BUNDLE[name])
+        text = source.report() if name == "report.html" else None
+        if text is None:
+            raise HTTPException(404)
+        # To be kept and opened later; here the header that guards the page would stop it.
+        attachment = {"Content-Disposition": 'attachment; filename="report.html"'}
+        return HTMLResponse(text, headers=attachment)
+
+    @app.get("/files/{name:path}")
+    def file_of_run(name: str) -> FileResponse:
+        path = source.file(name)
+        if path is None:
+            raise HTTPException(404)
+        return FileResponse(path, media_type="application/octet-stream", filename=path.name)
+
+    @app.websocket("/ws")
+    async def talk(websocket: WebSocket) -> None:
+        await websocket.accept()
+        box = hub.join(source.greeting())
+        if box is None:
+            await websocket.close(TRY_LATER)
+            return
+        try:
+            await _talk(websocket, box, source)
+        finally:
+            hub.leave(box)
+
+    return _Guard(app, gate)
+
+
+async def _talk(websocket: WebSocket, box: Outbox, source: Source) -> None:
+    """Send what waits and take what comes until either side ends."""
+    tasks = [
+        asyncio.create_task(_send(websocket, box)),
+        asyncio.create_task(_listen(websocket, box, source)),
+    ]
+    try:
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for task in tasks:
+            task.cancel()
+        results = await asyncio.gather(*tasks, return_exceptions=True)
+    for error in results:
+        # A browser may leave at any moment; that is no fault of anyone.
+        gone = (WebSocketDisconnect, asyncio.CancelledError)
+        if isinstance(error, BaseException) and not isinstance(error, gone):
+            raise error
+
+
+async def _send(websocket: WebSocket, box: Outbox) -> None:
+    while True:
+        text = await box.next()
+        try:
+            await websocket.send_text(text)
+        except (OSError, RuntimeError) as error:
+            # What the layers below say when the browser went away while this was on its way.
+            raise WebSocketDisconnect from error
+
+
+async def _listen(websocket: WebSocket, box: Outbox, source: Source) -> None:
+    def reply(content: Content) -> None:
+        box.put(make_message(content))
+
+    try:
+        while (message := await websocket.receive())["type"] == "websocket.receive":
+            content = parsed(message.get("text") or "")
+            if content is None:
+                continue
+            if content.get("type") == "ready":
+                box.drawn()
+            else:
+                await source.receive(content, reply)
+    finally:
+        await source.leave(reply)
+
+
+def parsed(text: str) -> dict[str, Any] | None:
+    """Return the object that a message holds, None when it holds none.
+
+    Examples
+    --------
+    >>> parsed('{"type": "ready"}'), parsed("[1]"), parsed("{")
+    ({'type': 'ready'}, None, None)
+    """
+    try:
+        content = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    return content if isinstance(content, dict) else None
+
+
+class _Guard:
+    """Stands before everything: nothing inside sees a request that the gate refuses."""
+
+    def __init__(self, app: ASGIApp, gate: Gate) -> None:
+        self._app, self._gate = app, gate
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        words = self._gate.refusal(_headers(scope), QueryParams(scope["query_string"]))
+        if scope["type"] == "websocket":
+            if words is None:
+                await self._app(scope, receive, send)
+            else:
+                await receive()
+                await send({"type": "websocket.close", "code": 1008, "reason": words})
+            return
+        answer: ASGIApp = self._app
+        if words is not None:
+            answer = PlainTextResponse(f"driftwalk: {words}\n", status_code=403)
+
+        async def send_with_headers(message: AsgiMessage) -> None:
+            if message["type"] == "http.response.start":
+                own = [(name.lower().encode(), value.encode()) for name, value in HEADERS.items()]
+                message = {**message, "headers": [*message.get("headers", ()), *own]}
+            await send(message)
+
+        await answer(scope, receive, send_with_headers)
+
+
+def _headers(scope: Scope) -> dict[str, str]:
+    """Return the headers; one that is given twice has no value that the gate would take."""
+    headers = Headers(scope=scope)
+    return {name: ", ".join(headers.getlist(name)) for name in set(headers.keys())}

@@ -1,0 +1,169 @@
+"""A tracker's stream: read over TCP, handed on to the browsers, found again when it was lost."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+from collections.abc import Sequence
+from typing import Any, Final
+
+from driftwalk.core.errors import InputError
+from driftwalk.viewer.hub import Content, Publish, Source
+from driftwalk.viewer.shell import page_frame
+
+FORMAT: Final = "driftwalk live"
+VERSION: Final = 1
+LONGEST_LINE: Final = 1 << 25
+"""Longest line [byte] that is read: a frame with a large image."""
+FIRST_PAUSE_S: Final = 0.25
+LONGEST_PAUSE_S: Final = 2.0
+"""Time between two attempts to connect [s]: it doubles up to this."""
+LAST_PORT: Final = 65535
+WIDTHS: Final = range(16, 4097)
+"""Widths [px] in which a tracker sends its images."""
+
+
+class LiveSource(Source):
+    """Shows the stream of a tracker, or of a playground that publishes its tank.
+
+    Parameters
+    ----------
+    host : str
+        Where the tracker runs.
+    port : int
+        Its port (``driftwalk track --live PORT``).
+
+    Raises
+    ------
+    InputError
+        When that is no address.
+
+    Examples
+    --------
+    >>> LiveSource("127.0.0.1", 5000).title
+    '127.0.0.1:5000'
+    """
+
+    view = "live"
+
+    def __init__(self, host: str, port: int) -> None:
+        if not host or not 0 < port <= LAST_PORT:
+            raise InputError(f"no address of a stream: {host}:{port}")
+        self._host, self._port = host, port
+        self.title = f"{host}:{port}"
+        self._last: dict[str, Content] = {
+            "lost": {"type": "lost", "words": f"waiting for a tracker on {self.title}"}
+        }
+        self._widths: dict[Publish, int] = {}
+        self._writer: asyncio.StreamWriter | None = None
+
+    def greeting(self) -> Sequence[Content]:
+        """Return the page, and the last that came of the stream."""
+        return [{"type": "page", "page": self._page()}, *self._last.values()]
+
+    async def run(self, publish: Publish) -> None:
+        """Read the stream, and connect again whenever it is lost."""
+        pause = FIRST_PAUSE_S
+        while True:
+            words = await self._connect(publish)
+            if words is None:
+                pause, words = FIRST_PAUSE_S, "the tracker is gone; the page waits for it"
+            self._note({"type": "lost", "words": words}, publish)
+            await asyncio.sleep(pause)
+            pause = min(2.0 * pause, LONGEST_PAUSE_S)
+
+    async def receive(self, content: Content, reply: Publish) -> None:
+        """Ask the tracker for its images, or no longer."""
+        width = content.get("width")
+        if content.get("type") == "video" and isinstance(width, int):
+            self._widths[reply] = width if width in WIDTHS else 0
+            await self._ask()
+
+    async def leave(self, reply: Publish) -> None:
+        """Ask no longer for images that only this browser wanted."""
+        self._widths.pop(reply, None)
+
+    async def _connect(self, publish: Publish) -> str | None:
+        """Read until the stream ends; return why it could not be read, None when it could."""
+        try:
+            reader, writer = await asyncio.open_connection(
+                self._host, self._port, limit=LONGEST_LINE
+            )
+        except OSError:
+            return f"waiting for a tracker on {self.title}"
+        self._writer = writer
+        try:
+            return await self._read(reader, publish)
+        except (OSError, ValueError):
+            # ValueError: a line that is longer than any frame.
+            return None
+        finally:
+            self._writer = None
+            writer.close()
+            with contextlib.suppress(OSError):
+                await writer.wait_closed()
+
+    async def _read(self, reader: asyncio.StreamReader, publish: Publish) -> str | None:
+        hello = stream_line(await reader.readline())
+        if hello is None or hello.get("type") != "hello" or hello.get("format") != FORMAT:
+            return f"what listens on {self.title} is no tracker of driftwalk"
+        if hello.get("version") != VERSION:
+            return (
+                f"the tracker on {self.title} speaks version {hello.get('version')} of the stream, "
+                f"this page version {VERSION}; use one driftwalk for both"
+            )
+        self._last.clear()
+        self._note(hello, publish)
+        await self._ask()
+        while line := await reader.readline():
+            content = stream_line(line)
+            if content is None or content.get("type") not in ("frame", "end"):
+                continue
+            self._note(content, publish)
+            if "jpeg_base64" in content:
+                await self._ask()
+        return None
+
+    def _note(self, content: dict[str, Any], publish: Publish) -> None:
+        """Publish, and keep it for browsers that connect later."""
+        kind = str(content["type"])
+        if kind == "lost" and "end" in self._last:
+            # It has ended as it should; that it is gone now is no news.
+            return
+        if self._last.get(kind) != content:
+            self._last[kind] = content
+            publish(content)
+
+    async def _ask(self) -> None:
+        """Ask for the next image where one is wanted: the tracker answers each request once."""
+        width = max(self._widths.values(), default=0)
+        if self._writer is not None and width:
+            with contextlib.suppress(OSError):
+                self._writer.write(json.dumps({"jpeg_width": width}).encode() + b"\n")
+                await self._writer.drain()
+
+    def _page(self) -> dict[str, Any]:
+        tank = {"id": "live", "kind": "live", "title": "The tank", "note": None}
+        return page_frame(
+            self.view, "Live", subtitle=f"the stream of {self.title}", sections=[tank]
+        )
+
+
+def stream_line(line: bytes) -> dict[str, Any] | None:
+    """Return the object in a line of the stream, None when there is none.
+
+    Examples
+    --------
+    >>> stream_line(b'{"type": "end"}'), stream_line(b"$STEP_START*0D")
+    ({'type': 'end'}, None)
+    """
+    try:
+        content = json.loads(line, parse_constant=_refuse)
+    except (ValueError, RecursionError):
+        return None
+    return content if isinstance(content, dict) and isinstance(content.get("type"), str) else None
+
+
+def _refuse(word: str) -> Any:
+    raise ValueError(f"{word} is no JSON")

@@ -1,0 +1,101 @@
+"""The finished work units of a run that is under way, read without disturbing it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from driftwalk.core.errors import RunDirectoryError
+from driftwalk.core.run_layout import SHARD_FOLDER
+from driftwalk.core.shards import (
+    SHARD_SUFFIX,
+    SPECIFICATION_FILE,
+    Arrays,
+    read_specification,
+    unpack_shard,
+)
+
+_UNIT: Final = re.compile(r"(\d{8,12})-(\d{8,12})", re.ASCII)
+
+
+class FinishedUnit(NamedTuple):
+    """What a work unit gave."""
+
+    start: int
+    """Its first setting."""
+    stop: int
+    """The setting after its last."""
+    arrays: Arrays
+    """One entry per setting each."""
+
+
+class StoreReader:
+    """Reads the shards of one sweep as they appear.
+
+    Parameters
+    ----------
+    folder : Path
+        A folder in ``.shards``.
+
+    Attributes
+    ----------
+    sweep : Any
+        What determines the sweep's numbers besides the run's specification.
+
+    Raises
+    ------
+    RunDirectoryError
+        When the folder says not yet, or no more, what it holds.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        stored = read_specification(folder / SPECIFICATION_FILE)
+        self.sweep: Any = stored["specification"].get("sweep")
+        self._fingerprint = str(stored["fingerprint"])
+        self._seen: set[str] = set()
+
+    def new_units(self) -> list[FinishedUnit]:
+        """Return the units that were finished since the last call."""
+        found = []
+        for path in sorted(self.folder.glob(f"*{SHARD_SUFFIX}")):
+            name = path.name.removesuffix(SHARD_SUFFIX)
+            match = _UNIT.fullmatch(name)
+            if name in self._seen or match is None:
+                continue
+            try:
+                arrays = unpack_shard(path.read_bytes(), name, self._fingerprint)
+            except OSError:
+                # The run may have ended in between, and removed it.
+                continue
+            if arrays is not None:
+                self._seen.add(name)
+                found.append(FinishedUnit(int(match[1]), int(match[2]), arrays))
+        return found
+
+
+def store_readers(run: Path, known: dict[str, StoreReader]) -> dict[str, StoreReader]:
+    """Return the sweeps of a run, those that began last at the end.
+
+    Parameters
+    ----------
+    run : Path
+        A run directory.
+    known : dict of str to StoreReader
+        The readers so far; they are kept.
+    """
+    try:
+        folders = [path for path in (run / SHARD_FOLDER).iterdir() if path.is_dir()]
+        began = {path: (path / SPECIFICATION_FILE).stat().st_mtime_ns for path in folders}
+    except OSError:
+        # Between two steps of the run a folder may have no specification yet, or be gone.
+        return dict(known)
+    readers = dict(known)
+    for path in sorted(began, key=began.__getitem__):
+        if path.name not in readers:
+            try:
+                readers[path.name] = StoreReader(path)
+            except RunDirectoryError:
+                continue
+    return readers

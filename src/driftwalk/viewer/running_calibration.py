@@ -1,0 +1,249 @@
+"""A calibration under way: the map that fills, the refined map in it, the bootstrap."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import DriftwalkError
+from driftwalk.report import encode_array
+from driftwalk.viewer.run_shards import FinishedUnit, StoreReader, store_readers
+from driftwalk.viewer.running import NO_CELL, Section
+
+if TYPE_CHECKING:
+    from driftwalk.model import Study
+    from driftwalk.viewer.recording_steps import RecordedSteps
+
+Floats = npt.NDArray[np.float64]
+
+STAGES: Final[dict[str, tuple[str, float, float]]] = {
+    "coarse": ("map", 0.0, 0.4),
+    "refined": ("refined map", 0.4, 0.65),
+    "bootstrap": ("bootstrap", 0.65, 0.93),
+}
+"""What each stage is called, and its share of the time: from, to."""
+DETAILS: Final = ("excerpt_x", "excerpt_y", "step_density", "ks_step_length", "ks_turning_angle")
+NO_DISTANCE: Final = 1.0
+"""A setting that lost its numbers is as far as can be, as in the finished map."""
+
+
+class SettingsMap:
+    """Distances over a grid of settings, NaN where they are still to come.
+
+    Parameters
+    ----------
+    axes : sequence of sequence of float
+        Drag coefficients, standard deviations of the force [N].
+    """
+
+    def __init__(self, axes: Any) -> None:
+        self.drag, self.force = (np.asarray(values, dtype=np.float64) for values in axes)
+        self.shape = (self.drag.size, self.force.size)
+        self.distance = np.full(self.shape, np.nan)
+        self.error = np.full(self.shape, np.nan)
+        self.details: dict[int, dict[str, npt.NDArray[Any]]] = {}
+        """What is kept of each setting, by its number."""
+
+    @property
+    def done(self) -> float:
+        """Share of the settings that are there."""
+        return float(np.isfinite(self.distance).mean())
+
+    def add(self, unit: FinishedUnit) -> None:
+        """Take the settings of a work unit."""
+        values = np.nan_to_num(unit.arrays["ks_distance"], nan=NO_DISTANCE)
+        count = values.shape[1]
+        settings = slice(unit.start, unit.stop)
+        self.distance.reshape(-1)[settings] = values.mean(axis=1)
+        if count > 1:
+            self.error.reshape(-1)[settings] = values.std(axis=1, ddof=1) / np.sqrt(count)
+        kept = {name: unit.arrays[name] for name in DETAILS if name in unit.arrays}
+        for row in range(unit.stop - unit.start):
+            self.details[unit.start + row] = {name: kept[name][row] for name in kept}
+
+    def best(self) -> dict[str, float] | None:
+        """Return the setting with the smallest distance so far."""
+        if not np.isfinite(self.distance).any():
+            return None
+        row, column = np.unravel_index(int(np.nanargmin(self.distance)), self.shape)
+        return {
+            "x": float(self.force[column]),
+            "y": float(self.drag[row]),
+            "value": float(self.distance[row, column]),
+        }
+
+
+class RunningCalibration:
+    """A calibration under way.
+
+    Parameters
+    ----------
+    folder : Path
+        The run directory.
+    specification : mapping
+        What determines its numbers.
+    """
+
+    title = "A calibration under way"
+
+    def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
+        from driftwalk.model import Study
+
+        self._folder = folder
+        self._study: Study = Study(**specification["study"])
+        self._body: str | None = specification.get("body")
+        self._readers: dict[str, StoreReader] = {}
+        self._maps: dict[str, SettingsMap] = {}
+        self._bootstrap: list[FinishedUnit] = []
+        self._stage = "coarse"
+        self._refined = ""
+
+    def look(self) -> list[Section]:
+        """Read the new shards, and return the sections that they changed."""
+        self._readers = store_readers(self._folder, self._readers)
+        changed = set()
+        for name, reader in self._readers.items():
+            stage = name.partition("-")[0]
+            if stage not in STAGES:
+                continue
+            self._stage = stage
+            if stage != "bootstrap" and name not in self._maps:
+                self._maps[name] = SettingsMap(reader.sweep["axes"])
+                changed.add("map")
+            if stage == "refined":
+                self._refined = name
+            for unit in reader.new_units():
+                changed.add("bootstrap" if stage == "bootstrap" else "map")
+                self._take(name, stage, unit)
+        made = {"map": self._map_section, "bootstrap": self._bootstrap_section}
+        return [made[name]() for name in sorted(changed, reverse=True)]
+
+    def sections(self) -> list[Section]:
+        """Return the map, and the bootstrap when it has begun."""
+        return [self._map_section(), *([self._bootstrap_section()] if self._bootstrap else [])]
+
+    def state(self) -> tuple[float | None, str]:
+        """Return the progress and the stage."""
+        words, begin, end = STAGES[self._stage]
+        share = self._share()
+        if self._stage == "bootstrap" and share >= 1.0:
+            words = "halves and figures"
+        return begin + share * (end - begin), f"{words}: {100.0 * share:.0f} %"
+
+    def cell(self, row: int, column: int) -> dict[str, Any]:
+        """Return the kept excerpt and step density of a setting."""
+        found = self._coarse
+        if found is None or not (0 <= row < found.shape[0] and 0 <= column < found.shape[1]):
+            return dict(NO_CELL)
+        kept = found.details.get(row * found.shape[1] + column)
+        if not kept or "excerpt_x" not in kept:
+            return dict(NO_CELL)
+        time = self._recorded.excerpt_time if self._recorded is not None else None
+        samples = kept["excerpt_x"].size
+        return {
+            "excerpt_time": None if time is None or time.size != samples else encode_array(time),
+            "excerpt_x": encode_array(kept["excerpt_x"]),
+            "excerpt_y": encode_array(kept["excerpt_y"]),
+            "density": encode_array(kept["step_density"]),
+            # Of the first replicate, as the excerpt.
+            "ks_step_length": float(kept["ks_step_length"].flat[0]),
+            "ks_turning_angle": float(kept["ks_turning_angle"].flat[0]),
+        }
+
+    def _take(self, name: str, stage: str, unit: FinishedUnit) -> None:
+        if stage == "bootstrap":
+            self._bootstrap.append(unit)
+        else:
+            self._maps[name].add(unit)
+
+    def _share(self) -> float:
+        if self._stage == "bootstrap":
+            done = sum(unit.stop - unit.start for unit in self._bootstrap)
+            return done / max(self._study.calibration.bootstrap, 1)
+        found = self._coarse if self._stage == "coarse" else self._maps.get(self._refined)
+        return 0.0 if found is None else found.done
+
+    @property
+    def _coarse(self) -> SettingsMap | None:
+        names = [name for name in self._maps if name.startswith("coarse-")]
+        return self._maps[names[0]] if names else None
+
+    @cached_property
+    def _recorded(self) -> RecordedSteps | None:
+        """The steps of the recording; None where the run holds no recording that can be read."""
+        from driftwalk.viewer.recording_steps import recorded_steps
+
+        try:
+            return recorded_steps(self._folder / "recording.nc", self._study, body=self._body)
+        except (DriftwalkError, OSError):
+            return None
+
+    def _map_section(self) -> Section:
+        search = self._study.calibration
+        coarse = self._coarse or SettingsMap((search.drag_coefficients, search.force_stds_N))
+        refined = self._maps.get(self._refined)
+        return {
+            "id": "map",
+            "kind": "map",
+            "title": "The map of 1 - D",
+            "note": "Settings appear as they are simulated; nothing is final before the run is.",
+            "x": _axis("force_std", "stochastic force σ_F", "N", coarse.force),
+            "y": _axis("drag_coefficient", "drag coefficient C_d", "1", coarse.drag),
+            "value": encode_array(coarse.distance),
+            "standard_error": encode_array(coarse.error),
+            "status": encode_array(np.zeros(coarse.shape), dtype="i2"),
+            "statuses": {},
+            "best": coarse.best(),
+            "found": None,
+            "noise_floor": None,
+            "noise_floor_upper": None,
+            "region": None,
+            "refined": None if refined is None else _refined_part(refined),
+            "cells": None,
+            "recording": None if self._recorded is None else self._recorded.part(),
+            "arena": self._study.tank.to_arena(),
+        }
+
+    def _bootstrap_section(self) -> Section:
+        units = sorted(self._bootstrap, key=lambda unit: unit.start)
+        drag, force = (
+            np.concatenate([unit.arrays[name] for unit in units] or [np.empty(0)])
+            for name in ("drag_coefficient", "force_std")
+        )
+        points = {
+            "name": "estimates",
+            "x": force.tolist(),
+            "y": drag.tolist(),
+            "low": None,
+            "high": None,
+            "style": "points",
+        }
+        return {
+            "id": "bootstrap",
+            "kind": "lines",
+            "title": "Bootstrap",
+            "note": "Estimates from recordings that were simulated at the optimum: how far they "
+            "scatter is how well the parameters are known.",
+            "x": {"label": "stochastic force σ_F", "unit": "N"},
+            "y": {"label": "drag coefficient C_d", "unit": "1"},
+            "series": [points],
+            "marks": [],
+            "after": "map",
+        }
+
+
+def _refined_part(refined: SettingsMap) -> dict[str, Any]:
+    return {
+        "x": refined.force.tolist(),
+        "y": refined.drag.tolist(),
+        "value": encode_array(refined.distance),
+    }
+
+
+def _axis(name: str, label: str, unit: str, values: Floats) -> dict[str, Any]:
+    return {"name": name, "label": label, "unit": unit, "values": values.tolist()}

@@ -1,0 +1,145 @@
+"""A sensitivity analysis under way: the map of distances to the reference that fills."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.assemble import l1_distance
+from driftwalk.report import encode_array
+from driftwalk.viewer.run_shards import StoreReader, store_readers
+from driftwalk.viewer.running import NO_CELL, Section
+
+if TYPE_CHECKING:
+    from driftwalk.model import Study
+
+LABELS: Final[dict[str, tuple[str, str]]] = {
+    "tank_diameter": ("tank diameter", "m"),
+    "blocks": ("blocks", "1"),
+    "flow": ("flow", "1"),
+    "latching": ("latching", "1"),
+    "hidden_face_drag": ("drag on joined faces", "1"),
+    "drag_coefficient": ("drag coefficient C_d", "1"),
+    "force_std": ("stochastic force σ_F", "N"),
+}
+
+
+class RunningSensitivity:
+    """A sensitivity analysis under way.
+
+    Parameters
+    ----------
+    folder : Path
+        The run directory.
+    specification : mapping
+        What determines its numbers.
+    """
+
+    title = "A sensitivity analysis under way"
+
+    def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
+        from driftwalk.model import Study
+
+        self._folder = folder
+        self._study: Study = Study(**specification["study"])
+        self._axes = dict(self._study.sensitivity.axes)
+        self._shape = tuple(len(values) for values in self._axes.values())
+        self._readers: dict[str, StoreReader] = {}
+        self._count: dict[str, dict[int, Counter[str]]] = {"reference": {}, "map": {}}
+
+    def look(self) -> list[Section]:
+        """Read the new shards; return the map if it has changed."""
+        self._readers = store_readers(self._folder, self._readers)
+        changed = False
+        for name, reader in self._readers.items():
+            if name not in self._count:
+                continue
+            for unit in reader.new_units():
+                changed = True
+                for row, text in enumerate(unit.arrays["count"]):
+                    self._count[name][unit.start + row] = Counter(json.loads(text))
+        return self.sections() if changed else []
+
+    def sections(self) -> list[Section]:
+        """Return the map up to now: of the last two axes, the others at their first value."""
+        names = list(self._axes)
+        fixed = names[: max(len(names) - 2, 0)]
+        shape = ([1, 1, *self._shape])[-2:]
+        value = self._distances().reshape(-1, *shape)[0]
+        at = ", ".join(f"{LABELS[name][0]} {self._axes[name][0]}" for name in fixed)
+        rows = _axis(names[-2], self._axes[names[-2]]) if len(names) > 1 else _axis("", (0,))
+        return [
+            {
+                "id": "l1",
+                "kind": "l1_map",
+                "title": "Distance of the outcomes to the reference",
+                "note": f"Settings appear as they are simulated{f'; here {at}' if at else ''}.",
+                "x": _axis(names[-1], self._axes[names[-1]]),
+                "y": rows,
+                "value": encode_array(value),
+                "reference": None,
+                "noise": None,
+                "label": "l1 distance",
+                "classes": [],
+                "cells": [],
+                "shares": None,
+            }
+        ]
+
+    def state(self) -> tuple[float | None, str]:
+        """Return the share of the settings that are done; Sobol' indices come on top."""
+        done = sum(len(counts) for counts in self._count.values())
+        wanted = int(np.prod(self._shape)) + self._study.sensitivity.reference_realisations
+        words = f"{done} of {wanted} settings"
+        if "sobol" in self._readers:
+            return None, f"{words}; Sobol' indices under way"
+        return 0.95 * done / wanted, words
+
+    def cell(self, row: int, column: int) -> dict[str, Any]:  # noqa: ARG002
+        """Return nothing: a setting of this map keeps no excerpt."""
+        return dict(NO_CELL)
+
+    def _distances(self) -> npt.NDArray[np.float64]:
+        """Return the l1 distance of every setting to the pooled reference, NaN where unknown."""
+        distance = np.full(int(np.prod(self._shape)), np.nan)
+        pooled: Counter[str] = Counter()
+        for count in self._count["reference"].values():
+            pooled.update(count)
+        blocks = _blocks(pooled)
+        for setting, count in self._count["map"].items():
+            # Outcomes of another number of blocks have nothing in common with the reference.
+            if pooled and count and _blocks(count) == blocks:
+                distance[setting] = l1_distance(_shares(count), _shares(pooled))
+        return distance
+
+
+def _shares(count: Mapping[str, int]) -> dict[str, float]:
+    total = sum(count.values())
+    return {name: number / total for name, number in count.items()}
+
+
+def _blocks(count: Mapping[str, int]) -> int:
+    """Return the number of blocks of the classes that were counted."""
+    from driftwalk.assemble import class_cells
+
+    return sum(len(cells) for cells in class_cells(next(iter(count)))) if count else 0
+
+
+def _axis(name: str, values: tuple[Any, ...]) -> dict[str, Any]:
+    """Return an axis; words stand as their numbers, and in the label."""
+    label, unit = LABELS.get(name, ("", "1"))
+    if any(isinstance(value, str) for value in values):
+        words = ", ".join(f"{number}: {value}" for number, value in enumerate(values))
+        return {
+            "name": name,
+            "label": f"{label} ({words})",
+            "unit": unit,
+            "values": list(range(len(values))),
+        }
+    return {"name": name, "label": label, "unit": unit, "values": [float(v) for v in values]}
