@@ -245,7 +245,8 @@ def _measure(
     pairs, distances, diameters = [], [], []
     for index, image in enumerate(images):
         label = tables.label[tables.codes(cv2, image)]
-        both = [[d for d in find_regions(cv2, label, k, 1) if _is_round(d)] for k in (1, 2)]
+        found = (find_regions(cv2, label, k, 1, diameter_at=_least_diameters) for k in (1, 2))
+        both = [[disc for disc in regions if _is_round(disc)] for regions in found]
         for one, two in _mutual(both[0], both[1]):
             ends = camera.to_world(np.array([[one.column, one.row], [two.column, two.row]]))
             scale = 1.0 / np.sqrt(np.abs(np.linalg.det(camera.jacobian(_places([one, two])))))
@@ -280,6 +281,11 @@ def _mutual(first: list[Disc], second: list[Disc]) -> list[tuple[Disc, Disc]]:
     apart = np.hypot(*(a[:, None] - b[None]).transpose(2, 0, 1))
     to_second, to_first = apart.argmin(axis=1), apart.argmin(axis=0)
     return [(first[i], second[j]) for i, j in enumerate(to_second) if to_first[j] == i]
+
+
+def _least_diameters(places: Array) -> Array:
+    """Return the least diameter of a disc, as long as the true one is not known [px]."""
+    return np.full(len(places), 2.0 * math.sqrt(_LEAST_AREA_PX / math.pi))
 
 
 def _places(discs: list[Disc]) -> Array:

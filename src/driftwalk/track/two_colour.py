@@ -13,7 +13,7 @@ from driftwalk.track.markers import TwoColourMarker
 from driftwalk.track.two_colour_discs import Disc, find_regions, join_pieces, sort_out
 from driftwalk.track.two_colour_outline import outlined_centres
 from driftwalk.track.two_colour_pairs import Pair, pair_discs
-from driftwalk.track.two_colour_pose import Measured, noise_of, weighted_centres
+from driftwalk.track.two_colour_pose import SMOOTHING_PX, Measured, weighted_centres
 from driftwalk.track.types import Array, Detection, Image, PixelToWorld, Rejected
 
 _LEAST_DIAMETER_PX: Final = 3.0
@@ -23,6 +23,7 @@ _MOST_FACTOR: Final = 4
 _WHOLE: Final = 0.93
 _LEAST_VISIBLE: Final = 0.35
 _MOST_OFF: Final = 0.06
+_MOST_UNEVEN: Final = 0.015
 
 
 class TwoColourDetector:
@@ -105,8 +106,7 @@ class TwoColourDetector:
         label = self._tables.label.take(self._tables.codes(cv2, small))
         both, rejected = [], []
         for colour in (1, 2):
-            regions = find_regions(cv2, label, colour, factor)
-            self._scale(regions)
+            regions = find_regions(cv2, label, colour, factor, diameter_at=self._diameter)
             kept, wrong = sort_out(join_pieces(regions), colour=colour)
             both.append(kept)
             rejected += wrong
@@ -115,17 +115,11 @@ class TwoColourDetector:
     def _choose_factor(self, columns: int, rows: int) -> int:
         """Return by how much an image can be reduced with the discs still found."""
         middle = np.array([[(columns - 1) / 2, (rows - 1) / 2]])
-        diameter = self.marker.size_m * self._px_per_m(middle)[0]
-        return int(np.clip(diameter / _COARSE_DIAMETER_PX, 1, _MOST_FACTOR))
+        return int(np.clip(self._diameter(middle)[0] / _COARSE_DIAMETER_PX, 1, _MOST_FACTOR))
 
-    def _scale(self, regions: list[Disc]) -> None:
-        """Set the share and the diameter of each region from the scale at its place."""
-        if not regions:
-            return
-        scale = self._px_per_m(np.array([[region.column, region.row] for region in regions]))
-        for region, px_per_m in zip(regions, scale, strict=True):
-            region.diameter = self.marker.size_m * float(px_per_m)
-            region.share = region.area / (math.pi * region.diameter**2 / 4.0)
+    def _diameter(self, points: Array) -> Array:
+        """Return the diameter of a whole disc at points of the image [px]."""
+        return self.marker.size_m * self._px_per_m(points)
 
     def _px_per_m(self, points: Array) -> Array:
         jacobian = self.camera.jacobian(points)
@@ -151,17 +145,14 @@ class TwoColourDetector:
         corner = np.array([left, top]) + (factor - 1) / 2
         start = np.array([[first.column, first.row], [second.column, second.row]]) - corner
         start, diameter, spacing = start / factor, diameter / factor, spacing / factor
-        noise = noise_of(weights)
-        result = weighted_centres(weights, start, diameter=diameter, noise=noise)
+        result = weighted_centres(self._cv2, weights, start, diameter=diameter)
         apart = float(np.hypot(*(result.centres[1] - result.centres[0]))) / spacing
-        if partly or abs(apart - 1.0) > _MOST_OFF:
+        whole = result.shares.min() >= _WHOLE and result.uneven < _MOST_UNEVEN
+        if not whole or abs(apart - 1.0) > _MOST_OFF:
             outlined = outlined_centres(weights, result.centres, diameter=diameter, spacing=spacing)
             result = outlined if outlined is not None else result
         return Measured(
-            result.centres * factor + corner,
-            result.covariance * factor**2,
-            result.visible,
-            result.explained,
+            result.centres * factor + corner, result.covariance * factor**2, result.shares
         )
 
     def _reduce(self, patch: Image, diameter: float) -> tuple[Any, int]:
@@ -172,7 +163,7 @@ class TwoColourDetector:
             size = (patch.shape[1] // factor, patch.shape[0] // factor)
             cut = patch[: size[1] * factor, : size[0] * factor]
             patch = cv2.resize(cut, size, interpolation=cv2.INTER_AREA)
-        return cv2.GaussianBlur(patch, (3, 3), 0.6), factor
+        return cv2.GaussianBlur(patch, (3, 3), SMOOTHING_PX), factor
 
     def _place(self, measured: list[tuple[Pair, Measured]]) -> list[Detection]:
         """Return the detections in the world."""
@@ -203,7 +194,7 @@ class TwoColourDetector:
                     theta=math.remainder(theta, 2 * math.pi),
                     covariance=lever @ result.covariance @ lever.T,
                     area_px=pair.first.area + pair.second.area,
-                    score=min(1.0, pair.score * min(1.0, result.visible)),
+                    score=pair.score * result.visible,
                 )
             )
         return found

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.track.types import Rejected
+from driftwalk.track.types import Array, Rejected
 
 LEAST_SHARE: Final = 0.15
 """Least area of a region, of the whole disc's."""
@@ -42,12 +43,19 @@ class Disc:
     row: float
     area: float
     box: tuple[float, float, float, float]
-    share: float = 0.0
-    diameter: float = 0.0
+    share: float
+    diameter: float
 
 
-def find_regions(cv2: Any, label: npt.NDArray[np.uint8], colour: int, factor: int) -> list[Disc]:
-    """Return the connected regions of one label, in pixels of the image that was reduced.
+def find_regions(
+    cv2: Any,
+    label: npt.NDArray[np.uint8],
+    colour: int,
+    factor: int,
+    *,
+    diameter_at: Callable[[Array], Array],
+) -> list[Disc]:
+    """Return the connected regions of one label; specks that noise alone makes are left out.
 
     Parameters
     ----------
@@ -59,30 +67,32 @@ def find_regions(cv2: Any, label: npt.NDArray[np.uint8], colour: int, factor: in
         Which label.
     factor : int
         By how much the image was reduced.
+    diameter_at : callable
+        Diameter of a whole disc [px] at points (column, row) of the image at full size, shape
+        (n, 2).
     """
     mask = np.equal(label, colour).view(np.uint8)
     # No more regions than a quarter of the pixels: where short labels are enough, they are quicker.
     kind = cv2.CV_16U if mask.size < 4 * 65535 else cv2.CV_32S
-    count, _, stats, centres = cv2.connectedComponentsWithStats(mask, connectivity=8, ltype=kind)
-    shift = (factor - 1) / 2
-    found = []
-    for index in range(1, count):
-        left, top, width, height, area = (float(value) for value in stats[index])
-        found.append(
-            Disc(
-                colour,
-                float(centres[index, 0]) * factor + shift,
-                float(centres[index, 1]) * factor + shift,
-                area * factor**2,
-                (
-                    left * factor,
-                    top * factor,
-                    (left + width) * factor - 1,
-                    (top + height) * factor - 1,
-                ),
-            )
+    _, _, stats, centres = cv2.connectedComponentsWithStats(mask, connectivity=8, ltype=kind)
+    places = centres[1:] * factor + (factor - 1) / 2
+    if not len(places):
+        return []
+    diameters = diameter_at(places)
+    areas = stats[1:, cv2.CC_STAT_AREA] * float(factor**2)
+    shares = areas / (np.pi * diameters**2 / 4.0)
+    # A noisy image has thousands of specks, so they go before there is an object for each.
+    kept = np.flatnonzero(shares >= _SPECK_SHARE)
+    corners = stats[1:, :2][kept]
+    ends = corners + stats[1:, 2:4][kept]
+    boxes = np.concatenate([corners * factor, ends * factor - 1], axis=1).astype(float)
+    columns = (places[kept, 0], places[kept, 1], areas[kept], shares[kept], diameters[kept])
+    return [
+        Disc(colour, column, row, area, tuple(box), share, diameter)
+        for box, column, row, area, share, diameter in zip(
+            boxes.tolist(), *(column.tolist() for column in columns), strict=True
         )
-    return found
+    ]
 
 
 def join_pieces(regions: list[Disc]) -> list[Disc]:
@@ -90,32 +100,48 @@ def join_pieces(regions: list[Disc]) -> list[Disc]:
 
     A narrow bar or reflection cuts a disc into pieces.
     """
+    if len(regions) < 2:
+        return regions
     joined: list[Disc] = []
+    # Pieces of one disc lie in the same or in adjoining cells.
+    side = _PIECES_EXTENT * max(region.diameter for region in regions)
+    cells: dict[tuple[int, int], set[int]] = {}
     for region in sorted(regions, key=lambda item: -item.area):
-        for index, other in enumerate(joined):
+        for index in sorted(_near(cells, region, side)):
+            other = joined[index]
+            if other.share >= 1.0 or other.share + region.share > MOST_SHARE:
+                continue
             both = _together(other, region)
             width, height = both.box[2] - both.box[0] + 1, both.box[3] - both.box[1] + 1
-            near = max(width, height) <= _PIECES_EXTENT * other.diameter
-            if near and other.share < 1.0 and both.share <= MOST_SHARE:
+            if max(width, height) <= _PIECES_EXTENT * other.diameter:
+                cells[_cell(other, side)].discard(index)
                 joined[index] = both
                 break
         else:
+            index = len(joined)
             joined.append(region)
+        cells.setdefault(_cell(joined[index], side), set()).add(index)
     return joined
 
 
-def sort_out(regions: list[Disc], *, colour: int) -> tuple[list[Disc], list[Rejected]]:
-    """Return the regions whose area may be that of a disc, and the others with the reason.
+def _cell(region: Disc, side: float) -> tuple[int, int]:
+    return int(region.column // side), int(region.row // side)
 
-    Specks that noise alone makes are left out of both.
-    """
+
+def _near(cells: dict[tuple[int, int], set[int]], region: Disc, side: float) -> set[int]:
+    """Return what lies in the cell of a region and in the eight around it."""
+    column, row = _cell(region, side)
+    around = ((column + i, row + j) for i in (-1, 0, 1) for j in (-1, 0, 1))
+    return set().union(*(cells.get(cell, ()) for cell in around))
+
+
+def sort_out(regions: list[Disc], *, colour: int) -> tuple[list[Disc], list[Rejected]]:
+    """Return the regions whose area may be that of a disc, and the others with the reason."""
     kept, rejected = [], []
     for region in regions:
         whole = (
             f"{region.area:.0f} px² of colour {colour}; a disc has {region.area / region.share:.0f}"
         )
-        if region.share < _SPECK_SHARE:
-            continue
         if region.share < LEAST_SHARE:
             rejected.append(_reject(region, f"too small: {whole}", "too small"))
         elif region.share > MOST_SHARE:

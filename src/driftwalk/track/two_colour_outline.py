@@ -68,8 +68,7 @@ def outlined_centres(
     lever = np.zeros((4, 3))
     lever[:2, :2] = lever[2:, :2] = np.eye(2)
     lever[:2, 2], lever[2:, 2] = -turned, turned
-    visible, explained = _shares(weights, centres, diameter)
-    return Measured(centres, lever @ variance @ lever.T, visible, explained)
+    return Measured(centres, lever @ variance @ lever.T, _shares(weights, centres, diameter))
 
 
 def _outline(weight: Weights, at: Array, diameter: float) -> Array:
@@ -141,13 +140,11 @@ def _refine(
     return pose, float(cost.sum()), normal, rms
 
 
-def _shares(weights: list[Weights], centres: Array, diameter: float) -> tuple[float, float]:
-    """Return how much of the discs is seen, and how much of the colour lies in them."""
-    inside, total = 0.0, 0.0
+def _shares(weights: list[Weights], centres: Array, diameter: float) -> Array:
+    """Return how much of each disc is seen."""
+    seen = []
     for weight, centre in zip(weights, centres, strict=True):
         rows, columns = np.ogrid[: weight.shape[0], : weight.shape[1]]
         disc = np.hypot(columns - centre[0], rows - centre[1]) < diameter / 2 + 1.0
-        strong = weight > _LEVEL
-        inside += float((strong & disc).sum())
-        total += float(strong.sum())
-    return inside / (math.pi * diameter**2 / 2), inside / max(total, 1.0)
+        seen.append(float(np.count_nonzero(disc & (weight > _LEVEL))))
+    return np.array(seen) / (math.pi * diameter**2 / 4.0)
