@@ -1,5 +1,5 @@
 // Bindings of the self-assembly core.
-#include "model.hpp"
+#include "assembly_rules.hpp"
 
 #include "driftwalk/assembly/assemble.hpp"
 #include "driftwalk/simulate/threads.hpp"
@@ -8,59 +8,10 @@
 #include <nanobind/stl/tuple.h>
 
 #include <cmath>
-#include <stdexcept>
-#include <string>
 
 using namespace nb::literals;
 
 namespace {
-
-// What the rules take from the model.
-driftwalk::AssemblyRules rules_of(const Model& model, std::size_t blocks) {
-  const driftwalk::Prepared<double>& run = model.twice().view();
-  driftwalk::AssemblyRules rules;
-  rules.blocks = static_cast<int>(blocks);
-  rules.side = 2 * run.half_side;
-  rules.mass = run.mass;
-  rules.inertia = run.inertia;
-  rules.radius = run.radius;
-  rules.edges = run.edges;
-  rules.edge_count = run.edge_count;
-  rules.low_x = run.flow.low_x;
-  rules.high_x = run.flow.high_x;
-  rules.low_y = run.flow.low_y;
-  rules.high_y = run.flow.high_y;
-  rules.bounce_speed = run.bounce_speed;
-  return rules;
-}
-
-driftwalk::Latching latching_of(const std::string& word) {
-  if (word == "none") {
-    return driftwalk::Latching::none;
-  }
-  if (word == "collision") {
-    return driftwalk::Latching::collision;
-  }
-  if (word == "connector") {
-    return driftwalk::Latching::connector;
-  }
-  throw std::invalid_argument("latching must be none, collision or connector");
-}
-
-bool is_first(const std::string& word, const char* first, const char* second) {
-  if (word != first && word != second) {
-    throw std::invalid_argument(word + " must be " + first + " or " + second);
-  }
-  return word == first;
-}
-
-constexpr std::size_t most_blocks = 256;
-
-void require_blocks(std::size_t blocks) {
-  if (blocks < 1 || blocks > most_blocks) {
-    throw std::invalid_argument("a world has 1 to 256 blocks");
-  }
-}
 
 nb::tuple place_blocks(const Model& model, std::size_t blocks, In<std::uint64_t, 1> key,
                        int threads) {

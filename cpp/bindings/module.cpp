@@ -5,6 +5,7 @@ void register_ks(nanobind::module_& module);
 void register_steps(nanobind::module_& module);
 void register_simulate(nanobind::module_& module);
 void register_assemble(nanobind::module_& module);
+void register_live(nanobind::module_& module);
 void register_infer(nanobind::module_& module);
 
 NB_MODULE(_core, module) {
@@ -13,5 +14,6 @@ NB_MODULE(_core, module) {
   register_steps(module);
   register_simulate(module);
   register_assemble(module);
+  register_live(module);
   register_infer(module);
 }

@@ -1,13 +1,12 @@
 #include "driftwalk/assembly/assemble.hpp"
 
-#include "driftwalk/assembly/kernel.hpp"
+#include "driftwalk/assembly/memory.hpp"
 #include "driftwalk/dispatch.hpp"
 #include "driftwalk/simulate/threads.hpp"
 
+#include <algorithm>
 #include <atomic>
-#include <cstdlib>
 #include <memory>
-#include <new>
 
 namespace driftwalk {
 
@@ -26,44 +25,6 @@ AssemblyKernel chosen_assembly_kernel() {
 }
 
 namespace {
-// What one thread works in.
-class ThreadMemory {
-public:
-  ThreadMemory(int blocks, std::size_t lane_bytes, std::int64_t flow_size)
-      : blocks_(static_cast<std::size_t>(blocks)), before_(blocks_.size()),
-        assemblies_(blocks_.size()), next_(blocks_.size()),
-        heads_(most_cells_per_side * most_cells_per_side),
-        pairs_(static_cast<std::size_t>(pair_capacity(blocks))),
-        flow_(static_cast<std::size_t>(flow_size)), flow_twice_(flow_.size()),
-        lanes_(static_cast<char*>(std::aligned_alloc(64, (lane_bytes + 63) / 64 * 64)), std::free) {
-    if (!lanes_) {
-      throw std::bad_alloc();
-    }
-    scratch_.lanes = lanes_.get();
-    scratch_.blended_flow = flow_.data();
-    scratch_.blended_flow_twice = flow_twice_.data();
-    Scene& scene = scratch_.scene;
-    scene = {};
-    scene.block = blocks_.data();
-    scene.blocks_before = before_.data();
-    scene.assembly = assemblies_.data();
-    scene.pairs = {pairs_.data(), 0};
-    scene.cell_head = heads_.data();
-    scene.cell_next = next_.data();
-  }
-  AssemblyScratch& scratch() { return scratch_; }
-
-private:
-  std::vector<SceneBlock> blocks_, before_;
-  std::vector<SceneAssembly> assemblies_;
-  std::vector<std::int32_t> next_, heads_;
-  std::vector<BlockPair> pairs_;
-  std::vector<std::int16_t> flow_;
-  std::vector<double> flow_twice_;
-  std::unique_ptr<char, decltype(&std::free)> lanes_;
-  AssemblyScratch scratch_;
-};
-
 std::int64_t take_next(void* self) {
   return (*static_cast<std::atomic<std::int64_t>*>(self))++;
 }
@@ -78,7 +39,7 @@ std::int64_t run_threads(int blocks, std::int64_t worlds, int lanes, int threads
   const std::int64_t tasks = std::min<std::int64_t>(std::max(threads, 1), packs);
   run_tasks(tasks, threads, [&] {
     return [&](std::int64_t) {
-      const auto memory = std::make_unique<ThreadMemory>(blocks, lane_bytes, flow_size);
+      const auto memory = std::make_unique<AssemblyMemory>(blocks, lane_bytes, flow_size);
       block_steps += run(queue, memory->scratch());
     };
   });

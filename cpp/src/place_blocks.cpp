@@ -10,8 +10,12 @@
 namespace driftwalk {
 
 namespace {
-constexpr int most_attempts = 20;
+constexpr UInt32 most_attempts = 20;
 constexpr int most_draws = 5000; // per block
+
+Philox<UInt32> stream_of(std::uint64_t key) {
+  return {static_cast<UInt32>(key), static_cast<UInt32>(key >> 32)};
+}
 
 struct Placed {
   Vec2 at, axis;
@@ -49,11 +53,11 @@ bool is_clear(const AssemblyRules& rules, const Placed& p, const double* start, 
 }
 
 // Word 0 of the address: attempt; 1: block; 2: draw.
-bool place_one(const AssemblyRules& rules, const Philox<UInt32>& stream, int attempt, int block,
+bool place_one(const AssemblyRules& rules, const Philox<UInt32>& stream, UInt32 attempt, int block,
                double* start) {
   for (int draw = 0; draw < most_draws; ++draw) {
     UInt32 words[4];
-    stream(static_cast<UInt32>(attempt), static_cast<UInt32>(block), static_cast<UInt32>(draw),
+    stream(attempt, static_cast<UInt32>(block), static_cast<UInt32>(draw),
            static_cast<UInt32>(Purpose::start), words);
     double* const pose = start + 3 * block;
     pose[0] = rules.low_x + words[0] * 0x1p-32 * (rules.high_x - rules.low_x);
@@ -68,10 +72,17 @@ bool place_one(const AssemblyRules& rules, const Philox<UInt32>& stream, int att
 }
 } // namespace
 
+bool place_one_more(const AssemblyRules& rules, std::uint64_t key, std::int64_t interval, int block,
+                    double* start) {
+  // Beyond the attempts of the start, so that no number is drawn twice.
+  return place_one(rules, stream_of(key), static_cast<UInt32>(most_attempts + interval), block,
+                   start);
+}
+
 int place_blocks(const AssemblyRules& rules, std::uint64_t key, double* start) {
-  const Philox<UInt32> stream{static_cast<UInt32>(key), static_cast<UInt32>(key >> 32)};
+  const Philox<UInt32> stream = stream_of(key);
   int most = 0;
-  for (int attempt = 0; attempt < most_attempts; ++attempt) {
+  for (UInt32 attempt = 0; attempt < most_attempts; ++attempt) {
     int block = 0;
     while (block < rules.blocks && place_one(rules, stream, attempt, block, start)) {
       ++block;

@@ -49,6 +49,14 @@ void place_members(Scene& scene, int assembly) {
   }
 }
 
+void place_by(Scene& scene, int assembly, int block, Vec2 at) {
+  SceneAssembly& a = scene.assembly[assembly];
+  const SceneBlock& b = scene.block[block];
+  a.x = at.x - (a.cosine * b.offset_x - a.sine * b.offset_y);
+  a.y = at.y - (a.sine * b.offset_x + a.cosine * b.offset_y);
+  place_members(scene, assembly);
+}
+
 namespace {
 // Bit of the face that looks at a neighbouring cell; none where it is no neighbour.
 unsigned face_towards(int dx, int dy) {

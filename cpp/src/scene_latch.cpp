@@ -137,15 +137,6 @@ void conserve_momentum(const SceneAssembly& a, const SceneAssembly& b, double ma
   joint.omega = spin / joint.inertia;
 }
 
-// The position of the joint body is given by a block of the assembly that stays where it is.
-void place_by(Scene& scene, int assembly, int block, Vec2 at) {
-  SceneAssembly& a = scene.assembly[assembly];
-  const SceneBlock& b = scene.block[block];
-  a.x = at.x - (a.cosine * b.offset_x - a.sine * b.offset_y);
-  a.y = at.y - (a.sine * b.offset_x + a.cosine * b.offset_y);
-  place_members(scene, assembly);
-}
-
 // One line of the world's list of events; faces in the blocks' own frames.
 void record(Scene& scene, const Merge& merge, const int (&own_faces)[2]) {
   if (scene.event_count >= scene.event_rows) {

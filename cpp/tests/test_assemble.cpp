@@ -455,7 +455,7 @@ public:
         noise_scale};
     driftwalk::AssemblyWorlds worlds;
     worlds.start = crowd.start.data();
-    driftwalk::load_lane<double, double>(rules, worlds, 0, pack_, 0);
+    driftwalk::load_lane<double, double>(rules, worlds.start, pack_, 0);
     scene_.block = blocks_.data();
     scene_.blocks_before = before_.data();
     scene_.assembly = assemblies_.data();
@@ -473,7 +473,7 @@ public:
     driftwalk::fill_scene(rules_, pack_, 0, assemblies_left_, scene_);
     driftwalk::find_pairs(rules_, scene_);
     driftwalk::settle(rules_, scene_);
-    driftwalk::read_scene<double, double>(rules_, scene_, pack_, 0);
+    driftwalk::read_scene(rules_, scene_, pack_, 0);
     assemblies_left_ = scene_.assemblies;
   }
   double energy() {

@@ -149,6 +149,40 @@ def assemble(
     precision: str,
 ) -> dict[str, npt.NDArray[Any] | int]: ...
 
+# A world that keeps its state between calls, in double precision. Changes take effect with the next
+# step.
+class LiveWorld:
+    def __init__(
+        self,
+        model: Model,
+        *,
+        start: _Floats,
+        key: int,
+        drag_coefficient: float,
+        force_std: float,
+        latching: str,
+        connector_distance: float,
+        connector_axis: float,
+        hidden_face_drag: str,
+        block_restitution: float,
+        block_friction: float,
+    ) -> None: ...
+    # The joinings: step (n,), block (n, 2), face (n, 2), as in `assemble`.
+    def advance(self, steps: int) -> dict[str, npt.NDArray[np.int32]]: ...
+    # pose (blocks, 3) [m, m, rad], velocity (blocks, 3) [m/s, m/s, rad/s], assembly (blocks,),
+    # cell (blocks, 2), quarter (blocks,).
+    def state(self) -> dict[str, npt.NDArray[Any]]: ...
+    def set_forces(
+        self, *, drag_coefficient: float, force_std: float, flow_scale: float
+    ) -> None: ...
+    def set_rules(self, *, latching: str, hidden_face_drag: str) -> None: ...
+    def set_blocks(self, blocks: int) -> int: ...  # as many as there are then
+    def part(self) -> None: ...
+    @property
+    def step(self) -> int: ...
+    @property
+    def status(self) -> int: ...
+
 # --- the likelihood fit -------------------------------------------------------------------------
 class InnovationsFilter:
     # Time [s] increasing; x and y [m], NaN where a sample is missing. excluded: 1 where the

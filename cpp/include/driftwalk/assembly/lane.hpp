@@ -55,35 +55,41 @@ inline void put_before(Member<Real>& m, int lane) {
   put(m.axes_before.sine, lane, get(m.axes.sine, lane));
 }
 
+// A block alone, at rest at a pose [x, y, theta].
 template <class Real, class T>
-inline void load_lane(const AssemblyRules& rules, const AssemblyWorlds& worlds, std::int64_t world,
-                      const PackMemory<Real>& pack, int lane) {
-  const double* start = worlds.start + 3 * rules.blocks * world;
-  for (int b = 0; b < rules.blocks; ++b, start += 3) {
-    Member<Real>& m = pack.members[b];
-    put(m.pose.x, lane, start[0]);
-    put(m.pose.y, lane, start[1]);
-    put(m.pose.theta, lane, __builtin_remainder(start[2], 2 * pi_value));
-    put_rest(m.motion, lane);
-    put_rest(m.drag, lane);
-    const Axes<Real> axes = axes_at(m.pose.theta);
-    put(m.axes.cosine, lane, get(axes.cosine, lane));
-    put(m.axes.sine, lane, get(axes.sine, lane));
-    put_before(m, lane);
-    put(m.root, lane, b);
-    put(m.per_count, lane, T(1));
-    put(m.per_inertia, lane, rules.mass / rules.inertia);
-    put(m.lightness, lane, T(1));
-    put(m.offset_x, lane, T(0));
-    put(m.offset_y, lane, T(0));
-    put(m.arm.x, lane, T(0));
-    put(m.arm.y, lane, T(0));
-    put(m.x, lane, start[0]);
-    put(m.y, lane, start[1]);
-    for (int face = 0; face < 4; ++face) {
-      put(m.covered[face], lane, false);
-    }
-    pack.book(b, lane) = {0, 0, 0, 0};
+inline void load_block(const AssemblyRules& rules, const double* pose, const PackMemory<Real>& pack,
+                       int block, int lane) {
+  Member<Real>& m = pack.members[block];
+  put(m.pose.x, lane, pose[0]);
+  put(m.pose.y, lane, pose[1]);
+  put(m.pose.theta, lane, __builtin_remainder(pose[2], 2 * pi_value));
+  put_rest(m.motion, lane);
+  put_rest(m.drag, lane);
+  const Axes<Real> axes = axes_at(m.pose.theta);
+  put(m.axes.cosine, lane, get(axes.cosine, lane));
+  put(m.axes.sine, lane, get(axes.sine, lane));
+  put_before(m, lane);
+  put(m.root, lane, block);
+  put(m.per_count, lane, T(1));
+  put(m.per_inertia, lane, rules.mass / rules.inertia);
+  put(m.lightness, lane, T(1));
+  put(m.offset_x, lane, T(0));
+  put(m.offset_y, lane, T(0));
+  put(m.arm.x, lane, T(0));
+  put(m.arm.y, lane, T(0));
+  put(m.x, lane, pose[0]);
+  put(m.y, lane, pose[1]);
+  for (int face = 0; face < 4; ++face) {
+    put(m.covered[face], lane, false);
+  }
+  pack.book(block, lane) = {0, 0, 0, 0};
+}
+
+template <class Real, class T>
+inline void load_lane(const AssemblyRules& rules, const double* start, const PackMemory<Real>& pack,
+                      int lane) {
+  for (int b = 0; b < rules.blocks; ++b) {
+    load_block<Real, T>(rules, start + 3 * b, pack, b, lane);
   }
 }
 
@@ -140,40 +146,54 @@ inline void fill_scene(const AssemblyRules& rules, const PackMemory<Real>& pack,
   }
 }
 
-template <class Real, class T>
+template <class Real>
+inline void cover_faces(const AssemblyRules& rules, const PackMemory<Real>& pack, int block,
+                        int lane) {
+  const unsigned joined = pack.book(block, lane).joined;
+  for (int face = 0; face < 4; ++face) {
+    put(pack.members[block].covered[face], lane,
+        !rules.hidden_faces_drag && (joined >> face & 1u) != 0);
+  }
+}
+
+template <class Real>
+inline void read_block(const AssemblyRules& rules, const Scene& scene, const PackMemory<Real>& pack,
+                       int b, int lane) {
+  Member<Real>& m = pack.members[b];
+  const SceneBlock& block = scene.block[b];
+  const SceneAssembly& body = scene.assembly[block.assembly];
+  put(m.pose.x, lane, body.x);
+  put(m.pose.y, lane, body.y);
+  put(m.pose.theta, lane, body.theta);
+  put(m.motion.vx, lane, body.vx);
+  put(m.motion.vy, lane, body.vy);
+  put(m.motion.omega, lane, body.omega);
+  if (body.touched) {
+    put_rest(m.drag, lane);
+  }
+  put(m.axes.cosine, lane, body.cosine);
+  put(m.axes.sine, lane, body.sine);
+  put(m.root, lane, block.assembly);
+  put(m.per_count, lane, 1.0 / body.blocks);
+  put(m.per_inertia, lane, rules.mass * body.blocks / body.inertia);
+  put(m.lightness, lane, rules.inertia / body.inertia);
+  put(m.offset_x, lane, block.offset_x);
+  put(m.offset_y, lane, block.offset_y);
+  put(m.arm.x, lane, block.x - body.x);
+  put(m.arm.y, lane, block.y - body.y);
+  put(m.x, lane, block.x);
+  put(m.y, lane, block.y);
+  pack.book(b, lane) = {
+      static_cast<std::int16_t>(block.cell_x), static_cast<std::int16_t>(block.cell_y),
+      static_cast<std::uint8_t>(block.quarter), static_cast<std::uint8_t>(block.joined)};
+  cover_faces(rules, pack, b, lane);
+}
+
+template <class Real>
 inline void read_scene(const AssemblyRules& rules, const Scene& scene, const PackMemory<Real>& pack,
                        int lane) {
   for (int b = 0; b < rules.blocks; ++b) {
-    Member<Real>& m = pack.members[b];
-    const SceneBlock& block = scene.block[b];
-    const SceneAssembly& body = scene.assembly[block.assembly];
-    put(m.pose.x, lane, body.x);
-    put(m.pose.y, lane, body.y);
-    put(m.pose.theta, lane, body.theta);
-    put(m.motion.vx, lane, body.vx);
-    put(m.motion.vy, lane, body.vy);
-    put(m.motion.omega, lane, body.omega);
-    if (body.touched) {
-      put_rest(m.drag, lane);
-    }
-    put(m.axes.cosine, lane, body.cosine);
-    put(m.axes.sine, lane, body.sine);
-    put(m.root, lane, block.assembly);
-    put(m.per_count, lane, 1.0 / body.blocks);
-    put(m.per_inertia, lane, rules.mass * body.blocks / body.inertia);
-    put(m.lightness, lane, rules.inertia / body.inertia);
-    put(m.offset_x, lane, block.offset_x);
-    put(m.offset_y, lane, block.offset_y);
-    put(m.arm.x, lane, block.x - body.x);
-    put(m.arm.y, lane, block.y - body.y);
-    put(m.x, lane, block.x);
-    put(m.y, lane, block.y);
-    for (int face = 0; face < 4; ++face) {
-      put(m.covered[face], lane, !rules.hidden_faces_drag && (block.joined >> face & 1u) != 0);
-    }
-    pack.book(b, lane) = {
-        static_cast<std::int16_t>(block.cell_x), static_cast<std::int16_t>(block.cell_y),
-        static_cast<std::uint8_t>(block.quarter), static_cast<std::uint8_t>(block.joined)};
+    read_block(rules, scene, pack, b, lane);
   }
 }
 
@@ -186,30 +206,40 @@ inline T own_angle(const PackMemory<Real>& pack, int block, int lane) {
   return turned > half ? turned - turn : turned;
 }
 
+// Bits of `Status` of the world in a lane.
 template <class Real, class T>
-inline void write_results(const Prepared<T>& run, const AssemblyRules& rules,
-                          const AssemblyOutputs& out, const PackMemory<Real>& pack, int lane,
-                          const LaneBook& book, std::int64_t steps) {
-  const std::int64_t world = book.world;
+inline std::uint32_t lane_status(const Prepared<T>& run, const AssemblyRules& rules,
+                                 const PackMemory<Real>& pack, int lane) {
   bool finite = true, inside = true;
   for (int b = 0; b < rules.blocks; ++b) {
     const Member<Real>& m = pack.members[b];
-    const std::int64_t row = world * rules.blocks + b;
     const T x = get(m.x, lane), y = get(m.y, lane), theta = own_angle<Real, T>(pack, b, lane);
     const T speed = get(m.motion.vx, lane) + get(m.motion.vy, lane) + get(m.motion.omega, lane);
     finite = finite && abs(x + y + theta + speed) < T(1e30);
     inside = inside && x > run.flow.low_x - run.half_side && x < run.flow.high_x + run.half_side &&
              y > run.flow.low_y - run.half_side && y < run.flow.high_y + run.half_side;
-    out.pose[3 * row] = x;
-    out.pose[3 * row + 1] = y;
-    out.pose[3 * row + 2] = theta;
+  }
+  return (finite ? 0u : status_non_finite) | (inside ? 0u : status_escaped);
+}
+
+template <class Real, class T>
+inline void write_results(const Prepared<T>& run, const AssemblyRules& rules,
+                          const AssemblyOutputs& out, const PackMemory<Real>& pack, int lane,
+                          const LaneBook& book, std::int64_t steps) {
+  const std::int64_t world = book.world;
+  for (int b = 0; b < rules.blocks; ++b) {
+    const Member<Real>& m = pack.members[b];
+    const std::int64_t row = world * rules.blocks + b;
+    out.pose[3 * row] = get(m.x, lane);
+    out.pose[3 * row + 1] = get(m.y, lane);
+    out.pose[3 * row + 2] = own_angle<Real, T>(pack, b, lane);
     const BlockBook& block = pack.book(b, lane);
     out.cell[2 * row] = block.cell_x;
     out.cell[2 * row + 1] = block.cell_y;
     out.quarter[row] = block.quarter;
     out.assembly[row] = get(m.root, lane);
   }
-  out.status[world] = (finite ? 0u : status_non_finite) | (inside ? 0u : status_escaped);
+  out.status[world] = lane_status<Real, T>(run, rules, pack, lane);
   out.event_count[world] = book.event_count;
   out.first_contact_step[world] = book.first_contact;
   out.end_step[world] = static_cast<std::int32_t>(steps);

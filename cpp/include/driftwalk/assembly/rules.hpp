@@ -7,6 +7,8 @@
 
 namespace driftwalk {
 
+inline constexpr int most_blocks = 256; // of a world
+
 enum class Latching : int { none = 0, collision = 1, connector = 2 };
 
 // The same for every world of a batch, in double precision. Lengths in m, SI throughout.

@@ -82,6 +82,13 @@ inline constexpr int most_blocks_all_pairs = 24;
 // Latches, impulses and positions of everything that touches (docs/explanation/assembly.md).
 void settle(const AssemblyRules& rules, Scene& scene);
 
+// Leaves the first `blocks` blocks alone in the scene. What is left of an assembly that has lost
+// some goes on as it was moving; where its blocks no longer hang together it is several assemblies.
+// Those are marked as touched.
+void keep_first_blocks(const AssemblyRules& rules, Scene& scene, int blocks);
+// Makes every block an assembly of its own, which moves as the block did, with its own frame.
+void part_blocks(const AssemblyRules& rules, Scene& scene);
+
 // Fills the list with the pairs whose centres are closer than a diagonal (or the connectors' reach)
 // and a skin, ordered by first and second block.
 void find_pairs(const AssemblyRules& rules, Scene& scene);

@@ -75,6 +75,8 @@ inline void add_member(Scene& scene, SceneAssembly& assembly, int block) {
 
 // Puts blocks where their assembly is.
 void place_members(Scene& scene, int assembly);
+// Puts an assembly so that one of its blocks is at a place, and its blocks with it.
+void place_by(Scene& scene, int assembly, int block, Vec2 at);
 // Members, offsets, inertia and joined faces of an assembly, from its blocks' cells and labels.
 void measure_assembly(const AssemblyRules& rules, Scene& scene, int assembly);
 

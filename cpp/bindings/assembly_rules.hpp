@@ -1,0 +1,55 @@
+// What the bindings of self-assembly share: rules from a model and from words.
+#pragma once
+
+#include "model.hpp"
+
+#include "driftwalk/assembly/rules.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+// What the rules take from the model.
+inline driftwalk::AssemblyRules rules_of(const Model& model, std::size_t blocks) {
+  const driftwalk::Prepared<double>& run = model.twice().view();
+  driftwalk::AssemblyRules rules;
+  rules.blocks = static_cast<int>(blocks);
+  rules.side = 2 * run.half_side;
+  rules.mass = run.mass;
+  rules.inertia = run.inertia;
+  rules.radius = run.radius;
+  rules.edges = run.edges;
+  rules.edge_count = run.edge_count;
+  rules.low_x = run.flow.low_x;
+  rules.high_x = run.flow.high_x;
+  rules.low_y = run.flow.low_y;
+  rules.high_y = run.flow.high_y;
+  rules.bounce_speed = run.bounce_speed;
+  return rules;
+}
+
+inline driftwalk::Latching latching_of(const std::string& word) {
+  if (word == "none") {
+    return driftwalk::Latching::none;
+  }
+  if (word == "collision") {
+    return driftwalk::Latching::collision;
+  }
+  if (word == "connector") {
+    return driftwalk::Latching::connector;
+  }
+  throw std::invalid_argument("latching must be none, collision or connector");
+}
+
+inline bool is_first(const std::string& word, const char* first, const char* second) {
+  if (word != first && word != second) {
+    throw std::invalid_argument(word + " must be " + first + " or " + second);
+  }
+  return word == first;
+}
+
+inline void require_blocks(std::size_t blocks) {
+  if (blocks < 1 || blocks > driftwalk::most_blocks) {
+    throw std::invalid_argument("a world has 1 to 256 blocks");
+  }
+}

@@ -1,0 +1,106 @@
+// Bindings of the live world: a world that keeps its state between calls.
+#include "assembly_rules.hpp"
+
+#include "driftwalk/assembly/live.hpp"
+
+#include <nanobind/stl/string.h>
+
+#include <cmath>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+using namespace nb::literals;
+
+namespace {
+
+using driftwalk::LiveForces;
+using driftwalk::LiveWorld;
+
+void start_world(LiveWorld* self, const Model& model, In<double, 2> start, std::uint64_t key,
+                 double drag_coefficient, double force_std, const std::string& latching,
+                 double connector_distance, double connector_axis,
+                 const std::string& hidden_face_drag, double block_restitution,
+                 double block_friction) {
+  require_blocks(start.shape(0));
+  if (start.shape(1) != 3) {
+    throw std::invalid_argument("start must have shape (blocks, 3)");
+  }
+  driftwalk::AssemblyRules rules = rules_of(model, start.shape(0));
+  rules.latching = latching_of(latching);
+  rules.connector_distance = connector_distance;
+  rules.connector_cosine = std::cos(connector_axis);
+  rules.hidden_faces_drag = is_first(hidden_face_drag, "full", "none");
+  rules.restitution = block_restitution;
+  rules.friction = block_friction;
+  new (self) LiveWorld(model.twice(), rules, {drag_coefficient, force_std, 1.0}, start.data(), key);
+}
+
+nb::dict advance(LiveWorld& world, std::int64_t steps) {
+  if (steps < 0 || steps >= INT32_MAX - world.step()) {
+    throw std::invalid_argument("a world has at most 2^31 - 2 steps");
+  }
+  {
+    nb::gil_scoped_release release;
+    world.advance(steps);
+  }
+  const driftwalk::LiveEvents events = world.events();
+  const std::size_t count = static_cast<std::size_t>(events.count);
+  const auto rows = [&](const std::int32_t* values, std::size_t width) {
+    return std::vector<std::int32_t>(values, values + count * width);
+  };
+  nb::dict out;
+  out["step"] = hand_out(rows(events.step, 1), {count});
+  out["block"] = hand_out(rows(events.block, 2), {count, 2});
+  out["face"] = hand_out(rows(events.face, 2), {count, 2});
+  return out;
+}
+
+nb::dict state(const LiveWorld& world) {
+  const std::size_t blocks = static_cast<std::size_t>(world.blocks());
+  std::vector<double> pose(blocks * 3), velocity(blocks * 3);
+  std::vector<std::int32_t> assembly(blocks), cell(blocks * 2), quarter(blocks);
+  world.read({pose.data(), velocity.data(), assembly.data(), cell.data(), quarter.data()});
+  nb::dict out;
+  out["pose"] = hand_out(std::move(pose), {blocks, 3});
+  out["velocity"] = hand_out(std::move(velocity), {blocks, 3});
+  out["assembly"] = hand_out(std::move(assembly), {blocks});
+  out["cell"] = hand_out(std::move(cell), {blocks, 2});
+  out["quarter"] = hand_out(std::move(quarter), {blocks});
+  return out;
+}
+
+int set_blocks(LiveWorld& world, std::size_t blocks) {
+  require_blocks(blocks);
+  nb::gil_scoped_release release;
+  return world.set_blocks(static_cast<int>(blocks));
+}
+
+} // namespace
+
+void register_live(nb::module_& module);
+void register_live(nb::module_& module) {
+  nb::class_<LiveWorld>(module, "LiveWorld")
+      .def("__init__", &start_world, nb::keep_alive<1, 2>(), "model"_a, nb::kw_only(), "start"_a,
+           "key"_a, "drag_coefficient"_a, "force_std"_a, "latching"_a, "connector_distance"_a,
+           "connector_axis"_a, "hidden_face_drag"_a, "block_restitution"_a, "block_friction"_a)
+      .def("advance", &advance, "steps"_a)
+      .def("state", &state)
+      .def(
+          "set_forces",
+          [](LiveWorld& world, double drag_coefficient, double force_std, double flow_scale) {
+            world.set_forces({drag_coefficient, force_std, flow_scale});
+          },
+          nb::kw_only(), "drag_coefficient"_a, "force_std"_a, "flow_scale"_a)
+      .def(
+          "set_rules",
+          [](LiveWorld& world, const std::string& latching, const std::string& hidden_face_drag) {
+            world.set_rules(latching_of(latching), is_first(hidden_face_drag, "full", "none"));
+          },
+          nb::kw_only(), "latching"_a, "hidden_face_drag"_a)
+      .def("set_blocks", &set_blocks, "blocks"_a)
+      .def("part", &LiveWorld::part)
+      .def_prop_ro("step", &LiveWorld::step)
+      .def_prop_ro("status", &LiveWorld::status);
+}

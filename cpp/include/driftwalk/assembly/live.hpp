@@ -1,0 +1,67 @@
+// One world of blocks that keeps its state between calls, and whose parameters may change while it
+// runs: the kernel of assembly/pack.hpp in double precision.
+#pragma once
+
+#include "driftwalk/assembly/rules.hpp"
+#include "driftwalk/simulate/prepare.hpp"
+
+#include <cstdint>
+#include <memory>
+
+namespace driftwalk {
+
+struct LiveForces {
+  double drag_coefficient = 0;
+  double force_std = 0;  // [N]
+  double flow_scale = 1; // on the velocity of the water
+};
+
+// The blocks of a live world, one row each; arrays of `blocks()` rows.
+struct LiveBlocks {
+  double* pose;           // [x, y, theta]
+  double* velocity;       // [vx, vy, omega] of the block's centre
+  std::int32_t* assembly; // lowest block of its assembly
+  std::int32_t* cell;     // [x, y] on the assembly's lattice
+  std::int32_t* quarter;
+};
+
+// Joinings of the last `advance`, as in AssemblyOutputs.
+struct LiveEvents {
+  int count;
+  const std::int32_t* step;
+  const std::int32_t* block; // [stayed, moved]
+  const std::int32_t* face;
+};
+
+// Changes take effect with the next step. Nothing is allocated but in the constructor.
+class LiveWorld {
+public:
+  // `run` has to outlive the world. Blocks [x, y, theta], as many as the rules say, start at rest.
+  LiveWorld(const PreparedRun<double>& run, const AssemblyRules& rules, const LiveForces& forces,
+            const double* start, std::uint64_t key);
+  ~LiveWorld();
+  LiveWorld(const LiveWorld&) = delete;
+  LiveWorld& operator=(const LiveWorld&) = delete;
+
+  void advance(std::int64_t steps);
+  void set_forces(const LiveForces& forces);
+  // What is joined stays so.
+  void set_rules(Latching latching, bool hidden_faces_drag);
+  // Removes the last blocks, or adds blocks at random free places, at rest, as long as there are
+  // any. Returns the number of blocks, 1 to most_blocks.
+  int set_blocks(int blocks);
+  // Every block is on its own.
+  void part();
+
+  int blocks() const;
+  std::int64_t step() const; // time steps since the start
+  std::uint32_t status() const;
+  LiveEvents events() const;
+  void read(const LiveBlocks& out) const;
+
+private:
+  struct Inside;
+  std::unique_ptr<Inside> inside_;
+};
+
+} // namespace driftwalk

@@ -1,0 +1,53 @@
+// The memory that one thread needs for its worlds.
+#pragma once
+
+#include "driftwalk/assembly/kernel.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <memory>
+#include <new>
+#include <vector>
+
+namespace driftwalk {
+
+// Room for `blocks` blocks a world; `lane_bytes` is what the kernel asks for.
+class AssemblyMemory {
+public:
+  AssemblyMemory(int blocks, std::size_t lane_bytes, std::int64_t flow_size)
+      : blocks_(static_cast<std::size_t>(blocks)), before_(blocks_.size()),
+        assemblies_(blocks_.size()), next_(blocks_.size()),
+        heads_(most_cells_per_side * most_cells_per_side),
+        pairs_(static_cast<std::size_t>(pair_capacity(blocks))),
+        flow_(static_cast<std::size_t>(flow_size)), flow_twice_(flow_.size()),
+        lanes_(static_cast<char*>(std::aligned_alloc(64, (lane_bytes + 63) / 64 * 64)), std::free) {
+    if (!lanes_) {
+      throw std::bad_alloc();
+    }
+    scratch_.lanes = lanes_.get();
+    scratch_.blended_flow = flow_.data();
+    scratch_.blended_flow_twice = flow_twice_.data();
+    Scene& scene = scratch_.scene;
+    scene = {};
+    scene.block = blocks_.data();
+    scene.blocks_before = before_.data();
+    scene.assembly = assemblies_.data();
+    scene.pairs = {pairs_.data(), 0};
+    scene.cell_head = heads_.data();
+    scene.cell_next = next_.data();
+  }
+  AssemblyScratch& scratch() { return scratch_; }
+
+private:
+  std::vector<SceneBlock> blocks_, before_;
+  std::vector<SceneAssembly> assemblies_;
+  std::vector<std::int32_t> next_, heads_;
+  std::vector<BlockPair> pairs_;
+  std::vector<std::int16_t> flow_;
+  std::vector<double> flow_twice_;
+  std::unique_ptr<char, decltype(&std::free)> lanes_;
+  AssemblyScratch scratch_;
+};
+
+} // namespace driftwalk

@@ -1,0 +1,246 @@
+// The worlds of a pack and one time step of all of them. Nothing a world does depends on its lane
+// or its neighbours.
+#pragma once
+
+#include "driftwalk/assembly/lane.hpp"
+#include "driftwalk/assembly/near.hpp"
+#include "driftwalk/assembly/walls.hpp"
+#include "driftwalk/random/normal.hpp"
+#include "driftwalk/simulate/run.hpp"
+
+DRIFTWALK_LANES_BEGIN
+
+template <class Real, class T>
+class WorldPack {
+public:
+  static constexpr int lanes = Numbers<Real>::lanes;
+  using Bool = typename Numbers<Real>::Bool;
+  using UInt = typename Numbers<Real>::UInt;
+  using Node = typename FlowNumber<T>::type;
+
+  // All lanes get the blocks at `start`; those that never begin move them along for nothing. The
+  // memory holds worlds of up to `capacity` blocks. Events go to `out`.
+  WorldPack(const Prepared<T>& run, const AssemblyRules& rules, const double* start,
+            const AssemblyOutputs& out, AssemblyScratch& scratch, Node* blended_flow, int capacity)
+      : run_(run), rules_(rules), out_(out), scratch_(scratch), blended_flow_(blended_flow),
+        memory_(scratch.lanes, capacity), near_(rules), blocks_(rules.blocks),
+        listed_(rules.blocks > most_blocks_all_pairs),
+        physics_{{run.half_side, run.strip_width, run.strips},
+                 run.flow,
+                 {run.radius, run.edges, run.edge_count, run.restitution, run.friction,
+                  run.bounce_speed},
+                 {run.dt, run.per_dt, run.per_inertia},
+                 {Real(T(0)), Real(T(0))},
+                 Real(T(0))} {
+    const bool has_lists = capacity > most_blocks_all_pairs;
+    for (int lane = 0; lane < lanes; ++lane) {
+      load_lane<Real, T>(rules_, start, memory_, lane);
+      books_[lane].pairs.pair = memory_.pairs + (has_lists ? pair_capacity(capacity) * lane : 0);
+      put(stream_.key0, lane, 0);
+      put(stream_.key1, lane, 0);
+      put(draw_, lane, 0);
+    }
+    for (int b = 0; b < blocks_; ++b) {
+      memory_.listed_x[b] = memory_.listed_y[b] = Real(T(0));
+    }
+  }
+
+  const PackMemory<Real>& memory() const { return memory_; }
+  LaneBook& book(int lane) { return books_[lane]; }
+  const LaneBook& book(int lane) const { return books_[lane]; }
+
+  // Steps that one block of random numbers serves: two force intervals.
+  std::int64_t period() const { return 2 * std::int64_t(run_.steps_per_interval); }
+
+  // Puts a world into a lane, before the pack's step `step`, a whole number of periods.
+  void begin(int lane, std::int64_t world, std::int64_t step, const double* start,
+             std::uint64_t key) {
+    LaneBook& book = books_[lane];
+    book.world = world;
+    book.first_step = step;
+    book.event_count = 0;
+    book.first_contact = -1;
+    book.assemblies = blocks_;
+    book.running = true;
+    load_lane<Real, T>(rules_, start, memory_, lane);
+    put(stream_.key0, lane, static_cast<UInt32>(key));
+    put(stream_.key1, lane, static_cast<UInt32>(key >> 32));
+    put(draw_, lane, 0);
+    if (listed_) {
+      list_pairs(lane);
+    }
+  }
+
+  void set_forces(int lane, double drag_coefficient, double force_std) {
+    // The same roundings as in the one-block kernel.
+    put(physics_.drag.drag_per_mass, lane,
+        static_cast<T>(drag_coefficient) * static_cast<T>(run_.drag_scale / run_.mass));
+    put(physics_.drag.drag_per_inertia, lane,
+        static_cast<T>(drag_coefficient) * static_cast<T>(run_.drag_scale / run_.inertia));
+    put(physics_.noise_scale, lane, static_cast<T>(force_std) * static_cast<T>(1.0 / run_.mass));
+  }
+
+  // For all worlds: the flow times a factor.
+  void scale_flow(T factor) { physics_.flow.unit = run_.flow.unit * factor; }
+
+  // To be called when the rules, or the blocks of a lane, have been changed from outside.
+  void renew() {
+    near_ = NearRules<T>(rules_);
+    blocks_ = rules_.blocks;
+    listed_ = blocks_ > most_blocks_all_pairs;
+    for (int lane = 0; lane < lanes && listed_; ++lane) {
+      if (books_[lane].running) {
+        list_pairs(lane);
+      }
+    }
+  }
+
+  // The normal numbers that a block has in the period under way.
+  void draw_again(int block) { draw_forces(block, draw_ - UInt(static_cast<UInt32>(1))); }
+
+  // One time step of every lane; returns whether a world has become one assembly in it.
+  bool step(std::int64_t step) {
+    const std::int64_t phase = step % period();
+    if (phase == 0) {
+      for (int b = 0; b < blocks_; ++b) {
+        draw_forces(b, draw_);
+      }
+      draw_ = draw_ + UInt(static_cast<UInt32>(1));
+    }
+    if (run_.frames > 1) {
+      blend_flow(step);
+    }
+    advance(physics_, phase < run_.steps_per_interval ? 0 : 1, memory_.members, memory_.sums,
+            blocks_);
+    meet_walls(physics_, memory_.members, blocks_);
+    return settle_lanes(step);
+  }
+
+private:
+  void draw_forces(int block, UInt draw) {
+    UInt words[4];
+    stream_(draw, UInt(static_cast<UInt32>(block)), UInt(static_cast<UInt32>(0)),
+            UInt(static_cast<UInt32>(Purpose::force)), words);
+    Real* const normals = memory_.members[block].normals;
+    normal_pair(words[0], words[1], normals[0], normals[1]);
+    normal_pair(words[2], words[3], normals[2], normals[3]);
+  }
+
+  void blend_flow(std::int64_t step) {
+    std::int64_t first = 0;
+    for (const LaneBook& book : books_) {
+      first = book.running ? book.first_step : first;
+    }
+    const double middle = (static_cast<double>(step - first) + 0.5) * static_cast<double>(run_.dt);
+    physics_.flow.table = flow_table_at(run_, middle, blended_flow_);
+  }
+
+  bool settle_lanes(std::int64_t step) {
+    bool complete = false;
+    if (listed_) {
+      renew_lists();
+      for (int lane = 0; lane < lanes; ++lane) {
+        if (books_[lane].running &&
+            lane_to_settle(near_, memory_.members, books_[lane].pairs, lane)) {
+          complete = settle_lane(step, lane) || complete;
+        }
+      }
+      return complete;
+    }
+    const Bool unsettled = lanes_to_settle(near_, memory_.members, blocks_);
+    if (any(unsettled)) {
+      for (int lane = 0; lane < lanes; ++lane) {
+        if (books_[lane].running && lane_of(unsettled, lane)) {
+          complete = settle_lane(step, lane) || complete;
+        }
+      }
+    }
+    return complete;
+  }
+
+  // Lists of near pairs reach half a skin beyond what touches on either side.
+  void renew_lists() {
+    const Real limit{
+        static_cast<T>(0.25 * pair_skin_sides * pair_skin_sides * rules_.side * rules_.side)};
+    Real farthest{T(0)};
+    for (int b = 0; b < blocks_; ++b) {
+      const Real dx = memory_.members[b].x - memory_.listed_x[b];
+      const Real dy = memory_.members[b].y - memory_.listed_y[b];
+      farthest = max(dx * dx + dy * dy, farthest);
+    }
+    const Bool stale = farthest > limit;
+    if (any(stale)) {
+      for (int lane = 0; lane < lanes; ++lane) {
+        if (books_[lane].running && lane_of(stale, lane)) {
+          list_pairs(lane);
+        }
+      }
+    }
+  }
+
+  void list_pairs(int lane) {
+    Scene& scene = scratch_.scene;
+    fill_scene(rules_, memory_, lane, books_[lane].assemblies, scene);
+    const PairList own = scene.pairs;
+    scene.pairs = books_[lane].pairs;
+    find_pairs(rules_, scene);
+    keep_list(lane);
+    scene.pairs = own;
+  }
+
+  void keep_list(int lane) {
+    books_[lane].pairs = scratch_.scene.pairs;
+    for (int b = 0; b < blocks_; ++b) {
+      put(memory_.listed_x[b], lane, get(memory_.members[b].x, lane));
+      put(memory_.listed_y[b], lane, get(memory_.members[b].y, lane));
+    }
+  }
+
+  // Returns whether the world is one assembly now.
+  bool settle_lane(std::int64_t step, int lane) {
+    LaneBook& book = books_[lane];
+    Scene& scene = scratch_.scene;
+    fill_scene(rules_, memory_, lane, book.assemblies, scene);
+    const std::int64_t row = book.world * out_.event_rows;
+    scene.step = static_cast<std::int32_t>(step + 1 - book.first_step);
+    scene.event_rows = out_.event_rows;
+    scene.event_count = book.event_count;
+    scene.event_step = out_.event_step + row;
+    scene.event_block = out_.event_block + 2 * row;
+    scene.event_face = out_.event_face + 2 * row;
+    const PairList own = scene.pairs;
+    if (listed_) {
+      scene.pairs = book.pairs;
+    } else {
+      find_pairs(rules_, scene);
+    }
+    settle(rules_, scene);
+    read_scene(rules_, scene, memory_, lane);
+    book.event_count = scene.event_count;
+    book.assemblies = scene.assemblies;
+    if (scene.contact && book.first_contact < 0) {
+      book.first_contact = scene.step;
+    }
+    if (listed_ && scene.rebuilt) {
+      keep_list(lane);
+    }
+    scene.pairs = own;
+    return book.assemblies == 1 && blocks_ > 1;
+  }
+
+  const Prepared<T>& run_;
+  const AssemblyRules& rules_;
+  const AssemblyOutputs& out_;
+  AssemblyScratch& scratch_;
+  Node* blended_flow_;
+  PackMemory<Real> memory_;
+  NearRules<T> near_;
+  int blocks_;
+  bool listed_;
+  Physics<Real, T> physics_;
+  Philox<UInt> stream_;
+  UInt draw_;
+  LaneBook books_[lanes];
+};
+
+DRIFTWALK_LANES_END

@@ -1,0 +1,172 @@
+#include "driftwalk/assembly/live.hpp"
+
+#include "driftwalk/assembly/assemble.hpp"
+#include "driftwalk/assembly/memory.hpp"
+#include "driftwalk/assembly/pack.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace driftwalk {
+
+namespace {
+using OneWorld = WorldPack<double, double>;
+
+// Between two calls of `advance` no blocks part, so there are no more joinings in one.
+constexpr int most_events = most_blocks - 1;
+} // namespace
+
+struct LiveWorld::Inside {
+  Inside(const PreparedRun<double>& model, const AssemblyRules& given, const double* start,
+         std::uint64_t own_key)
+      : run(model.view()), rules(given), key(own_key),
+        memory(most_blocks, PackMemory<double>::bytes(most_blocks), model.blended_flow_size()),
+        out(outputs()), pack(run, rules, start, out, memory.scratch(),
+                             memory.scratch().blended_flow_twice, most_blocks) {
+    pack.begin(0, 0, 0, start, key);
+  }
+
+  AssemblyOutputs outputs() {
+    AssemblyOutputs found;
+    found.event_rows = most_events;
+    found.event_step = event_step.data();
+    found.event_block = event_block.data();
+    found.event_face = event_face.data();
+    return found;
+  }
+
+  Scene& filled_scene() {
+    Scene& scene = memory.scratch().scene;
+    fill_scene(rules, pack.memory(), 0, pack.book(0).assemblies, scene);
+    return scene;
+  }
+
+  // Takes over what has been changed in the scene; everything else stays as it is, to the bit.
+  void take_scene(const Scene& scene) {
+    rules.blocks = scene.blocks;
+    for (int b = 0; b < scene.blocks; ++b) {
+      if (scene.assembly[scene.block[b].assembly].touched) {
+        read_block(rules, scene, pack.memory(), b, 0);
+      }
+    }
+    pack.book(0).assemblies = scene.assemblies;
+    pack.renew();
+  }
+
+  void add_blocks(int wanted) {
+    const std::int64_t interval = step / run.steps_per_interval;
+    std::array<double, 3 * most_blocks> pose;
+    for (int b = 0; b < rules.blocks; ++b) {
+      read_pose(b, &pose[3 * static_cast<std::size_t>(b)]);
+    }
+    while (rules.blocks < wanted &&
+           place_one_more(rules, key, interval, rules.blocks, pose.data())) {
+      const int block = rules.blocks++;
+      load_block<double, double>(rules, &pose[3 * static_cast<std::size_t>(block)], pack.memory(),
+                                 block, 0);
+      pack.draw_again(block);
+      ++pack.book(0).assemblies;
+    }
+    pack.renew();
+  }
+
+  void read_pose(int block, double* pose) const {
+    const Member<double>& m = pack.memory().members[block];
+    pose[0] = m.x;
+    pose[1] = m.y;
+    pose[2] = own_angle<double, double>(pack.memory(), block, 0);
+  }
+
+  const Prepared<double>& run;
+  AssemblyRules rules;
+  std::uint64_t key;
+  std::array<std::int32_t, most_events> event_step;
+  std::array<std::int32_t, 2 * most_events> event_block, event_face;
+  AssemblyMemory memory;
+  AssemblyOutputs out;
+  OneWorld pack;
+  std::int64_t step = 0;
+};
+
+LiveWorld::LiveWorld(const PreparedRun<double>& run, const AssemblyRules& rules,
+                     const LiveForces& forces, const double* start, std::uint64_t key)
+    : inside_(std::make_unique<Inside>(run, rules, start, key)) {
+  set_forces(forces);
+}
+
+LiveWorld::~LiveWorld() = default;
+
+void LiveWorld::advance(std::int64_t steps) {
+  inside_->pack.book(0).event_count = 0;
+  for (const std::int64_t end = inside_->step + steps; inside_->step < end; ++inside_->step) {
+    inside_->pack.step(inside_->step);
+  }
+}
+
+void LiveWorld::set_forces(const LiveForces& forces) {
+  inside_->pack.set_forces(0, forces.drag_coefficient, forces.force_std);
+  inside_->pack.scale_flow(forces.flow_scale);
+}
+
+void LiveWorld::set_rules(Latching latching, bool hidden_faces_drag) {
+  AssemblyRules& rules = inside_->rules;
+  rules.latching = latching;
+  rules.hidden_faces_drag = hidden_faces_drag;
+  for (int b = 0; b < rules.blocks; ++b) {
+    cover_faces(rules, inside_->pack.memory(), b, 0);
+  }
+  inside_->pack.renew();
+}
+
+int LiveWorld::set_blocks(int blocks) {
+  blocks = std::clamp(blocks, 1, most_blocks);
+  if (blocks < inside_->rules.blocks) {
+    Scene& scene = inside_->filled_scene();
+    keep_first_blocks(inside_->rules, scene, blocks);
+    inside_->take_scene(scene);
+  } else if (blocks > inside_->rules.blocks) {
+    inside_->add_blocks(blocks);
+  }
+  return inside_->rules.blocks;
+}
+
+void LiveWorld::part() {
+  Scene& scene = inside_->filled_scene();
+  part_blocks(inside_->rules, scene);
+  inside_->take_scene(scene);
+}
+
+int LiveWorld::blocks() const {
+  return inside_->rules.blocks;
+}
+
+std::int64_t LiveWorld::step() const {
+  return inside_->step;
+}
+
+std::uint32_t LiveWorld::status() const {
+  return lane_status<double, double>(inside_->run, inside_->rules, inside_->pack.memory(), 0);
+}
+
+LiveEvents LiveWorld::events() const {
+  return {inside_->pack.book(0).event_count, inside_->event_step.data(),
+          inside_->event_block.data(), inside_->event_face.data()};
+}
+
+void LiveWorld::read(const LiveBlocks& out) const {
+  const PackMemory<double>& memory = inside_->pack.memory();
+  for (int b = 0; b < inside_->rules.blocks; ++b) {
+    const Member<double>& m = memory.members[b];
+    const BlockBook& book = memory.book(b, 0);
+    inside_->read_pose(b, out.pose + 3 * b);
+    out.velocity[3 * b] = m.motion.vx - m.motion.omega * m.arm.y;
+    out.velocity[3 * b + 1] = m.motion.vy + m.motion.omega * m.arm.x;
+    out.velocity[3 * b + 2] = m.motion.omega;
+    out.assembly[b] = m.root;
+    out.cell[2 * b] = book.cell_x;
+    out.cell[2 * b + 1] = book.cell_y;
+    out.quarter[b] = book.quarter;
+  }
+}
+
+} // namespace driftwalk

@@ -1,0 +1,102 @@
+// Assemblies that lose blocks, or come apart into them.
+#include "driftwalk/assembly/settle_parts.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+
+namespace driftwalk {
+
+namespace {
+// Makes the blocks that are labelled with the lowest of them one body, which moves on as they did
+// in the assembly that they come from.
+void cut_loose(const AssemblyRules& rules, Scene& scene, const SceneAssembly& from, int lowest) {
+  const Vec2 at = centre(scene, lowest);
+  SceneAssembly& body = scene.assembly[lowest];
+  body = from;
+  measure_assembly(rules, scene, lowest);
+  place_by(scene, lowest, lowest, at);
+  body.vx = from.vx - from.omega * (body.y - from.y);
+  body.vy = from.vy + from.omega * (body.x - from.x);
+  body.before = {body.x, body.y, body.theta, body.cosine, body.sine};
+  body.touched = true;
+}
+
+bool are_neighbours(const SceneBlock& a, const SceneBlock& b) {
+  return std::abs(a.cell_x - b.cell_x) + std::abs(a.cell_y - b.cell_y) == 1;
+}
+
+// Labels members of an assembly, from one to before another, with the lowest of them that each
+// hangs together with.
+void label_connected(Scene& scene, int first, int end) {
+  for (int b = first; b != end; b = scene.block[b].next) {
+    scene.block[b].assembly = b;
+  }
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (int b = first; b != end; b = scene.block[b].next) {
+      for (int c = scene.block[b].next; c != end; c = scene.block[c].next) {
+        SceneBlock &one = scene.block[b], &other = scene.block[c];
+        if (one.assembly != other.assembly && are_neighbours(one, other)) {
+          one.assembly = other.assembly = std::min(one.assembly, other.assembly);
+          changed = true;
+        }
+      }
+    }
+  }
+}
+
+// The frame of an assembly, turned by quarter turns.
+SceneAssembly turned(SceneAssembly a, int quarters) {
+  constexpr double pi = 3.141592653589793;
+  const Vec2 axis = face_normal(a, quarters);
+  a.cosine = axis.x;
+  a.sine = axis.y;
+  a.theta += quarters * (pi / 2);
+  a.theta -= a.theta > pi ? 2 * pi : 0.0;
+  return a;
+}
+} // namespace
+
+void keep_first_blocks(const AssemblyRules& rules, Scene& scene, int blocks) {
+  scene.blocks = blocks;
+  scene.assemblies = 0;
+  // Members stand in the order of their indices. What an assembly falls into comes later in the
+  // loop, and is whole then.
+  for (int a = 0; a < blocks; ++a) {
+    const SceneAssembly from = scene.assembly[a];
+    if (from.blocks > 0 && from.last >= blocks) {
+      int end = from.first;
+      while (end >= 0 && end < blocks) {
+        end = scene.block[end].next;
+      }
+      label_connected(scene, from.first, end);
+      std::copy_n(scene.block, blocks, scene.blocks_before);
+      for (int b = from.first; b != end; b = scene.blocks_before[b].next) {
+        if (scene.block[b].assembly == b) {
+          cut_loose(rules, scene, from, b);
+        }
+      }
+    }
+    scene.assemblies += from.blocks > 0;
+  }
+}
+
+void part_blocks(const AssemblyRules& rules, Scene& scene) {
+  std::copy_n(scene.block, scene.blocks, scene.blocks_before);
+  for (int a = 0; a < scene.blocks; ++a) {
+    const SceneAssembly from = scene.assembly[a];
+    if (scene.blocks_before[a].assembly != a || from.blocks == 1) {
+      continue;
+    }
+    for (int b = from.first; b >= 0; b = scene.blocks_before[b].next) {
+      SceneBlock& block = scene.block[b];
+      const int quarter = block.quarter;
+      block.assembly = b;
+      block.cell_x = block.cell_y = block.quarter = 0;
+      cut_loose(rules, scene, turned(from, quarter), b);
+    }
+  }
+  scene.assemblies = scene.blocks;
+}
+
+} // namespace driftwalk
