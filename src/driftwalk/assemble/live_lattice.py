@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assemble.events import STEP, rotate
-from driftwalk.assemble.final_class import final_classes
-from driftwalk.assemble.polyomino import Chirality
+from driftwalk.assemble.outcome import class_name
+from driftwalk.assemble.polyomino import Cell, Chirality, moved_to_origin, name_of
 
 Integers = npt.NDArray[np.int64]
 
@@ -49,5 +49,8 @@ class Lattice(NamedTuple):
 
     def outcome(self, chirality: Chirality) -> str:
         """Return the outcome class of the world."""
-        names, _ = final_classes(self.cell[None], self.assembly[None], chirality=chirality)
-        return names[0]
+        members: dict[int, list[Cell]] = {}
+        for label, (x, y) in zip(self.assembly.tolist(), self.cell.tolist(), strict=True):
+            members.setdefault(label, []).append((x, y))
+        shapes = (name_of(moved_to_origin(tuple(cells)), chirality) for cells in members.values())
+        return class_name(shapes)
