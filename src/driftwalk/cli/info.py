@@ -41,12 +41,23 @@ _ROWS: list[tuple[str, str, float]] = [
     ("  standard error [mm]", "position_noise_standard_error_m", 1e3),
     ("orientation noise [deg]", "orientation_noise_rad", 57.29577951308232),
     ("  standard error [deg]", "orientation_noise_standard_error_rad", 57.29577951308232),
+    ("identity ambiguous [%]", "ambiguous_share", 100),
 ]
 _CIRCLE_ROWS: list[tuple[str, str, float]] = [
     ("circle of centres: radius [cm]", "radius_m", 100),
     ("  rim visited [%]", "sectors_visited_share", 100),
 ]
-_BRIEF = ["samples", "duration_s", "rate_Hz", "gaps", "speed_mean_m_s", "position_noise_m"]
+_TRACKED = ["ambiguous_share"]
+_BRIEF = [
+    *("samples", "duration_s", "rate_Hz", "gaps", "speed_mean_m_s", "position_noise_m"),
+    *_TRACKED,
+]
+_TRACKING = {
+    "frames": "frames tracked",
+    "dropped": "frames dropped",
+    "duplicates": "frames doubled",
+    "stale": "frames stale",
+}
 _COUNTS = {
     "rows": "rows of these bodies",
     "missing": "without a position",
@@ -82,6 +93,9 @@ def info(
     print()
     _print_bodies(described["bodies"])
     print()
+    if described["tracking"] is not None:
+        _print_tracking(described["tracking"])
+        print()
     _print_counts(described["counts"])
     for warning in described["warnings"]:
         print_note(f"warning: {warning}")
@@ -125,8 +139,11 @@ def _scaled(value: Any, factor: float) -> Any:
 
 
 def _print_bodies(bodies: dict[str, dict[str, Any]]) -> None:
+    known = [
+        row for row in _ROWS if row[1] not in _TRACKED or any(row[1] in b for b in bodies.values())
+    ]
     if len(bodies) > SIDE_BY_SIDE:
-        chosen = [row for row in _ROWS if row[1] in _BRIEF]
+        chosen = [row for row in known if row[1] in _BRIEF]
         lines = [
             [name, *(_scaled(body.get(key), factor) for _, key, factor in chosen)]
             for name, body in bodies.items()
@@ -135,13 +152,23 @@ def _print_bodies(bodies: dict[str, dict[str, Any]]) -> None:
         return
     rows = [
         [label, *(_scaled(body.get(key), factor) for body in bodies.values())]
-        for label, key, factor in _ROWS
+        for label, key, factor in known
     ]
     rows += [
         [label, *(_scaled((b["circle_of_centers"] or {}).get(key), f) for b in bodies.values())]
         for label, key, f in _CIRCLE_ROWS
     ]
     print_table(rows, columns=["body", *bodies])
+
+
+def _print_tracking(tracking: dict[str, Any]) -> None:
+    """Print what became of the frames, and why a recording ends early."""
+    rows: list[list[Any]] = [["tracked from", tracking["tracked_from"] or "-"]]
+    rows += [[label, tracking[key]] for key, label in _TRACKING.items() if key in tracking]
+    rows.append(["complete", "yes" if tracking["complete"] else "no"])
+    if tracking["interrupted"] is not None:
+        rows.append(["ended because", tracking["interrupted"]])
+    print_table(rows)
 
 
 def _print_counts(counts: dict[str, Any]) -> None:

@@ -95,7 +95,8 @@ def clean_body(
 
 def _take(body: RawBody, rows: npt.NDArray[np.bool_] | npt.NDArray[np.int64]) -> RawBody:
     theta = None if body.theta is None else body.theta[rows]
-    return RawBody(body.name, body.clock[rows], body.x[rows], body.y[rows], theta)
+    extra = {name: values[rows] for name, values in body.extra.items()}
+    return RawBody(body.name, body.clock[rows], body.x[rows], body.y[rows], theta, extra=extra)
 
 
 def _in_order(body: RawBody, counts: Counts, *, sort: str) -> RawBody:
@@ -128,7 +129,7 @@ def _without(body: RawBody, rows: npt.NDArray[np.int64]) -> RawBody:
         return body
     x, y = body.x.copy(), body.y.copy()
     x[rows] = y[rows] = np.nan
-    return RawBody(body.name, body.clock, x, y, body.theta)
+    return RawBody(body.name, body.clock, x, y, body.theta, extra=body.extra)
 
 
 def find_jumps(body: RawBody, max_speed: float) -> npt.NDArray[np.int64]:

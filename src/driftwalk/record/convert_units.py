@@ -66,7 +66,7 @@ def convert_units(
         if theta is not None and turn != 1.0:
             theta = _writable(theta)
             np.multiply(theta, turn, out=theta)
-        bodies.append(RawBody(body.name, clocks[id(body.clock)], x, y, theta))
+        bodies.append(RawBody(body.name, clocks[id(body.clock)], x, y, theta, extra=body.extra))
     return bodies, attrs
 
 

@@ -36,8 +36,9 @@ def describe(trajectory: xr.Dataset) -> dict[str, Any]:
     dict
         JSON-ready, with units in the keys: ``source``, ``format``, ``y_axis``, ``arena``,
         ``position_quantum_m``, ``counts``, ``warnings``, and ``bodies``: name to samples, missing
-        rows, duration_s, rate_Hz, jitter, gaps, extent, the circle of the centres, speed and the
-        estimated tracking noise. A number that cannot be had is None.
+        rows, duration_s, rate_Hz, jitter, gaps, extent, the circle of the centres, speed, the
+        estimated tracking noise, and of a tracked recording the ``ambiguous_share``. ``tracking``
+        is what tracking counted, None of other recordings. A number that cannot be had is None.
 
     Examples
     --------
@@ -58,9 +59,23 @@ def describe(trajectory: xr.Dataset) -> dict[str, Any]:
         "origin_shift_m": _json_attribute(attrs, "origin_shift_m", None),
         "position_quantum_m": _number(float(attrs.get("position_quantum_m", math.nan))),
         "metres_per_pixel": _number(float(attrs.get("metres_per_pixel", math.nan))),
+        "tracking": _tracking(attrs),
         "counts": counts,
         "warnings": warnings,
         "bodies": {name: _describe_body(trajectory, name) for name in body_names(trajectory)},
+    }
+
+
+def _tracking(attrs: dict[Any, Any]) -> dict[str, Any] | None:
+    """Return what tracking counted, from what, and whether it came to its end."""
+    counts = _json_attribute(attrs, "tracking_counts", None)
+    if counts is None:
+        return None
+    return {
+        "tracked_from": attrs.get("tracked_from"),
+        "complete": attrs.get("complete") == "yes",
+        "interrupted": attrs.get("interrupted"),
+        **counts,
     }
 
 
@@ -86,6 +101,9 @@ def _describe_body(trajectory: xr.Dataset, name: str) -> dict[str, Any]:
         **noise._asdict(),
     }
     described["circle_of_centers"] = _circle(track)
+    if "ambiguous" in trajectory:
+        scores = trajectory["ambiguous"].sel(body=name).values
+        described["ambiguous_share"] = float((scores > 0).mean())
     return {
         key: _number(value) if isinstance(value, float) else value
         for key, value in described.items()

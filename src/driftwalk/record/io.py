@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -214,7 +214,13 @@ def _assemble(
             "warnings": notes,
         }
     )
-    return build_trajectory(time, x, y, theta, body=[body.name for body in bodies], attrs=attrs)
+    names = [body.name for body in bodies]
+    recording = build_trajectory(time, x, y, theta, body=names, attrs=attrs)
+    for name, meaning in raw.extra.items():
+        values = _on_clock(time, bodies, [body.extra[name] for body in bodies])
+        recording[name] = (("time", "body", *meaning.dims), values, meaning.attrs)
+        recording = recording.assign_coords(meaning.coords)
+    return recording
 
 
 def _place(arena: str, bodies: list[RawBody], *, block_side: float | None) -> PlacedArena:
@@ -239,14 +245,20 @@ def _one_clock(bodies: list[RawBody]) -> tuple[Array, Array, Array, Array | None
         return body.clock, body.x, body.y, body.theta
     clocks = {id(body.clock): body.clock for body in bodies}
     time = np.unique(np.concatenate(list(clocks.values())))
-    columns = [np.full((time.size, len(bodies)), np.nan) for _ in range(3 if has_theta else 2)]
-    for index, body in enumerate(bodies):
-        at = np.searchsorted(time, body.clock)
-        columns[0][at, index] = body.x
-        columns[1][at, index] = body.y
-        if body.theta is not None:
-            columns[2][at, index] = body.theta
-    return time, columns[0], columns[1], columns[2] if has_theta else None
+    x = _on_clock(time, bodies, [body.x for body in bodies])
+    y = _on_clock(time, bodies, [body.y for body in bodies])
+    theta = _on_clock(time, bodies, [body.theta for body in bodies]) if has_theta else None
+    return time, x, y, theta
+
+
+def _on_clock(time: Array, bodies: list[RawBody], values: Sequence[Array | None]) -> Array:
+    """Return values of each body on a common clock, shape (time, body, ...); NaN where none is."""
+    shape = next(one.shape[1:] for one in values if one is not None)
+    columns = np.full((time.size, len(bodies), *shape), np.nan)
+    for index, (body, one) in enumerate(zip(bodies, values, strict=True)):
+        if one is not None:
+            columns[np.searchsorted(time, body.clock), index] = one
+    return columns
 
 
 def _usual_rate(bodies: list[RawBody]) -> float:

@@ -42,6 +42,20 @@ class RawBody:
     """Position y, shape (n,)."""
     theta: Array | None = None
     """Orientation, shape (n,), wrapped or not; None when the file has none."""
+    extra: dict[str, Array] = field(default_factory=dict, kw_only=True)
+    """What else is known of each sample, shape (n, ...), by name; see `RawRecording.extra`."""
+
+
+@dataclass(frozen=True)
+class Extra:
+    """What a further variable of a recording means: it is carried along as it is."""
+
+    dims: tuple[str, ...]
+    """Dimensions after (time, body)."""
+    attrs: dict[str, Any]
+    """Its unit and name."""
+    coords: dict[str, Any]
+    """Values along these dimensions."""
 
 
 @dataclass
@@ -69,6 +83,8 @@ class RawRecording:
     """Sentences for the person who loads the file."""
     attrs: dict[str, Any] = field(default_factory=dict)
     """Attributes to carry over into the dataset."""
+    extra: dict[str, Extra] = field(default_factory=dict)
+    """Further variables, which each body has in its `extra`."""
 
 
 @dataclass(frozen=True)

@@ -67,7 +67,8 @@ def save_trajectory(
 
 
 def _write_netcdf(dataset: xr.Dataset, path: Path) -> None:
-    encoding = {name: {"zlib": True, "complevel": 4} for name in ("x", "y", "theta")}
+    numbers = [name for name, field in dataset.data_vars.items() if field.dims[:1] == ("time",)]
+    encoding = {name: {"zlib": True, "complevel": 4} for name in numbers}
     # In memory first: HDF5 does not survive a disk that fills while it writes.
     path.write_bytes(dataset.to_netcdf(engine="h5netcdf", encoding=encoding))
 

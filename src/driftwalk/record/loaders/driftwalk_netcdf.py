@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.netcdf import open_netcdf, read_attributes
-from driftwalk.record.raw import RawBody, RawRecording, ReadOptions
+from driftwalk.record.raw import Extra, RawBody, RawRecording, ReadOptions
 from driftwalk.schema import body_names, check_trajectory
+from driftwalk.schema.trajectory import VARIABLES
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class DriftwalkLoader:
@@ -29,20 +34,44 @@ class DriftwalkLoader:
             check_trajectory(dataset)
         except ValueError as error:
             raise FormatError(str(error), path=path) from error
+        extra = _extra(dataset)
         time = np.asarray(dataset["time"].values, dtype=np.float64)
         fields = [np.asarray(dataset[name].values, np.float64) for name in ("x", "y", "theta")]
         bodies = []
         for index, name in enumerate(body_names(dataset)):
             x, y, theta = (np.ascontiguousarray(field[:, index]) for field in fields)
-            bodies.append(RawBody(name, time, x, y, theta if np.isfinite(theta).any() else None))
+            own = {key: np.array(dataset[key].values[:, index], np.float64) for key in extra}
+            oriented = theta if np.isfinite(theta).any() else None
+            bodies.append(RawBody(name, time, x, y, oriented, extra=own))
         kept = {
             key: value
             for key, value in dataset.attrs.items()
             if key not in ("kind", "schema_version", "counts")
         }
+        if dataset.attrs.get("format") == "driftwalk track":
+            # `counts` is what reading found; what the tracker counted stays beside it.
+            kept["tracking_counts"] = dataset.attrs["counts"]
         return RawRecording(
-            bodies, clock_unit="s", length_unit="m", y_axis="up", rows=time.size, attrs=kept
+            bodies,
+            clock_unit="s",
+            length_unit="m",
+            y_axis="up",
+            rows=time.size,
+            attrs=kept,
+            extra=extra,
         )
+
+
+def _extra(dataset: xr.Dataset) -> dict[str, Extra]:
+    """Return the further numbers that are known of each sample, such as its covariance."""
+    found = {}
+    for name, variable in dataset.data_vars.items():
+        dims = tuple(str(dim) for dim in variable.dims)
+        if name in VARIABLES or dims[:2] != ("time", "body") or variable.dtype.kind not in "fiub":
+            continue
+        coords = {dim: dataset[dim] for dim in dims[2:] if dim in dataset.coords}
+        found[str(name)] = Extra(dims[2:], dict(variable.attrs), coords)
+    return found
 
 
 LOADER = DriftwalkLoader()
