@@ -48,6 +48,8 @@ COMMANDS: Final[dict[str, Command]] = {
     "classify": Command(
         "classify", "classify", "Say what the blocks of a recording assembled into."
     ),
+    "report": Command("report", "report", "Write a report of a run: one HTML file."),
+    "view": Command("view", "view", "Explore a run in the browser, or watch a tracker."),
     "demo": Command("demo", "demo", "Fit a bundled recording, and calibrate on the fitted flow."),
 }
 

@@ -1,0 +1,68 @@
+"""`driftwalk report`: a run or a recording as one HTML file to open, click and show."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from driftwalk.cli.options import TankDiameter
+from driftwalk.cli.output import print_note, require_place
+from driftwalk.cli.recording_options import RecordingOptions, with_recording_options
+from driftwalk.core.errors import InputError
+
+
+@with_recording_options
+def report(
+    run: Annotated[
+        Path, typer.Argument(metavar="RUN", help="Run directory, finished or not, or a recording.")
+    ],
+    how: RecordingOptions,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="FILE", help="The HTML file to write.")
+    ] = Path("report.html"),
+    tank_diameter: TankDiameter = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace a file that exists.")
+    ] = False,
+) -> None:
+    """Write a report of a run or a recording: one HTML file that loads nothing from anywhere.
+
+    For what calibrate, fit, assemble, sensitivity and study recover make: the answer in words with
+    its uncertainty, recording, flow, maps to click, outcomes to replay, the manifest and how to
+    cite. It opens by a double click, without a network. The options on reading are for a recording.
+    """
+    from driftwalk.report import write_report
+
+    existing = "replace" if overwrite else "error"
+    require_place(out, existing=existing)
+    page = _page(run, how, tank_diameter)
+    write_report(page, out, existing="replace" if overwrite else "error")
+    if page["state"]["words"] is not None:
+        print_note(page["state"]["words"])
+    megabytes = out.stat().st_size / 1e6
+    print(f"report  {out}, {megabytes:.2g} MB")
+
+
+def _page(path: Path, how: RecordingOptions, tank_diameter: float | None) -> dict[str, Any]:
+    """Return the page data of a run directory, or of a recording."""
+    from driftwalk.record import describe
+    from driftwalk.report import recording_page, report_page
+
+    if not path.is_file():
+        _refuse_reading_options(path, how, tank_diameter)
+        return report_page(path)
+    trajectory = how.load(path, tank_diameter=tank_diameter)
+    return recording_page(trajectory, describe(trajectory))
+
+
+def _refuse_reading_options(path: Path, how: RecordingOptions, tank_diameter: float | None) -> None:
+    """Refuse options that have no meaning for a run directory."""
+    given = [field.name for field in fields(how) if getattr(how, field.name) not in (None, False)]
+    given += [] if tank_diameter is None else ["tank_diameter"]
+    words = {"start": "from", "stop": "to"}
+    if path.is_dir() and given:
+        names = ", ".join(f"--{words.get(name, name).replace('_', '-')}" for name in given)
+        raise InputError(f"{names}: for a recording; {path} is a directory, read as a run")

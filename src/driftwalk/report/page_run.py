@@ -1,0 +1,176 @@
+"""A run directory as a page needs it: which kind of run, how far it is, and its datasets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from driftwalk.core.errors import DriftwalkError, InputError
+from driftwalk.core.provenance import read_manifest
+from driftwalk.core.run_layout import MANIFEST_FILE, RECORD_FILE, State, state_of, visible
+from driftwalk.core.shards import read_specification
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# The file that each kind of run makes, by which a finished one is known.
+MAIN_FILES: Final = {
+    "calibration": "calibration.nc",
+    "fit": "fit.nc",
+    "assembly": "assembly.nc",
+    "sensitivity": "sensitivity.nc",
+    "recovery": "recovery.nc",
+}
+
+
+@dataclass
+class Run:
+    """What a run directory holds.
+
+    Attributes
+    ----------
+    folder : Path
+        The run directory.
+    state : {"finished", "unfinished"}
+        Whether the run has come to its end.
+    kind : str or None
+        A key of `MAIN_FILES`; None when nothing says it.
+    manifest : dict
+        The manifest; of an unfinished run its specification and when it was started.
+    problems : list of str
+        What could not be read, filled by `dataset`.
+    """
+
+    folder: Path
+    state: State
+    kind: str | None
+    manifest: dict[str, Any]
+    problems: list[str] = field(default_factory=list)
+    read: int = 0
+    """How many datasets were read."""
+
+    @property
+    def name(self) -> str:
+        """Name of the folder."""
+        return self.folder.resolve().name
+
+    @property
+    def body(self) -> str | None:
+        """The body of the recording that was used, where it was named."""
+        found = self.specification.get("body")
+        return None if found is None else str(found)
+
+    @property
+    def specification(self) -> Mapping[str, Any]:
+        """What determines the numbers of the run."""
+        found = self.manifest.get("specification")
+        return found if isinstance(found, Mapping) else {}
+
+    @property
+    def version(self) -> str | None:
+        """The version of driftwalk that made the run, None when it does not say."""
+        software = self.manifest.get("software")
+        found = software.get("driftwalk") if isinstance(software, Mapping) else None
+        found = found or self.specification.get("driftwalk_version")
+        return None if found is None else str(found)
+
+    def dataset(self, name: str) -> xr.Dataset | None:
+        """Return a dataset of the run, None when it is not there or cannot be read."""
+        path = self.folder / name
+        if not path.is_file():
+            return None
+        try:
+            found = read_dataset(path)
+        except InputError as error:
+            self.problems.append(str(error))
+            return None
+        self.read += 1
+        return found
+
+    def recordings(self) -> list[xr.Dataset]:
+        """Return the recordings of the run, in their order."""
+        names = ["recording.nc"]
+        while (self.folder / f"recording-{len(names) + 1}.nc").is_file():
+            names.append(f"recording-{len(names) + 1}.nc")
+        return [found for name in names if (found := self.dataset(name)) is not None]
+
+
+def open_run_folder(folder: Path) -> Run:
+    """Look at a run directory, finished or not; nothing in it is changed.
+
+    Parameters
+    ----------
+    folder : Path
+        The directory.
+
+    Raises
+    ------
+    InputError
+        When it is not there or holds no run; names the runs in its subfolders.
+    RunDirectoryError
+        When it cannot be read.
+    """
+    state = state_of(folder)
+    if state == "new":
+        raise InputError(_no_run(folder))
+    manifest: dict[str, Any]
+    if state == "finished":
+        manifest = read_manifest(folder / MANIFEST_FILE)
+    else:
+        stored = read_specification(folder / RECORD_FILE)
+        manifest = {key: stored[key] for key in ("started_utc", "specification") if key in stored}
+        manifest["study"] = stored["specification"].get("study")
+    run = Run(folder, state, None, manifest)
+    run.kind = next((kind for kind, name in MAIN_FILES.items() if (folder / name).is_file()), None)
+    if run.kind is None:
+        run.kind = _kind_of(run.specification)
+    return run
+
+
+def read_dataset(path: Path) -> xr.Dataset:
+    """Read a NetCDF file whole.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read.
+    """
+    import xarray as xr
+
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as dataset:
+            return dataset.load()
+    except (OSError, ValueError, KeyError, RuntimeError) as error:
+        raise InputError(f"{path.name} cannot be read: {error}") from error
+
+
+def _kind_of(specification: Mapping[str, Any]) -> str | None:
+    """Return the kind of a run that has no result yet, from what determines its numbers."""
+    if specification.get("kind") in MAIN_FILES:
+        return str(specification["kind"])
+    telling = {
+        "recording_sha256": "calibration",
+        "calibration_sha256": "assembly",
+        "sobol_samples": "sensitivity",
+    }
+    return next((kind for key, kind in telling.items() if key in specification), None)
+
+
+def _no_run(folder: Path) -> str:
+    if not folder.is_dir():
+        return f"{folder} does not exist" if not folder.exists() else f"{folder} is no directory"
+    inside = []
+    for entry in visible(folder):
+        try:
+            if entry.is_dir() and state_of(entry) != "new":
+                inside.append(entry.name)
+        except DriftwalkError:
+            continue
+    if inside:
+        return f"{folder} is no run directory, but holds some: name {' or '.join(inside)} in it"
+    return (
+        f"{folder} is no run directory: give one that calibrate, fit, assemble, sensitivity or "
+        "study recover made, or a recording"
+    )

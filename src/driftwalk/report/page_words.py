@@ -1,0 +1,87 @@
+"""Numbers in the sentences of a page: with SI prefixes, as many digits as they deserve."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+_PREFIXES: Final = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
+_PREFIXED: Final = ("m", "s", "N", "m/s", "Hz")
+
+
+def quantity(value: float, unit: str = "1", *, digits: int = 4) -> str:
+    """Return a number and its unit as a sentence has it.
+
+    Parameters
+    ----------
+    value : float
+        The number, in SI.
+    unit : str
+        Its SI unit, "1" for none.
+    digits : int
+        Significant digits.
+
+    Examples
+    --------
+    >>> quantity(0.000665, "N"), quantity(0.3825), quantity(1800.0, "s"), quantity(0.3, "m")
+    ('0.665 mN', '0.3825', '30 min', '30 cm')
+    """
+    if not math.isfinite(value):
+        return "unknown"
+    if unit == "1":
+        return f"{value:.{digits}g}"
+    if unit == "s" and value >= 120.0:
+        return f"{value / 60.0:.{digits}g} min"
+    if unit == "m" and 0.01 <= abs(value) < 1.0:
+        return f"{100.0 * value:.{digits}g} cm"
+    if unit == "m/s" and 0.001 <= abs(value) < 1.0:
+        return f"{100.0 * value:.{digits}g} cm/s"
+    if unit == "N" and 1e-5 <= abs(value) < 1.0:
+        return f"{1e3 * value:.{digits}g} mN"
+    if unit not in _PREFIXED or value == 0.0:
+        return f"{value:.{digits}g} {unit}"
+    power = 3 * math.floor(math.log10(abs(value)) / 3.0 + 1e-12)
+    power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
+    return f"{value / 10.0**power:.{digits}g} {_PREFIXES[power]}{unit}"
+
+
+def percent(share: float) -> str:
+    """Return a share as a percentage.
+
+    Examples
+    --------
+    >>> percent(0.9), percent(0.0025)
+    ('90 %', '0.25 %')
+    """
+    return f"{100.0 * share:.3g} %"
+
+
+def count(number: int, word: str) -> str:
+    """Return "1 run" or "2 runs".
+
+    Examples
+    --------
+    >>> count(1, "run"), count(400, "run")
+    ('1 run', '400 runs')
+    """
+    return f"{number} {word}{'' if number == 1 else 's'}"
+
+
+def with_interval(
+    value: float, ends: tuple[float, float] | None, unit: str = "1", confidence: float | None = None
+) -> str:
+    """Return an estimate with its interval, or with the remark that it has none.
+
+    Examples
+    --------
+    >>> with_interval(0.39, (0.38, 0.4), confidence=0.9)
+    '0.39 (90 % interval 0.38 to 0.4)'
+    >>> with_interval(0.39, None)
+    '0.39 (no interval)'
+    """
+    if ends is None:
+        return f"{quantity(value, unit)} (no interval)"
+    words = "interval" if confidence is None else f"{percent(confidence)} interval"
+    return (
+        f"{quantity(value, unit)} ({words} {quantity(ends[0], unit)} to {quantity(ends[1], unit)})"
+    )
