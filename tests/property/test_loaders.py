@@ -71,7 +71,7 @@ def load_or_refuse(path: Path, name: str | None) -> None:
 )
 @example(head=b",frame,pos_x,pos_y,id\n", body=b"\n", name=None)
 @example(head=b"", body=b"0,", name="tracktor")
-@example(head=b"\x1f\x8b", body=b"", name="json")
+@example(head=b"\x1f\x8b", body=b"", name="swistrack-nmea")
 @example(head=b"\x1f\x8b\x08\x00\x00\x00\x00\x00\x00\x03", body=b"\xff\xff\xff", name="json")
 @example(head=b"\x1f\x8b\x08\x00\x00\x00\x00\x00\x00\x03", body=b"\xff\xff\xff", name=None)
 def test_arbitrary_bytes_are_read_or_refused(head: bytes, body: bytes, name: str | None) -> None:

@@ -16,6 +16,7 @@ from driftwalk.record.clean import Counts, clean_body
 from driftwalk.record.convert_units import convert_units
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.registry import find_loader
+from driftwalk.record.text import DAMAGED_GZIP
 from driftwalk.record.warn import plausibility_warnings
 from driftwalk.schema import build_trajectory
 
@@ -120,7 +121,10 @@ def load(
         keypoint=keypoint,
     )
     loader = find_loader(source, format=format or ("matrices" if options.y is not None else None))
-    raw = loader.read(source, options)
+    try:
+        raw = loader.read(source, options)
+    except DAMAGED_GZIP as error:
+        raise FormatError(f"is a damaged gzip file: {error}", path=source) from error
     raw.bodies = _select(raw.bodies, body)
     try:
         bodies, attrs = convert_units(raw, options, y_axis=y_axis)

@@ -24,7 +24,7 @@ from driftwalk.record.raw import Array
 
 BLOCK_BYTES = 4 << 20
 GZIP_MAGIC = b"\x1f\x8b"
-DAMAGED_GZIP = (OSError, EOFError, zlib.error)
+DAMAGED_GZIP = (gzip.BadGzipFile, EOFError, zlib.error)
 """What reading a gzip file that is cut off or damaged raises."""
 BOM = b"\xef\xbb\xbf"
 HEAD_BYTES = 1 << 16
@@ -75,7 +75,7 @@ def read_head(path: Path) -> bytes:
     with open_binary(path) as file:
         try:
             head = file.read(HEAD_BYTES)
-        except DAMAGED_GZIP as error:
+        except (OSError, *DAMAGED_GZIP) as error:
             raise FormatError(f"is a damaged gzip file: {error}", path=path) from error
     return head.removeprefix(BOM)
 
@@ -158,7 +158,7 @@ def _blocks(path: Path, skip_lines: int) -> Iterator[tuple[int, bytes]]:
                     line += whole.count(b"\n") + 1
             if rest.strip():
                 yield line, rest + b"\n"
-        except DAMAGED_GZIP as error:
+        except (OSError, *DAMAGED_GZIP) as error:
             raise FormatError(f"cannot be read to its end: {error}", path=path) from error
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
-from driftwalk.record.text import DAMAGED_GZIP, open_binary
+from driftwalk.record.text import open_binary
 
 KEYS = ("x", "y", "theta", "t")
 
@@ -35,8 +35,6 @@ class JsonPointsLoader:
                 raise FormatError(
                     f"is not JSON: {error.msg}", path=path, line=error.lineno, column=error.colno
                 ) from error
-            except DAMAGED_GZIP as error:
-                raise FormatError(f"is a damaged gzip file: {error}", path=path) from error
             except (UnicodeDecodeError, RecursionError) as error:
                 raise FormatError(f"is not JSON: {error}", path=path) from error
         if not isinstance(points, list) or not points:
