@@ -83,17 +83,16 @@ void keep_first_blocks(const AssemblyRules& rules, Scene& scene, int blocks) {
 
 void part_blocks(const AssemblyRules& rules, Scene& scene) {
   std::copy_n(scene.block, scene.blocks, scene.blocks_before);
+  for (int b = 0; b < scene.blocks; ++b) {
+    SceneBlock& block = scene.block[b];
+    block.assembly = b;
+    block.cell_x = block.cell_y = block.quarter = 0;
+  }
   for (int a = 0; a < scene.blocks; ++a) {
     const SceneAssembly from = scene.assembly[a];
-    if (scene.blocks_before[a].assembly != a || from.blocks == 1) {
-      continue;
-    }
-    for (int b = from.first; b >= 0; b = scene.blocks_before[b].next) {
-      SceneBlock& block = scene.block[b];
-      const int quarter = block.quarter;
-      block.assembly = b;
-      block.cell_x = block.cell_y = block.quarter = 0;
-      cut_loose(rules, scene, turned(from, quarter), b);
+    // What has been cut loose is an assembly of one.
+    for (int b = from.first; from.blocks > 1 && b >= 0; b = scene.blocks_before[b].next) {
+      cut_loose(rules, scene, turned(from, scene.blocks_before[b].quarter), b);
     }
   }
   scene.assemblies = scene.blocks;
