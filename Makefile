@@ -15,7 +15,7 @@ TEST_TOOLS := $(VENV)/.test-tools
 DEV_TOOLS := $(VENV)/.dev-tools
 CPP := $(shell find cpp -name '*.cpp' -o -name '*.hpp')
 
-.PHONY: demo test test-slow doctest lint format cpp-test cpp-test-portable bench studies docs wheel clean
+.PHONY: demo test test-slow doctest lint format cpp-test cpp-test-portable bench studies docs web wheel clean
 
 demo: $(PACKAGE)
 	$(BIN)/driftwalk demo
@@ -69,6 +69,11 @@ studies: $(PACKAGE)
 	    || test $$? -eq 77 || exit 1; \
 	done; done
 	$(BIN)/python studies/likelihood/summary.py $(STUDIES) --store studies/likelihood/results
+
+# The page that reports and live views show, from TypeScript into the package. Needs Node 20 or later;
+# the bundle is committed, so that only those who change web/ need it.
+web:
+	cd web && npm ci && npm run check && npm test && npm run build
 
 wheel: $(DEV_TOOLS)
 	$(BIN)/python -m build

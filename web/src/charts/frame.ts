@@ -1,0 +1,176 @@
+/** Axes around a plot: frame, ticks, labels with units. Values are SI, ticks in display units. */
+
+import { freshId, svg } from "../dom";
+import { type Scale, linearScale, linearTicks, logScale, logTicks } from "../scale";
+import { richSvg } from "../symbols";
+import { type Display, fixed, labelled, short, stepDecimals } from "../units";
+
+export interface AxisOptions {
+  readonly domain: readonly [number, number];
+  readonly label: string;
+  readonly display: Display;
+  readonly log?: boolean;
+  /** Ticks at places of one's own, in SI, with their text. */
+  readonly ticks?: readonly Tick[];
+}
+
+export interface FrameOptions {
+  readonly width: number;
+  /** Height of the plot without labels [px]; equal scales of both axes when left out. */
+  readonly height?: number;
+  readonly x: AxisOptions;
+  readonly y: AxisOptions;
+  /** Room at the right, for a colour bar [px]. */
+  readonly right?: number;
+  readonly top?: number;
+  /** What the picture shows, for those who do not see it. */
+  readonly label: string;
+  readonly grid?: "y" | "none";
+}
+
+export interface Frame {
+  readonly svg: SVGSVGElement;
+  readonly defs: SVGDefsElement;
+  /** Where data are drawn; clipped to the frame. */
+  readonly plot: SVGGElement;
+  /** Where marks are drawn that may reach over the frame. */
+  readonly front: SVGGElement;
+  readonly x: Scale;
+  readonly y: Scale;
+  readonly left: number;
+  readonly top: number;
+  readonly width: number;
+  readonly height: number;
+}
+
+export interface Tick {
+  readonly at: number;
+  readonly text: string;
+}
+
+const TICK = 4;
+/** Width of a letter of a tick [px]. */
+export const LETTER = 6.6;
+const LINE = 15;
+
+export function makeFrame(options: FrameOptions): Frame {
+  const top = options.top ?? 8;
+  const right = options.right ?? 10;
+  // The width of the labels of y depends on its ticks, their number on the height: guess once.
+  const guess = options.height ?? options.width;
+  const yTicks = ticksOf(options.y, guess / 46);
+  const widest = Math.max(1, ...yTicks.map((tick) => tick.text.length));
+  const left = Math.ceil(widest * LETTER) + TICK + 6 + (options.y.label === "" ? 0 : LINE + 5);
+  const width = Math.max(40, options.width - left - right);
+  const height = options.height ?? (width * spanOf(options.y)) / spanOf(options.x);
+  const bottom = TICK + LINE + (options.x.label === "" ? 2 : LINE + 6);
+
+  const total = top + height + bottom;
+  const picture = svg("svg", {
+    class: "plot",
+    viewBox: `0 0 ${options.width} ${total}`,
+    width: options.width,
+    height: total,
+    role: "img",
+    "aria-label": options.label,
+  });
+  const clip = freshId("clip");
+  const defs = svg("defs", {}, svg("clipPath", { id: clip }, svg("rect", { x: left, y: top, width, height })));
+  const plot = svg("g", { "clip-path": `url(#${clip})` });
+  const front = svg("g");
+  const x = scaleOf(options.x, left, left + width);
+  const y = scaleOf(options.y, top + height, top);
+  const frame = { svg: picture, defs, plot, front, x, y, left, top, width, height };
+  const xTicks = ticksOf(options.x, width / 64);
+  picture.append(defs, ...gridLines(frame, options, yTicks), plot, border(frame), front);
+  picture.append(xAxis(frame, xTicks, options.x), yAxis(frame, yTicks, options.y));
+  return frame;
+}
+
+function spanOf(axis: AxisOptions): number {
+  return Math.abs(axis.domain[1] - axis.domain[0]) || 1;
+}
+
+function scaleOf(axis: AxisOptions, from: number, to: number): Scale {
+  return axis.log === true ? logScale(axis.domain, from, to) : linearScale(axis.domain, from, to);
+}
+
+/** Returns round ticks in the unit that is shown, all with the same number of decimals. */
+export function ticksOf(axis: AxisOptions, count: number): Tick[] {
+  if (axis.ticks !== undefined) return thinned(axis.ticks, count);
+  const { factor } = axis.display;
+  const [one, other] = [axis.domain[0] * factor, axis.domain[1] * factor];
+  const [low, high] = [Math.min(one, other), Math.max(one, other)];
+  const many = Math.max(2, Math.floor(count));
+  if (axis.log === true) {
+    return logTicks(low, high, many).map((tick) => ({ at: tick / factor, text: short(tick, 3) }));
+  }
+  const ticks = linearTicks(low, high, many);
+  const step = ticks.length > 1 ? (ticks[1] ?? 0) - (ticks[0] ?? 0) : 1;
+  const decimals = stepDecimals(step);
+  const large = Math.max(Math.abs(low), Math.abs(high));
+  const write = (tick: number): string =>
+    large >= 1e5 || large < 1e-3 ? short(tick, 3) : fixed(tick, decimals);
+  return ticks.map((tick) => ({ at: tick / factor, text: write(tick) }));
+}
+
+function thinned(ticks: readonly Tick[], count: number): Tick[] {
+  const every = Math.max(1, Math.ceil(ticks.length / Math.max(2, count)));
+  return ticks.filter((_, index) => index % every === 0);
+}
+
+function border(frame: Frame): SVGElement {
+  const { left, top, width, height } = frame;
+  return svg("rect", { class: "frame", x: left, y: top, width, height });
+}
+
+function gridLines(frame: Frame, options: FrameOptions, ticks: readonly Tick[]): SVGElement[] {
+  if (options.grid !== "y") return [];
+  return ticks.map((tick) => {
+    const y = frame.y.px(tick.at);
+    return svg("line", { class: "grid", x1: frame.left, x2: frame.left + frame.width, y1: y, y2: y });
+  });
+}
+
+function xAxis(frame: Frame, ticks: readonly Tick[], options: AxisOptions): SVGElement {
+  const bottom = frame.top + frame.height;
+  const group = svg("g", { class: "axis", "aria-hidden": "true" });
+  for (const tick of ticks) {
+    const x = frame.x.px(tick.at);
+    group.append(
+      svg("line", { x1: x, x2: x, y1: bottom, y2: bottom + TICK }),
+      svg("text", { x, y: bottom + TICK + 12, "text-anchor": "middle" }, tick.text),
+    );
+  }
+  if (options.label !== "") {
+    const place = { x: frame.left + frame.width / 2, y: bottom + TICK + LINE + 14 };
+    const label = labelled(options.label, options.display);
+    group.append(
+      svg("text", { class: "label", "text-anchor": "middle", ...place }, ...richSvg(label)),
+    );
+  }
+  return group;
+}
+
+function yAxis(frame: Frame, ticks: readonly Tick[], options: AxisOptions): SVGElement {
+  const group = svg("g", { class: "axis", "aria-hidden": "true" });
+  for (const tick of ticks) {
+    const y = frame.y.px(tick.at);
+    group.append(
+      svg("line", { x1: frame.left - TICK, x2: frame.left, y1: y, y2: y }),
+      svg("text", { x: frame.left - TICK - 3, y: y + 4, "text-anchor": "end" }, tick.text),
+    );
+  }
+  if (options.label !== "") {
+    const middle = frame.top + frame.height / 2;
+    const label = labelled(options.label, options.display);
+    group.append(
+      svg(
+        "text",
+        { class: "label", transform: `translate(12 ${middle}) rotate(-90)`, "text-anchor": "middle" },
+        ...richSvg(label),
+      ),
+    );
+  }
+  return group;
+}

@@ -1,0 +1,36 @@
+/** Where the pointer is in a plot, in the plot's own values. */
+
+import { svg } from "../dom";
+import type { Frame } from "./frame";
+
+export interface Place {
+  readonly x: number;
+  readonly y: number;
+}
+
+/** Calls back with the place of the pointer, null when it has left; `pressed` on a click. */
+export function onPointer(
+  frame: Frame,
+  moved: (place: Place | null) => void,
+  pressed?: (place: Place) => void,
+): void {
+  const cover = svg("rect", {
+    class: pressed === undefined ? "cover" : "cover pressable",
+    x: frame.left,
+    y: frame.top,
+    width: frame.width,
+    height: frame.height,
+  });
+  const placeOf = (event: PointerEvent | MouseEvent): Place => {
+    const box = frame.svg.getBoundingClientRect();
+    const zoom = frame.svg.viewBox.baseVal.width / box.width;
+    return {
+      x: frame.x.value((event.clientX - box.left) * zoom),
+      y: frame.y.value((event.clientY - box.top) * zoom),
+    };
+  };
+  cover.addEventListener("pointermove", (event) => moved(placeOf(event)));
+  cover.addEventListener("pointerleave", () => moved(null));
+  if (pressed !== undefined) cover.addEventListener("click", (event) => pressed(placeOf(event)));
+  frame.svg.append(cover);
+}

@@ -1,0 +1,28 @@
+/** What a section is drawn with, beside its own data. */
+
+import type { Numbers } from "./arrays";
+
+/** What is kept of one setting of a map. */
+export interface CellExcerpt {
+  readonly time: Numbers | null;
+  readonly x: Numbers;
+  readonly y: Numbers;
+  readonly density: Numbers;
+  readonly ksStepLength: number | null;
+  readonly ksTurningAngle: number | null;
+}
+
+export interface Context {
+  /** What the reader has chosen, by section; it stays when the section is drawn anew. */
+  readonly memory: Map<string, unknown>;
+  /** Asks the server for a cell that the page does not hold; null in a report. */
+  readonly fetchCell: ((id: string, row: number, column: number) => Promise<CellExcerpt>) | null;
+  /** Sends what the reader has set on a control; null where nobody listens. */
+  readonly send: ((message: Readonly<Record<string, unknown>>) => void) | null;
+}
+
+/** Returns what was kept under a key, else what `make` gives, which is kept from now on. */
+export function remembered<T>(context: Context, key: string, make: () => T): T {
+  if (!context.memory.has(key)) context.memory.set(key, make());
+  return context.memory.get(key) as T;
+}

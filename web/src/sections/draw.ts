@@ -1,0 +1,72 @@
+/** Draws a section of any kind; a fault in one section never takes the others with it. */
+
+import { PageError } from "../check";
+import type { Context } from "../context";
+import { el } from "../dom";
+import { type Kind, type RawSection, SECTIONS, type SectionOf } from "../page";
+import { rich } from "../symbols";
+import { drawEmpty } from "./empty";
+import { drawFlow } from "./flow";
+import { drawMap } from "./map";
+import { drawSummary } from "./summary";
+import { drawTrajectory } from "./trajectory";
+import { drawWarnings } from "./warnings";
+
+type Draw<K extends Kind> = (section: SectionOf<K>, body: HTMLElement, context: Context) => void | Promise<void>;
+
+const DRAWERS: Partial<{ [K in Kind]: Draw<K> }> = {
+  summary: drawSummary,
+  warnings: drawWarnings,
+  trajectory: drawTrajectory,
+  flow: drawFlow,
+  map: drawMap,
+  empty: drawEmpty,
+};
+
+/** Returns the empty frame of a section; `fillSection` draws into it once it is in the document. */
+export function sectionFrame(section: RawSection): HTMLElement {
+  const heading = `heading-${section.id}`;
+  return el(
+    "section",
+    { id: section.id, class: "section", "data-kind": section.kind, "aria-labelledby": heading },
+    el("h2", { id: heading, tabindex: -1 }, ...rich(section.title)),
+    el("div", { class: "body" }),
+  );
+}
+
+export async function fillSection(frame: HTMLElement, section: RawSection, context: Context): Promise<void> {
+  const body = el("div", { class: "body" });
+  frame.querySelector(":scope > .body")?.replaceWith(body);
+  frame.querySelector(":scope > .note")?.remove();
+  try {
+    await drawBody(section, body, context);
+  } catch (error) {
+    body.replaceChildren(el("p", { class: "fault", role: "alert" }, faultText(error)));
+    if (!(error instanceof PageError)) console.error(error);
+  }
+  if (section.note !== null && section.note !== "") {
+    frame.append(el("p", { class: "note" }, ...rich(section.note)));
+  }
+}
+
+async function drawBody(section: RawSection, body: HTMLElement, context: Context): Promise<void> {
+  if (!isKind(section.kind)) {
+    throw new PageError(`sections of kind '${section.kind}' are not known to this version of driftwalk`);
+  }
+  await drawKind(section.kind, section.content, body, context);
+}
+
+function isKind(kind: string): kind is Kind {
+  return Object.hasOwn(SECTIONS, kind);
+}
+
+async function drawKind<K extends Kind>(kind: K, content: unknown, body: HTMLElement, context: Context): Promise<void> {
+  const draw: Draw<K> | undefined = DRAWERS[kind];
+  const section = SECTIONS[kind](content, "") as SectionOf<K>;
+  await draw?.(section, body, context);
+}
+
+function faultText(error: unknown): string {
+  const words = error instanceof Error ? error.message : String(error);
+  return `This part cannot be shown: ${words}`;
+}

@@ -1,0 +1,268 @@
+/** The map of 1 − D: hover reads, a click or Enter selects, the selected setting is shown beside. */
+
+import { type Grid, at, decode, nearest } from "../arrays";
+import type { Place } from "../charts/hover";
+import { figure } from "../charts/responsive";
+import { type Context, remembered } from "../context";
+import { el } from "../dom";
+import { type Cell, moveCell } from "../keyboard";
+import type { MapSection } from "../page";
+import { type Swatch, choices, details, legend, readout, table } from "../parts";
+import { cellAt, cellEdges } from "../scale";
+import { rich, spoken } from "../symbols";
+import { inUnit, labelled, percent, short } from "../units";
+import { type MapData, decodeMap, distanceAt, errorAt, excerptSource, failureAt } from "./map_data";
+import { drawRefinedMap, drawWholeMap, failures } from "./map_plot";
+import { decodeRecorded, drawSetting } from "./map_setting";
+
+interface Choice {
+  selected: Cell | null;
+  view: "whole" | "refined";
+}
+
+export async function drawMap(section: MapSection, body: HTMLElement, context: Context): Promise<void> {
+  const map = await decodeMap(section);
+  const refined = section.refined === null ? null : { ...section.refined, value: await decode(section.refined.value) };
+  const choice = remembered<Choice>(context, `map ${section.id}`, () => ({ selected: null, view: "whole" }));
+  if (refined === null) choice.view = "whole";
+  const shown = el("div", { class: "map-plot" });
+  const panel = el("div", { class: "map-setting", "aria-live": "off" });
+  const grid = el("div", { class: "map", "data-part": "map" }, shown, panel);
+  body.append(grid);
+
+  const line = readout("Point at a cell to read it; click it to see its motion.");
+  line.element.setAttribute("aria-live", "polite");
+  const showSetting = settingPanel(map, panel, context);
+  let cursor: Cell | null = null;
+  // What is shown at first follows a sweep as its map fills, until the reader chooses.
+  const first = choice.selected ?? startCell(map);
+
+  const select = (cell: Cell): void => {
+    choice.selected = cell;
+    mark(grid, map, cell);
+    plot.redraw();
+    void showSetting(cell);
+  };
+  const pointed = (place: Place | null): void => {
+    const cell = place === null ? null : cellUnder(map, place);
+    line.show(cell === null ? null : reading(map, cell));
+  };
+  const look = (): Parameters<typeof drawWholeMap>[2] => ({
+    selected: choice.selected ?? first,
+    cursor,
+    pointed,
+    pressed: (place) => {
+      const cell = cellUnder(map, place);
+      if (cell !== null) select(cell);
+    },
+  });
+
+  if (refined !== null) {
+    const views = [["whole", "whole box"], ["refined", "near the optimum"]] as const;
+    shown.append(
+      choices("Part of the map", views, choice.view, (view) => {
+        choice.view = view;
+        plot.redraw();
+      }),
+    );
+  }
+  const plot = figure(shown, "map-figure", (width) => {
+    if (choice.view === "whole" || refined === null) return drawWholeMap(width, map, look());
+    return drawRefinedMap(width, map, refined, (place) => line.show(refinedReading(map, refined, place)));
+  });
+  const moved = (cell: Cell | null): void => {
+    cursor = cell;
+    plot.redraw();
+    line.show(cell === null ? null : reading(map, cell));
+  };
+  useKeys(plot.element, map, () => choice, () => cursor, moved, select);
+  shown.append(line.element, mapLegend(map), details("Values as a table", () => valueTable(map)));
+
+  if (first === null) {
+    panel.append(el("p", { class: "nothing" }, "No setting has been computed yet."));
+    return;
+  }
+  mark(grid, map, first);
+  await showSetting(first);
+}
+
+/** Returns the cell nearest to what was found, or the best one. */
+function startCell(map: MapData): Cell | null {
+  const wanted = map.section.best ?? map.section.found;
+  if (wanted === null) return null;
+  const row = nearest(map.section.y.values, wanted.y);
+  const column = nearest(map.section.x.values, wanted.x);
+  return row < 0 || column < 0 ? null : { row, column };
+}
+
+function cellUnder(map: MapData, place: Place): Cell | null {
+  const [column, row] = [cellAt(map.xEdges, place.x), cellAt(map.yEdges, place.y)];
+  return row < 0 || column < 0 ? null : { row, column };
+}
+
+/** Leaves what is selected where a script or a test can read it. */
+function mark(element: HTMLElement, map: MapData, { row, column }: Cell): void {
+  const distance = distanceAt(map, row, column);
+  const error = errorAt(map, row, column);
+  Object.assign(element.dataset, {
+    row: String(row),
+    column: String(column),
+    value: Number.isFinite(distance) ? String(distance) : "",
+    standardError: Number.isFinite(error) ? String(error) : "",
+    x: String(map.section.x.values[column]),
+    y: String(map.section.y.values[row]),
+    failure: failureAt(map, row, column) ?? "",
+  });
+}
+
+type Pairs = [label: string, value: string][];
+
+function settingPairs(map: MapData, { row, column }: Cell): Pairs {
+  const { x, y } = map.section;
+  return [
+    [shortName(y.label), inUnit(y.values[row] ?? Number.NaN, map.yDisplay, 4)],
+    [shortName(x.label), inUnit(x.values[column] ?? Number.NaN, map.xDisplay, 4)],
+  ];
+}
+
+/** Returns the symbol in a label when it has one, else the label. */
+function shortName(label: string): string {
+  return /(?:\p{L}|sigma)_\p{L}/u.exec(label)?.[0] ?? label;
+}
+
+function reading(map: MapData, cell: Cell): Pairs {
+  const pairs = settingPairs(map, cell);
+  const distance = distanceAt(map, cell.row, cell.column);
+  const failure = failureAt(map, cell.row, cell.column);
+  if (Number.isFinite(distance)) {
+    const error = errorAt(map, cell.row, cell.column);
+    const spread = Number.isFinite(error) ? ` ± ${short(error, 2)}` : "";
+    pairs.push(["1 − D", `${short(1 - distance, 3)}${spread}`]);
+  }
+  if (failure !== null) pairs.push(["", failure]);
+  return pairs;
+}
+
+function refinedReading(
+  map: MapData,
+  refined: { x: readonly number[]; y: readonly number[]; value: Grid },
+  place: Place | null,
+): Pairs | null {
+  if (place === null) return null;
+  const column = cellAt(cellEdges(refined.x), place.x);
+  const row = cellAt(cellEdges(refined.y), place.y);
+  if (row < 0 || column < 0) return null;
+  return [
+    [shortName(map.section.y.label), inUnit(refined.y[row] ?? Number.NaN, map.yDisplay, 4)],
+    [shortName(map.section.x.label), inUnit(refined.x[column] ?? Number.NaN, map.xDisplay, 4)],
+    ["1 − D", short(1 - at(refined.value.data, row * refined.x.length + column), 3)],
+  ];
+}
+
+function useKeys(
+  element: HTMLElement,
+  map: MapData,
+  choice: () => Choice,
+  cursor: () => Cell | null,
+  moved: (cell: Cell | null) => void,
+  select: (cell: Cell) => void,
+): void {
+  element.tabIndex = 0;
+  element.setAttribute("role", "application");
+  element.setAttribute("aria-roledescription", "map");
+  element.setAttribute("aria-label", "Map of 1 − D: arrow keys move over the settings, Enter selects one");
+  element.addEventListener("keydown", (event) => {
+    if (choice().view !== "whole") return;
+    const here = cursor() ?? choice().selected ?? startCell(map) ?? { row: 0, column: 0 };
+    if (event.key === "Enter" || event.key === " ") select(here);
+    else if (event.key === "Escape") moved(null);
+    else {
+      const next = moveCell(here, event.key, map);
+      if (next === null) return;
+      moved(next);
+    }
+    event.preventDefault();
+  });
+  element.addEventListener("blur", () => {
+    if (cursor() !== null) moved(null);
+  });
+}
+
+/** Returns what shows a setting in the panel; of several calls the last one counts. */
+function settingPanel(map: MapData, panel: HTMLElement, context: Context): (cell: Cell) => Promise<void> {
+  const source = excerptSource(map, context);
+  const recorded = decodeRecorded(map);
+  let newest = 0;
+  return async (cell) => {
+    newest += 1;
+    const mine = newest;
+    const excerpt = source === null ? null : await source(cell.row, cell.column).catch(() => null);
+    const beside = await recorded;
+    if (mine !== newest) return;
+    panel.style.setProperty("min-height", `${panel.clientHeight}px`);
+    panel.replaceChildren(settingHead(map, cell));
+    if (excerpt === null) panel.append(el("p", { class: "nothing" }, "No motion of this setting was kept."));
+    else drawSetting(panel, map, beside, excerpt);
+    panel.style.removeProperty("min-height");
+    panel.dataset["shown"] = `${cell.row},${cell.column}`;
+  };
+}
+
+function settingHead(map: MapData, cell: Cell): HTMLElement {
+  const title = settingPairs(map, cell).flatMap(([label, value], index) => [
+    index > 0 && ", ",
+    ...rich(label),
+    ` = ${value}`,
+  ]);
+  const distance = distanceAt(map, cell.row, cell.column);
+  const error = errorAt(map, cell.row, cell.column);
+  const failure = failureAt(map, cell.row, cell.column);
+  const spread = Number.isFinite(error) ? ` ± ${short(error, 2)}` : "";
+  return el(
+    "div",
+    { class: "setting-head" },
+    el("h3", {}, ...title),
+    el(
+      "p",
+      {},
+      Number.isFinite(distance) && `1 − D = ${short(1 - distance, 3)}${spread}`,
+      failure !== null && el("strong", { class: "failure" }, Number.isFinite(distance) ? ` (${failure})` : failure),
+    ),
+  );
+}
+
+function mapLegend(map: MapData): HTMLElement {
+  const { section } = map;
+  const items: { swatch: Swatch; colour?: string; text: string }[] = [{ swatch: "box", colour: "var(--orange)", text: "selected" }];
+  if (section.found !== null) items.push({ swatch: "ring", text: "found" });
+  if (section.best !== null) items.push({ swatch: "box", colour: "var(--muted)", text: "best cell" });
+  if (section.region !== null) {
+    const { confidence } = section.region;
+    items.push({ swatch: "line", text: `${confidence === null ? "" : `${percent(confidence)} `}region` });
+  }
+  for (const reason of failures(map).keys()) items.push({ swatch: "hatch", text: reason });
+  const list = legend(items);
+  if (section.noise_floor !== null) {
+    const upper = section.noise_floor_upper;
+    const reach = upper === null ? "" : `, ${short(1 - upper, 3)} is still likely`;
+    list.append(
+      el("li", { class: "wide" }, `Line in the colour bar: two runs of one model reach ${short(1 - section.noise_floor, 3)} (noise floor${reach}).`),
+    );
+  }
+  return list;
+}
+
+function valueTable(map: MapData): HTMLElement {
+  const { x, y } = map.section;
+  const corner = `${spoken(labelled(y.label, map.yDisplay))} \\ ${spoken(labelled(x.label, map.xDisplay))}`;
+  const rows = y.values.map((value, row) => [
+    short(value * map.yDisplay.factor, 4),
+    ...x.values.map((_, column) => failureText(map, row, column) ?? short(1 - distanceAt(map, row, column), 3)),
+  ]);
+  const heads = x.values.map((value) => short(value * map.xDisplay.factor, 4));
+  return table("Values of 1 − D", [corner, ...heads], rows, () => true);
+}
+
+function failureText(map: MapData, row: number, column: number): string | null {
+  return Number.isFinite(distanceAt(map, row, column)) ? null : failureAt(map, row, column);
+}

@@ -1,0 +1,114 @@
+/** The map of 1 − D, decoded, and what is kept of its settings. */
+
+import { type Grid, at, decode, decodeMaybe, part } from "../arrays";
+import type { CellExcerpt, Context } from "../context";
+import type { MapSection } from "../page";
+import { cellEdges } from "../scale";
+import { type Display, displayFor } from "../units";
+
+export interface MapData {
+  readonly section: MapSection;
+  readonly distance: Grid;
+  readonly error: Grid | null;
+  readonly status: Grid | null;
+  readonly rows: number;
+  readonly columns: number;
+  readonly xEdges: number[];
+  readonly yEdges: number[];
+  readonly xDisplay: Display;
+  readonly yDisplay: Display;
+}
+
+/** What a reader sees of one setting beside the recording. */
+export interface Excerpt {
+  readonly x: ArrayLike<number>;
+  readonly y: ArrayLike<number>;
+  readonly time: Grid | null;
+  readonly density: Grid;
+  readonly ksStepLength: number;
+  readonly ksTurningAngle: number;
+}
+
+export async function decodeMap(section: MapSection): Promise<MapData> {
+  const [distance, error, status] = await Promise.all([
+    decode(section.value),
+    decodeMaybe(section.standard_error),
+    decodeMaybe(section.status),
+  ]);
+  return {
+    section,
+    distance,
+    error,
+    status,
+    rows: section.y.values.length,
+    columns: section.x.values.length,
+    xEdges: cellEdges(section.x.values),
+    yEdges: cellEdges(section.y.values),
+    xDisplay: displayFor(section.x.unit, section.x.values),
+    yDisplay: displayFor(section.y.unit, section.y.values),
+  };
+}
+
+export function distanceAt(map: MapData, row: number, column: number): number {
+  return at(map.distance.data, row * map.columns + column);
+}
+
+export function errorAt(map: MapData, row: number, column: number): number {
+  return map.error === null ? Number.NaN : at(map.error.data, row * map.columns + column);
+}
+
+/** Returns why a setting has no distance, null when it has one and nothing failed. */
+export function failureAt(map: MapData, row: number, column: number): string | null {
+  const status = map.status === null ? 0 : at(map.status.data, row * map.columns + column);
+  if (status === 0 && Number.isFinite(distanceAt(map, row, column))) return null;
+  return map.section.statuses.get(String(status)) ?? "not computed";
+}
+
+/** Returns how what is kept of a setting is found: in the page, at the server, or not at all. */
+export function excerptSource(
+  map: MapData,
+  context: Context,
+): ((row: number, column: number) => Promise<Excerpt | null>) | null {
+  const { cells } = map.section;
+  if (cells !== null) {
+    const decoded = Promise.all([
+      decodeMaybe(cells.excerpt_time),
+      decode(cells.excerpt_x),
+      decode(cells.excerpt_y),
+      decode(cells.density),
+      decode(cells.ks_step_length),
+      decode(cells.ks_turning_angle),
+    ]);
+    return async (row, column) => {
+      const [time, x, y, density, length, angle] = await decoded;
+      return {
+        x: part(x, row, column),
+        y: part(y, row, column),
+        time,
+        density: { shape: density.shape.slice(2), data: part(density, row, column) },
+        ksStepLength: at(length.data, row * map.columns + column),
+        ksTurningAngle: at(angle.data, row * map.columns + column),
+      };
+    };
+  }
+  const { fetchCell } = context;
+  if (fetchCell === null) return null;
+  return async (row, column) => decodeExcerpt(await fetchCell(map.section.id, row, column));
+}
+
+async function decodeExcerpt(cell: CellExcerpt): Promise<Excerpt> {
+  const [time, x, y, density] = await Promise.all([
+    decodeMaybe(cell.time),
+    decode(cell.x),
+    decode(cell.y),
+    decode(cell.density),
+  ]);
+  return {
+    x: x.data,
+    y: y.data,
+    time,
+    density,
+    ksStepLength: cell.ksStepLength ?? Number.NaN,
+    ksTurningAngle: cell.ksTurningAngle ?? Number.NaN,
+  };
+}

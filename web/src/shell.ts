@@ -1,0 +1,97 @@
+/** What surrounds the sections: title, state, contents, theme button, foot. */
+
+import { el, svg } from "./dom";
+import type { Page, RawSection, State } from "./page";
+import { rich } from "./symbols";
+import { toggleTheme } from "./theme";
+import { percent } from "./units";
+
+export interface Shell {
+  readonly main: HTMLElement;
+  showState(state: State | null): void;
+  showConnection(words: string | null): void;
+  showContents(sections: readonly RawSection[]): void;
+}
+
+/** Builds the shell into the document and returns its parts. */
+export function makeShell(page: Page): Shell {
+  document.title = page.title;
+  const state = el("p", { class: "state", role: "status" });
+  const bar = el("progress", { max: 1, "aria-label": "progress", hidden: true });
+  const connection = el("p", { class: "connection", role: "status", hidden: true });
+  const contents = el("nav", { class: "contents", "aria-label": "Contents" });
+  const main = el("main", { id: "main" });
+  const header = el(
+    "header",
+    { class: "head" },
+    el(
+      "div",
+      { class: "titles" },
+      el("h1", {}, ...rich(page.title)),
+      page.subtitle !== null && page.subtitle !== "" && el("p", { class: "subtitle" }, ...rich(page.subtitle)),
+      state,
+      bar,
+    ),
+    el("div", { class: "tools" }, connection, themeButton()),
+  );
+  const columns = el("div", { class: "layout" }, contents, main);
+  document.body.replaceChildren(
+    el("a", { class: "skip", href: "#main" }, "Skip to the content"),
+    header,
+    columns,
+    foot(page),
+  );
+  document.body.dataset["view"] = page.view;
+  return {
+    main,
+    showState: (now) => showState(now, state, bar),
+    showConnection: (words) => {
+      connection.hidden = words === null;
+      connection.textContent = words ?? "";
+    },
+    showContents: (sections) => showContents(sections, contents),
+  };
+}
+
+function showState(now: State | null, words: HTMLElement, bar: HTMLProgressElement): void {
+  const running = now !== null && !now.finished;
+  bar.hidden = !running || now.progress === null;
+  if (running && now.progress !== null) bar.value = now.progress;
+  const share = running && now.progress !== null ? `${percent(now.progress)} done` : null;
+  const text = [running ? (share ?? "running") : null, now?.words ?? null].filter((part) => part !== null).join(" · ");
+  words.textContent = text;
+  words.hidden = text === "";
+  const root = document.documentElement.dataset;
+  root["finished"] = running ? "no" : "yes";
+  root["progress"] = now?.progress === null || now === null ? "" : String(now.progress);
+}
+
+function showContents(sections: readonly RawSection[], contents: HTMLElement): void {
+  const links = sections.map((section) =>
+    el("li", {}, el("a", { href: `#${section.id}` }, ...rich(section.title))),
+  );
+  // Folded on a narrow screen, always open on a wide one.
+  const fold = el("details", {}, el("summary", {}, "Contents"), el("ol", {}, ...links));
+  fold.open = matchMedia("(min-width: 1100px)").matches;
+  contents.replaceChildren(...(sections.length > 1 ? [fold] : []));
+}
+
+function themeButton(): HTMLButtonElement {
+  const icon = svg(
+    "svg",
+    { viewBox: "0 0 20 20", width: 18, height: 18, "aria-hidden": "true" },
+    svg("circle", { cx: 10, cy: 10, r: 7.5, fill: "none", stroke: "currentColor", "stroke-width": 1.6 }),
+    svg("path", { d: "M10 2.5A7.5 7.5 0 0 1 10 17.5Z", fill: "currentColor" }),
+  );
+  const button = el("button", { type: "button", class: "theme", "aria-label": "Switch between light and dark", title: "light or dark" }, icon);
+  button.addEventListener("click", toggleTheme);
+  return button;
+}
+
+function foot(page: Page): HTMLElement {
+  const parts = [
+    page.driftwalk_version === null ? "driftwalk" : `driftwalk ${page.driftwalk_version}`,
+    page.created_utc,
+  ].filter((part) => part !== null);
+  return el("footer", { class: "foot" }, parts.join(" · "));
+}
