@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.compare import apply_steps, joint_density, plan_steps
-from driftwalk.report import encode_array
+from driftwalk.schema import body_track
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,10 +41,6 @@ class RecordedSteps(NamedTuple):
     """[rad]"""
     excerpt_time: Floats
     """Times [s] of the first half minute, from the first sample on."""
-    excerpt_x: Floats
-    """[m]"""
-    excerpt_y: Floats
-    """[m]"""
 
     def density(self, points: Floats | None = None) -> Floats:
         """Return the share of steps in every bin: of the recording, or of others."""
@@ -54,26 +49,16 @@ class RecordedSteps(NamedTuple):
             length, angle, step_length_edge=self.length_edge, turning_angle_edge=self.angle_edge
         )
 
-    def part(self) -> dict[str, Any]:
-        """Return what a map shows of the recording."""
-        return {
-            "density": encode_array(self.density()),
-            "step_length_edges": self.length_edge.tolist(),
-            "turning_angle_edges": self.angle_edge.tolist(),
-            "excerpt_x": encode_array(self.excerpt_x),
-            "excerpt_y": encode_array(self.excerpt_y),
-        }
-
 
 def recorded_steps(
-    recording: Path | xr.Dataset, study: Study, *, body: str | None = None
+    recording: xr.Dataset, study: Study, *, body: str | None = None
 ) -> RecordedSteps:
     """Return the steps of a recording.
 
     Parameters
     ----------
-    recording : Path or xarray.Dataset
-        A `trajectory`, or the file of one.
+    recording : xarray.Dataset
+        A `trajectory`.
     study : Study
         Its [steps] says how steps are formed.
     body : str, optional
@@ -82,13 +67,9 @@ def recorded_steps(
     Raises
     ------
     InputError
-        When it cannot be read, or no steps can be formed.
+        When no steps can be formed.
     """
-    from driftwalk.record import load
-    from driftwalk.schema import body_track
-
-    dataset = load(recording) if isinstance(recording, Path) else recording
-    track = body_track(dataset, body)
+    track = body_track(recording, body)
     time = track.time - track.time[0]
     interval = study.steps.step_interval_s
     plan = plan_steps(time, step_interval=None if interval == "auto" else float(interval))
@@ -97,14 +78,11 @@ def recorded_steps(
     length_limit = LENGTH_REACH * float(np.quantile(points[:, 0], LENGTH_SHARE))
     angle_limit = ANGLE_REACH * float(np.quantile(np.abs(points[:, 1]), ANGLE_SHARE))
     angle_limit = min(np.pi, angle_limit) or np.pi
-    early = time <= EXCERPT_S
     return RecordedSteps(
-        name=str(dataset.attrs.get("source", "recording")),
+        name=str(recording.attrs.get("source", "recording")),
         step_interval=plan.step_interval,
         points=points,
         length_edge=np.linspace(0.0, length_limit or 1.0, BINS + 1),
         angle_edge=np.linspace(-angle_limit, angle_limit, BINS + 1),
-        excerpt_time=time[early],
-        excerpt_x=track.x[early],
-        excerpt_y=track.y[early],
+        excerpt_time=time[time <= EXCERPT_S],
     )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -11,15 +11,15 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import DriftwalkError
-from driftwalk.report import encode_array
+from driftwalk.report import encode_array, map_section
 from driftwalk.viewer.run_shards import FinishedUnit, StoreReader, store_readers
 from driftwalk.viewer.running import NO_CELL, Section
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from driftwalk.model import Study
     from driftwalk.viewer.recording_steps import RecordedSteps
-
-Floats = npt.NDArray[np.float64]
 
 STAGES: Final[dict[str, tuple[str, float, float]]] = {
     "coarse": ("map", 0.0, 0.4),
@@ -28,6 +28,7 @@ STAGES: Final[dict[str, tuple[str, float, float]]] = {
 }
 """What each stage is called, and its share of the time: from, to."""
 DETAILS: Final = ("excerpt_x", "excerpt_y", "step_density", "ks_step_length", "ks_turning_angle")
+GRID: Final = ("drag_coefficient", "force_std")
 NO_DISTANCE: Final = 1.0
 """A setting that lost its numbers is as far as can be, as in the finished map."""
 
@@ -42,8 +43,9 @@ class SettingsMap:
     """
 
     def __init__(self, axes: Any) -> None:
-        self.drag, self.force = (np.asarray(values, dtype=np.float64) for values in axes)
-        self.shape = (self.drag.size, self.force.size)
+        drag, force = (np.asarray(values, dtype=np.float64) for values in axes)
+        self.axes = (drag, force)
+        self.shape = (drag.size, force.size)
         self.distance = np.full(self.shape, np.nan)
         self.error = np.full(self.shape, np.nan)
         self.details: dict[int, dict[str, npt.NDArray[Any]]] = {}
@@ -62,20 +64,12 @@ class SettingsMap:
         self.distance.reshape(-1)[settings] = values.mean(axis=1)
         if count > 1:
             self.error.reshape(-1)[settings] = values.std(axis=1, ddof=1) / np.sqrt(count)
-        kept = {name: unit.arrays[name] for name in DETAILS if name in unit.arrays}
+        kept: dict[str, npt.NDArray[Any]] = {
+            name: unit.arrays[name] for name in DETAILS if name in unit.arrays
+        }
+        kept["away"] = np.abs(unit.arrays["ks_distance"] - values.mean(axis=1)[:, None])
         for row in range(unit.stop - unit.start):
             self.details[unit.start + row] = {name: kept[name][row] for name in kept}
-
-    def best(self) -> dict[str, float] | None:
-        """Return the setting with the smallest distance so far."""
-        if not np.isfinite(self.distance).any():
-            return None
-        row, column = np.unravel_index(int(np.nanargmin(self.distance)), self.shape)
-        return {
-            "x": float(self.force[column]),
-            "y": float(self.drag[row]),
-            "value": float(self.distance[row, column]),
-        }
 
 
 class RunningCalibration:
@@ -100,6 +94,9 @@ class RunningCalibration:
         self._readers: dict[str, StoreReader] = {}
         self._maps: dict[str, SettingsMap] = {}
         self._bootstrap: list[FinishedUnit] = []
+        self._loaded: xr.Dataset | None = None
+        self._steps: RecordedSteps | None = None
+        self._still: dict[str, Section] = {}
         self._stage = "coarse"
         self._refined = ""
 
@@ -124,8 +121,9 @@ class RunningCalibration:
         return [made[name]() for name in sorted(changed, reverse=True)]
 
     def sections(self) -> list[Section]:
-        """Return the map, and the bootstrap when it has begun."""
-        return [self._map_section(), *([self._bootstrap_section()] if self._bootstrap else [])]
+        """Return the map, the bootstrap when it has begun, and what it is all made from."""
+        bootstrap = [self._bootstrap_section()] if self._bootstrap else []
+        return [self._map_section(), *bootstrap, *self._made_from]
 
     def state(self) -> tuple[float | None, str]:
         """Return the progress and the stage."""
@@ -143,16 +141,18 @@ class RunningCalibration:
         kept = found.details.get(row * found.shape[1] + column)
         if not kept or "excerpt_x" not in kept:
             return dict(NO_CELL)
-        time = self._recorded.excerpt_time if self._recorded is not None else None
-        samples = kept["excerpt_x"].size
+        time = None if self._recorded is None else self._recorded.excerpt_time
+        nearest = int(np.nanargmin(kept["away"])) if np.isfinite(kept["away"]).any() else 0
         return {
-            "excerpt_time": None if time is None or time.size != samples else encode_array(time),
+            "excerpt_time": None
+            if time is None or time.size != kept["excerpt_x"].size
+            else encode_array(time),
             "excerpt_x": encode_array(kept["excerpt_x"]),
             "excerpt_y": encode_array(kept["excerpt_y"]),
             "density": encode_array(kept["step_density"]),
-            # Of the first replicate, as the excerpt.
-            "ks_step_length": float(kept["ks_step_length"].flat[0]),
-            "ks_turning_angle": float(kept["ks_turning_angle"].flat[0]),
+            # Of the replicate nearest to the mean, as in the finished map.
+            "ks_step_length": float(kept["ks_step_length"][nearest]),
+            "ks_turning_angle": float(kept["ks_turning_angle"][nearest]),
         }
 
     def _take(self, name: str, stage: str, unit: FinishedUnit) -> None:
@@ -173,41 +173,78 @@ class RunningCalibration:
         names = [name for name in self._maps if name.startswith("coarse-")]
         return self._maps[names[0]] if names else None
 
-    @cached_property
+    @property
+    def _recording(self) -> xr.Dataset | None:
+        """The recording; None where the run holds none that can be read, or not yet."""
+        from driftwalk.record import load
+
+        if self._loaded is None:
+            with contextlib.suppress(DriftwalkError, OSError):
+                self._loaded = load(self._folder / "recording.nc")
+        return self._loaded
+
+    @property
     def _recorded(self) -> RecordedSteps | None:
-        """The steps of the recording; None where the run holds no recording that can be read."""
+        """The steps of the recording, once it is there."""
         from driftwalk.viewer.recording_steps import recorded_steps
 
-        try:
-            return recorded_steps(self._folder / "recording.nc", self._study, body=self._body)
-        except (DriftwalkError, OSError):
-            return None
+        if self._steps is None and self._recording is not None:
+            with contextlib.suppress(DriftwalkError):
+                self._steps = recorded_steps(self._recording, self._study, body=self._body)
+        return self._steps
+
+    @property
+    def _made_from(self) -> list[Section]:
+        """The sections on the recording and on the flow, once they are there."""
+        from driftwalk.flow import load_flow
+        from driftwalk.report import flow_section, trajectory_section
+
+        if "recording" not in self._still and self._recording is not None:
+            self._still["recording"] = trajectory_section(self._recording, body=self._body)
+        if "flow" not in self._still:
+            with contextlib.suppress(DriftwalkError, OSError):
+                flow = load_flow(self._folder / "flow.nc", own_flags="keep")
+                self._still["flow"] = flow_section(flow)
+        return list(self._still.values())
 
     def _map_section(self) -> Section:
+        section = map_section(self._dataset(), self._one_body())
+        waiting = "Settings appear as they are simulated; nothing is final before the run is."
+        return {**section, "note": f"{section['note']} {waiting}"}
+
+    def _one_body(self) -> xr.Dataset | None:
+        found = self._recording
+        if found is None or self._body is None:
+            return found
+        return found.sel(body=[self._body])
+
+    def _dataset(self) -> xr.Dataset:
+        """Return what is there of the calibration that is being made, in its own form."""
+        import xarray as xr
+
         search = self._study.calibration
         coarse = self._coarse or SettingsMap((search.drag_coefficients, search.force_stds_N))
-        refined = self._maps.get(self._refined)
-        return {
-            "id": "map",
-            "kind": "map",
-            "title": "The map of 1 - D",
-            "note": "Settings appear as they are simulated; nothing is final before the run is.",
-            "x": _axis("force_std", "stochastic force σ_F", "N", coarse.force),
-            "y": _axis("drag_coefficient", "drag coefficient C_d", "1", coarse.drag),
-            "value": encode_array(coarse.distance),
-            "standard_error": encode_array(coarse.error),
-            "status": encode_array(np.zeros(coarse.shape), dtype="i2"),
-            "statuses": {},
-            "best": coarse.best(),
-            "found": None,
-            "noise_floor": None,
-            "noise_floor_upper": None,
-            "region": None,
-            "refined": None if refined is None else _refined_part(refined),
-            "cells": None,
-            "recording": None if self._recorded is None else self._recorded.part(),
-            "arena": self._study.tank.to_arena(),
+        variables: dict[str, Any] = {
+            "ks_distance": (GRID, coarse.distance),
+            "ks_distance_standard_error": (GRID, coarse.error),
         }
+        coordinates: dict[str, Any] = dict(zip(GRID, coarse.axes, strict=True))
+        refined = self._maps.get(self._refined)
+        if refined is not None:
+            names = [f"refined_{name}" for name in GRID]
+            variables["refined_ks_distance"] = (names, refined.distance)
+            coordinates |= dict(zip(names, refined.axes, strict=True))
+        if self._recorded is not None:
+            bins = ("density_step_length", "density_turning_angle")
+            variables["recording_step_density"] = (bins, self._recorded.density())
+            variables["excerpt_time"] = ("excerpt_sample", self._recorded.excerpt_time)
+            coordinates["step_length_edge"] = self._recorded.length_edge
+            coordinates["turning_angle_edge"] = self._recorded.angle_edge
+        facts = {
+            "kind": "calibration",
+            "force_interval_s": self._study.forces.force_interval_s,
+        }
+        return xr.Dataset(variables, coordinates, facts)
 
     def _bootstrap_section(self) -> Section:
         units = sorted(self._bootstrap, key=lambda unit: unit.start)
@@ -235,15 +272,3 @@ class RunningCalibration:
             "marks": [],
             "after": "map",
         }
-
-
-def _refined_part(refined: SettingsMap) -> dict[str, Any]:
-    return {
-        "x": refined.force.tolist(),
-        "y": refined.drag.tolist(),
-        "value": encode_array(refined.distance),
-    }
-
-
-def _axis(name: str, label: str, unit: str, values: Floats) -> dict[str, Any]:
-    return {"name": name, "label": label, "unit": unit, "values": values.tolist()}

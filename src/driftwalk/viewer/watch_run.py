@@ -119,8 +119,10 @@ class RunSource(Source):
             return [{"type": "page", "page": self._page}]
         changed = running.look()
         page = self._page_of(running)
-        same = page["state"] == self._page["state"]
-        self._page = page
+        before, self._page = self._page, page
+        if _ids(page) != _ids(before):
+            return [{"type": "page", "page": page}]
+        same = page["state"] == before["state"]
         sections: list[Content] = [{"type": "section", "section": one} for one in changed]
         return sections + ([] if same else [{"type": "state", "state": page["state"]}])
 
@@ -252,6 +254,10 @@ def file_in(folder: Path, name: str) -> Path | None:
     if not inside or any(part[0] == "." for part in path.relative_to(root).parts):
         return None
     return path
+
+
+def _ids(page: Mapping[str, Any]) -> list[str]:
+    return [section["id"] for section in page["sections"]]
 
 
 def _holds_run(path: Path) -> bool:

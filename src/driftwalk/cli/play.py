@@ -1,0 +1,135 @@
+"""`driftwalk play`: the simulator behind sliders, in the browser."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from driftwalk.cli.options import (
+    ASSEMBLY_KEYS,
+    Blocks,
+    FlowFile,
+    Seed,
+    StudyFile,
+    TankDiameter,
+    resolve_study,
+    study_overrides,
+)
+from driftwalk.cli.output import print_note
+from driftwalk.cli.recording_options import RecordingOptions
+from driftwalk.cli.study_recording import load_for_run
+from driftwalk.cli.view import Host, Open, Port, show
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+FLOW_SEED = 1
+BLOCKS = 4
+
+
+def play(
+    study: StudyFile = None,
+    flow: FlowFile = None,
+    recording: Annotated[
+        Path | None,
+        typer.Option(
+            "--recording",
+            metavar="FILE",
+            help="Recording whose steps the blocks' are compared with.",
+            show_default=False,
+        ),
+    ] = None,
+    body: Annotated[
+        str | None,
+        typer.Option("--body", help="Body of the recording.", show_default=False),
+    ] = None,
+    tank_diameter: TankDiameter = None,
+    blocks: Blocks = None,
+    seed: Seed = None,
+    live: Annotated[
+        int | None,
+        typer.Option(
+            "--live",
+            metavar="PORT",
+            help="Publish the tank as a tracker's stream; 0 takes a free port.",
+            show_default=False,
+        ),
+    ] = None,
+    port: Port = 8765,
+    host: Host = "127.0.0.1",
+    open: Open = None,
+) -> None:
+    """Turn the knobs of the model while the tank moves.
+
+    Without a study, a flow and a recording they are those of the bundled example. In a tank without
+    a flow field the water moves in a random one. Ctrl-C ends it.
+    """
+    from driftwalk.viewer import PlaySource, hello_line, require_server
+
+    require_server()
+    bundled = study is None and flow is None and tank_diameter is None
+    overrides = study_overrides(
+        keys=ASSEMBLY_KEYS, tank_diameter=tank_diameter, blocks=blocks, seed=seed
+    )
+    chosen = resolve_study(study, {**(_bundled() if bundled else {}), **overrides})
+    source = PlaySource(
+        chosen,
+        _flow(flow, chosen, bundled=bundled),
+        recording=_recording(recording, chosen, body, bundled=bundled),
+        body=body,
+        seed=chosen.assembly.seed,
+    )
+    with contextlib.ExitStack() as open_things:
+        if live is not None:
+            from driftwalk.track import LiveServer
+
+            server = open_things.enter_context(LiveServer(live, hello=hello_line(source.tank)))
+            source.stream_to(server)
+            print_note(f"the tank as a tracker's stream on {server.host}, port {server.port}")
+        show(source, host=host, port=port, open=open)
+
+
+def _bundled() -> dict[str, Any]:
+    """Return the parameters of the bundled recording."""
+    from driftwalk.datasets import tank30_truth
+
+    truth = tank30_truth()
+    return {
+        "forces.drag_coefficient": truth["drag_coefficient"],
+        "forces.force_std_N": truth["force_std_N"],
+        "forces.force_interval_s": truth["force_interval_s"],
+        "tank.wall_friction": truth["wall_friction"],
+        "tank.wall_restitution": truth["wall_restitution"],
+        "assembly.blocks": BLOCKS,
+    }
+
+
+def _flow(path: Path | None, study: Study, *, bundled: bool) -> xr.Dataset:
+    """Return the flow of a file, of the bundled example, or a random one for the tank."""
+    from driftwalk.datasets import tank30_flow
+    from driftwalk.flow import load_flow, random_tank_flow
+
+    arena = study.tank.to_arena()
+    if path is not None:
+        return load_flow(path, arena=arena, own_flags="keep")
+    if bundled:
+        return tank30_flow()
+    print_note("no flow field was given (--flow): the water moves in a random one")
+    return random_tank_flow(FLOW_SEED, arena=arena)
+
+
+def _recording(
+    path: Path | None, study: Study, body: str | None, *, bundled: bool
+) -> xr.Dataset | None:
+    """Return the recording to compare with; none where none was given."""
+    from driftwalk.datasets import tank30_recording
+
+    if path is not None:
+        how = RecordingOptions(body=body)
+        return load_for_run(path, study, how, tank="unsaid" if bundled else "stated")
+    return tank30_recording() if bundled else None
