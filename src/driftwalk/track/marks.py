@@ -1,0 +1,120 @@
+"""Where identities could have been exchanged: intervals that are marked, each with a score."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.track.settings import TrackerSettings
+from driftwalk.track.tracks import Track
+
+Floats = npt.NDArray[np.float64]
+
+PARTED: Final = 0.5
+"""Score of two that were lost sight of together: which one went on being seen, nobody can say."""
+# Measurements that tell the velocity anew, and with it whether an assignment was right.
+_SETTLES_IN: Final = 3
+
+
+class _Mark(NamedTuple):
+    track: Track
+    first: int
+    last: int
+    score: float
+
+
+class Marks:
+    """Notes who was near whom, and marks what could have been exchanged.
+
+    Parameters
+    ----------
+    settings : TrackerSettings
+        From which score on an assignment is ambiguous.
+    """
+
+    def __init__(self, settings: TrackerSettings) -> None:
+        self._settings = settings
+        self._marks: list[_Mark] = []
+
+    def add(self, track: Track, first: int, last: int, score: float) -> None:
+        """Mark a track from one frame to another."""
+        self._marks.append(_Mark(track, first, last, score))
+
+    def scores(self, frames: int, bodies: int) -> Floats:
+        """Return the score of each frame and body, shape (frames, bodies); 0 where not marked."""
+        score = np.zeros((frames, bodies))
+        for mark in self._marks:
+            if mark.track.body is not None:
+                part = score[mark.first : mark.last + 1, mark.track.body]
+                np.maximum(part, mark.score, out=part)
+        return score
+
+    def note_company(
+        self, tracks: Sequence[Track], frame: int, group: npt.NDArray[np.int64]
+    ) -> None:
+        """Note which tracks are near each other, and since when."""
+        before = {track: track.company for track in tracks}
+        for track in tracks:
+            track.company = {}
+        for one, other in self._near_pairs(tracks, group):
+            since = before[one].get(other, frame)
+            one.company[other] = other.company[one] = since
+        for track in tracks:
+            if track.measured is None and track.samples.last_frame == frame - 1:
+                track.lost_beside = dict(track.company)
+
+    def doubt(self, tracks: Iterable[Track], parted: Sequence[Track], frame: int) -> None:
+        """Mark tracks whose assignment was a close thing, or that came back beside others."""
+        for track in parted:
+            for other in track.lost_beside if track.key is None else ():
+                track.score = max(track.score, PARTED)
+                other.score = max(other.score, PARTED)
+        for track in tracks:
+            self._doubt(track, frame)
+        for track in parted:
+            track.lost_beside = {}
+
+    def _near_pairs(
+        self, tracks: Sequence[Track], group: npt.NDArray[np.int64]
+    ) -> list[tuple[Track, Track]]:
+        """Return pairs that compete for a detection, or are both unseen where they might meet."""
+        members: dict[int, list[int]] = {}
+        for index, number in enumerate(group.tolist()):
+            members.setdefault(number, []).append(index)
+        pairs = {
+            (one, other)
+            for inside in members.values()
+            for place, one in enumerate(inside)
+            for other in inside[place + 1 :]
+        }
+        unseen = [index for index, track in enumerate(tracks) if track.measured is None]
+        if len(unseen) > 1:
+            at = np.array([tracks[index].mean[:2] for index in unseen])
+            spread = np.sqrt([tracks[index].covariance[0, 0] for index in unseen])
+            apart = np.hypot(*(at[:, None] - at).transpose(2, 0, 1))
+            near = apart <= self._settings.gate * (spread[:, None] + spread)
+            pairs |= {(unseen[i], unseen[j]) for i, j in np.argwhere(np.triu(near, 1)).tolist()}
+        return [(tracks[one], tracks[other]) for one, other in sorted(pairs)]
+
+    def _doubt(self, track: Track, frame: int) -> None:
+        """Mark a track whose assignment was a close thing, and go on until that has settled.
+
+        After a wrong choice the velocities are wrong too, and the way back looks certain.
+        """
+        if track.score >= self._settings.ambiguous_above:
+            track.doubt, track.settles_in = track.score, _SETTLES_IN
+            self.add(track, self._since(track), frame, track.score)
+        elif track.settles_in > 0:
+            track.settles_in -= track.measured is not None
+            track.score = track.doubt
+            self.add(track, frame, frame, track.score)
+
+    def _since(self, track: Track) -> int:
+        """Return since when a track has been near those that it might be exchanged with."""
+        # What was not seen may have been exchanged at any time since it was.
+        last = int(track.samples.frames[-2 if track.measured is not None else -1 :][0])
+        beside: Iterable[int] = track.lost_beside.values() if track.measured is not None else ()
+        return min([*track.company.values(), *beside, last])
