@@ -59,17 +59,24 @@ def assign(cost: Floats) -> Assignment:
     group = np.arange(tracks)
     for number, (rows, columns) in enumerate(connected_groups(np.isfinite(cost))):
         group[rows] = number
-        if not columns.size:
+        if not columns:
+            continue
+        if len(rows) == len(columns) == 1:
+            # By far the most frequent case, and a frame with many bodies has many of it.
+            alone = float(cost[rows[0], columns[0]])
+            if alone < 0.0:
+                detection[rows[0]] = columns[0]
+            elif alone < NO_ALTERNATIVE:
+                score[rows[0]] = math.exp(-alone)
             continue
         part = cost[np.ix_(rows, columns)]
         taken = _solve(part)
-        detection[rows] = np.where(taken >= 0, columns[taken], -1)
-        if part.size > 1 or taken[0] < 0:
-            score[rows] = _alternatives(part, taken)
+        detection[rows] = np.where(taken >= 0, np.array(columns)[taken], -1)
+        score[rows] = _alternatives(part, taken)
     return Assignment(detection, score, group)
 
 
-def connected_groups(edges: npt.NDArray[np.bool_]) -> list[tuple[Integers, Integers]]:
+def connected_groups(edges: npt.NDArray[np.bool_]) -> list[tuple[list[int], list[int]]]:
     """Return the tracks and the detections of each connected group that has a track.
 
     Parameters
@@ -79,35 +86,35 @@ def connected_groups(edges: npt.NDArray[np.bool_]) -> list[tuple[Integers, Integ
 
     Examples
     --------
-    >>> groups = connected_groups(np.array([[True, False], [True, False], [False, True]]))
-    >>> [(rows.tolist(), columns.tolist()) for rows, columns in groups]
+    >>> connected_groups(np.array([[True, False], [True, False], [False, True]]))
     [([0, 1], [0]), ([2], [1])]
     """
-    tracks, detections = edges.shape
-    unseen = np.ones(tracks, dtype=bool)
+    tracks = edges.shape[0]
+    of_track: list[list[int]] = [[] for _ in range(tracks)]
+    of_detection: dict[int, list[int]] = {}
+    for track, detection in np.argwhere(edges).tolist():
+        of_track[track].append(detection)
+        of_detection.setdefault(detection, []).append(track)
+    seen: set[int] = set()
     groups = []
-    for track in range(tracks):
-        if not unseen[track]:
+    for first in range(tracks):
+        if first in seen:
             continue
-        rows = np.zeros(tracks, dtype=bool)
-        columns = np.zeros(detections, dtype=bool)
-        rows[track] = True
-        while True:
-            columns |= edges[rows].any(axis=0)
-            wider = rows | edges[:, columns].any(axis=1)
-            if (wider == rows).all():
-                break
-            rows = wider
-        unseen &= ~rows
-        groups.append((np.flatnonzero(rows), np.flatnonzero(columns)))
+        seen.add(first)
+        rows, columns = [first], set(of_track[first])
+        for track in rows:
+            columns.update(of_track[track])
+            for other in (other for column in of_track[track] for other in of_detection[column]):
+                if other not in seen:
+                    seen.add(other)
+                    rows.append(other)
+        groups.append((sorted(rows), sorted(columns)))
     return groups
 
 
 def _solve(cost: Floats) -> Integers:
     """Return the detection of each track, -1 for none."""
     rows, columns = cost.shape
-    if rows == columns == 1:
-        return np.array([0 if cost[0, 0] < 0 else -1])
     from scipy.optimize import linear_sum_assignment
 
     # One spare column for each track, at cost 0: to be left alone is always possible.

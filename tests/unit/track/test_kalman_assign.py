@@ -119,10 +119,10 @@ def test_groups_are_those_of_the_graph(bits: int) -> None:
     whole = bmat([[None, edges.astype(int)], [edges.astype(int).T, None]])
     label = connected_components(whole, directed=False)[1]
     found = connected_groups(edges)
-    assert sorted(track for rows, _ in found for track in rows.tolist()) == list(range(4))
+    assert sorted(track for rows, _ in found for track in rows) == list(range(4))
     for rows, columns in found:
-        assert len({*label[rows], *label[4 + columns]}) == 1
-        assert columns.tolist() == [j for j in range(5) if label[4 + j] == label[rows[0]]]
+        assert len({*label[rows], *(label[4 + j] for j in columns)}) == 1
+        assert columns == [j for j in range(5) if label[4 + j] == label[rows[0]]]
 
 
 def test_one_lost_body_does_not_move_two_distant_ones() -> None:
