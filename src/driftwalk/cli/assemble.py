@@ -43,7 +43,7 @@ from driftwalk.cli.options import (
     WallRestitution,
     study_overrides,
 )
-from driftwalk.cli.output import print_json, print_note, print_table
+from driftwalk.cli.output import print_json, print_note, print_table, report_command
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -265,7 +265,7 @@ def print_answer(study: Study, result: AssemblyResult, folder: Path) -> None:
             f"l1 distance of the two: {apart['l1_distance']:.4f}; by chance "
             f"{apart['l1_noise_floor']:.4f} (95 %: {apart['l1_noise_floor_95']:.4f})"
         )
-    print(f"figures: {folder / 'figures'}")
+    print(f"figures: {folder / 'figures'}; all in one page: {report_command(folder)}")
 
 
 def _seen(distributions: list[xr.Dataset]) -> list[str]:

@@ -29,7 +29,7 @@ from driftwalk.cli.options import (
     resolve_study,
     study_overrides,
 )
-from driftwalk.cli.output import print_json, print_note
+from driftwalk.cli.output import print_json, print_note, report_command
 from driftwalk.cli.recording_options import (
     RecordingFile,
     RecordingOptions,
@@ -202,6 +202,7 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
     for warning in json_module.loads(facts["warnings"]):
         print_note(f"warning: {warning}")
     print(f"figures                {folder / 'figures'}")
+    print(f"all in one page        {report_command(folder)}")
 
 
 def _interval(facts: dict[str, Any], key: str, scale: float, percent: str) -> str:

@@ -31,6 +31,8 @@ QUICK = {
 }
 FIT, CALIBRATION = "fit", "calibrate"
 """The run directories inside that of the demo, one for each command."""
+REPORT = "report.html"
+"""The report of each, in its run directory."""
 
 
 def demo(
@@ -51,6 +53,7 @@ def demo(
     distances in the fitted flow (DIR/calibrate). Both are printed beside the truth.
     """
     from driftwalk.datasets import tank30_recording
+    from driftwalk.report import report_page, write_report
 
     _require_own(out)
     recording, study = tank30_recording(), demo_study(quick=quick)
@@ -58,6 +61,8 @@ def demo(
     with as_file(folder / "recording.csv") as path:
         fit, check = _fit(recording, study, path, out / FIT, overwrite=overwrite)
         calibration = _calibrate(recording, study, path, out, overwrite=overwrite, threads=threads)
+    for run in (FIT, CALIBRATION):
+        write_report(report_page(out / run), out / run / REPORT, existing="replace")
     found = Found(fit, check, calibration, recording)
     if json:
         print_json(in_json(found))

@@ -102,6 +102,7 @@ def print_beside_truth(found: Found, folder: Path) -> None:
         for warning in warnings:
             print_note(f"warning: {name}: {warning}")
     print(f"figures: {folder}/fit/figures, {folder}/calibrate/figures")
+    print(f"open in a browser: {folder}/fit/report.html, {folder}/calibrate/report.html")
 
 
 def print_row(name: str, *cells: str) -> None:

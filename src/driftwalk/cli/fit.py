@@ -23,7 +23,7 @@ from driftwalk.cli.options import (
     resolve_study,
     study_overrides,
 )
-from driftwalk.cli.output import print_json, print_note
+from driftwalk.cli.output import print_json, print_note, report_command
 from driftwalk.cli.recording_options import RecordingOptions, with_recording_options
 from driftwalk.cli.require_motion import require_motion
 from driftwalk.cli.study_recording import load_for_run
@@ -157,6 +157,7 @@ def fit(
     else:
         print_answer(found.fit, out)
         print_verdict(found.check)
+        print(f"all in one page        {report_command(out)}")
 
 
 def _items(text: str | None) -> list[str] | None:

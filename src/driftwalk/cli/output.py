@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePath
@@ -95,6 +96,17 @@ def print_table(
 def print_note(text: str) -> None:
     """Print a remark or warning on stderr, where it does not disturb the output."""
     print(f"driftwalk: {' '.join(text.split())}", file=sys.stderr)
+
+
+def report_command(folder: Path) -> str:
+    """Return the command that makes the report of a run, for a person to copy.
+
+    Examples
+    --------
+    >>> report_command(Path("my run"))
+    "driftwalk report 'my run' -o report.html"
+    """
+    return f"driftwalk report {shlex.quote(str(folder))} -o report.html"
 
 
 def require_place(path: Path, *, existing: str) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.cli.output import print_note, print_table
+from driftwalk.cli.output import print_note, print_table, report_command
 from driftwalk.cli.progress import duration_text
 
 if TYPE_CHECKING:
@@ -165,6 +165,7 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
     for text in warnings(found):
         print_note(f"warning: {text}")
     print(f"every recording        {folder / 'recovery.nc'}")
+    print(f"all in one page        {report_command(folder)}")
 
 
 def _parts(found: xr.Dataset) -> list[xr.Dataset]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.cli.output import print_table
+from driftwalk.cli.output import print_table, report_command
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -159,7 +159,7 @@ def print_answer(study: Study, result: SensitivityResult, folder: Path) -> None:
     _print_components(result.components)
     if result.indices is not None:
         _print_indices(result.indices)
-    print(f"figures: {folder / 'figures'}")
+    print(f"figures: {folder / 'figures'}; all in one page: {report_command(folder)}")
 
 
 def _print_reference(reference: xr.Dataset) -> None:
