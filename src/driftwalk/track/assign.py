@@ -124,26 +124,33 @@ def _solve(cost: Floats) -> Integers:
     return np.where(taken < columns, taken, -1)
 
 
-def _total(cost: Floats, taken: Integers) -> float:
-    at = np.flatnonzero(taken >= 0)
-    return float(cost[at, taken[at]].sum())
-
-
 def _alternatives(cost: Floats, taken: Integers) -> Floats:
-    """Return the score of each track of a group; see `Assignment`."""
-    best = _total(cost, taken)
-    least = np.full(len(cost), math.inf)
-    owner = {int(column): row for row, column in enumerate(taken) if column >= 0}
-    for row, column in np.argwhere(np.isfinite(cost)).tolist():
-        if taken[row] == column:
-            continue
-        excess = _forced(cost, row, column) - best
-        for track in {row, owner.get(column, row)}:
-            least[track] = min(least[track], excess)
+    """Return the score of each track of a group; see `Assignment`.
+
+    Another assignment differs by cycles, in which each track takes the detection of the next one.
+    The cheapest cycle through an edge is that edge and the shortest way back. One more node stands
+    for what nobody has: a track that goes there takes a detection that was left, or none; from
+    there it costs nothing to leave a track's detection to nobody.
+    """
+    tracks = np.arange(len(cost))
+    has = taken >= 0
+    own = np.where(has, cost[tracks, taken], 0.0)
+    left = np.setdiff1d(np.arange(cost.shape[1]), taken)
+    step = np.full((len(cost) + 1, len(cost) + 1), math.inf)
+    step[:-1, :-1][:, has] = cost[:, taken[has]]
+    step[:-1, -1] = np.min(cost[:, left], axis=1, initial=math.inf)
+    step[:-1, -1][has] = np.minimum(step[:-1, -1][has], 0.0)
+    step[:-1] -= own[:, None]
+    step[-1] = 0.0
+    np.fill_diagonal(step, 0.0)
+    for node in range(len(step)):
+        np.minimum(step, step[:, node, None] + step[node], out=step)
+    owner = np.full(cost.shape[1], len(cost))
+    owner[taken[has]] = tracks[has]
+    # Of each edge that was not taken: the cost of the cheapest assignment that has it, less the
+    # best one's.
+    excess = cost - own[:, None] + step[owner, :-1].T
+    excess[tracks[has], taken[has]] = math.inf
+    least = excess.min(axis=1)
+    least[has] = np.minimum(least[has], excess[:, taken[has]].min(axis=0))
     return np.where(least < NO_ALTERNATIVE, np.exp(-np.maximum(least, 0.0)), 0.0)
-
-
-def _forced(cost: Floats, row: int, column: int) -> float:
-    """Return the least cost of all assignments that hold one edge."""
-    rest = np.delete(np.delete(cost, row, axis=0), column, axis=1)
-    return float(cost[row, column]) + (_total(rest, _solve(rest)) if rest.size else 0.0)
