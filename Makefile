@@ -15,7 +15,7 @@ TEST_TOOLS := $(VENV)/.test-tools
 DEV_TOOLS := $(VENV)/.dev-tools
 CPP := $(shell find cpp -name '*.cpp' -o -name '*.hpp')
 
-.PHONY: demo test test-slow doctest lint format cpp-test cpp-test-portable bench studies docs web wheel clean
+.PHONY: demo test test-slow doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs web wheel clean
 
 demo: $(PACKAGE)
 	$(BIN)/driftwalk demo
@@ -74,6 +74,19 @@ studies: $(PACKAGE)
 # the bundle is committed, so that only those who change web/ need it.
 web:
 	cd web && npm ci && npm run check && npm test && npm run build
+
+# How well tracking works on videos of known truth: about an hour, and 10 GB for the longest video
+# while it is there. The mouse too, where its folder is named: make studies-tracking MOUSE=FOLDER
+TRACKING := run/tracking
+TRACKING_SETS := moderate heavy closed-loop
+
+studies-tracking: $(TEST_TOOLS)
+	for name in $(TRACKING_SETS); do \
+	  $(BIN)/python studies/tracking/run.py $(TRACKING) --set $$name || exit 1; \
+	done
+	test -z "$(MOUSE)" || $(BIN)/python studies/tracking/run.py $(TRACKING) --set mouse \
+	  --video $(MOUSE)/mouse_video.mp4 --published $(MOUSE)/mouse_video_tracked.csv
+	$(BIN)/python studies/tracking/summary.py $(TRACKING) --store studies/tracking/results
 
 wheel: $(DEV_TOOLS)
 	$(BIN)/python -m build

@@ -13,8 +13,8 @@ from typing import Any, Final
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 ASIDE: Final = (
-    "__init__", "boards", "camera", "explain", "lens", "live", "live_camera", "observer", "overlay",
-    "possible", "tags",
+    "__init__", "boards", "explain", "live", "live_camera", "observer", "overlay", "possible",
+    "tags",
 )  # fmt: skip
 """Modules of the tracking that make no difference to these recordings."""
 

@@ -3,9 +3,9 @@
     python studies/tracking/run.py OUT --set moderate [--count 5] [--keep-videos]
     python studies/tracking/run.py OUT --set mouse --video mouse_video.mp4 --published tracked.csv
 
-OUT holds the recordings and `SET.jsonl`. What is in there already is not done again, so a study that
-was stopped goes on where it was; `--again` does it with this version of the tracker, whose number
-stands in each line.
+OUT holds the recordings and `SET.jsonl`. What is in there already is not done again, so a study
+that was stopped goes on where it was; `--again` does it with this version of the tracker, whose
+number stands in each line.
 """
 
 from __future__ import annotations
