@@ -26,6 +26,8 @@ class Predicted(NamedTuple):
     """Positions last measured [m], shape (n, 2)."""
     unseen_for: Floats
     """Time since then [s], shape (n,)."""
+    missed: Booleans
+    """Whether they were not seen in the frame before this one, shape (n,)."""
 
 
 class Measured(NamedTuple):
@@ -68,8 +70,10 @@ def edge_costs(predicted: Predicted, measured: Measured, settings: TrackerSettin
         math.log(share) + pushed[1] - 0.5 * pushed[0],
     )
     log_turned = _angle_term(difference[:, 2], total[:, 2, 2], settings.bounce_probability)
-    seen = settings.detection_probability
-    alone = math.log(settings.clutter_density) + math.log(1.0 - seen) - math.log(seen)
+    seen = np.where(
+        predicted.missed[track], settings.return_probability, settings.detection_probability
+    )
+    alone = math.log(settings.clutter_density) + np.log(1.0 - seen) - np.log(seen)
     inside = square <= settings.gate**2
     value = alone - log_density - log_turned
     cost[track[inside], detection[inside]] = value[inside]

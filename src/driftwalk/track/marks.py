@@ -43,10 +43,18 @@ class Marks:
         """Mark a track from one frame to another."""
         self._marks.append(_Mark(track, first, last, score))
 
-    def scores(self, frames: int, bodies: int) -> Floats:
-        """Return the score of each frame and body, shape (frames, bodies); 0 where not marked."""
+    def scores(self, frames: int, bodies: int, tracks: Iterable[Track]) -> Floats:
+        """Return the score of each frame and body, shape (frames, bodies); 0 where not marked.
+
+        What is still in doubt in one of the tracks counts as marked.
+        """
         score = np.zeros((frames, bodies))
-        for mark in self._marks:
+        still = [
+            _Mark(track, track.rival.since, frames - 1, track.rival.score)
+            for track in tracks
+            if track.rival is not None
+        ]
+        for mark in (*self._marks, *still):
             if mark.track.body is not None:
                 part = score[mark.first : mark.last + 1, mark.track.body]
                 np.maximum(part, mark.score, out=part)

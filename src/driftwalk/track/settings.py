@@ -29,6 +29,8 @@ class TrackerSettings:
         How many bodies there are at most. A new track then stands for one that was lost.
     detection_probability : float
         Chance that a body in view is detected in a frame.
+    return_probability : float
+        Chance that a body that was missed is detected in the next frame.
     bounce_probability : float
         Chance that a body collides between two frames, and has any velocity afterwards.
     clutter_density : float
@@ -56,6 +58,7 @@ class TrackerSettings:
     confirm_after: int = 3
     bodies: int | None = None
     detection_probability: float = 0.98
+    return_probability: float = 0.5
     bounce_probability: float = 0.01
     clutter_density: float = 1.0
     gate: float = 5.0
@@ -68,6 +71,7 @@ class TrackerSettings:
         self._require("bounce_probability", 0 < self.bounce_probability < 1)
         self._require("gate", math.isfinite(self.gate) and self.gate >= 1)
         self._require("detection_probability", 0 < self.detection_probability < 1)
+        self._require("return_probability", 0 < self.return_probability < 1)
         self._require("ambiguous_above", 0 < self.ambiguous_above <= 1)
         self._require("confirm_after", self.confirm_after >= 1)
         self._require("bodies", self.bodies is None or self.bodies >= 1)

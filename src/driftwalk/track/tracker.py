@@ -22,6 +22,7 @@ from driftwalk.track.kalman import predict, start_state, update
 from driftwalk.track.marks import Marks
 from driftwalk.track.naming import Naming
 from driftwalk.track.recorded import recording_of
+from driftwalk.track.rivals import Rival, Rivals
 from driftwalk.track.settings import TrackerSettings
 from driftwalk.track.tracks import Track, TrackState, measured_of, stacked
 from driftwalk.track.types import Detection
@@ -68,6 +69,7 @@ class Tracker:
         self._over: list[Track] = []
         self._marks = Marks(settings)
         self._naming = Naming(settings, self._marks)
+        self._rivals = Rivals(settings, self._marks, self.counts)
 
     def step(self, time: float, detections: Iterable[Detection]) -> list[TrackState]:
         """Take the detections of the next frame.
@@ -134,11 +136,12 @@ class Tracker:
                 f"nothing was tracked in {len(self._times)} frames: no object was found in "
                 f"{self.settings.confirm_after} frames in a row"
             )
+        tracks = [*self._over, *self._tracks]
         return recording_of(
             self._times,
             names,
-            [*self._over, *self._tracks],
-            self._marks.scores(len(self._times), len(names)),
+            tracks,
+            self._marks.scores(len(self._times), len(names), tracks),
             attrs=attrs or {},
             counts={**self.counts, **(counts or {})},
         )
@@ -166,13 +169,16 @@ class Tracker:
     def _predict(self, time: float) -> None:
         if not self._tracks:
             return
-        elapsed = np.array([time - track.time for track in self._tracks])
-        mean, covariance = predict(*stacked(self._tracks), elapsed, self.settings.motion)
+        rivals = [track.rival for track in self._tracks if track.rival is not None]
+        both: list[Track | Rival] = [*self._tracks, *rivals]
+        elapsed = np.array([time - one.time for one in both])
+        mean, covariance = predict(*stacked(both), elapsed, self.settings.motion)
         speed = np.hypot(mean[:, 3], mean[:, 4])
         # Velocities beyond the bound are noise.
         mean[:, 3:5] *= np.minimum(1.0, self.settings.max_speed / np.maximum(speed, 1e-12))[:, None]
-        for track, state, spread in zip(self._tracks, mean, covariance, strict=True):
-            track.mean, track.covariance, track.time = state, spread, time
+        for one, state, spread in zip(both, mean, covariance, strict=True):
+            one.mean, one.covariance, one.time = state, spread, time
+        for track in self._tracks:
             track.measured, track.score = None, 0.0
 
     def _assign(
@@ -182,9 +188,12 @@ class Tracker:
         if not self._tracks:
             return set()
         tracks = self._tracks
-        cost = edge_costs(self._predicted(time), measured, self.settings)
+        cost = edge_costs(self._predicted(time, frame), measured, self.settings)
+        rival = self._rivals.costs(tracks, measured, time)
         _obey_keys(cost, tracks, found)
-        chosen = assign(cost)
+        _obey_keys(rival, tracks, found)
+        chosen = assign(np.minimum(cost, rival))
+        self._rivals.settle(tracks, chosen.detection, cost, rival, frame)
         pairs = [(track, int(j)) for track, j in zip(tracks, chosen.detection, strict=True)]
         parted = [t for t, j in pairs if j >= 0 and t.samples.last_frame < frame - 1]
         self._update(time, frame, [(t, j) for t, j in pairs if j >= 0], found, measured)
@@ -192,13 +201,17 @@ class Tracker:
         for track, score in zip(tracks, chosen.score, strict=True):
             track.score = float(score) if track.key is None else 0.0
         self._marks.doubt(tracks, parted, frame)
+        for track in tracks:
+            if track.rival is not None:
+                track.score = max(track.score, track.rival.score)
         return {j for _, j in pairs if j >= 0}
 
-    def _predicted(self, time: float) -> Predicted:
+    def _predicted(self, time: float, frame: int) -> Predicted:
         return Predicted(
             *stacked(self._tracks),
             np.array([track.seen_at for track in self._tracks]),
             np.array([time - track.seen for track in self._tracks]),
+            np.array([track.samples.last_frame < frame - 1 for track in self._tracks]),
         )
 
     def _update(

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
 from driftwalk.track.gate import Measured
+from driftwalk.track.rivals import Rival
 from driftwalk.track.types import Detection
 
 Floats = npt.NDArray[np.float64]
@@ -127,9 +128,11 @@ class Track:
     """Tracks that are near now, each with the frame since when."""
     lost_beside: dict[Track, int] = field(default_factory=dict)
     """Tracks that were near when it was seen last."""
+    rival: Rival | None = None
+    """What it was before a measurement that is in doubt."""
 
 
-def stacked(tracks: Sequence[Track]) -> tuple[Floats, Floats]:
+def stacked(tracks: Sequence[Track | Rival]) -> tuple[Floats, Floats]:
     """Return means (n, 6) and covariances (n, 6, 6)."""
     return (
         np.array([track.mean for track in tracks]),
