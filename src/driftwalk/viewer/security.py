@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hmac
 import ipaddress
+import re
 import secrets
 import socket
 from collections.abc import Mapping
@@ -18,6 +19,7 @@ from typing import Final
 
 LOOPBACK_NAMES: Final = ("127.0.0.1", "localhost", "[::1]")
 TOKEN: Final = "token"
+_HOST: Final = re.compile(r"(\[[0-9a-f:.]+\]|[0-9a-z._-]+)(?::[0-9]{1,5})?", re.ASCII)
 
 HEADERS: Final[dict[str, str]] = {
     "Content-Security-Policy": (
@@ -148,12 +150,12 @@ def is_address(name: str) -> bool:
 
 
 def host_name(header: str) -> str:
-    """Return the name in a Host header, without the port.
+    """Return the name in a Host header, without the port; empty when it is no such header.
 
     Examples
     --------
-    >>> [host_name(header) for header in ("localhost:8765", "[::1]:8765", "[::1]", "lab")]
-    ['localhost', '[::1]', '[::1]', 'lab']
+    >>> [host_name(header) for header in ("localhost:8765", "[::1]:8765", "lab", "lab, lab:80")]
+    ['localhost', '[::1]', 'lab', '']
     """
-    name, colon, port = header.rpartition(":")
-    return name if colon and not port.endswith("]") else header
+    match = _HOST.fullmatch(header)
+    return "" if match is None else match[1]

@@ -1,0 +1,180 @@
+"""The client of a tracker's stream, against the real server of streams and against others."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, closing
+from typing import Any
+
+import numpy as np
+import pytest
+
+from driftwalk.core.errors import InputError
+from driftwalk.track import LiveServer
+from driftwalk.viewer.live_client import LiveSource, stream_line
+
+HELLO = {"type": "hello", "format": "driftwalk live", "version": 1, "source": "test"}
+
+
+def free_port() -> int:
+    with closing(socket.create_server(("127.0.0.1", 0))) as found:
+        return int(found.getsockname()[1])
+
+
+class Heard(list[Any]):
+    """Everything that was published, and a wait for something among it."""
+
+    async def until(self, wanted: Callable[[Any], bool]) -> Any:
+        async with asyncio.timeout(10):
+            while True:
+                for content in self:
+                    if wanted(content):
+                        return content
+                await asyncio.sleep(0.01)
+
+
+@asynccontextmanager
+async def listening(port: int) -> AsyncIterator[tuple[LiveSource, Heard]]:
+    source, heard = LiveSource("127.0.0.1", port), Heard()
+    task = asyncio.create_task(source.run(heard.append))
+    try:
+        yield source, heard
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+def kind(name: str) -> Callable[[Any], bool]:
+    return lambda content: content["type"] == name
+
+
+def test_hello_and_frames_are_handed_on() -> None:
+    async def run() -> None:
+        with LiveServer(0, hello=HELLO) as server:
+            async with listening(server.port) as (source, heard):
+                assert (await heard.until(kind("hello")))["source"] == "test"
+                server.publish({"type": "frame", "frame": 7, "bodies": []})
+                assert (await heard.until(kind("frame")))["frame"] == 7
+                # A browser that comes later sees the last of both.
+                kinds = [content["type"] for content in source.greeting()]
+                assert kinds == ["page", "hello", "frame"]
+
+    asyncio.run(run())
+
+
+def test_a_lost_tracker_is_found_again() -> None:
+    async def run() -> None:
+        port = free_port()
+        async with listening(port) as (source, heard):
+            with LiveServer(port, hello=HELLO) as server:
+                await heard.until(kind("hello"))
+                server.publish({"type": "frame", "frame": 1})
+                await heard.until(kind("frame"))
+            assert "gone" in (await heard.until(kind("lost")))["words"]
+            heard.clear()
+            with LiveServer(port, hello={**HELLO, "source": "again"}):
+                assert (await heard.until(kind("hello")))["source"] == "again"
+                # Nothing of the old stream is left.
+                assert [c["type"] for c in source.greeting()] == ["page", "hello"]
+
+    asyncio.run(run())
+
+
+def test_the_end_is_no_loss() -> None:
+    async def run() -> None:
+        with LiveServer(0, hello=HELLO) as server:
+            async with listening(server.port) as (_, heard):
+                await heard.until(kind("hello"))
+                server.publish({"type": "end", "interrupted": None})
+                await heard.until(kind("end"))
+                server.close()
+                await asyncio.sleep(0.6)
+                assert [c["type"] for c in heard] == ["hello", "end"]
+
+    asyncio.run(run())
+
+
+def test_images_come_for_as_long_as_a_browser_wants_them() -> None:
+    pytest.importorskip("cv2")
+
+    async def run() -> None:
+        picture = np.zeros((48, 64, 3), np.uint8)
+        with LiveServer(0, hello=HELLO) as server:
+            async with listening(server.port) as (source, heard):
+                await heard.until(kind("hello"))
+                reply = heard.append
+
+                async def images(number: int) -> int:
+                    heard.clear()
+                    for index in range(number):
+                        server.publish({"type": "frame", "frame": index}, picture)
+                        await heard.until(lambda c, i=index: c.get("frame") == i)
+                        await asyncio.sleep(0.02)
+                    return sum("jpeg_base64" in content for content in heard)
+
+                assert await images(5) == 0
+                await source.receive({"type": "video", "width": 32}, reply)
+                await asyncio.sleep(0.1)
+                assert await images(10) >= 8
+                await source.leave(reply)
+                await images(2)
+                assert await images(5) == 0
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        (b"220 mail.example ESMTP\r\n", "is no tracker of driftwalk"),
+        (b'{"type": "hello", "format": "other"}\n', "is no tracker of driftwalk"),
+        (b'{"type": "hello", "format": "driftwalk live", "version": 2}\n', "speaks version 2"),
+        (b"$STEP_START*0D\r\n", "is no tracker of driftwalk"),
+    ],
+)
+def test_others_are_named(line: bytes, words: str) -> None:
+    async def run() -> None:
+        async def answer(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            writer.write(line)
+            await writer.drain()
+            writer.close()
+            await writer.wait_closed()
+
+        server = await asyncio.start_server(answer, "127.0.0.1", 0)
+        async with server, listening(server.sockets[0].getsockname()[1]) as (_, heard):
+            assert words in (await heard.until(kind("lost")))["words"]
+
+    asyncio.run(run())
+
+
+def test_nobody_there_is_said_once() -> None:
+    async def run() -> None:
+        async with listening(free_port()) as (source, heard):
+            await asyncio.sleep(0.8)
+            # The page says so from the beginning.
+            assert heard == []
+            assert "waiting" in source.greeting()[1]["words"]
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize(
+    "line", [b"", b"\n", b"[]", b"{}", b'{"type": 1}', b'{"type":"frame","x":NaN}', b"\xff", b"["]
+)
+def test_what_is_no_line_is_nothing(line: bytes) -> None:
+    assert stream_line(line) is None
+
+
+@pytest.mark.parametrize("width", [True, -5, 10**9, "640", None, 640.5])
+def test_a_width_that_is_none_asks_for_nothing(width: Any) -> None:
+    source = LiveSource("127.0.0.1", 1)
+    asyncio.run(source.receive({"type": "video", "width": width}, print))
+    assert max(source._widths.values(), default=0) == 0
+
+
+@pytest.mark.parametrize(("host", "port"), [("", 5000), ("lab", 0), ("lab", 70000)])
+def test_no_address(host: str, port: int) -> None:
+    with pytest.raises(InputError, match="no address"):
+        LiveSource(host, port)

@@ -1,0 +1,294 @@
+"""Runs under way: what a page shows equals what lies in the run directory, no more and no less."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import driftwalk as dw
+from driftwalk.core.errors import InputError
+from driftwalk.core.rundir import RunDirectory
+from driftwalk.core.shards import ShardStore
+from driftwalk.model import Study
+from driftwalk.sweep import grid
+from driftwalk.viewer.run_shards import StoreReader
+from driftwalk.viewer.watch_run import RunSource
+
+DRAG, FORCE = [0.2, 0.3, 0.4], [1e-4, 2e-4, 3e-4, 4e-4]
+SEARCH = {
+    "calibration.drag_coefficient_min": 0.2,
+    "calibration.drag_coefficient_max": 0.4,
+    "calibration.drag_coefficient_step": 0.1,
+    "calibration.force_std_min_N": 1e-4,
+    "calibration.force_std_max_N": 4e-4,
+    "calibration.force_std_step_N": 1e-4,
+    "calibration.bootstrap": 4,
+}
+UNITS = grid(drag_coefficient=DRAG, force_std=FORCE).units(5)
+RANDOM = np.random.default_rng(1)
+DISTANCE = RANDOM.uniform(0.1, 0.9, (12, 2))
+EXCERPT = RANDOM.normal(size=(12, 7))
+
+
+def arrays(unit: Any) -> dict[str, Any]:
+    rows = slice(unit.start, unit.stop)
+    return {
+        "ks_distance": DISTANCE[rows],
+        "status": np.zeros((unit.size, 2), np.uint8),
+        "pairs": np.full(unit.size, 99),
+        "excerpt_x": EXCERPT[rows],
+        "excerpt_y": -EXCERPT[rows],
+        "step_density": np.full((unit.size, 4, 4), 1 / 16),
+        "ks_step_length": np.arange(unit.start, unit.stop)[:, None] + [0.0, 0.5],
+        "ks_turning_angle": np.zeros((unit.size, 2)),
+    }
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Iterator[RunDirectory]:
+    """Return a calibration that has begun."""
+    study = dw.apply_overrides(Study(), SEARCH)
+    specification = {
+        "study": study.to_dict(),
+        "body": None,
+        "recording_sha256": "0" * 64,
+        "flow_sha256": None,
+    }
+    with RunDirectory(tmp_path / "run", specification=specification) as opened:
+        yield opened
+
+
+def coarse(run: RunDirectory) -> ShardStore:
+    return run.store("coarse-x", fingerprint={"axes": [DRAG, FORCE], "replicates": 2})
+
+
+def page(source: RunSource) -> dict[str, Any]:
+    return dict(source.greeting()[0]["page"])
+
+
+def the_map(source: RunSource) -> dict[str, Any]:
+    return next(section for section in page(source)["sections"] if section["id"] == "map")
+
+
+def test_map_fills_as_units_are_finished(run: RunDirectory) -> None:
+    source = RunSource(run.path)
+    assert page(source)["state"]["progress"] == 0.0
+    assert np.isnan(dw.decode_array(the_map(source)["value"])).all()
+    store, done = coarse(run), 0
+    for unit in UNITS:
+        store.write(unit, arrays(unit))
+        done += unit.size
+        kinds = [content["type"] for content in source.look()]
+        assert kinds == ["section", "state"]
+        value = dw.decode_array(the_map(source)["value"]).reshape(-1)
+        np.testing.assert_allclose(value[:done], DISTANCE.mean(axis=1)[:done])
+        assert np.isnan(value[done:]).all()
+        assert page(source)["state"]["progress"] == pytest.approx(0.4 * done / 12)
+        assert source.look() == []
+    error = DISTANCE.std(axis=1, ddof=1) / np.sqrt(2)
+    np.testing.assert_allclose(
+        dw.decode_array(the_map(source)["standard_error"]).reshape(-1), error, rtol=1e-6
+    )
+    best = int(DISTANCE.mean(axis=1).argmin())
+    assert the_map(source)["best"]["y"] == DRAG[best // 4]
+    assert the_map(source)["best"]["x"] == FORCE[best % 4]
+
+
+def test_units_may_come_in_any_order(run: RunDirectory) -> None:
+    source, store = RunSource(run.path), coarse(run)
+    for unit in reversed(UNITS):
+        store.write(unit, arrays(unit))
+        source.look()
+    np.testing.assert_allclose(
+        dw.decode_array(the_map(source)["value"]).reshape(-1), DISTANCE.mean(axis=1)
+    )
+
+
+def test_a_page_opened_late_shows_what_is_there(run: RunDirectory) -> None:
+    store = coarse(run)
+    for unit in UNITS:
+        store.write(unit, arrays(unit))
+    assert page(RunSource(run.path))["state"]["progress"] == pytest.approx(0.4)
+
+
+def test_a_setting_without_numbers_is_as_far_as_can_be(run: RunDirectory) -> None:
+    source, store = RunSource(run.path), coarse(run)
+    broken = arrays(UNITS[0])
+    broken["ks_distance"] = np.full((5, 2), np.nan)
+    store.write(UNITS[0], broken)
+    source.look()
+    np.testing.assert_array_equal(
+        dw.decode_array(the_map(source)["value"]).reshape(-1)[:5], np.ones(5)
+    )
+
+
+def test_a_cell_gives_its_own_excerpt(run: RunDirectory) -> None:
+    source, store = RunSource(run.path), coarse(run)
+    store.write(UNITS[0], arrays(UNITS[0]))
+    source.look()
+    assert source._running is not None
+    found = source._running.cell(0, 3)
+    np.testing.assert_allclose(dw.decode_array(found["excerpt_x"]), EXCERPT[3], rtol=1e-6)
+    np.testing.assert_allclose(dw.decode_array(found["excerpt_y"]), -EXCERPT[3], rtol=1e-6)
+    assert dw.decode_array(found["density"]).sum() == pytest.approx(1.0)
+    # Both replicates are as far from their mean; the first is taken.
+    assert found["ks_step_length"] == 3.0
+
+
+@pytest.mark.parametrize(("row", "column"), [(2, 3), (-1, 0), (3, 0), (0, 4), (10**9, 0)])
+def test_a_cell_that_is_not_there_is_empty(run: RunDirectory, row: int, column: int) -> None:
+    source, store = RunSource(run.path), coarse(run)
+    store.write(UNITS[0], arrays(UNITS[0]))
+    source.look()
+    assert source._running is not None
+    assert set(source._running.cell(row, column).values()) == {None}
+
+
+def test_refined_map_and_bootstrap(run: RunDirectory) -> None:
+    source, store = RunSource(run.path), coarse(run)
+    for unit in UNITS:
+        store.write(unit, arrays(unit))
+    fine = grid(drag_coefficient=[0.25, 0.3], force_std=[1e-4, 2e-4]).units(2)
+    refined = run.store(
+        "refined-x", fingerprint={"axes": [[0.25, 0.3], [1e-4, 2e-4]], "replicates": 2}
+    )
+    refined.write(fine[0], {"ks_distance": np.array([[0.1, 0.3], [0.5, 0.7]])})
+    source.look()
+    part = the_map(source)["refined"]
+    assert part["y"] == [0.25, 0.3]
+    np.testing.assert_allclose(
+        dw.decode_array(part["value"]), [[0.2, 0.6], [np.nan, np.nan]], rtol=1e-6
+    )
+    assert page(source)["state"]["progress"] == pytest.approx(0.4 + 0.25 * 0.5)
+    repeats = run.store("bootstrap-x", fingerprint={"count": 4})
+    unit = grid(recording=np.arange(4)).units(2)[1]
+    estimates = {"drag_coefficient": np.array([0.3, 0.4]), "force_std": np.array([1e-4, 2e-4])}
+    repeats.write(unit, {**estimates, "excess": np.zeros((2, 3))})
+    # A section more: the page is sent anew.
+    assert [content["type"] for content in source.look()] == ["page"]
+    lines = next(s for s in page(source)["sections"] if s["id"] == "bootstrap")
+    assert lines["series"][0]["y"] == [0.3, 0.4]
+    assert page(source)["state"]["progress"] == pytest.approx(0.65 + 0.28 * 0.5)
+
+
+def test_damaged_and_foreign_shards_are_no_units(run: RunDirectory) -> None:
+    store = coarse(run)
+    for unit in UNITS[:2]:
+        store.write(unit, arrays(unit))
+    path = store.folder / f"{UNITS[0].id}.npz"
+    path.write_bytes(path.read_bytes()[:-100])
+    (store.folder / "<script>.npz").write_bytes(b"x")
+    (store.folder / "00000000-99999999.npz").write_bytes(b"")
+    reader = StoreReader(store.folder)
+    assert [unit.start for unit in reader.new_units()] == [5]
+    assert reader.new_units() == []
+
+
+def test_assembly_counts_the_classes_of_finished_runs(tmp_path: Path) -> None:
+    study = dw.apply_overrides(Study(), {"assembly.blocks": 3, "assembly.runs": 8})
+    row, pair, apart = [(0, 0), (1, 0), (2, 0)], [(0, 0), (1, 0), (0, 0)], [(0, 0)] * 3
+    cells = [row, pair, apart, row, row, pair, apart, row]
+    labels = {str(row): [0, 0, 0], str(pair): [0, 0, 2], str(apart): [0, 1, 2]}
+    specification = {"study": study.to_dict(), "flow_sha256": "0", "calibration_sha256": None}
+    with RunDirectory(tmp_path / "run", specification=specification) as opened:
+        source = RunSource(opened.path)
+        store = opened.store("fixed")
+        status = np.array([0, 0, 0, 0, 0, 0, 0, 1])
+        for unit in grid(run=np.arange(8)).units(4):
+            part = cells[unit.start : unit.stop]
+            store.write(
+                unit,
+                {
+                    "status": status[unit.start : unit.stop],
+                    "cell": np.array(part, np.int32),
+                    "assembly": np.array([labels[str(cell)] for cell in part], np.int32),
+                },
+            )
+            source.look()
+        section = page(source)["sections"][0]
+        items = {item["class"]: item["count"] for item in section["series"][0]["items"]}
+        # The run whose numbers were lost has no outcome, but it has ended.
+        assert items == Counter({"I3": 3, "2+1": 2, "1+1+1": 2})
+        assert section["runs"] == 8
+        low, high = dw.proportion_interval(3, 7, confidence=1 - 0.1 / 3)
+        first = section["series"][0]["items"][0]
+        assert (first["low"], first["high"]) == pytest.approx((float(low), float(high)))
+        assert first["cells"] == [[[0, 0], [1, 0], [2, 0]]]
+
+
+def test_sensitivity_fills_its_map(tmp_path: Path) -> None:
+    chosen = {
+        "sensitivity.drag_coefficient": [0.2, 0.3],
+        "sensitivity.force_std_N": [1e-4, 2e-4, 3e-4],
+        "sensitivity.reference_realisations": 2,
+    }
+    study = dw.apply_overrides(Study(), chosen)
+    specification = {"study": study.to_dict(), "flow_sha256": "0", "flows_sha256": {}}
+    with RunDirectory(tmp_path / "run", specification=specification) as opened:
+        source = RunSource(opened.path)
+        reference, settings = opened.store("reference"), opened.store("map")
+        for unit in grid(setting=np.arange(2)).units(2):
+            counts = [{"2": 6, "1+1": 4}, {"2": 4, "1+1": 6}]
+            reference.write(unit, {"count": np.array([json.dumps(c).encode() for c in counts])})
+        unit = grid(setting=np.arange(6)).units(4)[0]
+        counts = [{"2": 5, "1+1": 5}, {"2": 10}, {"1+1": 10}, {"2": 8, "1+1": 2}]
+        settings.write(unit, {"count": np.array([json.dumps(c).encode() for c in counts])})
+        source.look()
+        section = page(source)["sections"][0]
+        # Eq. 5 by hand: the pooled reference is one half each.
+        np.testing.assert_allclose(
+            dw.decode_array(section["value"]), [[0.0, 1.0, 1.0], [0.6, np.nan, np.nan]], rtol=1e-6
+        )
+        assert section["x"]["name"] == "force_std"
+        assert section["y"]["values"] == [0.2, 0.3]
+        assert page(source)["state"]["words"] == "6 of 8 settings"
+
+
+def test_a_kind_without_pictures_says_so(tmp_path: Path) -> None:
+    specification = {"kind": "fit", "study": {}, "recordings_sha256": []}
+    with RunDirectory(tmp_path / "run", specification=specification) as opened:
+        source = RunSource(opened.path)
+        assert page(source)["sections"][0]["kind"] == "empty"
+        assert page(source)["state"]["progress"] is None
+
+
+def test_a_run_that_vanishes_and_comes_back(run: RunDirectory) -> None:
+    source = RunSource(run.path)
+    aside = run.path.with_name("aside")
+    run.path.rename(aside)
+    said = source.look()
+    assert "no longer there" in said[0]["state"]["words"]
+    assert source.look() == []
+    aside.rename(run.path)
+    assert [content["type"] for content in source.look()] == ["page"]
+    assert source.look() == []
+
+
+def test_another_version_is_refused(run: RunDirectory) -> None:
+    record = run.path / ".run.json"
+    text = record.read_text()
+    record.write_text(text.replace(dw.__version__, "99.1.2"))
+    with pytest.raises(InputError, match=r"driftwalk 99\.1\.2, this is"):
+        RunSource(run.path)
+    record.write_text("{")
+    with pytest.raises(InputError, match="expected JSON"):
+        RunSource(run.path)
+
+
+def test_what_is_no_run_is_refused(tmp_path: Path, run: RunDirectory) -> None:
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "file").write_text("x")
+    for name, words in (
+        ("nowhere", "there is no such directory"),
+        ("file", "is a file, expected a run directory"),
+        ("empty", "holds no run of driftwalk$"),
+        ("", "there are runs in it: run"),
+    ):
+        with pytest.raises(InputError, match=words):
+            RunSource(tmp_path / name)
