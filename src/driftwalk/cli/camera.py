@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
@@ -16,6 +16,8 @@ from driftwalk.core.errors import FormatError, InputError
 if TYPE_CHECKING:
     from driftwalk.track import Board, Camera
 
+# Corners are found to a tenth of a pixel; farther off, the board or the lens is another one.
+_POOR_PX: Final = 1.0
 camera_app = typer.Typer(add_completion=False, help="Calibrate the camera.")
 
 
@@ -85,6 +87,11 @@ def _calibrated(
         for index in found.not_found:
             print_note(f"warning: {paths[index]}: the board is not found in this image")
     camera = camera_from_board(pictures[0], board, known)
+    if (camera.reprojection_rms_px or 0.0) > _POOR_PX:
+        print_note(
+            f"warning: the corners lie {camera.reprojection_rms_px:.2g} px off a plane: check "
+            "--squares" + ("" if lens else ", and that lines are straight without --no-lens")
+        )
     return camera, facts | {"plane_rms_px": camera.reprojection_rms_px}
 
 

@@ -20,6 +20,8 @@ _FOR_BACKGROUND: Final = 25
 _FOR_RIM: Final = 7
 _FOR_COLOURS: Final = 60
 _LEAST_DISC_PX: Final = 2.0
+# A rim that stands a little above the water is seen larger.
+_RIM_OFF: Final = 0.03
 
 
 class TrackingParts(NamedTuple):
@@ -80,15 +82,37 @@ def find_camera(options: TrackingOptions, images: Sequence[Any]) -> Camera:
             raise ConfigurationError(f"--px-per-m: {options.camera} has a scale already")
         rows, columns = images[0].shape[:2]
         return Camera.from_scale(columns, rows, px_per_m=options.px_per_m, lens=lens)
+    still = median_background(list(images)) if len(images) > 2 else images[0]
     if known is not None and known.homography_px_to_m is not None:
-        return known
+        known.check_size(still.shape[1], still.shape[0])
+        return known if options.tank_diameter is None else _centred(known, still, options)
     if options.tank_diameter is not None:
-        still = median_background(list(images)) if len(images) > 2 else images[0]
         return camera_from_rim(still, diameter=options.tank_diameter, lens=lens)
     raise InputError(
         "no scale: state --tank-diameter (the rim must be seen), or --camera with a plane, or "
         "--px-per-m"
     )
+
+
+def _centred(camera: Camera, still: Any, options: TrackingOptions) -> Camera:
+    """Return a camera with a scale of its own, its origin moved to the middle of the tank."""
+    from driftwalk.track import centre_on_rim
+
+    stated = options.tank_diameter
+    assert stated is not None
+    try:
+        centred, found = centre_on_rim(camera, still)
+    except InputError as error:
+        raise InputError(
+            f"{options.camera} has a scale, and the tank's centre is not found: {error}; or leave "
+            "--tank-diameter out: then the origin is that of the camera file"
+        ) from error
+    if abs(found / stated - 1) > _RIM_OFF:
+        print_note(
+            f"warning: by the scale of {options.camera} the rim is {100 * found:.3g} cm wide, not "
+            f"{100 * stated:.3g} cm: does it lie at another height than the board did?"
+        )
+    return centred
 
 
 def _detector(

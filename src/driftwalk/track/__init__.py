@@ -11,7 +11,7 @@ from driftwalk.track.live_camera import LiveCamera
 from driftwalk.track.markers import MarkerColour, TwoColourMarker, load_markers, save_markers
 from driftwalk.track.observer import AssemblyObserver, AssemblySeen, SeenEvent, observe
 from driftwalk.track.overlay import OverlayWriter, draw_states, save_picture
-from driftwalk.track.rim import Rim, camera_from_rim, find_rim
+from driftwalk.track.rim import Rim, camera_from_rim, centre_on_rim, find_rim
 from driftwalk.track.sampled import frame_count, sample_images
 from driftwalk.track.settings import TrackerSettings
 from driftwalk.track.tags import TagDetector
@@ -60,6 +60,7 @@ __all__ = [
     "calibrate_lens",
     "camera_from_board",
     "camera_from_rim",
+    "centre_on_rim",
     "colours_seen",
     "draw_states",
     "explain_frame",

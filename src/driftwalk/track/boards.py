@@ -13,6 +13,9 @@ from driftwalk.track.tags import dictionary_of
 from driftwalk.track.types import Array, Image
 
 _LEAST_CORNERS: Final = 8
+# Half the side of the window in which a corner is refined, in squares: no other corner is in it.
+_SHARE_OF_SQUARE: Final = 0.3
+_SHARE_OF_GAP: Final = 0.8
 
 
 @dataclass(frozen=True)
@@ -93,7 +96,10 @@ class Board:
         found, corners = cv2.findChessboardCornersSB(grey, size, flags=flags)
         if not found:
             return None
-        return self.corners(), np.asarray(corners, dtype=np.float64).reshape(-1, 2)
+        pixels = _refined(cv2, grey, corners, _SHARE_OF_SQUARE)
+        # Turned by half a turn the grid is the same: the board's x axis points to the right.
+        to_the_right = pixels[size[0] - 1 :: size[0]] - pixels[:: size[0]]
+        return self.corners(), pixels if to_the_right[:, 0].sum() >= 0 else pixels[::-1].copy()
 
     def _charuco(self, cv2: Any, grey: Any) -> tuple[Array, Array] | None:
         detector = cv2.aruco.CharucoDetector(self.charuco_board(cv2))
@@ -101,4 +107,19 @@ class Board:
         if numbers is None or len(numbers) < _LEAST_CORNERS:
             return None
         which = np.asarray(numbers).ravel()
-        return self.corners()[which], np.asarray(corners, dtype=np.float64).reshape(-1, 2)
+        # A window that reaches a tag would find the tag's corner.
+        free = _SHARE_OF_GAP * (1.0 - (self.marker_m or 0.0) / self.square_m) / 2.0
+        share = min(free, _SHARE_OF_SQUARE)
+        return self.corners()[which], _refined(cv2, grey, corners, share)
+
+
+def _refined(cv2: Any, grey: Any, corners: Any, share: float) -> Array:
+    """Return corners [px] once more, each from a window of a share of a square to each side."""
+    pixels = np.asarray(corners, dtype=np.float32).reshape(-1, 2)
+    apart = np.hypot(*(pixels[:, None] - pixels).transpose(2, 0, 1))
+    spacing = apart[apart > 0].min()
+    half = int(np.clip(share * spacing, 2, 15))
+    stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-3)
+    # It works in place.
+    found = cv2.cornerSubPix(grey, pixels[:, None].copy(), (half, half), (-1, -1), stop)
+    return np.asarray(found, dtype=np.float64).reshape(-1, 2)

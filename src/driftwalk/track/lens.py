@@ -76,8 +76,7 @@ def calibrate_lens(images: Sequence[Image], board: Board) -> LensCalibration:
     if len(used) < _LEAST_IMAGES:
         raise InputError(
             f"the {board.kind} of {board.columns} x {board.rows} squares was found in {len(used)} "
-            f"of {len(images)} images, {_LEAST_IMAGES} are needed: check the number of squares, "
-            "and that the board is sharp, flat and seen whole"
+            f"of {len(images)} images, {_LEAST_IMAGES} are needed: {_advice(board)}"
         )
     places, pixels = [], []
     for seen in found:
@@ -107,7 +106,8 @@ def calibrate_lens(images: Sequence[Image], board: Board) -> LensCalibration:
 def camera_from_board(image: Image, board: Board, lens: Lens | None = None) -> Camera:
     """Return the camera whose plane is that of a board lying where the water's surface is.
 
-    The origin is the board's middle, x along its columns, y up in the image.
+    The origin is the board's middle, x along its rows of squares, y up. A chessboard looks the same
+    after half a turn: its x points to the right of the image. That of a ChArUco board is its own.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def camera_from_board(image: Image, board: Board, lens: Lens | None = None) -> C
     if seen is None:
         raise InputError(
             f"the {board.kind} of {board.columns} x {board.rows} squares was not found in the "
-            "image of the water's plane: check the number of squares, and that it is seen whole"
+            f"image of the water's plane: {_advice(board)}"
         )
     places, pixels = seen
     middle = np.array([board.columns, board.rows]) * board.square_m / 2
@@ -163,6 +163,14 @@ def camera_from_board(image: Image, board: Board, lens: Lens | None = None) -> C
     off = camera.to_pixel(world) - pixels
     rms = math.sqrt(float((off**2).sum(axis=1).mean()))
     return camera.model_copy(update={"reprojection_rms_px": rms})
+
+
+def _advice(board: Board) -> str:
+    """Return what to check when a board is not found."""
+    what = "the number of squares (columns first)"
+    if board.kind == "charuco":
+        return f"check {what} and the tags' dictionary, and that the board is sharp and flat"
+    return f"check {what}, and that the board is sharp, flat and seen whole"
 
 
 def _is_right_handed(world: Array, pixels: Array) -> bool:

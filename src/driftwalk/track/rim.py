@@ -144,6 +144,71 @@ def camera_from_rim(image: Image, *, diameter: float, lens: Lens | None = None) 
     return camera.model_copy(update={"plane_found_by": "rim", "tank_diameter_m": diameter})
 
 
+def centre_on_rim(camera: Camera, image: Image) -> tuple[Camera, float]:
+    """Move the origin of a calibrated camera to the tank's centre.
+
+    The image is seen straight from above first: there the rim is a circle, however the camera is
+    tilted.
+
+    Parameters
+    ----------
+    camera : Camera
+        With a plane.
+    image : array, shape (rows, columns, 3)
+        See `find_rim`.
+
+    Returns
+    -------
+    Camera
+        The same scale and axes, origin at the tank's centre.
+    float
+        Diameter of the rim at the camera's scale [m].
+
+    Raises
+    ------
+    InputError
+        When no rim is found.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> track = dw.tank30_recording("without_noise").isel(time=slice(0, 1))
+    >>> _, image = next(dw.render_video(track))
+    >>> aside = Camera.from_scale(640, 480, px_per_m=1500.0, centre_px=(300.0, 200.0))
+    >>> centred, diameter = centre_on_rim(aside, image)
+    >>> round(diameter, 3), bool(np.hypot(*centred.to_world(np.array([[319.5, 239.5]]))[0]) < 1e-4)
+    (0.3, True)
+    """
+    rows, columns = image.shape[:2]
+    above = _from_above(camera, columns, rows)
+    grid = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2)
+    at = camera.to_pixel(above.to_world(grid.astype(np.float64))).astype(np.float32)
+    cv2 = require_opencv()
+    seen = cv2.remap(
+        image, *at.reshape(rows, columns, 2).transpose(2, 0, 1), cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )  # fmt: skip
+    rim = find_rim(seen)
+    middle = above.to_world(np.array([[rim.column, rim.row]]))[0]
+    moved = np.eye(3)
+    moved[:2, 2] = -middle
+    plane = moved @ np.array(camera.homography_px_to_m).reshape(3, 3)
+    nine: Any = tuple(plane.ravel().tolist())
+    metres_per_px = float(np.hypot(*above.jacobian(np.zeros((1, 2)))[0][:, 0]))
+    return camera.model_copy(update={"homography_px_to_m": nine}), 2 * rim.radius_px * metres_per_px
+
+
+def _from_above(camera: Camera, columns: int, rows: int) -> Camera:
+    """Return a camera that looks straight down at what is seen, on an image of the same size."""
+    edge = np.array([[0, 0], [columns - 1, 0], [0, rows - 1], [columns - 1, rows - 1]])
+    world = camera.to_world(edge.astype(np.float64))
+    low, high = world.min(axis=0), world.max(axis=0)
+    px_per_m = float(min((columns - 1) / (high - low)[0], (rows - 1) / (high - low)[1]))
+    centre = (low + high) / 2
+    origin = (columns - 1) / 2 - centre[0] * px_per_m, (rows - 1) / 2 + centre[1] * px_per_m
+    return Camera.from_scale(columns, rows, px_per_m=px_per_m, centre_px=origin)
+
+
 def _roughly(cv2: Any, grey: Any, lens: Lens | None) -> tuple[float, float, float]:
     """Return column, row and radius of the strongest large circle, to a few pixels."""
     rows, columns = grey.shape
