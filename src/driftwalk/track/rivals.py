@@ -71,9 +71,16 @@ class Rivals:
         self._marks = marks
         self._counts = counts
         self._beyond_doubt = -math.log(settings.ambiguous_above)
+        # What it tells that nothing was seen: a body that was seen just now hardly disappears.
+        self._miss_tells = math.log(1.0 - settings.detection_probability) - math.log(
+            1.0 - settings.return_probability
+        )
 
-    def costs(self, tracks: Sequence[Track], measured: Measured, time: float) -> Floats:
-        """Return the cost of each pair if the rival were right, its lag included; for `assign`."""
+    def costs(self, tracks: Sequence[Track], measured: Measured, time: float, frame: int) -> Floats:
+        """Return the cost of each pair if the rival were right, its lag included; for `assign`.
+
+        Both are compared with the same: that the track as it is was missed.
+        """
         cost = np.full((len(tracks), len(measured.pose)), np.inf)
         having = [(row, track.rival) for row, track in enumerate(tracks) if track.rival is not None]
         if having and len(measured.pose):
@@ -85,7 +92,7 @@ class Rivals:
                 np.array([time - rival.seen for rival in rivals]),
                 np.ones(len(rivals), dtype=bool),
             )
-            lead = np.array([rival.lead for rival in rivals])
+            lead = np.array([self._lead(tracks[row], rival, frame) for row, rival in having])
             cost[[row for row, _ in having]] = (
                 edge_costs(predicted, measured, self._settings) + lead[:, None]
             )
@@ -121,21 +128,24 @@ class Rivals:
                 continue
             else:
                 lead = float(rival[row, taken] - own[row, taken])
-                cost = float(own[row, taken]) if lead >= 0 else rival[row, taken] - track.rival.lead
+                lag = self._lead(track, track.rival, frame)
+                cost = float(own[row, taken] if lead >= 0.0 else rival[row, taken] - lag)
                 self._seen(track, track.rival, lead, frame)
             doubtful = taken >= 0 and cost > -self._beyond_doubt
             if track.rival is None and doubtful and track.body is not None and track.key is None:
                 track.rival = _without(track, frame, -cost)
 
+    def _lead(self, track: Track, rival: Rival, frame: int) -> float:
+        """Return the lead of a track if it is missed now."""
+        seen_just_now = track.samples.last_frame == frame - 1
+        return rival.lead + (self._miss_tells if seen_just_now else 0.0)
+
     def _miss(self, track: Track, rival: Rival, frame: int) -> None:
-        """Weigh that nothing was seen: a body that was seen just now hardly disappears again."""
-        settings = self._settings
-        if track.samples.last_frame == frame - 1:
-            rival.lead += math.log(1.0 - settings.detection_probability)
-            rival.lead -= math.log(1.0 - settings.return_probability)
+        """Weigh that nothing was seen."""
+        rival.lead = self._lead(track, rival, frame)
         if rival.lead < 0.0:
             self._go_back(track, rival)
-        elif rival.time - rival.seen > settings.lost_after:
+        elif rival.time - rival.seen > self._settings.lost_after:
             self._leave_open(track, rival, frame)
 
     def _seen(self, track: Track, rival: Rival, lead: float, frame: int) -> None:

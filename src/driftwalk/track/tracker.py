@@ -189,7 +189,7 @@ class Tracker:
             return set()
         tracks = self._tracks
         cost = edge_costs(self._predicted(time, frame), measured, self.settings)
-        rival = self._rivals.costs(tracks, measured, time)
+        rival = self._rivals.costs(tracks, measured, time, frame)
         _obey_keys(cost, tracks, found)
         _obey_keys(rival, tracks, found)
         chosen = assign(np.minimum(cost, rival))
