@@ -38,7 +38,7 @@ const NIGHT_BLUES = steps("1d2733223345273f56294c682b5979306788397699468aab5a9fb
 const BLUE_ORANGE = steps("0b559f3d82bd7fb0d6bdd6e8f1f0eef6d2b0eda66cd8742fb34a06");
 const NIGHT_BLUE_ORANGE = steps("6db6ec4b8fc3356995294763262a2f5e40288d5a29c0772ef0974a");
 
-export type Palette = "score" | "magnitude" | "density" | "speed" | "signed";
+export type Palette = "score" | "distance" | "magnitude" | "density" | "speed" | "signed";
 
 /** Maps values to colours; its bar shows `ticks` at `position`. */
 export interface ColourScale {
@@ -78,6 +78,9 @@ function coloursOf(palette: Palette, dark: boolean): Rgb[] {
   switch (palette) {
     case "score":
       return VIRIDIS;
+    case "distance":
+      // Near is bright, as a high score is.
+      return [...VIRIDIS].reverse();
     case "magnitude":
       return CIVIDIS;
     case "density":

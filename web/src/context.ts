@@ -5,9 +5,9 @@ import type { Numbers } from "./arrays";
 /** What is kept of one setting of a map. */
 export interface CellExcerpt {
   readonly time: Numbers | null;
-  readonly x: Numbers;
-  readonly y: Numbers;
-  readonly density: Numbers;
+  readonly x: Numbers | null;
+  readonly y: Numbers | null;
+  readonly density: Numbers | null;
   readonly ksStepLength: number | null;
   readonly ksTurningAngle: number | null;
 }

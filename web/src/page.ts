@@ -103,11 +103,11 @@ const flow = object({
 
 const mapCells = object({
   excerpt_time: nullable(numbers),
-  excerpt_x: numbers,
-  excerpt_y: numbers,
-  density: numbers,
-  ks_step_length: numbers,
-  ks_turning_angle: numbers,
+  excerpt_x: nullable(numbers),
+  excerpt_y: nullable(numbers),
+  density: nullable(numbers),
+  ks_step_length: nullable(numbers),
+  ks_turning_angle: nullable(numbers),
 });
 
 const map = object({
@@ -183,9 +183,10 @@ const classes = object({
           class: text,
           cells: withDefault(polyominoes, []),
           count: nullable(number),
-          share: number,
+          share: nullable(number),
           low: nullable(number),
           high: nullable(number),
+          note: nullable(text),
         }),
       ),
     }),
@@ -226,7 +227,7 @@ const biplot = object({
     x: numbers,
     y: numbers,
     names: list(text),
-    values: nullable(record(list(nullable(anything)))),
+    values: nullable(record(numbers)),
   }),
   arrows: list(object({ name: text, x: number, y: number })),
 });

@@ -3,7 +3,7 @@
 import { type Child, el, svg } from "./dom";
 import { rich } from "./symbols";
 
-export type Swatch = "line" | "dash" | "band" | "dot" | "hatch" | "cross" | "star" | "ring" | "box";
+export type Swatch = "line" | "dash" | "band" | "solid" | "dot" | "hatch" | "cross" | "star" | "ring" | "box";
 
 /** Returns a legend; the colour of a swatch is a colour or a variable of the style sheet. */
 export function legend(
@@ -28,6 +28,7 @@ const SHAPES: Readonly<Record<Swatch, () => SVGElement[]>> = {
   line: () => [svg("path", { d: "M1 6H17", class: "stroke" })],
   dash: () => [svg("path", { d: "M1 6H17", class: "stroke", "stroke-dasharray": "4 3" })],
   band: () => [svg("rect", { x: 1, y: 1, width: 16, height: 10, class: "fill faint" })],
+  solid: () => [svg("rect", { x: 1, y: 1, width: 16, height: 10, class: "fill" })],
   dot: () => [svg("circle", { cx: 9, cy: 6, r: 4, class: "fill" })],
   hatch: () => [
     svg("rect", { x: 1.5, y: 1.5, width: 15, height: 9, class: "outline" }),

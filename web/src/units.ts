@@ -66,9 +66,12 @@ export function displayFor(unit: string | null, values: Iterable<number>): Displ
   return displayOf(unit, magnitude === 0 ? 1 : magnitude);
 }
 
-/** Returns "label (unit)", or the label alone. */
+/** Returns "label (unit)", the unit before what a comma adds, or the label alone. */
 export function labelled(label: string, display: Display): string {
-  return display.unit === "" ? label : `${label} (${display.unit})`;
+  if (display.unit === "") return label;
+  const comma = label.indexOf(", ");
+  if (comma < 0) return `${label} (${display.unit})`;
+  return `${label.slice(0, comma)} (${display.unit})${label.slice(comma)}`;
 }
 
 /** Returns a number with so many significant digits, a real minus and no useless zeros. */

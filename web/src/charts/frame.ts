@@ -60,10 +60,12 @@ export function makeFrame(options: FrameOptions): Frame {
   const guess = options.height ?? options.width;
   const yTicks = ticksOf(options.y, guess / 46);
   const widest = Math.max(1, ...yTicks.map((tick) => tick.text.length));
-  const left = Math.ceil(widest * LETTER) + TICK + 6 + (options.y.label === "" ? 0 : LINE + 5);
+  const yLabel = labelLines(options.y, guess);
+  const left = Math.ceil(widest * LETTER) + TICK + 6 + (options.y.label === "" ? 0 : LINE * yLabel.length + 5);
   const width = Math.max(40, options.width - left - right);
   const height = options.height ?? (width * spanOf(options.y)) / spanOf(options.x);
-  const bottom = TICK + LINE + (options.x.label === "" ? 2 : LINE + 6);
+  const xLabel = labelLines(options.x, width + left);
+  const bottom = TICK + LINE + (options.x.label === "" ? 2 : LINE * xLabel.length + 6);
 
   const total = top + height + bottom;
   const picture = svg("svg", {
@@ -83,7 +85,7 @@ export function makeFrame(options: FrameOptions): Frame {
   const frame = { svg: picture, defs, plot, front, x, y, left, top, width, height };
   const xTicks = ticksOf(options.x, width / 64);
   picture.append(defs, ...gridLines(frame, options, yTicks), plot, border(frame), front);
-  picture.append(xAxis(frame, xTicks, options.x), yAxis(frame, yTicks, options.y));
+  picture.append(xAxis(frame, xTicks, xLabel), yAxis(frame, yTicks, yLabel));
   return frame;
 }
 
@@ -132,7 +134,16 @@ function gridLines(frame: Frame, options: FrameOptions, ticks: readonly Tick[]):
   });
 }
 
-function xAxis(frame: Frame, ticks: readonly Tick[], options: AxisOptions): SVGElement {
+/** Returns the label of an axis, in two lines when it is longer than its axis. */
+function labelLines(axis: AxisOptions, room: number): string[] {
+  if (axis.label === "") return [];
+  const label = labelled(axis.label, axis.display);
+  const comma = label.indexOf(", ");
+  if (label.length * LETTER <= room || comma < 0) return [label];
+  return [label.slice(0, comma + 1), label.slice(comma + 2)];
+}
+
+function xAxis(frame: Frame, ticks: readonly Tick[], label: readonly string[]): SVGElement {
   const bottom = frame.top + frame.height;
   const group = svg("g", { class: "axis", "aria-hidden": "true" });
   for (const tick of ticks) {
@@ -142,17 +153,14 @@ function xAxis(frame: Frame, ticks: readonly Tick[], options: AxisOptions): SVGE
       svg("text", { x, y: bottom + TICK + 12, "text-anchor": "middle" }, tick.text),
     );
   }
-  if (options.label !== "") {
-    const place = { x: frame.left + frame.width / 2, y: bottom + TICK + LINE + 14 };
-    const label = labelled(options.label, options.display);
-    group.append(
-      svg("text", { class: "label", "text-anchor": "middle", ...place }, ...richSvg(label)),
-    );
-  }
+  label.forEach((line, index) => {
+    const place = { x: frame.left + frame.width / 2, y: bottom + TICK + LINE + 14 + index * LINE };
+    group.append(svg("text", { class: "label", "text-anchor": "middle", ...place }, ...richSvg(line)));
+  });
   return group;
 }
 
-function yAxis(frame: Frame, ticks: readonly Tick[], options: AxisOptions): SVGElement {
+function yAxis(frame: Frame, ticks: readonly Tick[], label: readonly string[]): SVGElement {
   const group = svg("g", { class: "axis", "aria-hidden": "true" });
   for (const tick of ticks) {
     const y = frame.y.px(tick.at);
@@ -161,16 +169,10 @@ function yAxis(frame: Frame, ticks: readonly Tick[], options: AxisOptions): SVGE
       svg("text", { x: frame.left - TICK - 3, y: y + 4, "text-anchor": "end" }, tick.text),
     );
   }
-  if (options.label !== "") {
-    const middle = frame.top + frame.height / 2;
-    const label = labelled(options.label, options.display);
-    group.append(
-      svg(
-        "text",
-        { class: "label", transform: `translate(12 ${middle}) rotate(-90)`, "text-anchor": "middle" },
-        ...richSvg(label),
-      ),
-    );
-  }
+  const middle = frame.top + frame.height / 2;
+  label.forEach((line, index) => {
+    const turned = `translate(${12 + index * LINE} ${middle}) rotate(-90)`;
+    group.append(svg("text", { class: "label", transform: turned, "text-anchor": "middle" }, ...richSvg(line)));
+  });
   return group;
 }

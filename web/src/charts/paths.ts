@@ -18,20 +18,6 @@ export function linePath(x: ArrayLike<number>, y: ArrayLike<number>, from = 0, t
   return path;
 }
 
-/** Returns the data of a path that stays level until the next point. */
-export function stepPath(x: ArrayLike<number>, y: ArrayLike<number>): string {
-  const [stepX, stepY]: [number[], number[]] = [[], []];
-  for (let index = 0; index < x.length; index += 1) {
-    stepX.push(at(x, index));
-    stepY.push(at(y, index));
-    if (index + 1 < x.length) {
-      stepX.push(at(x, index + 1));
-      stepY.push(at(y, index));
-    }
-  }
-  return linePath(stepX, stepY);
-}
-
 /** Returns the data of the area between two lines. */
 export function bandPath(x: ArrayLike<number>, low: ArrayLike<number>, high: ArrayLike<number>): string {
   const known = Array.from(x, (_, index) => index).filter(

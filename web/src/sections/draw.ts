@@ -5,10 +5,19 @@ import type { Context } from "../context";
 import { el } from "../dom";
 import { type Kind, type RawSection, SECTIONS, type SectionOf } from "../page";
 import { rich } from "../symbols";
+import { drawBiplot } from "./biplot";
+import { drawClassTimes } from "./class_times";
+import { drawClasses } from "./classes";
 import { drawEmpty } from "./empty";
 import { drawFlow } from "./flow";
+import { drawImageGrid } from "./image_grid";
+import { drawL1Map } from "./l1_map";
+import { drawLines } from "./lines";
+import { drawManifest } from "./manifest";
 import { drawMap } from "./map";
+import { drawReplay } from "./replay";
 import { drawSummary } from "./summary";
+import { drawTable } from "./table";
 import { drawTrajectory } from "./trajectory";
 import { drawWarnings } from "./warnings";
 
@@ -20,6 +29,15 @@ const DRAWERS: Partial<{ [K in Kind]: Draw<K> }> = {
   trajectory: drawTrajectory,
   flow: drawFlow,
   map: drawMap,
+  lines: drawLines,
+  image_grid: drawImageGrid,
+  classes: drawClasses,
+  class_times: drawClassTimes,
+  l1_map: drawL1Map,
+  biplot: drawBiplot,
+  replay: drawReplay,
+  table: drawTable,
+  manifest: drawManifest,
   empty: drawEmpty,
 };
 

@@ -5,12 +5,13 @@ import type { Place } from "../charts/hover";
 import { figure } from "../charts/responsive";
 import { type Context, remembered } from "../context";
 import { el } from "../dom";
-import { type Cell, moveCell } from "../keyboard";
+import type { Cell } from "../keyboard";
 import type { MapSection } from "../page";
 import { type Swatch, choices, details, legend, readout, table } from "../parts";
 import { cellAt, cellEdges } from "../scale";
 import { rich, spoken } from "../symbols";
 import { inUnit, labelled, percent, short } from "../units";
+import { useGridKeys } from "./grid_keys";
 import { type MapData, decodeMap, distanceAt, errorAt, excerptSource, failureAt } from "./map_data";
 import { drawRefinedMap, drawWholeMap, failures } from "./map_plot";
 import { decodeRecorded, drawSetting } from "./map_setting";
@@ -75,7 +76,15 @@ export async function drawMap(section: MapSection, body: HTMLElement, context: C
     plot.redraw();
     line.show(cell === null ? null : reading(map, cell));
   };
-  useKeys(plot.element, map, () => choice, () => cursor, moved, select);
+  useGridKeys(plot.element, {
+    label: "Map of 1 − D",
+    size: map,
+    enabled: () => choice.view === "whole",
+    here: () => choice.selected ?? first ?? { row: 0, column: 0 },
+    cursor: () => cursor,
+    moved,
+    select,
+  });
   shown.append(line.element, mapLegend(map), details("Values as a table", () => valueTable(map)));
 
   if (first === null) {
@@ -157,35 +166,6 @@ function refinedReading(
     [shortName(map.section.x.label), inUnit(refined.x[column] ?? Number.NaN, map.xDisplay, 4)],
     ["1 − D", short(1 - at(refined.value.data, row * refined.x.length + column), 3)],
   ];
-}
-
-function useKeys(
-  element: HTMLElement,
-  map: MapData,
-  choice: () => Choice,
-  cursor: () => Cell | null,
-  moved: (cell: Cell | null) => void,
-  select: (cell: Cell) => void,
-): void {
-  element.tabIndex = 0;
-  element.setAttribute("role", "application");
-  element.setAttribute("aria-roledescription", "map");
-  element.setAttribute("aria-label", "Map of 1 − D: arrow keys move over the settings, Enter selects one");
-  element.addEventListener("keydown", (event) => {
-    if (choice().view !== "whole") return;
-    const here = cursor() ?? choice().selected ?? startCell(map) ?? { row: 0, column: 0 };
-    if (event.key === "Enter" || event.key === " ") select(here);
-    else if (event.key === "Escape") moved(null);
-    else {
-      const next = moveCell(here, event.key, map);
-      if (next === null) return;
-      moved(next);
-    }
-    event.preventDefault();
-  });
-  element.addEventListener("blur", () => {
-    if (cursor() !== null) moved(null);
-  });
 }
 
 /** Returns what shows a setting in the panel; of several calls the last one counts. */

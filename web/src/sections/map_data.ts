@@ -21,10 +21,11 @@ export interface MapData {
 
 /** What a reader sees of one setting beside the recording. */
 export interface Excerpt {
+  /** Empty when no path was kept. */
   readonly x: ArrayLike<number>;
   readonly y: ArrayLike<number>;
   readonly time: Grid | null;
-  readonly density: Grid;
+  readonly density: Grid | null;
   readonly ksStepLength: number;
   readonly ksTurningAngle: number;
 }
@@ -73,21 +74,22 @@ export function excerptSource(
   if (cells !== null) {
     const decoded = Promise.all([
       decodeMaybe(cells.excerpt_time),
-      decode(cells.excerpt_x),
-      decode(cells.excerpt_y),
-      decode(cells.density),
-      decode(cells.ks_step_length),
-      decode(cells.ks_turning_angle),
+      decodeMaybe(cells.excerpt_x),
+      decodeMaybe(cells.excerpt_y),
+      decodeMaybe(cells.density),
+      decodeMaybe(cells.ks_step_length),
+      decodeMaybe(cells.ks_turning_angle),
     ]);
     return async (row, column) => {
       const [time, x, y, density, length, angle] = await decoded;
+      const cell = row * map.columns + column;
       return {
-        x: part(x, row, column),
-        y: part(y, row, column),
+        x: x === null ? [] : part(x, row, column),
+        y: y === null ? [] : part(y, row, column),
         time,
-        density: { shape: density.shape.slice(2), data: part(density, row, column) },
-        ksStepLength: at(length.data, row * map.columns + column),
-        ksTurningAngle: at(angle.data, row * map.columns + column),
+        density: density === null ? null : { shape: density.shape.slice(2), data: part(density, row, column) },
+        ksStepLength: at(length?.data ?? [], cell),
+        ksTurningAngle: at(angle?.data ?? [], cell),
       };
     };
   }
@@ -96,16 +98,17 @@ export function excerptSource(
   return async (row, column) => decodeExcerpt(await fetchCell(map.section.id, row, column));
 }
 
-async function decodeExcerpt(cell: CellExcerpt): Promise<Excerpt> {
+async function decodeExcerpt(cell: CellExcerpt): Promise<Excerpt | null> {
+  if (cell.x === null && cell.density === null) return null;
   const [time, x, y, density] = await Promise.all([
     decodeMaybe(cell.time),
-    decode(cell.x),
-    decode(cell.y),
-    decode(cell.density),
+    decodeMaybe(cell.x),
+    decodeMaybe(cell.y),
+    decodeMaybe(cell.density),
   ]);
   return {
-    x: x.data,
-    y: y.data,
+    x: x?.data ?? [],
+    y: y?.data ?? [],
     time,
     density,
     ksStepLength: cell.ksStepLength ?? Number.NaN,

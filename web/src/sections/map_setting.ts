@@ -40,7 +40,7 @@ export function drawSetting(body: HTMLElement, map: MapData, recorded: Recorded 
   }
   drawExcerpt(column(pair, "This setting"), arena, excerpt.x, excerpt.y, `Path of this setting${span}`);
   const edges = map.section.recording;
-  if (recorded === null || edges === null) return;
+  if (recorded === null || edges === null || excerpt.density === null) return;
   const bins = { length: edges.step_length_edges, angle: edges.turning_angle_edges };
   const look = densityLook(bins, [recorded.density, excerpt.density]);
   const cross = { length: excerpt.ksStepLength, angle: excerpt.ksTurningAngle };
