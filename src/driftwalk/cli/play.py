@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -15,6 +15,7 @@ from driftwalk.cli.options import (
     Seed,
     StudyFile,
     TankDiameter,
+    override_study,
     resolve_study,
     study_overrides,
 )
@@ -76,7 +77,11 @@ def play(
     overrides = study_overrides(
         keys=ASSEMBLY_KEYS, tank_diameter=tank_diameter, blocks=blocks, seed=seed
     )
-    chosen = resolve_study(study, {**(_bundled() if bundled else {}), **overrides})
+    if bundled:
+        base, name = _bundled(), "the bundled example"
+    else:
+        base, name = resolve_study(study, {}), str(study or "the default study")
+    chosen = override_study(base, overrides, base=name, keys=ASSEMBLY_KEYS)
     source = PlaySource(
         chosen,
         _flow(flow, chosen, bundled=bundled),
@@ -94,12 +99,13 @@ def play(
         show(source, host=host, port=port, open=open)
 
 
-def _bundled() -> dict[str, Any]:
-    """Return the parameters of the bundled recording."""
+def _bundled() -> Study:
+    """Return the study of the bundled recording: its parameters, and a few blocks."""
     from driftwalk.datasets import tank30_truth
+    from driftwalk.model import Study, apply_overrides
 
     truth = tank30_truth()
-    return {
+    known = {
         "forces.drag_coefficient": truth["drag_coefficient"],
         "forces.force_std_N": truth["force_std_N"],
         "forces.force_interval_s": truth["force_interval_s"],
@@ -107,6 +113,7 @@ def _bundled() -> dict[str, Any]:
         "tank.wall_restitution": truth["wall_restitution"],
         "assembly.blocks": BLOCKS,
     }
+    return apply_overrides(Study(), known)
 
 
 def _flow(path: Path | None, study: Study, *, bundled: bool) -> xr.Dataset:

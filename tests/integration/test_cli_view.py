@@ -1,0 +1,286 @@
+"""`driftwalk view` and `driftwalk play` as a user runs them, with what can be wrong."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import socket
+import sys
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import here, refusal
+from finished_run import write_finished_run
+from page_server import PageServer, received, say, served
+from websockets.exceptions import InvalidStatus
+
+import driftwalk as dw
+from driftwalk.core.rundir import RunDirectory
+
+HOSTILE = "<script>alert(1)<|script>&\"'"
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a finished calibration in a folder with a hostile name."""
+    return write_finished_run(tmp_path_factory.mktemp("view") / HOSTILE)
+
+
+@pytest.fixture(scope="module")
+def server(finished: Path) -> Iterator[PageServer]:
+    """Serve the finished run."""
+    with served("view", finished) as started:
+        yield started
+
+
+def test_page_of_a_finished_run(server: PageServer, finished: Path) -> None:
+    assert server.address == f"http://127.0.0.1:{server.port}/"
+    page = server.get("/")
+    assert page.status == 200
+    assert page.headers["x-content-type-options"] == "nosniff"
+    assert page.headers["cache-control"] == "no-store"
+    policy = page.headers["content-security-policy"]
+    assert "default-src 'none'" in policy
+    assert "unsafe" not in policy
+    assert "<script>alert" not in page.body.decode()
+    for name in ("driftwalk.js", "driftwalk.css"):
+        assert server.get(f"/{name}").status == 200
+    with server.socket() as channel:
+        sent = received(channel, "page")["page"]
+    assert sent["view"] == "run"
+    assert sent["state"]["finished"] is True
+    found = xr.load_dataset(finished / "calibration.nc", engine="h5netcdf")
+    section = next(part for part in sent["sections"] if part["kind"] == "map")
+    np.testing.assert_allclose(dw.decode_array(section["value"]), found["ks_distance"].values)
+
+
+def test_files_and_report(server: PageServer, finished: Path) -> None:
+    stored = server.get("/files/figures/map.png")
+    assert stored.body == (finished / "figures" / "map.png").read_bytes()
+    assert stored.headers["content-type"] == "application/octet-stream"
+    assert stored.headers["content-disposition"].startswith("attachment")
+    report = server.get("/report.html")
+    assert report.headers["content-disposition"].startswith("attachment")
+    assert b"<script>alert" not in report.body
+    assert report.body.startswith(b"<!doctype html>")
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        *("/files/../../etc/passwd", "/files/%2e%2e/study.toml", "/files/..%2fstudy.toml"),
+        *("/files//etc/passwd", "/files/.lock", "/files/figures", "/files/", "/files/%00"),
+        *("/../study.toml", "/docs", "/openapi.json", "/nothing", "/static/driftwalk.js"),
+    ],
+)
+def test_no_other_path(server: PageServer, path: str) -> None:
+    answer = server.get(path)
+    assert answer.status == 404
+    assert b"force_std" not in answer.body
+    assert "content-security-policy" in answer.headers
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Host": "evil.example"},
+        {"Origin": "http://evil.example"},
+        {"Origin": "null"},
+        {"Host": "evil.example", "Origin": "http://evil.example"},
+    ],
+)
+def test_strangers_are_turned_away(server: PageServer, headers: dict[str, str]) -> None:
+    for path in ("/", "/driftwalk.js", "/files/calibration.nc", "/report.html"):
+        assert server.get(path, **headers).status == 403
+    if "Host" not in headers:
+        with pytest.raises(InvalidStatus, match="403"), server.socket(**headers):
+            pass
+
+
+def test_only_reading(server: PageServer) -> None:
+    for method in ("POST", "PUT", "DELETE", "OPTIONS"):
+        assert server.get("/", method=method).status == 405
+
+
+def test_nonsense_on_the_socket_is_survived(server: PageServer) -> None:
+    with server.socket() as channel:
+        received(channel, "page")
+        for text in ("", "{", "[]", "null", '{"type":{}}', '{"type":"cell","row":"x"}', "[" * 9999):
+            channel.send(text)
+        channel.send(b"\xff\x00")
+        say(channel, type="cell", id="map", row=0, column=0)
+        while received(channel, "cell")["row"] != 0:
+            pass
+    with server.socket() as channel:
+        received(channel, "page")
+
+
+def test_a_browser_that_goes_away_is_forgotten(server: PageServer) -> None:
+    for _ in range(40):
+        with closing(socket.create_connection(("127.0.0.1", server.port))) as raw:
+            key = "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
+            head = f"GET /ws HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n"
+            raw.sendall(f"{head}Upgrade: websocket\r\nConnection: Upgrade\r\n{key}\r\n".encode())
+            assert raw.recv(12) == b"HTTP/1.1 101"
+            # Torn off, with the page on its way.
+    with server.socket() as channel:
+        received(channel, "page")
+
+
+def test_ctrl_c_ends_it(finished: Path) -> None:
+    with served("view", finished) as started, started.socket() as channel:
+        received(channel, "page")
+        code, words = started.stop()
+        assert code == 0, words
+        assert "Traceback" not in words
+
+
+def test_away_from_loopback_a_token_is_asked_for(finished: Path) -> None:
+    with served("view", finished, "--host", "0.0.0.0") as started:
+        token = started.parts.query
+        assert token.startswith("token=")
+        assert started.get("/").status == 403
+        assert started.get("/?token=guess").status == 403
+        page = started.get(f"/?{token}")
+        assert page.status == 200
+        assert f"driftwalk.js?{token}" in page.body.decode()
+        with started.socket(query=f"?{token}") as channel:
+            received(channel, "page")
+        with pytest.raises(InvalidStatus, match="403"), started.socket():
+            pass
+
+
+def test_a_port_in_use(finished: Path) -> None:
+    with closing(socket.create_server(("127.0.0.1", 0))) as taken:
+        port = taken.getsockname()[1]
+        words = refusal(here("view", finished, "--port", port, "--no-open"))
+    assert f"port {port} on 127.0.0.1 is in use" in words
+    assert "--port" in words
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["view"], "name a run directory"),
+        (["view", "nowhere"], "nowhere: there is no such directory"),
+        (["view", "."], "holds no run of driftwalk"),
+        (["view", ".", "--live", "5000"], "name a run directory, or a stream"),
+        (["view", "--live", "lab"], "expected an address and a port"),
+        (["view", "--live", "lab:99999"], "expected an address and a port"),
+        (["play", "--blocks", "200"], "do not fit into the tank"),
+        (["play", "--blocks", "5000"], "--blocks over the bundled example"),
+        (["play", "--study", "nowhere.toml"], "nowhere.toml"),
+        (["play", "--flow", "nowhere.nc"], "nowhere.nc"),
+        (["play", "--recording", "nowhere.csv"], "nowhere.csv"),
+    ],
+)
+def test_mistakes(
+    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert said in refusal(here(*words))
+
+
+@pytest.mark.parametrize("words", [["--host", "no.such.host.invalid"], ["--port", "70000"]])
+def test_no_such_address(finished: Path, words: list[str]) -> None:
+    refusal(here("view", finished, "--no-open", *words))
+
+
+@pytest.mark.parametrize("package", ["fastapi", "uvicorn", "websockets"])
+def test_without_the_extra_one_line_says_what_to_install(
+    finished: Path, package: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    for command in (["view", finished], ["play"]):
+        words = refusal(here(*command))
+        assert f"needs {package}: pip install 'driftwalk[view]'" in words
+
+
+def test_a_run_of_a_later_version(finished: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(finished, folder)
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["manifest_version"] = 99
+    manifest["software"]["driftwalk"] = "9.9.9"
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    words = refusal(here("view", folder, "--no-open"))
+    assert "9.9.9" in words
+    assert "manifest version 99" in words
+
+
+def test_a_finished_run_that_lost_its_results(finished: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(finished, folder)
+    (folder / "calibration.nc").unlink()
+    with served("view", folder) as started, started.socket() as channel:
+        page = received(channel, "page")["page"]
+    # An honest empty state in place of the map, the rest is shown.
+    kinds = [section["kind"] for section in page["sections"]]
+    assert "map" not in kinds
+    assert "empty" in kinds
+
+
+def test_a_sweep_that_has_not_begun(tmp_path: Path) -> None:
+    specification = {"study": dw.Study().to_dict(), "body": None, "recording_sha256": "0"}
+    with (
+        RunDirectory(tmp_path / "run", specification=specification),
+        served("view", tmp_path / "run") as started,
+        started.socket() as channel,
+    ):
+        page = received(channel, "page")["page"]
+        assert page["state"] == {"finished": False, "progress": 0.0, "words": "map: 0 %"}
+        value = dw.decode_array(page["sections"][0]["value"])
+        assert np.isnan(value).all()
+        say(channel, type="cell", id="map", row=0, column=0)
+        assert received(channel, "cell")["excerpt_x"] is None
+
+
+def test_play_shows_a_tank_and_speaks_as_a_tracker() -> None:
+    with closing(socket.create_server(("127.0.0.1", 0))) as taken:
+        port = taken.getsockname()[1]
+    with served("play", "--blocks", 3, "--live", port) as started:
+        with started.socket() as channel:
+            page = received(channel, "page")["page"]
+            assert [s["kind"] for s in page["sections"]] == ["tank", "controls", "density"]
+            first = received(channel, "tank")
+            assert len(first["x"]) == 3
+            say(channel, type="set", name="blocks", value=4)
+            for _ in range(200):
+                if len(received(channel, "tank")["x"]) == 4:
+                    break
+            else:
+                raise AssertionError("the number of blocks did not change")
+            say(channel, type="set", name="force_std", value=-1)
+            assert "stochastic force" in received(channel, "note")["words"]
+            assert received(channel, "density")["noise_floor"] is None
+        live = f"127.0.0.1:{port}"
+        with served("view", "--live", live) as watcher, watcher.socket() as channel:
+            assert received(channel, "page")["page"]["view"] == "live"
+            assert received(channel, "hello")["source"] == "playground"
+            frame = received(channel, "frame")
+            assert len(frame["bodies"]) == 4
+            assert received(channel, "frame")["time_s"] > frame["time_s"]
+
+
+def test_play_does_without_a_bundled_flow(tmp_path: Path) -> None:
+    with served("play", "--tank-diameter", "60cm", "--blocks", 2) as started:
+        with started.socket() as channel:
+            page = received(channel, "page")["page"]
+            assert page["sections"][0]["arena"]["diameter_m"] == 0.6
+            assert page["sections"][2]["recording"] is None
+        _, words = started.stop()
+    assert "the water moves in a random one" in words
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a directory cannot have this name elsewhere")
+def test_the_folder_s_name_is_only_text(server: PageServer, finished: Path) -> None:
+    assert finished.name == HOSTILE
+    with server.socket() as channel:
+        assert HOSTILE in json.dumps(received(channel, "page")["page"], ensure_ascii=False).replace(
+            '\\"', '"'
+        )

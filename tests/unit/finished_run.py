@@ -1,0 +1,50 @@
+"""A finished calibration in a run directory, small and real, for the tests of pages."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from command_line import FLOW, RECORDING
+
+import driftwalk as dw
+from driftwalk.core.provenance import manifest
+from driftwalk.core.rundir import RunDirectory
+from driftwalk.model import Study
+
+SEARCH = {
+    "calibration.drag_coefficient_min": 0.2,
+    "calibration.drag_coefficient_max": 0.6,
+    "calibration.drag_coefficient_step": 0.1,
+    "calibration.force_std_min_N": 0.2e-3,
+    "calibration.force_std_max_N": 1e-3,
+    "calibration.force_std_step_N": 0.2e-3,
+    "calibration.replicates": 2,
+    "calibration.refine": "none",
+    "calibration.bootstrap": 0,
+}
+
+
+def write_finished_run(folder: Path) -> Path:
+    """Calibrate on the bundled recording, 25 settings without refinement, and return the folder."""
+    study = dw.apply_overrides(Study(), SEARCH)
+    recording, flow = dw.tank30_recording(), dw.tank30_flow()
+    found = dw.calibrate(recording, study, flow=flow, threads=1)
+    specification = {
+        "study": study.to_dict(),
+        "body": None,
+        "recording_sha256": "0" * 64,
+        "flow_sha256": "0" * 64,
+    }
+    with RunDirectory(folder, specification=specification) as run:
+        about = manifest(
+            command=["driftwalk", "calibrate", str(RECORDING)],
+            study=study.to_dict(),
+            seeds={"calibration": study.calibration.seed},
+            inputs={"recording": RECORDING, "flow": FLOW},
+        )
+        parts = {"calibration.nc": found, "recording.nc": recording, "flow.nc": flow}
+        for name, dataset in parts.items():
+            run.write(name, bytes(dataset.to_netcdf(engine="h5netcdf")))
+        run.write("figures/map.png", b"no picture")
+        run.finish(about)
+    return folder
