@@ -11,7 +11,8 @@ namespace driftwalk {
 
 namespace {
 constexpr UInt32 most_attempts = 20;
-constexpr int most_draws = 5000; // per block
+constexpr int most_draws = 5000;      // per block
+constexpr int most_draws_later = 500; // for one that comes later, which may try again
 
 Philox<UInt32> stream_of(std::uint64_t key) {
   return {static_cast<UInt32>(key), static_cast<UInt32>(key >> 32)};
@@ -53,9 +54,9 @@ bool is_clear(const AssemblyRules& rules, const Placed& p, const double* start, 
 }
 
 // Word 0 of the address: attempt; 1: block; 2: draw.
-bool place_one(const AssemblyRules& rules, const Philox<UInt32>& stream, UInt32 attempt, int block,
-               double* start) {
-  for (int draw = 0; draw < most_draws; ++draw) {
+bool place_one(const AssemblyRules& rules, const Philox<UInt32>& stream, UInt32 attempt, int draws,
+               int block, double* start) {
+  for (int draw = 0; draw < draws; ++draw) {
     UInt32 words[4];
     stream(attempt, static_cast<UInt32>(block), static_cast<UInt32>(draw),
            static_cast<UInt32>(Purpose::start), words);
@@ -75,8 +76,8 @@ bool place_one(const AssemblyRules& rules, const Philox<UInt32>& stream, UInt32 
 bool place_one_more(const AssemblyRules& rules, std::uint64_t key, std::int64_t interval, int block,
                     double* start) {
   // Beyond the attempts of the start, so that no number is drawn twice.
-  return place_one(rules, stream_of(key), static_cast<UInt32>(most_attempts + interval), block,
-                   start);
+  return place_one(rules, stream_of(key), static_cast<UInt32>(most_attempts + interval),
+                   most_draws_later, block, start);
 }
 
 int place_blocks(const AssemblyRules& rules, std::uint64_t key, double* start) {
@@ -84,7 +85,7 @@ int place_blocks(const AssemblyRules& rules, std::uint64_t key, double* start) {
   int most = 0;
   for (UInt32 attempt = 0; attempt < most_attempts; ++attempt) {
     int block = 0;
-    while (block < rules.blocks && place_one(rules, stream, attempt, block, start)) {
+    while (block < rules.blocks && place_one(rules, stream, attempt, most_draws, block, start)) {
       ++block;
     }
     most = std::max(most, block);
