@@ -50,7 +50,7 @@ class Marks:
         """
         score = np.zeros((frames, bodies))
         still = [
-            _Mark(track, track.rival.since, frames - 1, track.rival.score)
+            _Mark(track, track.rival.since, track.samples.last_frame, track.rival.score)
             for track in tracks
             if track.rival is not None
         ]
