@@ -14,7 +14,6 @@ from driftwalk.report.page_manifest import manifest_section
 from driftwalk.report.page_parts import (
     SIMULATED,
     Section,
-    empty_section,
     is_simulated,
     section,
     warnings_section,

@@ -114,10 +114,11 @@ def assembly_summary(
     paragraphs = [f"{done}.", _most_common(distribution)]
     shown = [_complete(distribution, "complete: one assembly")]
     if drawn is not None:
-        what = ", ".join(_word(name) for name in str(drawn.attrs.get("drawn", "")).split())
+        what = ", ".join(_drawn_word(name) for name in str(drawn.attrs.get("drawn", "")).split())
         paragraphs.append(
-            f"A second set of runs has its own {what} each, drawn from what the calibration leaves "
-            "open: how the two differ is what that leaves open of the prediction."
+            f"In a second set each run has its own {what or 'parameters'}, drawn from what the "
+            "calibration leaves open: by how much the two sets differ is what that leaves open of "
+            "the prediction."
         )
         shown.append(_complete(drawn, "complete, parameters drawn"))
     paragraphs.append(
@@ -136,7 +137,8 @@ def survival_section(times: xr.Dataset) -> Section:
     drawn: list[dict[str, Any]] = []
     for name, words in SURVIVAL.items():
         ends = [f"{name}_{end}" for end in ("low", "high")]
-        band = (times[ends[0]].values, times[ends[1]].values) if ends[0] in times else None
+        known = all(end in times for end in ends)
+        band = (times[ends[0]].values, times[ends[1]].values) if known else None
         drawn.append(series(words, times["time"].values, times[name].values, ends=band))
     return chart(
         "survival", "How long it takes",
@@ -210,6 +212,10 @@ def _left_out(found: dict[str, xr.Dataset]) -> list[str]:
         for name, one in found.items()
         if one.attrs.get("left_out")
     ]
+
+
+def _drawn_word(name: str) -> str:
+    return "stochastic force" if name == "force_std" else _word(name)
 
 
 def _word(name: str) -> str:

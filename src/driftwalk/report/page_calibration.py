@@ -91,6 +91,7 @@ def calibration_sections(
 
 def calibration_summary(calibration: xr.Dataset) -> Section:
     """Return the answer of a calibration in words and numbers."""
+    require(calibration, "ks_distance")
     facts = calibration.attrs
     every = quantity(required(calibration, "force_interval_s"), "s")
     paragraphs = [SIMULATED] if is_simulated(calibration) else []
@@ -195,10 +196,11 @@ def _what_was_found(calibration: xr.Dataset) -> str:
         for name, unit in (("drag_coefficient", "1"), ("force_std_N", "N"))
     )
     every = quantity(required(calibration, "force_interval_s"), "s")
+    intensity = quantity(required(calibration, "force_noise_intensity_N2_s"), "N² s")
     return (
         f"The best agreement is at a drag coefficient C_d = {drag} and a stochastic force "
         f"σ_F = {force}, drawn anew every {every}. What the recording can tell is σ_F²·τ = "
-        f"{required(calibration, 'force_noise_intensity_N2_s'):.4g} N² s: σ_F means nothing "
+        f"{intensity}: σ_F means nothing "
         "without its interval."
     )
 
@@ -217,7 +219,7 @@ def _how_good(calibration: xr.Dataset) -> list[str]:
     )
     words = (
         f"There D = {distance:.4g}, where two runs of one and the same model are {floor:.4g} apart "
-        f"(noise floor): {ratio:.3g} times it, {verdict}."
+        f"(noise floor): {ratio:.2f} times it, {verdict}."
     )
     second, second_floor = (
         value_of(calibration, f"second_half_{name}") for name in ("ks_distance", "noise_floor")

@@ -103,7 +103,7 @@ def drag_axis(dataset: xr.Dataset, name: str = "drag_coefficient") -> dict[str, 
 def region_part(calibration: xr.Dataset) -> dict[str, Any] | None:
     """Return the border of the joint region, None when there is none."""
     names = ("region_force_std", "region_drag_coefficient")
-    if any(name not in calibration for name in names):
+    if not _has(calibration, *names):
         return None
     x, y = (calibration[name].values for name in names)
     known = np.isfinite(x) & np.isfinite(y)
@@ -114,6 +114,10 @@ def region_part(calibration: xr.Dataset) -> dict[str, Any] | None:
         "y": plain_list(y[known]),
         "confidence": value_of(calibration, "confidence"),
     }
+
+
+def _has(calibration: xr.Dataset, *names: str) -> bool:
+    return all(name in calibration.variables for name in names)
 
 
 def _plane(calibration: xr.Dataset, name: str, prefix: str = "") -> Floats:
@@ -158,7 +162,7 @@ def _found(calibration: xr.Dataset) -> dict[str, Any] | None:
 
 
 def _refined(calibration: xr.Dataset) -> dict[str, Any] | None:
-    if "refined_ks_distance" not in calibration:
+    if not _has(calibration, "refined_ks_distance", *(f"refined_{name}" for name in PLANE)):
         return None
     return {
         "x": plain_list(calibration["refined_force_std"].values),
@@ -172,7 +176,7 @@ def _cells(calibration: xr.Dataset) -> dict[str, Any] | None:
     kept: dict[str, Any] = dict.fromkeys(
         ("excerpt_time", "excerpt_x", "excerpt_y", "density", "ks_step_length", "ks_turning_angle")
     )
-    if "excerpt_x" in calibration and "excerpt_y" in calibration:
+    if _has(calibration, "excerpt_x", "excerpt_y", "excerpt_time"):
         x, y = (_plane(calibration, f"excerpt_{name}") for name in "xy")
         step = _excerpt_step(x, y)
         kept["excerpt_x"] = encode_array(x, dtype="i2", resolution=step, delta=True)
@@ -199,6 +203,8 @@ def _typical(calibration: xr.Dataset, name: str) -> Floats:
     values = _plane(calibration, name)
     if values.ndim == 2:
         return values
+    if "ks_distance_replicate" not in calibration:
+        return values[..., 0]
     distance = _plane(calibration, "ks_distance_replicate")
     away = np.abs(distance - _plane(calibration, "ks_distance")[..., None])
     nearest = np.argmin(np.where(np.isfinite(away), away, np.inf), axis=2)
@@ -207,7 +213,7 @@ def _typical(calibration: xr.Dataset, name: str) -> Floats:
 
 def _recording(calibration: xr.Dataset, recording: xr.Dataset | None) -> dict[str, Any] | None:
     """Return what stands beside a cell: the recording's density and its first seconds."""
-    if "recording_step_density" not in calibration:
+    if not _has(calibration, "recording_step_density", "step_length_edge", "turning_angle_edge"):
         return None
     part: dict[str, Any] = {
         "density": encode_array(calibration["recording_step_density"].values),

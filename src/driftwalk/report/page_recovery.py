@@ -39,7 +39,7 @@ SUMMARY: Final = {
     "coverage_low": "at least",
     "coverage_high": "at most",
 }
-DIMS: Final = ("duration", "angle", "recording")
+COORDINATES: Final = ("duration", "angle", "parameter")
 
 
 def recovery_sections(recovery: xr.Dataset | None) -> list[Section]:
@@ -62,6 +62,10 @@ def recovery_sections(recovery: xr.Dataset | None) -> list[Section]:
     """
     if recovery is None:
         return [empty_section("summary", "What was found", "There are no estimates yet.")]
+    missing = [name for name in COORDINATES if name not in recovery.variables]
+    if missing:
+        reason = f"the recovery holds no {', '.join(missing)}"
+        return [empty_section("summary", "What was found", reason)]
     made = attempt("summary", "What was found", lambda: recovery_summary(recovery))
     made += attempt("warnings", "Warnings", lambda: warnings_section(_warnings(recovery)))
     made += attempt("errors", "Errors and intervals", lambda: errors_section(recovery))
@@ -79,7 +83,8 @@ def recovery_sections(recovery: xr.Dataset | None) -> list[Section]:
 
 def recovery_summary(recovery: xr.Dataset) -> Section:
     """Return a recovery study in words and numbers."""
-    require(recovery, "used", "median_absolute_error", "coverage", "needed_duration")
+    ends = [f"needed_duration{end}" for end in ("", "_low", "_high")]
+    require(recovery, "used", "median_absolute_error", "coverage", *ends)
     lengths = ", ".join(quantity(float(value), "s") for value in recovery["duration"].values)
     confidence = value_of(recovery, "confidence")
     done = (

@@ -84,7 +84,7 @@ def sensitivity_sections(
         made += attempt(
             "summary", "What was found", lambda: sensitivity_summary(sensitivity, reference)
         )
-        made.append(warnings_section(_warnings(sensitivity)))
+        made += attempt("warnings", "Warnings", lambda: warnings_section(_warnings(sensitivity)))
         made += attempt("l1", "Distance to the reference", lambda: l1_sections(sensitivity))
         made += attempt("medians", "Over the settings", lambda: setting_sections(sensitivity))
     if reference is not None:
@@ -148,6 +148,12 @@ def sensitivity_summary(sensitivity: xr.Dataset, reference: xr.Dataset | None) -
     )
 
 
+def require_axes(sensitivity: xr.Dataset) -> None:
+    """Raise `InputError` unless the study has its distances and the values of its axes."""
+    require(sensitivity, "l1_distance")
+    require(sensitivity, *map(str, sensitivity["l1_distance"].dims))
+
+
 def l1_sections(sensitivity: xr.Dataset) -> list[Section]:
     """Return the distance to the reference over the axes: maps, or lines where they are no map.
 
@@ -163,7 +169,7 @@ def l1_sections(sensitivity: xr.Dataset) -> list[Section]:
     InputError
         When it holds no distance.
     """
-    require(sensitivity, "l1_distance")
+    require_axes(sensitivity)
     made: list[Section] = []
     for number_of, (words, part) in enumerate(_slices(sensitivity)):
         if number_of == MOST_SLICES:
@@ -186,6 +192,7 @@ def setting_sections(sensitivity: xr.Dataset) -> list[Section]:
         "first_contact_median": ("Median time of the first contact", "time", "s"),
         "completion_median": ("Median time of completion", "time", "s"),
     }
+    require_axes(sensitivity)
     made: list[Section] = []
     if sensitivity["l1_distance"].ndim > MAP_AXES:
         return made
@@ -210,7 +217,8 @@ def setting_sections(sensitivity: xr.Dataset) -> list[Section]:
 
 def biplot_section(components: xr.Dataset, sensitivity: xr.Dataset) -> Section:
     """Return the settings on their first two principal components, the classes as arrows."""
-    require(components, "score", "loading", "explained_variance_ratio")
+    require(components, "score", "loading", "explained_variance_ratio", "class")
+    require_axes(sensitivity)
     if components.sizes["component"] < MAP_AXES:
         raise InputError("all outcomes lie on one line: there is one principal component")
     dims = [str(dim) for dim in components["score"].dims if dim != "component"]
@@ -404,10 +412,11 @@ def _value_words(name: str, value: Any) -> str:
 
 
 def _axis_words(name: str) -> str:
-    return name.replace("_std", "").replace("_", " ")
+    return "stochastic force" if name == "force_std" else name.replace("_", " ")
 
 
 def _warnings(sensitivity: xr.Dataset) -> list[str]:
+    require(sensitivity, "l1_distance")
     left_out = int(sensitivity["left_out"].sum()) if "left_out" in sensitivity else 0
     unknown = int((~np.isfinite(sensitivity["l1_distance"].values)).sum())
     said = (

@@ -7,6 +7,7 @@ from typing import Final
 
 _PREFIXES: Final = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
 _PREFIXED: Final = ("m", "s", "N", "m/s", "Hz")
+_RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def quantity(value: float, unit: str = "1", *, digits: int = 4) -> str:
@@ -25,24 +26,26 @@ def quantity(value: float, unit: str = "1", *, digits: int = 4) -> str:
     --------
     >>> quantity(0.000665, "N"), quantity(0.3825), quantity(1800.0, "s"), quantity(0.3, "m")
     ('0.665 mN', '0.3825', '30 min', '30 cm')
+    >>> quantity(7.076e-9, "N² s")
+    '7.076×10⁻⁹ N² s'
     """
     if not math.isfinite(value):
         return "unknown"
     if unit == "1":
-        return f"{value:.{digits}g}"
+        return _digits(value, digits)
     if unit == "s" and value >= 120.0:
-        return f"{value / 60.0:.{digits}g} min"
+        return f"{_digits(value / 60.0, digits)} min"
     if unit == "m" and 0.01 <= abs(value) < 1.0:
-        return f"{100.0 * value:.{digits}g} cm"
+        return f"{_digits(100.0 * value, digits)} cm"
     if unit == "m/s" and 0.001 <= abs(value) < 1.0:
-        return f"{100.0 * value:.{digits}g} cm/s"
+        return f"{_digits(100.0 * value, digits)} cm/s"
     if unit == "N" and 1e-5 <= abs(value) < 1.0:
-        return f"{1e3 * value:.{digits}g} mN"
+        return f"{_digits(1e3 * value, digits)} mN"
     if unit not in _PREFIXED or value == 0.0:
-        return f"{value:.{digits}g} {unit}"
+        return f"{_digits(value, digits)} {unit}"
     power = 3 * math.floor(math.log10(abs(value)) / 3.0 + 1e-12)
     power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
-    return f"{value / 10.0**power:.{digits}g} {_PREFIXES[power]}{unit}"
+    return f"{_digits(value / 10.0**power, digits)} {_PREFIXES[power]}{unit}"
 
 
 def percent(share: float) -> str:
@@ -85,3 +88,10 @@ def with_interval(
     return (
         f"{quantity(value, unit)} ({words} {quantity(ends[0], unit)} to {quantity(ends[1], unit)})"
     )
+
+
+def _digits(value: float, digits: int) -> str:
+    """Return a number with so many significant digits, powers of ten written as such."""
+    text = f"{value:.{digits}g}"
+    mantissa, _, power = text.partition("e")
+    return f"{mantissa}×10{str(int(power)).translate(_RAISED)}" if power else text

@@ -1,0 +1,147 @@
+"""The pages of a fit, its check and a recovery study hold the numbers of their datasets."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from made_up_fit import made_up_check, made_up_fit
+from page_reading import numbers_of, part_of, values
+from recovery_worlds import TRUTH, synthetic_recovery
+from synthetic_calibration import bundled_recording
+
+from driftwalk.report import fit_sections, recovery_sections
+
+
+@pytest.fixture(scope="module")
+def sections() -> list[dict[str, Any]]:
+    recordings = [bundled_recording(rows=300), bundled_recording(rows=200)]
+    return fit_sections(made_up_fit(), recordings=recordings, check=made_up_check())
+
+
+def test_the_answer_of_a_fit_with_its_uncertainty(sections: list[dict[str, Any]]) -> None:
+    part, fit = part_of(sections, "summary"), made_up_fit()
+    shown = numbers_of(part)
+    for label, name in (
+        ("drag coefficient", "drag_coefficient"),
+        ("stochastic force", "force_std_N"),
+        ("noise intensity", "force_noise_intensity_N2_s"),
+        ("tracking noise", "tracking_noise_m"),
+    ):
+        one = shown[label]
+        assert one["value"] == fit.attrs[name]
+        assert [one["low"], one["high"]] == list(fit.attrs[f"{name}_interval"])
+        assert one["confidence"] == 0.9
+    text = " ".join(part["paragraphs"])
+    for words in (
+        "C_d = 0.39 (90 % interval 0.351 to 0.429)",
+        "2 recordings; 10 min; 990 of 1000 samples used; 1 % of the intervals at the wall",
+        "THE MODEL DOES NOT EXPLAIN THIS RECORDING",
+        "KS distance of 0.05 to the real one, and of 0.02 among themselves",
+    ):
+        assert words in text
+
+
+def test_what_speaks_against_a_fit_stands_in_the_warnings(sections: list[dict[str, Any]]) -> None:
+    assert part_of(sections, "warnings")["items"] == [
+        "the block was rarely in the middle",
+        "model check: the flow changes in time",
+    ]
+
+
+def test_each_recording_has_a_section(sections: list[dict[str, Any]]) -> None:
+    first, second = (part_of(sections, f"recording-1-of-{k}") for k in (1, 2))
+    assert second["title"] == "The recording (2 of 2)"
+    noise = numbers_of(first, "facts")["tracking noise"]
+    assert (noise["value"], noise["note"]) == (3e-4, "estimated by the fit")
+    assert numbers_of(second, "facts")["positions"]["value"] == 200
+
+
+def test_every_flow_of_a_fit_has_a_section() -> None:
+    fit = made_up_fit(flows=("on", "<b>off</b>"))
+    made = fit_sections(fit)
+    assert [part_of(made, f"flow-{k}")["title"] for k in (1, 2)] == [
+        "The flow on",
+        "The flow <b>off</b>",
+    ]
+    np.testing.assert_allclose(values(part_of(made, "flow-2")["u"]), fit["u"].values[1], rtol=1e-6)
+
+
+def test_the_check_of_a_fit(sections: list[dict[str, Any]]) -> None:
+    check = made_up_check()
+    rows = part_of(sections, "check")["rows"]
+    assert rows == [["autocorrelation", 0.5, ""], ["flow change", 0.0001, "finding"]]
+    band, x, _ = part_of(sections, "check-innovations")["series"]
+    np.testing.assert_allclose(values(band["low"]), -0.002 - 0.0196)
+    np.testing.assert_allclose(values(x["y"]), check["autocorrelation"].values[0])
+    place = part_of(sections, "check-place")
+    np.testing.assert_allclose(values(place["value"]), check["residual_distance"], rtol=1e-6)
+    assert place["limits"] == [0.0, pytest.approx(float(check["residual_distance"].max()))]
+    noise = part_of(sections, "check-noise")
+    off = (check["noise_ratio"] - 1.0) / 0.05
+    np.testing.assert_allclose(values(noise["value"]), off, rtol=1e-5, atol=1e-6)
+    assert noise["diverging"] is True
+    time = part_of(sections, "check-flow-time")["series"][0]
+    assert values(time["x"]).tolist() == [30.0, 90.0, 150.0, 210.0]
+    np.testing.assert_allclose(values(time["high"]) - values(time["y"]), 0.0196)
+    speed = part_of(sections, "check-drag-speed")["series"][0]
+    np.testing.assert_allclose(values(speed["x"]), [0.01, 0.035])
+    for name in ("step-length", "turning-angle"):
+        simulated, real = part_of(sections, f"check-{name}")["series"]
+        assert values(simulated["x"]).size == values(simulated["y"]).size + 1
+        assert values(simulated["low"]).tolist() == [0.9] * 6
+        assert values(real["y"]).tolist() == [1.0] * 6
+
+
+def test_a_fit_that_was_not_checked_says_so() -> None:
+    made = fit_sections(made_up_fit())
+    assert part_of(made, "check")["kind"] == "empty"
+    assert "EXPLAIN" not in " ".join(part_of(made, "summary")["paragraphs"])
+
+
+def test_a_check_without_simulated_recordings_says_why() -> None:
+    check = made_up_check(explained="yes").drop_vars(["step_length_edge", "turning_angle_edge"])
+    check = check.assign_attrs(ks_distance=np.nan, ks_left_out="the steps are too few")
+    made = fit_sections(made_up_fit(), check=check)
+    assert "the steps are too few" in part_of(made, "check-step-length")["reason"]
+    text = " ".join(part_of(made, "summary")["paragraphs"])
+    assert "There is no KS distance: the steps are too few." in text
+    assert "finds many faults, not all" in text
+
+
+def test_a_recovery_study_beside_its_truth() -> None:
+    study = synthetic_recovery(recordings=6)
+    made = recovery_sections(study)
+    for name, truth in (
+        ("drag_coefficient", TRUTH["drag_coefficient"]),
+        ("force_std", TRUTH["force_std_N"]),
+        ("tracking_noise", TRUTH["tracking_noise_m"]),
+    ):
+        part = part_of(made, f"estimates-{name.replace('_', '-')}")
+        assert part["marks"] == [{"label": "truth", "x": None, "y": truth}]
+        kept, out = part["series"][:2]
+        exact = study[name].values[0, 0]
+        np.testing.assert_allclose(values(kept["y"])[1:], exact[1:])
+        assert np.isnan(values(kept["y"])[0])
+        assert out["name"] == "10 min, angle given, left out of the summary"
+        np.testing.assert_allclose(values(out["y"])[0], exact[0])
+        np.testing.assert_allclose(values(kept["low"])[1:], study[f"{name}_low"].values[0, 0, 1:])
+    rows = part_of(made, "errors")["rows"]
+    assert len(rows) == 3 * 2 * 2
+    first = study.sel(parameter="drag_coefficient", duration=600.0, angle="given")
+    assert rows[0][:3] == ["drag coefficient C_d", "10 min", "given"]
+    assert rows[0][3] == float(first["median_absolute_error"])
+    assert rows[0][6] == float(first["coverage"])
+    assert part_of(made, "warnings")["items"] == [
+        "4 recordings left out of the summary: too long at the wall"
+    ]
+    shown = numbers_of(part_of(made, "summary"))
+    assert shown["length needed, angle given"]["value"] == float(
+        study["needed_duration"].sel(angle="given")
+    )
+
+
+def test_runs_that_have_just_begun_are_empty() -> None:
+    assert [part["kind"] for part in fit_sections(None)] == ["empty"]
+    assert [part["kind"] for part in recovery_sections(None)] == ["empty"]
