@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import socket
 import threading
@@ -13,6 +14,8 @@ import xarray as xr
 from command_line import end, here, refusal, start
 
 import driftwalk as dw
+from driftwalk.cli.progress import ProgressReporter
+from driftwalk.cli.tracking_run import tell_progress
 from driftwalk.schema import build_trajectory
 
 pytest.importorskip("cv2")
@@ -77,6 +80,18 @@ def test_video_to_recording(folder: Path, truth: xr.Dataset, tmp_path: Path) -> 
     assert described["arena"] == {"shape": "circle", "diameter_m": 0.3, "center_m": [0.0, 0.0]}
     observed = dw.observe(dw.load(out), side=0.03)
     assert observed["class"].values[observed["outcome"].values[[0, -1]]].tolist() == ["1+1", "2"]
+
+
+def test_progress_of_a_file_that_holds_more_than_it_states() -> None:
+    text = io.StringIO()
+    with ProgressReporter("track", stream=text, seconds_between_lines=0) as progress:
+        for done in (5, 11):
+            tell_progress(progress, done, 10)
+        tell_progress(progress, 5, 0)
+    assert text.getvalue().splitlines() == [
+        "track: 5 of 10 (50 %)",
+        "track: 11 of 11 (100 %): the source stated 10, there are more",
+    ]
 
 
 def test_explained_frame(folder: Path, tmp_path: Path) -> None:

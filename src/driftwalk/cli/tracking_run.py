@@ -93,7 +93,7 @@ class TrackingRun:
                 for frame in source:
                     self._source_counts = source.counts.to_dict()
                     self._take(frame, source.waited_s, live, overlay)
-                    _tell_progress(progress, frame.index + 1, total)
+                    tell_progress(progress, frame.index + 1, total)
                     self._save_now_and_then()
                 self.interrupted = source.interrupted
             except KeyboardInterrupt:
@@ -212,7 +212,7 @@ class TrackingRun:
         self._pause = max(_SAVE_EVERY_S, (self._saved - began) / _SAVING_SHARE)
 
 
-def _tell_progress(progress: ProgressReporter, done: int, total: int) -> None:
+def tell_progress(progress: ProgressReporter, done: int, total: int) -> None:
     """Say how far it is; a file may hold more frames than it states."""
     if 0 < total < done:
         progress.update(done, done, f"the source stated {total}, there are more")

@@ -104,7 +104,8 @@ class _Printer:
             print(f"{event.time:9.2f} s  {event.kind}  {between}  {event.outcome}")
         if observed.possible != self._class:
             self._class = observed.possible
-            print(f"{frame.time:9.2f} s  class  {_classes(observed)}")
+            hidden = f"  (hidden: {', '.join(observed.hidden)})" if observed.hidden else ""
+            print(f"{frame.time:9.2f} s  class  {_classes(observed)}{hidden}")
         if frame.time >= self._next:
             self._next = frame.time + 1.0
             poses = "  ".join(_pose(state) for state in states)
@@ -116,7 +117,7 @@ def _classes(observed: AssemblySeen) -> str:
         return observed.outcome
     names = sorted(observed.possible)
     if not names:
-        return "unknown"
+        return f"unknown: {len(observed.hidden)} blocks are hidden, any class is possible"
     more = f" and {len(names) - _MOST_CLASSES} more" if len(names) > _MOST_CLASSES else ""
     return "one of " + ", ".join(names[:_MOST_CLASSES]) + more
 

@@ -279,8 +279,9 @@ def observe(recording: xr.Dataset, *, side: float, **rules: Any) -> xr.Dataset:
     -------
     xarray.Dataset
         What `classify` returns, with the same classes and events as a simulated run, and
-        ``possible`` (time, class): whether the class is possible. At a sample with no class
-        possible nothing is known: see `AssemblyObserver`.
+        ``possible`` (time, class): whether the class is possible, and ``hidden`` (time): how many
+        blocks are hidden. With more than three no class is excluded; of more than eight blocks
+        the classes are not listed then, none is marked, and that means that nothing is known.
 
     Raises
     ------
@@ -307,12 +308,14 @@ def observe(recording: xr.Dataset, *, side: float, **rules: Any) -> xr.Dataset:
     given = {_without_unit(key): found.attrs[key] for key in used}
     observer = AssemblyObserver(names, side=side, **given)
     poses = np.stack([recording[name].values for name in ("x", "y", "theta")], axis=-1)
-    sets = [
+    seen = [
         observer.step(
             float(time), {name: tuple(pose) for name, pose in zip(names, row, strict=True)}
-        ).possible
+        )
         for time, row in zip(recording["time"].values, poses, strict=True)
     ]
+    sets = [one.possible for one in seen]
+    hidden = np.array([len(one.hidden) for one in seen])
     outcome = found["outcome"].values
     classes = [str(name) for name in found["class"].values]
     # Beyond eight blocks `classify` lists what occurred; what is merely possible is added.
@@ -324,7 +327,10 @@ def observe(recording: xr.Dataset, *, side: float, **rules: Any) -> xr.Dataset:
     known = outcome >= 0
     possible[known] = np.arange(len(classes)) == outcome[known, None]
     about = {"long_name": "whether the class is possible"}
-    return found.assign(possible=(("time", "class"), possible, about))
+    number = {"long_name": "number of blocks that are hidden", "units": "1"}
+    return found.assign(
+        possible=(("time", "class"), possible, about), hidden=("time", hidden, number)
+    )
 
 
 def _with_classes(found: xr.Dataset, classes: Sequence[str]) -> xr.Dataset:
