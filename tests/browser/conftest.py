@@ -1,0 +1,125 @@
+"""Chromium for the browser tests: found on the machine, nothing is downloaded.
+
+``DRIFTWALK_CHROMIUM`` names another one. Without any the tests are skipped, and say so; with
+``DRIFTWALK_REQUIRE_BROWSER=1``, as in CI, they fail. Screenshots go to ``DRIFTWALK_SCREENSHOTS``
+where that is set.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from finished_run import write_finished_run
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+ARGUMENTS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+DESKTOP = {"width": 1440, "height": 900}
+PHONE = {"width": 390, "height": 844}
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """Start Chromium once, for all tests."""
+    found = os.environ.get("DRIFTWALK_CHROMIUM") or shutil.which("chromium")
+    if found is None:
+        words = "no Chromium: install Debian's 'chromium', or name one in DRIFTWALK_CHROMIUM"
+        if os.environ.get("DRIFTWALK_REQUIRE_BROWSER") == "1":
+            pytest.fail(words)
+        pytest.skip(words)
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        started = playwright.chromium.launch(executable_path=found, args=ARGUMENTS)
+        yield started
+        started.close()
+
+
+class Visit:
+    """A page in a browser of its own, and everything that it asked for or complained about."""
+
+    def __init__(self, page: Page, allowed: str) -> None:
+        self.page = page
+        self.requests: list[str] = []
+        self.refused: list[str] = []
+        self.complaints: list[str] = []
+        self._allowed = allowed
+        page.context.route("**/*", self._decide)
+        page.on("console", self._hear)
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("websocket", lambda socket: self.requests.append(socket.url))
+
+    def _decide(self, route: Any) -> None:
+        url = route.request.url
+        self.requests.append(url)
+        if url.startswith(self._allowed):
+            route.continue_()
+        else:
+            self.refused.append(url)
+            route.abort()
+
+    def _hear(self, message: Any) -> None:
+        # A server that is restarted is part of some tests.
+        if message.type == "error" and "ERR_CONNECTION" not in message.text:
+            self.complaints.append(message.text)
+
+    def open(self, address: str) -> Page:
+        """Open an address and wait until everything has been drawn."""
+        self.page.goto(address)
+        self.page.wait_for_selector("html[data-ready=yes]")
+        return self.page
+
+
+@pytest.fixture
+def visit(browser: Browser) -> Iterator[Callable[..., Visit]]:
+    """Return a function that opens a browser of its own; only what is allowed is loaded.
+
+    At the end no page may have asked for anything else, nor complained.
+    """
+    visits: list[Visit] = []
+
+    def start(allowed: str, *, viewport: dict[str, int] = DESKTOP, **options: Any) -> Visit:
+        context = browser.new_context(viewport=viewport, **options)
+        context.set_default_timeout(20_000)
+        visits.append(Visit(context.new_page(), allowed))
+        return visits[-1]
+
+    yield start
+    for one in visits:
+        one.page.context.close()
+    assert [url for one in visits for url in one.refused] == []
+    assert [words for one in visits for words in one.complaints] == []
+
+
+@pytest.fixture
+def picture(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[..., Path]:
+    """Return a function that takes a screenshot of a page, whole."""
+    folder = Path(os.environ.get("DRIFTWALK_SCREENSHOTS") or tmp_path)
+    folder.mkdir(parents=True, exist_ok=True)
+
+    def take(page: Page, name: str, *, whole: bool = True) -> Path:
+        path = folder / f"{name}.png"
+        page.screenshot(path=path, full_page=whole)
+        return path
+
+    return take
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the run directory of a finished calibration."""
+    return write_finished_run(tmp_path_factory.mktemp("finished") / "run")

@@ -1,0 +1,154 @@
+"""The report opened from a file, with the network cut off."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import driftwalk as dw
+from browser.conftest import PHONE, Visit
+from browser.pictures import assert_same_path, drawn_share, path_points, pixels
+
+pytestmark = pytest.mark.browser
+
+CELLS = [(0, 0), (4, 1), (2, 3)]
+
+
+@pytest.fixture(scope="module")
+def report(finished: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the report of the finished run."""
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    dw.write_report(dw.report_page(finished), path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def calibration(finished: Path) -> xr.Dataset:
+    """Return what the run found."""
+    return xr.load_dataset(finished / "calibration.nc", engine="h5netcdf")
+
+
+@pytest.fixture
+def page(visit: Callable[..., Visit], report: Path) -> Any:
+    """Open the report; nothing but the file itself may be asked for."""
+    one = visit(report.as_uri())
+    yield one.open(report.as_uri())
+    assert one.requests == [report.as_uri()]
+
+
+def click_cell(page: Any, row: int, column: int, shape: tuple[int, int]) -> None:
+    """Click into the middle of a cell of the map."""
+    page.locator(".map-figure").scroll_into_view_if_needed()
+    area = page.locator(".map-figure svg image").bounding_box()
+    rows, columns = shape
+    x = area["x"] + area["width"] * (column + 0.5) / columns
+    y = area["y"] + area["height"] * (rows - row - 0.5) / rows
+    page.mouse.click(x, y)
+
+
+@pytest.mark.parametrize(("row", "column"), CELLS)
+def test_a_click_shows_the_setting_s_own_motion(
+    page: Any, calibration: xr.Dataset, finished: Path, row: int, column: int
+) -> None:
+    click_cell(page, row, column, calibration["ks_distance"].shape)
+    page.wait_for_selector(f'.map-setting[data-shown="{row},{column}"]')
+    shown = page.locator("[data-part=map]")
+    said = {name: float(shown.get_attribute(f"data-{name}")) for name in ("value", "x", "y")}
+    assert said["value"] == float(calibration["ks_distance"][row, column])
+    assert said["x"] == float(calibration["force_std"][column])
+    assert said["y"] == float(calibration["drag_coefficient"][row])
+    # The recording's excerpt is the first of the two pictures, the setting's the second.
+    trails = page.locator(".map-setting .excerpt .trail")
+    assert trails.count() == 2
+    excerpt = [calibration[f"excerpt_{axis}"].values[row, column] for axis in "xy"]
+    assert_same_path(path_points(trails.nth(1)), *excerpt)
+    recorded = xr.load_dataset(finished / "recording.nc", engine="h5netcdf", decode_times=False)
+    beginning = recorded.sel(time=slice(None, recorded["time"].values[0] + 30.0))
+    path = [beginning[axis].values[:, 0] for axis in "xy"]
+    assert_same_path(path_points(trails.nth(0)), *path)
+    for index in range(2):
+        assert drawn_share(pixels(page.locator(".map-setting .excerpt svg").nth(index))) > 0.005
+
+
+def test_settings_differ(page: Any, calibration: xr.Dataset) -> None:
+    """The check above can fail: another setting's path is not taken for this one's."""
+    click_cell(page, 0, 0, calibration["ks_distance"].shape)
+    page.wait_for_selector('.map-setting[data-shown="0,0"]')
+    points = path_points(page.locator(".map-setting .excerpt .trail").nth(1))
+    other = [calibration[f"excerpt_{axis}"].values[1, 1] for axis in "xy"]
+    with pytest.raises(AssertionError):
+        assert_same_path(points, *other)
+
+
+def test_the_keyboard_does_the_same(page: Any, calibration: xr.Dataset) -> None:
+    figure = page.locator(".map-figure")
+    figure.focus()
+    before = page.locator("[data-part=map]").get_attribute("data-row")
+    page.keyboard.press("ArrowDown" if before != "0" else "ArrowUp")
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("Enter")
+    page.wait_for_function(
+        "before => document.querySelector('[data-part=map]').dataset.row !== before", arg=before
+    )
+    shown = page.locator("[data-part=map]")
+    row, column = (int(shown.get_attribute(f"data-{name}")) for name in ("row", "column"))
+    value = float(shown.get_attribute("data-value"))
+    assert value == float(calibration["ks_distance"][row, column])
+
+
+def test_every_section_is_drawn(page: Any, picture: Callable[..., Path]) -> None:
+    for section in page.locator("section[data-kind]").all():
+        words = section.inner_text()
+        assert "cannot be shown" not in words, words
+        figures = section.locator("svg[role=img], canvas[role=img]")
+        if section.get_attribute("data-kind") in ("map", "trajectory", "flow", "lines"):
+            assert figures.count() >= 1
+        for figure in figures.all():
+            if figure.is_visible():
+                assert figure.get_attribute("aria-label")
+                assert drawn_share(pixels(figure)) > 0.002
+    picture(page, "report-desktop")
+
+
+def test_on_a_phone_nothing_is_cut_off(
+    visit: Callable[..., Visit], report: Path, picture: Callable[..., Path]
+) -> None:
+    one = visit(report.as_uri(), viewport=PHONE)
+    page = one.open(report.as_uri())
+    width = page.evaluate("document.documentElement.scrollWidth")
+    assert width <= PHONE["width"]
+    picture(page, "report-phone")
+
+
+def test_in_the_dark(
+    visit: Callable[..., Visit], report: Path, picture: Callable[..., Path]
+) -> None:
+    one = visit(report.as_uri(), color_scheme="dark")
+    page = one.open(report.as_uri())
+    background = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert max(int(part) for part in re.findall(r"\d+", background)[:3]) < 80
+    picture(page, "report-dark")
+
+
+def test_hostile_words_stay_words(
+    visit: Callable[..., Visit], finished: Path, tmp_path: Path
+) -> None:
+    hostile = "</script><script>document.title='taken'</script><img src=x onerror=alert(1)>"
+    page_data = dw.report_page(finished)
+    page_data["title"] = hostile
+    for section in page_data["sections"]:
+        section["title"] = section["note"] = hostile
+    path = tmp_path / "report.html"
+    dw.write_report(page_data, path)
+    one = visit(path.as_uri())
+    page = one.open(path.as_uri())
+    assert page.title() == hostile
+    assert page.locator("h1").inner_text() == hostile
+    assert page.locator("img").count() == 0
+    assert np.all([hostile in words for words in page.locator("h2").all_inner_texts()])
