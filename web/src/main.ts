@@ -5,10 +5,16 @@ import { PageError } from "./check";
 import { el } from "./dom";
 import { type Page, checkPage } from "./page";
 import { startTheme } from "./theme";
+import { pageHolder } from "./shell";
+import { showLive } from "./views/live";
+import { showPlay } from "./views/play";
 import { showReport } from "./views/report";
+import { showRun } from "./views/run";
+
+const VIEWS = { report: showReport, run: showRun, live: showLive, play: showPlay } as const;
 
 async function show(page: Page): Promise<void> {
-  await showReport(page);
+  await VIEWS[page.view](page);
 }
 
 function readPage(): Page {
@@ -29,7 +35,7 @@ async function start(): Promise<void> {
     await show(readPage());
   } catch (error) {
     const words = error instanceof Error ? error.message : String(error);
-    document.body.replaceChildren(
+    pageHolder().replaceChildren(
       el("main", { class: "stopped" }, el("h1", {}, "This page cannot be shown"), el("p", { role: "alert" }, words)),
     );
     if (!(error instanceof PageError)) console.error(error);

@@ -271,8 +271,6 @@ const empty = object({ ...base, reason: text });
 
 const controls = object({
   ...base,
-  arena: nullable(arena),
-  side: nullable(number),
   items: list(
     object({
       name: text,
@@ -290,6 +288,12 @@ const controls = object({
   ),
 });
 
+const arrows = object({ x: numbers, y: numbers, u: numbers, v: numbers });
+/** The tank of the playground. */
+const tank = object({ ...base, arena: nullable(arena), side: number, flow: nullable(arrows) });
+
+export type TankSection = Checked<typeof tank>;
+export { tank as checkTank, controls as checkControls };
 export type Arena = Checked<typeof arena>;
 export type Axis = Checked<typeof axis>;
 export type Polyominoes = Checked<typeof polyominoes>;
@@ -327,13 +331,12 @@ export const SECTIONS = {
   table,
   manifest,
   empty,
-  controls,
 } as const;
 
 export type Kind = keyof typeof SECTIONS;
 export type SectionOf<K extends Kind> = Checked<(typeof SECTIONS)[K]>;
 
-export { arena as checkArena, pair as checkPair };
+export { arena as checkArena };
 
 const state = object({
   finished: withDefault(flag, true),

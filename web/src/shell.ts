@@ -9,45 +9,58 @@ import { percent } from "./units";
 export interface Shell {
   readonly main: HTMLElement;
   showState(state: State | null): void;
-  showConnection(words: string | null): void;
+  /** Shows another page's title. */
+  showPage(page: Page): void;
+  showConnection(words: string, open: boolean): void;
+  /** Offers the page as a file. */
+  showSaving(address: string): void;
   showContents(sections: readonly RawSection[]): void;
 }
 
 /** Builds the shell into the document and returns its parts. */
 export function makeShell(page: Page): Shell {
-  document.title = page.title;
   const state = el("p", { class: "state", role: "status" });
   const bar = el("progress", { max: 1, "aria-label": "progress", hidden: true });
   const connection = el("p", { class: "connection", role: "status", hidden: true });
   const contents = el("nav", { class: "contents", "aria-label": "Contents" });
   const main = el("main", { id: "main" });
+  const titles = el("div", {});
+  const saving = el("a", { class: "saving", hidden: true }, "Save as a file");
   const header = el(
     "header",
     { class: "head" },
     el(
       "div",
       { class: "titles" },
-      el("h1", {}, ...rich(page.title)),
-      page.subtitle !== null && page.subtitle !== "" && el("p", { class: "subtitle" }, ...rich(page.subtitle)),
+      titles,
       state,
       bar,
     ),
-    el("div", { class: "tools" }, connection, themeButton()),
+    el("div", { class: "tools" }, connection, saving, themeButton()),
   );
   const columns = el("div", { class: "layout" }, contents, main);
-  document.body.replaceChildren(
-    el("a", { class: "skip", href: "#main" }, "Skip to the content"),
-    header,
-    columns,
-    foot(page),
-  );
+  const foot = el("footer", { class: "foot" });
+  pageHolder().replaceChildren(el("a", { class: "skip", href: "#main" }, "Skip to the content"), header, columns, foot);
   document.body.dataset["view"] = page.view;
+  const showPage = (now: Page): void => {
+    document.title = now.subtitle === null || now.subtitle === "" ? now.title : `${now.title} · ${now.subtitle}`;
+    const subtitle = now.subtitle !== null && now.subtitle !== "" && el("p", { class: "subtitle" }, ...rich(now.subtitle));
+    titles.replaceChildren(el("h1", {}, ...rich(now.title)), ...(subtitle === false ? [] : [subtitle]));
+    foot.textContent = footText(now);
+  };
+  showPage(page);
   return {
     main,
+    showPage,
+    showSaving: (address) => {
+      saving.href = address;
+      saving.hidden = false;
+    },
     showState: (now) => showState(now, state, bar),
-    showConnection: (words) => {
-      connection.hidden = words === null;
-      connection.textContent = words ?? "";
+    showConnection: (words, open) => {
+      connection.hidden = false;
+      connection.textContent = words;
+      connection.dataset["open"] = open ? "yes" : "no";
     },
     showContents: (sections) => showContents(sections, contents),
   };
@@ -88,10 +101,16 @@ function themeButton(): HTMLButtonElement {
   return button;
 }
 
-function foot(page: Page): HTMLElement {
-  const parts = [
-    page.driftwalk_version === null ? "driftwalk" : `driftwalk ${page.driftwalk_version}`,
-    page.created_utc,
-  ].filter((part) => part !== null);
-  return el("footer", { class: "foot" }, parts.join(" · "));
+function footText(page: Page): string {
+  const program = page.driftwalk_version === null ? "driftwalk" : `driftwalk ${page.driftwalk_version}`;
+  return page.created_utc === null ? program : `${program} · ${page.created_utc}`;
+}
+
+/** Returns where the page is built: beside its data, which stay in the document. */
+export function pageHolder(): HTMLElement {
+  const holder = document.getElementById("app");
+  if (holder !== null) return holder;
+  const made = el("div", { id: "app" });
+  document.body.append(made);
+  return made;
 }

@@ -53,18 +53,28 @@ export function sectionFrame(section: RawSection): HTMLElement {
 }
 
 export async function fillSection(frame: HTMLElement, section: RawSection, context: Context): Promise<void> {
-  const body = el("div", { class: "body" });
-  frame.querySelector(":scope > .body")?.replaceWith(body);
-  frame.querySelector(":scope > .note")?.remove();
+  // Drawn out of sight first, so that what is there stays until the new picture is complete.
+  const body = el("div", { class: "body drawing" });
+  const before = frame.querySelector(":scope > .body");
+  frame.append(body);
   try {
     await drawBody(section, body, context);
   } catch (error) {
     body.replaceChildren(el("p", { class: "fault", role: "alert" }, faultText(error)));
     if (!(error instanceof PageError)) console.error(error);
   }
+  const focused = before === null ? -1 : focusable(before).indexOf(document.activeElement as HTMLElement);
+  before?.replaceWith(body);
+  body.classList.remove("drawing");
+  if (focused >= 0) focusable(body)[focused]?.focus({ preventScroll: true });
+  frame.querySelector(":scope > .note")?.remove();
   if (section.note !== null && section.note !== "") {
     frame.append(el("p", { class: "note" }, ...rich(section.note)));
   }
+}
+
+function focusable(body: Element): HTMLElement[] {
+  return [...body.querySelectorAll<HTMLElement>("[tabindex], button, select, input, summary")];
 }
 
 async function drawBody(section: RawSection, body: HTMLElement, context: Context): Promise<void> {

@@ -1,0 +1,232 @@
+/** A tracker's stream: blocks in the tank, over the video when wanted, and what they make. */
+
+import { el } from "../dom";
+import type { Page } from "../page";
+import { facts } from "../parts";
+import { type Shell, makeShell } from "../shell";
+import { TankCanvas, type Trail, type View } from "../tank/canvas";
+import { assemblies, shapeName } from "../tank/joined";
+import { boxAround } from "../tank/outline";
+import { type Camera, drawVideo, imageBox } from "../tank/video";
+import { onThemeChange } from "../theme";
+import { duration, fixed, quantity, whole } from "../units";
+import { checkPage } from "../page";
+import { connected } from "./connection";
+import { type Frame, type Hello, type LiveEvent, checkFrame, checkHello } from "./live_message";
+import { ShapeCounts, shapeColour } from "./shape_counts";
+import { newestWins } from "./newest";
+import type { Link, Message } from "./socket";
+
+const VIDEO_WIDTH = 640;
+/** How far back a trail goes [s], and how many events are listed. */
+const TRAIL_S = 10;
+const MOST_EVENTS = 200;
+
+export function showLive(first: Page): Promise<void> {
+  const shell = makeShell(first);
+  return new Promise((ready) => {
+    const stream = new LiveStream(shell);
+    connected(shell, {
+      opened: (link) => stream.opened(link),
+      received: (message) => {
+        if (message.type === "page") shell.showPage(checkPage(message["page"]));
+        stream.receive(message);
+        ready();
+      },
+    });
+  });
+}
+
+class LiveStream {
+  private readonly tank: TankCanvas;
+  private readonly status = el("p", { class: "readout", role: "status" });
+  private readonly outcome = el("p", { class: "outcome", "aria-live": "polite" });
+  private readonly numbers = el("div");
+  private readonly list = el("ol", { class: "events", reversed: true });
+  private readonly counts: ShapeCounts;
+  private readonly video = el("input", { type: "checkbox", name: "video" });
+  private readonly trails = el("input", { type: "checkbox", name: "trails" });
+  private readonly take: (frame: Frame) => void;
+  private readonly past = new Map<string, { time: number; x: number; y: number }[]>();
+  private readonly seenEvents = new Set<string>();
+  private link: Link | null = null;
+  private hello: Hello | null = null;
+  private camera: Camera | null = null;
+  private picture: HTMLImageElement | null = null;
+  private last: Frame | null = null;
+
+  constructor(shell: Shell) {
+    const place = el("div", { class: "section live-tank" });
+    const beside = el("div", { class: "live-side" });
+    const now = el("section", { class: "section", "aria-label": "Now" });
+    const counted = el("section", { class: "section", "aria-label": "Assemblies over time" });
+    const events = el("section", { class: "section", "aria-label": "Events" });
+    beside.append(now, counted, events);
+    shell.main.replaceChildren(el("div", { class: "live" }, place, beside));
+    shell.showState(null);
+    this.video.disabled = true;
+    const options = el(
+      "div",
+      { class: "options" },
+      el("label", {}, this.video, " video"),
+      el("label", {}, this.trails, " trails"),
+    );
+    place.append(options);
+    this.tank = new TankCanvas(place, "The tank: blocks where the tracker sees them, dashed where it does not");
+    place.append(this.status);
+    now.append(el("h2", {}, "Now"), this.outcome, this.numbers);
+    counted.append(el("h2", {}, "Assemblies over time"));
+    this.counts = new ShapeCounts(counted);
+    events.append(el("h2", {}, "Joins and partings"), this.list);
+    this.take = newestWins((frame) => this.draw(frame));
+    this.video.addEventListener("change", () => this.askForVideo());
+    this.trails.addEventListener("change", () => this.last !== null && this.draw(this.last));
+    onThemeChange(() => this.last !== null && this.draw(this.last));
+    this.say("Waiting for the stream.");
+  }
+
+  opened(link: Link): void {
+    this.link = link;
+    this.askForVideo();
+  }
+
+  receive(message: Message): void {
+    if (message.type === "hello") this.meet(checkHello(message, ""));
+    else if (message.type === "frame") {
+      const frame = checkFrame(message);
+      this.note(frame);
+      this.take(frame);
+    } else if (message.type === "lost") this.say(String(message["words"] ?? "the tracker is gone"));
+    else if (message.type === "end") {
+      const why = message["interrupted"];
+      this.say(typeof why === "string" ? `The stream has ended: ${why}` : "The stream has ended.");
+    }
+  }
+
+  /** A stream begins: its tank, its camera. */
+  private meet(hello: Hello): void {
+    this.hello = hello;
+    const { image } = hello;
+    this.camera =
+      image === null
+        ? null
+        : { width: image.width_px, height: image.height_px, homography: image.homography_px_to_m, lens: image.lens };
+    this.picture = null;
+    this.past.clear();
+    this.counts.clear();
+    this.list.replaceChildren();
+    this.seenEvents.clear();
+    this.video.disabled = this.camera === null;
+    const box = hello.tank === null && this.camera !== null ? imageBox(this.camera) : boxAround(hello.tank);
+    this.tank.setTank(hello.tank, hello.block_side_m ?? 0, box);
+    this.say("");
+    this.askForVideo();
+  }
+
+  private askForVideo(): void {
+    const wanted = this.video.checked && this.camera !== null;
+    this.link?.send({ type: "video", width: wanted ? VIDEO_WIDTH : 0 });
+    if (!wanted) this.picture = null;
+  }
+
+  /** Keeps what must not be lost when the page draws more slowly than frames come. */
+  private note(frame: Frame): void {
+    for (const one of frame.events ?? []) this.addEvent(one);
+    for (const body of frame.bodies) {
+      const trail = this.past.get(body.id) ?? [];
+      trail.push({ time: frame.time_s, x: body.x_m ?? Number.NaN, y: body.y_m ?? Number.NaN });
+      while (frame.time_s - (trail[0]?.time ?? frame.time_s) > TRAIL_S) trail.shift();
+      this.past.set(body.id, trail);
+    }
+    if (frame.jpeg_base64 !== null && this.video.checked) void this.load(frame.jpeg_base64);
+  }
+
+  private async load(jpeg: string): Promise<void> {
+    const image = new Image();
+    image.src = `data:image/jpeg;base64,${jpeg}`;
+    await image.decode().catch(() => undefined);
+    if (image.naturalWidth > 0 && this.video.checked) this.picture = image;
+  }
+
+  private draw(frame: Frame): void {
+    this.last = frame;
+    const ids = frame.bodies.map((body) => body.id);
+    const groups = assemblies(ids, frame.joined ?? []);
+    const shapes = new Map<string, string>();
+    for (const group of groups) {
+      const name = shapeName(group, frame.joined ?? []);
+      for (const id of group) shapes.set(id, name);
+    }
+    const picture = this.picture;
+    const camera = this.camera;
+    this.tank.draw({
+      blocks: {
+        x: frame.bodies.map((body) => body.x_m ?? Number.NaN),
+        y: frame.bodies.map((body) => body.y_m ?? Number.NaN),
+        theta: frame.bodies.map((body) => body.theta_rad ?? Number.NaN),
+        colours: ids.map((id) => shapeColour(shapes.get(id) ?? "1")),
+        hidden: frame.bodies.map((body) => !body.seen),
+        names: ids,
+      },
+      trails: this.trails.checked ? this.trailsNow(shapes) : [],
+      under: picture === null || camera === null ? null : (view: View) => drawVideo(view, picture, camera),
+    });
+    this.link?.send({ type: "ready" });
+    this.tank.element.dataset["time"] = String(frame.time_s);
+    if (frame.joined !== null) this.counts.add(frame.time_s, groups.map((group) => shapes.get(group[0] ?? "") ?? "1"));
+    this.showNow(frame);
+  }
+
+  private trailsNow(shapes: ReadonlyMap<string, string>): Trail[] {
+    return [...this.past].map(([id, points]) => ({
+      x: points.map((point) => point.x),
+      y: points.map((point) => point.y),
+      colour: shapeColour(shapes.get(id) ?? "1"),
+    }));
+  }
+
+  private showNow(frame: Frame): void {
+    const words = outcomeText(frame);
+    if (this.outcome.textContent !== words) this.outcome.textContent = words;
+    const seen = frame.bodies.filter((body) => body.seen).length;
+    this.numbers.replaceChildren(
+      facts([
+        ["time", duration(frame.time_s)],
+        ["frame", whole(frame.frame)],
+        ["blocks seen", `${seen} of ${frame.bodies.length}`],
+        ["latency", frame.latency_s === null ? "–" : quantity(frame.latency_s, "s", 2)],
+        ["frames dropped", frame.dropped_frames === null ? "–" : whole(frame.dropped_frames)],
+        ["source", this.hello?.source ?? "–"],
+      ]),
+    );
+    Object.assign(document.documentElement.dataset, { outcome: frame.outcome ?? "", frame: String(frame.frame) });
+  }
+
+  private addEvent(one: LiveEvent): void {
+    const key = `${one.time_s} ${one.kind} ${one.bodies.join(" ")}`;
+    if (this.seenEvents.has(key)) return;
+    this.seenEvents.add(key);
+    const verb = one.kind === "join" ? "joined" : "parted";
+    const item = el(
+      "li",
+      {},
+      el("span", { class: "name" }, `${fixed(one.time_s, 1)} s`),
+      ` ${one.bodies.join(" and ")} ${verb}`,
+      one.outcome !== null && el("b", {}, `, now ${one.outcome}`),
+    );
+    this.list.prepend(item);
+    while (this.list.childElementCount > MOST_EVENTS) this.list.lastElementChild?.remove();
+  }
+
+  private say(words: string): void {
+    this.status.textContent = words;
+  }
+}
+
+function outcomeText(frame: Frame): string {
+  if (frame.outcome !== null) return frame.outcome;
+  if (frame.joined === null) return "Who is joined is not observed.";
+  if (frame.possible === null || frame.possible.length === 0) return "not known: a block is hidden";
+  return `${frame.possible.join(" or ")}: a block is hidden`;
+}
+

@@ -1,0 +1,213 @@
+/** The playground: a tank that moves while its knobs are turned, and the motion beside a recording. */
+
+import { decode } from "../arrays";
+import { list, nullable, number, object, record, text, withDefault, flag } from "../check";
+import { el } from "../dom";
+import { type ControlsSection, type Page, checkControls, checkPage, checkTank } from "../page";
+import { cellsOfName, sketchPicture, writtenName } from "../polyomino";
+import { type Shell, makeShell } from "../shell";
+import { TankCanvas, assemblyColours } from "../tank/canvas";
+import { onThemeChange } from "../theme";
+import { duration, short } from "../units";
+import { connected } from "./connection";
+import { type Knobs, makeKnobs } from "./controls";
+import { DensityPanel } from "./density_panel";
+import { newestWins } from "./newest";
+import type { Link, Message } from "./socket";
+
+const tankMessage = object({
+  time_s: number,
+  speed: nullable(number),
+  paused: withDefault(flag, false),
+  x: list(number),
+  y: list(number),
+  theta: list(number),
+  assembly: list(number),
+  waiting: withDefault(number, 0),
+  outcome: nullable(text),
+  counts: withDefault(record(number), new Map<string, number>()),
+});
+
+type Tank = ReturnType<typeof tankMessage>;
+
+/** Shapes of which the page counts assemblies; of more, the most frequent. */
+const MOST_SHAPES = 10;
+
+export function showPlay(first: Page): Promise<void> {
+  const shell = makeShell(first);
+  shell.main.append(el("p", { class: "nothing" }, "Waiting for the server."));
+  return new Promise((ready) => {
+    let playground: Playground | null = null;
+    connected(shell, {
+      received: (message, link) => {
+        if (message.type === "page") {
+          const page = checkPage(message["page"]);
+          shell.showPage(page);
+          playground = new Playground(shell, page, link);
+          ready();
+        } else playground?.receive(message);
+      },
+      lost: () => playground?.rest(),
+    });
+  });
+}
+
+class Playground {
+  private readonly tank: TankCanvas;
+  private readonly knobs: Knobs | null;
+  private readonly density: DensityPanel;
+  private readonly pause = el("button", { type: "button" }, "Pause");
+  private readonly clock = el("p", { class: "readout" });
+  private readonly shapes = el("ul", { class: "shapes", "aria-label": "Assemblies by shape" });
+  private readonly note = el("p", { class: "fault", role: "status" });
+  private readonly take: (state: Tank) => void;
+  private readonly set: (wish: { name: string; value: unknown }) => void;
+  private last: Tank | null = null;
+  private frames = { count: 0, since: 0, rate: 0 };
+
+  constructor(
+    shell: Shell,
+    page: Page,
+    private readonly link: Link,
+  ) {
+    const section = (kind: string): unknown => page.sections.find((one) => one.kind === kind)?.content;
+    const place = el("div", { class: "play-tank section" });
+    const beside = el("div", { class: "play-side" });
+    const panel = el("section", { class: "section", "aria-label": "Settings" });
+    const motion = el("section", { class: "section", "aria-label": "Motion" });
+    beside.append(panel, motion);
+    shell.main.replaceChildren(el("div", { class: "playground" }, place, beside));
+    shell.showState(null);
+
+    this.tank = new TankCanvas(place, "The tank: blocks of one colour are joined, grey ones are alone");
+    place.append(this.clock, this.shapes, this.note);
+    void this.showTank(section("tank"));
+    // A knob sends at most once per picture of the screen; the newest value counts.
+    const wishes = new Map<string, (value: unknown) => void>();
+    this.set = ({ name, value }) => {
+      const send = wishes.get(name) ?? newestWins<unknown>((now) => this.link.send({ type: "set", name, value: now }));
+      wishes.set(name, send);
+      send(value);
+    };
+    this.knobs = this.addKnobs(panel, section("controls"));
+    const density = page.sections.find((one) => one.kind === "density");
+    this.density = new DensityPanel(motion, density?.title ?? "Step length and turning angle", density?.note ?? null);
+    this.take = newestWins((state) => this.draw(state));
+    onThemeChange(() => this.last !== null && this.tank.element.isConnected && this.draw(this.last));
+  }
+
+  receive(message: Message): void {
+    if (message.type === "tank") this.take(tankMessage(message, ""));
+    else if (message.type === "density") void this.density.show(message);
+    else if (message.type === "note") this.note.textContent = String(message["words"] ?? "");
+    else if (message.type === "section") this.showSection(message["section"]);
+  }
+
+  /** The connection is lost: what is shown stands still. */
+  rest(): void {
+    this.frames = { count: 0, since: 0, rate: 0 };
+  }
+
+  private async showTank(content: unknown): Promise<void> {
+    if (content === undefined) return;
+    const section = checkTank(content, "");
+    this.tank.setTank(section.arena, section.side);
+    if (section.flow === null) this.tank.setArrows(null);
+    else {
+      const [x, y, u, v] = await Promise.all([section.flow.x, section.flow.y, section.flow.u, section.flow.v].map(decode));
+      if (x === undefined || y === undefined || u === undefined || v === undefined) return;
+      const columns = x.data.length;
+      this.tank.setArrows({
+        x: u.data.map((_, index) => x.data[index % columns] ?? 0),
+        y: u.data.map((_, index) => y.data[Math.floor(index / columns)] ?? 0),
+        u: u.data,
+        v: v.data,
+      });
+    }
+    if (this.last !== null) this.draw(this.last);
+  }
+
+  private addKnobs(panel: HTMLElement, content: unknown): Knobs | null {
+    if (content === undefined) return null;
+    const section: ControlsSection = checkControls(content, "");
+    const knobs = makeKnobs(section, (name, value) => {
+      this.note.textContent = "";
+      this.set({ name, value });
+    });
+    panel.append(el("h2", {}, section.title), this.actions(), knobs.element);
+    if (section.note !== null) panel.append(el("p", { class: "note" }, section.note));
+    return knobs;
+  }
+
+  private actions(): HTMLElement {
+    const act = (name: string) => (): void => this.link.send({ type: "action", name });
+    const restart = el("button", { type: "button", "data-action": "restart" }, "Restart");
+    restart.addEventListener("click", act("restart"));
+    this.pause.addEventListener("click", () => act(this.last?.paused === true ? "run" : "pause")());
+    const clear = el("button", { type: "button", "data-action": "clear" }, "Clear the density");
+    clear.addEventListener("click", act("clear"));
+    return el("div", { class: "actions" }, this.pause, restart, clear);
+  }
+
+  private showSection(content: unknown): void {
+    if (typeof content !== "object" || content === null || !("kind" in content)) return;
+    if (content.kind === "controls") this.knobs?.update(checkControls(content, ""));
+    if (content.kind === "tank") void this.showTank(content);
+  }
+
+  private draw(state: Tank): void {
+    this.last = state;
+    this.tank.draw({
+      blocks: { x: state.x, y: state.y, theta: state.theta, colours: assemblyColours(state.assembly) },
+    });
+    this.link.send({ type: "ready" });
+    this.countFrame();
+    this.pause.textContent = state.paused ? "Run" : "Pause";
+    this.pause.dataset["action"] = state.paused ? "run" : "pause";
+    this.tank.element.dataset["time"] = String(state.time_s);
+    this.tank.element.dataset["blocks"] = String(state.x.length);
+    // Words ten times a second are enough, and leave the time to the tank.
+    if (this.frames.count % 6 === 1 || state.paused) this.showWords(state);
+  }
+
+  private countFrame(): void {
+    const now = performance.now();
+    if (this.frames.since === 0) this.frames.since = now;
+    this.frames.count += 1;
+    if (now - this.frames.since < 1000) return;
+    this.frames.rate = (1000 * this.frames.count) / (now - this.frames.since);
+    this.frames.count = 0;
+    this.frames.since = now;
+    this.tank.element.dataset["rate"] = this.frames.rate.toFixed(1);
+  }
+
+  private showWords(state: Tank): void {
+    const speed = state.paused ? "paused" : state.speed === null ? "–" : `${short(state.speed, 2)} × real time`;
+    const pairs: [string, string][] = [
+      ["time", duration(state.time_s)],
+      ["speed", speed],
+      ["blocks", String(state.x.length)],
+    ];
+    if (this.frames.rate > 0) pairs.push(["pictures", `${Math.round(this.frames.rate)}/s`]);
+    if (state.waiting > 0) pairs.push(["waiting for room", String(state.waiting)]);
+    this.clock.replaceChildren(
+      ...pairs.map(([name, value]) => el("span", { class: "pair" }, el("span", { class: "name" }, name), " ", el("b", {}, value))),
+    );
+    this.showShapes(state.counts);
+  }
+
+  private showShapes(counts: ReadonlyMap<string, number>): void {
+    const sorted = [...counts].sort(([, one], [, other]) => other - one);
+    const shown = sorted.slice(0, MOST_SHAPES);
+    const words = sorted.map(([name, count]) => `${count} ${name}`).join(", ");
+    if (this.shapes.dataset["counts"] === words) return;
+    this.shapes.dataset["counts"] = words;
+    const rest = sorted.length - shown.length;
+    this.shapes.replaceChildren(
+      ...shown.map(([name, count]) =>
+        el("li", { "aria-label": `${count} ${name}` }, el("b", {}, String(count)), sketchPicture(cellsOfName(name), 7), el("span", { class: "name" }, writtenName(name))),
+      ),
+      ...(rest > 0 ? [el("li", {}, `${rest} more`)] : []),
+    );
+  }
+}
