@@ -15,7 +15,7 @@ TEST_TOOLS := $(VENV)/.test-tools
 DEV_TOOLS := $(VENV)/.dev-tools
 CPP := $(shell find cpp -name '*.cpp' -o -name '*.hpp')
 
-.PHONY: demo test test-slow doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs web wheel clean
+.PHONY: demo test test-slow test-browser doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs web wheel clean
 
 demo: $(PACKAGE)
 	$(BIN)/driftwalk demo
@@ -27,6 +27,10 @@ test: $(TEST_TOOLS)
 
 test-slow: $(TEST_TOOLS)
 	$(BIN)/python -m pytest -n 2 -m slow
+
+# In Chromium, which has to be installed; without it the tests are skipped.
+test-browser: $(TEST_TOOLS)
+	$(BIN)/python -m pytest tests/browser -m browser
 
 doctest: $(TEST_TOOLS)
 	$(BIN)/python -m pytest -n 2 --doctest-modules src/driftwalk
