@@ -11,6 +11,10 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.opencv import require_opencv
 from driftwalk.track.types import Array, Detection, Image, PixelToWorld, Rejected
 
+Polarity = Literal["dark", "bright", "both"]
+"""What objects are, compared with their background."""
+
+_EITHER: Final[tuple[Polarity, Polarity]] = ("dark", "bright")
 _NOISE_FACTOR: Final = 6.0
 _LEAST_CONTRAST: Final = 12.0
 _OF_PEAK: Final = 0.35
@@ -46,6 +50,46 @@ def median_background(images: list[Image]) -> Image:
     if len(images) < 3:
         raise InputError(f"a background takes 3 images or more, there are {len(images)}")
     return np.asarray(np.median(np.stack(images), axis=0), dtype=np.uint8)
+
+
+def usual_polarity(images: list[Image], background: Image) -> Polarity:
+    """Return whether the largest object is dark or bright in most images.
+
+    Something else that moves now and then, larger than the objects, is not what is looked for.
+
+    Parameters
+    ----------
+    images : list of array, shape (rows, columns, 3)
+        Spread over the video.
+    background : array, shape (rows, columns, 3)
+        See `median_background`.
+
+    Returns
+    -------
+    {"dark", "bright", "both"}
+        "both" when neither holds for two thirds of the images in which there is an object.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> background = np.full((60, 80, 3), 200, np.uint8)
+    >>> images = [background.copy() for _ in range(3)]
+    >>> for step, image in enumerate(images):
+    ...     image[20:31, 20 + 10 * step : 30 + 10 * step] = 30
+    >>> usual_polarity(images, background)
+    'dark'
+    """
+    detectors = [BlobDetector(background, polarity=one, objects=1) for one in _EITHER]
+    votes = []
+    for image in images:
+        found = [detector.detect(image)[0] for detector in detectors]
+        dark, bright = (one[0].area_px if one else 0.0 for one in found)
+        if dark != bright:
+            votes.append(dark > bright)
+    if not votes:
+        return "both"
+    share = sum(votes) / len(votes)
+    return "dark" if share >= 2 / 3 else "bright" if share <= 1 / 3 else "both"
 
 
 class BlobDetector:
@@ -89,7 +133,7 @@ class BlobDetector:
         background: Image,
         camera: PixelToWorld | None = None,
         *,
-        polarity: Literal["dark", "bright", "both"] = "both",
+        polarity: Polarity = "both",
         least_area_px: float = 30.0,
         most_area_px: float | None = None,
         objects: int | None = None,
