@@ -16,7 +16,7 @@ from driftwalk.assemble.l1 import (
     l1_noise_floor,
     pairwise_l1,
 )
-from driftwalk.assemble.live_world import LiveTank
+from driftwalk.assemble.live_world import LiveEvent, LiveTank
 from driftwalk.assemble.outcome import (
     class_cells,
     class_name,
@@ -42,6 +42,7 @@ from driftwalk.assemble.survival import SurvivalCurve, class_times, survival_cur
 __all__ = [
     "Alignment",
     "L1NoiseFloor",
+    "LiveEvent",
     "LiveTank",
     "PairwiseL1",
     "ReplayedEvents",
