@@ -148,3 +148,8 @@ def test_watching_takes_what_it_needs(tmp_path: Path) -> None:
     done = here("watch", words[0], "--markers", "blob", *TANK, "--bodies", "2", "--side", "3cm")
     assert done.code == 2
     assert "markers with an orientation" in done.err
+    done = here("watch", words[0], "--markers", "aruco:4X4_50", *TANK, "--bodies", "2",
+                "--side", "3cm", "-o", tmp_path / "none.nc")  # fmt: skip
+    assert done.code == 2
+    assert "nothing was tracked in 6 frames" in done.err
+    assert not (tmp_path / "none.nc").exists()

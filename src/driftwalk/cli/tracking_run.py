@@ -67,7 +67,7 @@ class TrackingRun:
         self._left_out: set[str] = set()
         self._source_counts: dict[str, int] = {}
         self._saved = clock.monotonic()
-        self._saved_once = False
+        self.saved = False
         self._pause = _SAVE_EVERY_S
 
     def run(self) -> None:
@@ -114,7 +114,7 @@ class TrackingRun:
         live.end(self.interrupted)
         self._source_counts = source.counts.to_dict()
         self._save(complete=False)
-        if self._saved_once:
+        if self.saved:
             print_note(f"wrote {self.out}: {self.frames} frames up to here")
 
     def recording(self, *, complete: bool = True) -> xr.Dataset:
@@ -207,7 +207,7 @@ class TrackingRun:
             with contextlib.suppress(InputError):
                 recording = self.recording(complete=complete)
                 save_trajectory(recording, self.out, existing="replace")
-                self._saved_once = True
+                self.saved = True
         self._saved = clock.monotonic()
         self._pause = max(_SAVE_EVERY_S, (self._saved - began) / _SAVING_SHARE)
 

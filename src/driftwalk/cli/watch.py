@@ -82,6 +82,10 @@ def watch(
         )
     run = TrackingRun(options, parts, out, _Printer())
     run.run()
+    if out is not None and not run.saved:
+        run.recording()  # Says that nothing was tracked, and what was there instead.
+    if run.saved:
+        print_note(f"wrote {out}")
     if run.interrupted is not None:
         print_note(f"warning: {run.interrupted}")
 

@@ -211,8 +211,10 @@ class VideoFile:
         Where the rate varies, the number of frames that a file states is often its duration times
         a rate: only the duration tells.
         """
-        duration = self._promised / self._rate if self._rate > 0 else 0.0
-        if frames >= self._promised - 1 or duration - end < max(_CUT_OFF_S, 2 / self._rate):
+        if frames >= self._promised - 1 or not self._rate > 0:
+            return None
+        duration = self._promised / self._rate
+        if duration - end < max(_CUT_OFF_S, 2 / self._rate):
             return None
         return f"{self.name} ends after {frames} frames, at {end:.1f} s of {duration:.1f} s"
 
