@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from driftwalk.report.assembly_labels import class_names
 from driftwalk.report.page_chart import chart, label, mark, series
 from driftwalk.report.page_classes import class_times_section, classes_section
 from driftwalk.report.page_parts import (
@@ -14,6 +15,7 @@ from driftwalk.report.page_parts import (
     empty_section,
     figure,
     require,
+    required,
     section,
     value_of,
     warnings_section,
@@ -114,12 +116,7 @@ def assembly_summary(
     paragraphs = [f"{done}.", _most_common(distribution)]
     shown = [_complete(distribution, "complete: one assembly")]
     if drawn is not None:
-        what = ", ".join(_drawn_word(name) for name in str(drawn.attrs.get("drawn", "")).split())
-        paragraphs.append(
-            f"In a second set each run has its own {what or 'parameters'}, drawn from what the "
-            "calibration leaves open: by how much the two sets differ is what that leaves open of "
-            "the prediction."
-        )
+        paragraphs.append(_beside(distribution, drawn))
         shown.append(_complete(drawn, "complete, parameters drawn"))
     paragraphs.append(
         "These are predictions of the model with rules of latching that no recording has settled."
@@ -152,12 +149,14 @@ def drawn_section(assembly: xr.Dataset) -> Section:
     require(assembly, "force_std", "drag_coefficient")
     force, drag = (assembly[name].values for name in ("force_std", "drag_coefficient"))
     what = str(assembly.attrs.get("drawn", "")).split()
+    every = value_of(assembly, "force_interval_s")
+    anew = "" if every is None else f", drawn anew every {quantity(every, 's')}"
     note = f"{count(int(force.size), 'run')}, each with parameters of its own."
     if "flow" in what:
         note += " Each has a flow of its own, too, drawn within the errors of the field."
     return chart(
         "drawn", "The drawn parameters", note,
-        x=label("stochastic force σ_F", "N"), y=label("drag coefficient C_d"),
+        x=label(f"stochastic force σ_F{anew}", "N"), y=label("drag coefficient C_d"),
         series=[series("runs", force, drag, style="points")],
     )  # fmt: skip
 
@@ -173,6 +172,37 @@ def _parameters(distribution: xr.Dataset, assembly: xr.Dataset | None) -> str:
     return (
         f" with C_d = {quantity(float(drag[0]))} and σ_F = {quantity(float(force[0]), 'N')}{anew}"
     )
+
+
+def _beside(distribution: xr.Dataset, drawn: xr.Dataset) -> str:
+    """Return how far the runs with drawn parameters are from the others."""
+    require(drawn, "class", "proportion")
+    words = [_drawn_word(name) for name in str(drawn.attrs.get("drawn", "")).split()]
+    what = " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+    apart, chance = l1_and_chance(distribution, drawn)
+    return (
+        f"In a second set each run has its own {what or 'parameters'}, drawn from what the "
+        f"calibration leaves open. The l1 distance of the two sets is {apart:.3g} (0: alike, 2: "
+        f"nothing in common); by chance alone it would be {chance:.2g} on average."
+    )
+
+
+def l1_and_chance(first: xr.Dataset, second: xr.Dataset) -> tuple[float, float]:
+    """Return the l1 distance of two distributions, and what chance alone makes on average.
+
+    The second number is that of normal differences of the shares, with the variance that their
+    common value gives.
+    """
+    runs = [float(required(one, "runs")) for one in (first, second)]
+    shares: list[dict[str, float]] = [
+        dict(zip(class_names(one), one["proportion"].values.tolist(), strict=True))
+        for one in (first, second)
+    ]
+    names = list(dict.fromkeys([*shares[0], *shares[1]]))
+    one, other = (np.array([share.get(name, 0.0) for name in names]) for share in shares)
+    common = (runs[0] * one + runs[1] * other) / sum(runs)
+    spread = np.sqrt(common * (1.0 - common) * sum(1.0 / number for number in runs))
+    return float(np.abs(one - other).sum()), float(np.sqrt(2.0 / np.pi) * spread.sum())
 
 
 def _most_common(distribution: xr.Dataset) -> str:

@@ -82,7 +82,8 @@ def _innovations(check: xr.Dataset) -> Section:
     for name, values in zip(
         check["component"].values, check["autocorrelation"].values, strict=True
     ):
-        drawn.append(series(f"error in {name}", lag, values, style="points"))
+        shown = "θ" if name == "theta" else name
+        drawn.append(series(f"error in {shown}", lag, values, style="points"))
     return chart(
         "", "", "Errors of a right model have no memory.",
         x=label("lag (samples)"), y=label("autocorrelation"), series=drawn,
