@@ -18,7 +18,7 @@ from driftwalk.cli.progress import ProgressReporter
 from driftwalk.cli.tracking_run import tell_progress
 from driftwalk.schema import build_trajectory
 
-pytest.importorskip("cv2")
+cv2 = pytest.importorskip("cv2")
 
 FRAMES = 40
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "reference"
@@ -92,6 +92,27 @@ def test_progress_of_a_file_that_holds_more_than_it_states() -> None:
         "track: 5 of 10 (50 %)",
         "track: 11 of 11 (100 %): the source stated 10, there are more",
     ]
+
+
+def test_one_dark_object_among_brighter_ones(tmp_path: Path) -> None:
+    """A larger bright thing that comes now and then is not taken for the dark one."""
+    random = np.random.default_rng(0)
+    columns = 20 + 3.0 * np.arange(40)
+    for frame, column in enumerate(columns):
+        image = np.full((160, 200), 150.0)
+        rows, places = np.indices(image.shape)
+        image[np.hypot(rows - 80, places - column) < 7] = 30
+        if frame % 8 == 0:
+            image[10:30, 150:190] = 240
+        image += random.normal(0, 2, image.shape)
+        cv2.imwrite(str(tmp_path / f"{frame:03d}.png"), np.clip(image, 0, 255).astype(np.uint8))
+    out = tmp_path / "r.nc"
+    words = ("--px-per-m", "500", "--image-rate", "10Hz", "--bodies", "1")
+    done = here("track", tmp_path, "--markers", "blob", *words, "-o", out)
+    assert done.code == 0, done.err
+    assert "objects that are dark are followed" in done.err
+    x = dw.load(out)["x"].values[:, 0]
+    assert x == pytest.approx((columns - 99.5) / 500, abs=0.5e-3)
 
 
 def test_explained_frame(folder: Path, tmp_path: Path) -> None:

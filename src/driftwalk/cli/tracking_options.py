@@ -66,7 +66,7 @@ Polarity = Annotated[
         _FINDING,
         "--polarity",
         metavar="dark|bright|both",
-        help="Of --markers blob: what they are like.",
+        help="Of --markers blob: what they are like (default: looked up).",
     ),
 ]
 LeastArea = Annotated[

@@ -125,6 +125,7 @@ def _detector(
         TwoColourDetector,
         load_markers,
         median_background,
+        usual_polarity,
     )
 
     blob = {
@@ -135,6 +136,10 @@ def _detector(
     given: dict[str, Any] = {key: value for key, value in blob.items() if value is not None}
     if options.markers == "blob":
         background = median_background(list(images))
+        if "polarity" not in given:
+            given["polarity"] = usual_polarity(list(images), background)
+            word = "dark or bright" if given["polarity"] == "both" else given["polarity"]
+            print_note(f"objects that are {word} are followed; --polarity says otherwise")
         return BlobDetector(background, camera, objects=options.bodies, **given), None
     if given:
         name = next(iter(given)).replace("_", "-")

@@ -1,6 +1,6 @@
 """Where is every block? From a camera or a video to poses, with reasons for what was left out."""
 
-from driftwalk.track.blobs import BlobDetector, median_background
+from driftwalk.track.blobs import BlobDetector, median_background, usual_polarity
 from driftwalk.track.boards import Board
 from driftwalk.track.camera import Camera, Lens, load_camera, save_camera
 from driftwalk.track.explain import explain_frame
@@ -78,4 +78,5 @@ __all__ = [
     "save_camera",
     "save_markers",
     "save_picture",
+    "usual_polarity",
 ]
