@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import time as clock
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,10 +86,9 @@ def owners(found: Floats, world: World) -> npt.NDArray[np.int64]:
 def unmarked_swaps(recording, world: World) -> tuple[int, int]:
     """Return how often a column went from one true body to another, and how often unmarked.
 
-    A change is marked when the first sample that shows the other body is.
+    A change is marked when all is, from the last sample of the one to the first of the other.
     """
-    found = np.stack([recording[name].values for name in ("x", "y", "theta")], axis=-1)
-    owner = owners(found, world)
+    owner = owners(poses_of(recording), world)
     score = recording["ambiguous"].values
     changes = unmarked = 0
     for column in range(owner.shape[1]):
@@ -96,8 +96,39 @@ def unmarked_swaps(recording, world: World) -> tuple[int, int]:
         for one, other in itertools.pairwise(present):
             if owner[one, column] != owner[other, column]:
                 changes += 1
-                unmarked += not score[other, column] > 0
+                unmarked += not (score[one : other + 1, column] > 0).all()
     return changes, unmarked
+
+
+def poses_of(recording) -> Floats:
+    return np.stack([recording[name].values for name in ("x", "y", "theta")], axis=-1)
+
+
+def of_nothing(recording, world: World) -> npt.NDArray[np.bool_]:
+    """Return where an unmarked sample shows no body, (time, body)."""
+    there = np.isfinite(recording["x"].values) & ~(recording["ambiguous"].values > 0)
+    return there & (owners(poses_of(recording), world) < 0)
+
+
+def with_gaps(seed: int) -> tuple[World, npt.NDArray[np.bool_]]:
+    """Return blocks that cannot come nearer than a side, 60 s, and when each is hidden.
+
+    2 % of the frames are missed, and there are gaps of up to 0.8 s.
+    """
+    world = wander(seed, bodies=4, frames=600, apart=0.03, jitter=0.3)
+    random = np.random.default_rng(1000 + seed)
+    lost = random.random((600, 4)) < 0.02
+    for begin in random.integers(20, 580, 8):
+        lost[begin : begin + random.integers(2, 8), random.integers(4)] = True
+    return world, lost
+
+
+def crossing(seed: int) -> tuple[World, npt.NDArray[np.bool_]]:
+    """Return points that cross, and when each is hidden: while it does."""
+    world = wander(seed, bodies=5, frames=900, apart=0.0, speed=0.08)
+    gap = world.pose[:, :, None, :2] - world.pose[:, None, :, :2]
+    near = np.hypot(gap[..., 0], gap[..., 1]) + np.eye(5)
+    return world, (near < 0.012).any(axis=2)
 
 
 def follow(world: World, settings: TrackerSettings, seed: int, *, lost=None, false=0.0, angle=True):
@@ -118,22 +149,38 @@ def follow(world: World, settings: TrackerSettings, seed: int, *, lost=None, fal
 
 @pytest.mark.parametrize("seed", range(2))
 def test_four_blocks_with_clutter_and_gaps_never_swap(seed: int) -> None:
-    """Blocks that cannot come nearer than a side: 60 s, 2 % missed, gaps of up to 0.8 s."""
-    world = wander(seed, bodies=4, frames=600, apart=0.03, jitter=0.3)
-    random = np.random.default_rng(1000 + seed)
-    lost = random.random((600, 4)) < 0.02
-    for begin in random.integers(20, 580, 8):
-        lost[begin : begin + random.integers(2, 8), random.integers(4)] = True
+    world, lost = with_gaps(seed)
     recording = follow(world, TrackerSettings(max_speed=0.3, bodies=4), seed, lost=lost, false=0.5)
     assert recording.sizes["body"] == 4
-    changes, unmarked = unmarked_swaps(recording, world)
-    assert unmarked == 0
-    assert changes <= 2
-    found = np.stack([recording[name].values for name in ("x", "y", "theta")], axis=-1)
-    owner = owners(found, world)
+    assert unmarked_swaps(recording, world) == (0, 0)
     # Every true pose that was seen stands in the recording, but for what clutter displaced.
-    assert (owner >= 0).sum() >= 0.995 * (~lost).sum()
+    assert (owners(poses_of(recording), world) >= 0).sum() >= 0.995 * (~lost).sum()
     assert (recording["ambiguous"].values > 0).mean() < 0.1
+    assert not of_nothing(recording, world).any()
+
+
+@pytest.mark.slow
+def test_worlds_that_no_setting_was_chosen_on() -> None:
+    """The same in twenty worlds whose seeds were used for nothing else.
+
+    There is no swap. Of some 6000 detections of nothing, those that lie within a few millimetres of
+    where a hidden body is expected cannot be told from it: 6 in 60 worlds of other seeds were taken
+    without a mark. 10 in 20 worlds come once in 20,000 times from that rate.
+    """
+    nothing = 0
+    for seed in range(600, 620):
+        world, lost = with_gaps(seed)
+        settings = TrackerSettings(max_speed=0.3, bodies=4)
+        recording = follow(world, settings, seed, lost=lost, false=0.5)
+        assert unmarked_swaps(recording, world) == (0, 0)
+        assert (owners(poses_of(recording), world) >= 0).sum() >= 0.995 * (~lost).sum()
+        assert (recording["ambiguous"].values > 0).mean() < 0.1
+        nothing += int(of_nothing(recording, world).sum())
+        world, lost = crossing(seed)
+        settings = TrackerSettings(max_speed=0.4, bodies=5)
+        recording = follow(world, settings, seed, lost=lost, angle=False)
+        assert unmarked_swaps(recording, world)[1] == 0
+    assert nothing < 10
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -142,11 +189,7 @@ def test_bodies_that_cross_unseen_are_marked(seed: int) -> None:
 
     Hidden for up to two seconds, so tracks end and come back as well.
     """
-    world = wander(seed, bodies=5, frames=900, apart=0.0, speed=0.08)
-    gap = world.pose[:, :, None, :2] - world.pose[:, None, :, :2]
-    near = np.hypot(gap[..., 0], gap[..., 1]) + np.eye(5)
-    close = (near < 0.012).any(axis=2)
-    lost = close.copy()
+    world, lost = crossing(seed)
     recording = follow(
         world, TrackerSettings(max_speed=0.4, bodies=5), seed, lost=lost, angle=False
     )
@@ -280,3 +323,49 @@ def test_a_collision_does_not_end_a_track() -> None:
     recording = tracker.finish()
     assert np.isfinite(recording["x"].values).all()
     assert not recording["ambiguous"].values.any()
+
+
+def test_what_turns_up_beside_a_hidden_body_is_taken_back() -> None:
+    """A body at rest is missed once; something else is seen 3 cm away in that frame only."""
+    tracker = Tracker(TrackerSettings(max_speed=0.3, bodies=1))
+    live = []
+    for frame in range(40):
+        states = tracker.step(0.1 * frame, [one_at(0.03 if frame == 20 else 0.0)])
+        live.append(states[0].ambiguous if states else 0.0)
+    recording = tracker.finish()
+    x = recording["x"].values[:, 0]
+    assert np.isnan(x[20])
+    assert (np.delete(x, 20) == 0.0).all()
+    assert not (recording["ambiguous"].values[25:] > 0).any()
+    # While it was not settled, it was said.
+    assert live[20] > 0.001
+    assert json.loads(recording.attrs["counts"])["taken_back"] == 1
+
+
+def test_a_body_that_is_pushed_is_not_taken_back() -> None:
+    """The same jump, but it stays there: then it was the body, and nothing is in doubt."""
+    tracker = Tracker(TrackerSettings(max_speed=0.4, bodies=1))
+    for frame in range(40):
+        tracker.step(0.1 * frame, [one_at(0.03 if frame >= 20 else 0.0)])
+    recording = tracker.finish()
+    assert np.isfinite(recording["x"].values).all()
+    assert "taken_back" not in json.loads(recording.attrs["counts"])
+    assert not (recording["ambiguous"].values > 0).any()
+
+
+def test_a_long_recording_takes_no_longer_for_each_frame() -> None:
+    """Samples of one that never gets a name, and of all others, do not slow the next frame."""
+    tracker = Tracker(TrackerSettings(max_speed=0.3, bodies=1))
+    random = np.random.default_rng(5)
+    began, spans = clock.process_time(), []
+    for frame in range(4001):
+        hidden = frame > 500 and frame % 50 == 0
+        found = [] if hidden else [one_at(1e-4 * random.normal())]
+        tracker.step(0.1 * frame, [*found, one_at(0.1)])
+        if frame % 1000 == 0:
+            spans.append(clock.process_time() - began)
+            began = clock.process_time()
+    assert spans[-1] < 2.0 * spans[1] + 0.1
+    began = clock.process_time()
+    tracker.finish()
+    assert clock.process_time() - began < 0.05 * sum(spans)
