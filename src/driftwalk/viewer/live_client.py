@@ -17,8 +17,10 @@ VERSION: Final = 1
 LONGEST_LINE: Final = 1 << 25
 """Longest line [byte] that is read: a frame with a large image."""
 FIRST_PAUSE_S: Final = 0.25
-LONGEST_PAUSE_S: Final = 2.0
+LONGEST_PAUSE_S: Final = 1.0
 """Time between two attempts to connect [s]: it doubles up to this."""
+EVENTS_REPEATED: Final = 50
+"""Events that every frame repeats: a browser that misses frames misses no event."""
 LAST_PORT: Final = 65535
 WIDTHS: Final = range(16, 4097)
 """Widths [px] in which a tracker sends its images."""
@@ -55,6 +57,7 @@ class LiveSource(Source):
         self._last: dict[str, Content] = {
             "lost": {"type": "lost", "words": f"waiting for a tracker on {self.title}"}
         }
+        self._events: list[Any] = []
         self._widths: dict[Publish, int] = {}
         self._writer: asyncio.StreamWriter | None = None
 
@@ -114,16 +117,25 @@ class LiveSource(Source):
                 f"this page version {VERSION}; use one driftwalk for both"
             )
         self._last.clear()
+        self._events.clear()
         self._note(hello, publish)
         await self._ask()
         while line := await reader.readline():
             content = stream_line(line)
             if content is None or content.get("type") not in ("frame", "end"):
                 continue
-            self._note(content, publish)
+            self._note(self._with_events(content), publish)
             if "jpeg_base64" in content:
                 await self._ask()
         return None
+
+    def _with_events(self, content: dict[str, Any]) -> dict[str, Any]:
+        """Return a frame with the last events of all frames before it."""
+        events = content.get("events")
+        if isinstance(events, list):
+            self._events = [*self._events, *events][-EVENTS_REPEATED:]
+            return {**content, "events": self._events}
+        return content
 
     def _note(self, content: dict[str, Any], publish: Publish) -> None:
         """Publish, and keep it for browsers that connect later."""

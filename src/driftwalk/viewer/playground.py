@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import math
 import queue
 import threading
@@ -141,6 +142,10 @@ class PlaySource(Source):
     async def run(self, publish: Publish) -> None:
         """Advance the tank in a thread of its own, and compare its motion in another."""
         loop = asyncio.get_running_loop()
+        # What has been loaded up to now stays: looking through it again would stop the tank for
+        # three pictures each time.
+        gc.collect()
+        gc.freeze()
 
         def publish_from_thread(content: Content) -> None:
             if not self._over.is_set():

@@ -64,6 +64,23 @@ def test_hello_and_frames_are_handed_on() -> None:
     asyncio.run(run())
 
 
+def test_no_event_is_missed_with_a_frame() -> None:
+    async def run() -> None:
+        with LiveServer(0, hello=HELLO) as server:
+            async with listening(server.port) as (_, heard):
+                await heard.until(kind("hello"))
+                for number in range(60):
+                    events = [{"time_s": number}] if number % 10 == 5 else []
+                    server.publish({"type": "frame", "frame": number, "events": events})
+                    await heard.until(lambda c, n=number: c.get("frame") == n)
+                last = heard[-1]["events"]
+                assert [event["time_s"] for event in last] == [5, 15, 25, 35, 45, 55]
+                server.publish({"type": "frame", "frame": 60, "events": None})
+                assert (await heard.until(lambda c: c.get("frame") == 60))["events"] is None
+
+    asyncio.run(run())
+
+
 def test_a_lost_tracker_is_found_again() -> None:
     async def run() -> None:
         port = free_port()

@@ -1,0 +1,300 @@
+"""The live pages in Chromium, each with its real server: a run, a tracker, the playground."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import FLOW, RECORDING, end, here, start
+from finished_run import write_finished_run
+from page_server import PageServer, served
+
+import driftwalk as dw
+from browser.conftest import PHONE, Visit
+from browser.pictures import drawn_share, pixels
+from driftwalk.schema import build_trajectory
+
+pytestmark = pytest.mark.browser
+
+HOSTILE = "<script>document.title='taken'<|script><img src=x onerror=alert(1)>&\"'"
+# 441 settings, seven work units: some seconds.
+SWEEP = """\
+[calibration]
+drag_coefficient_min = 0.2
+drag_coefficient_max = 0.6
+drag_coefficient_step = 0.02
+force_std_min_N = "0.2mN"
+force_std_max_N = "1mN"
+force_std_step_N = "0.04mN"
+replicates = 2
+refine = "none"
+bootstrap = 0
+"""
+TRACKED_FRAMES = 240
+
+
+def free_port() -> int:
+    with closing(socket.create_server(("127.0.0.1", 0))) as found:
+        return int(found.getsockname()[1])
+
+
+def data(page: Any, name: str) -> str:
+    """Return what the document says of itself."""
+    return str(page.evaluate("name => document.documentElement.dataset[name] ?? ''", name))
+
+
+def until_tank(page: Any, name: str, above: float) -> None:
+    """Wait until the tank's picture says a number above another one."""
+    page.wait_for_function(
+        "([name, above]) => +document.querySelector('.tank-canvas').dataset[name] > above",
+        arg=[name, above],
+    )
+
+
+def wait_for(page: Any, name: str, value: str, *, seconds: float = 20.0) -> None:
+    page.wait_for_function(
+        "([name, value]) => document.documentElement.dataset[name] === value",
+        arg=[name, value],
+        timeout=1e3 * seconds,
+    )
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
+    """Serve a finished run from a directory with a hostile name."""
+    folder = tmp_path_factory.mktemp("hostile") / HOSTILE
+    with served("view", write_finished_run(folder)) as started:
+        yield started
+
+
+def test_a_hostile_name_is_only_text(server: PageServer, visit: Callable[..., Visit]) -> None:
+    one = visit(f"http://127.0.0.1:{server.port}/")
+    dialogs: list[str] = []
+    one.page.on("dialog", lambda dialog: (dialogs.append(dialog.message), dialog.dismiss()))
+    page = one.open(server.address)
+    assert page.locator(".subtitle").inner_text() == HOSTILE
+    assert page.locator("img").count() == 0
+    assert HOSTILE in page.title()
+    assert dialogs == []
+    # Nothing but the page, the front end and its WebSocket was asked for.
+    names = {url.partition("?")[0].rpartition("/")[2] for url in one.requests}
+    assert names == {"", "driftwalk.js", "driftwalk.css", "ws"}
+
+
+@pytest.mark.parametrize(("size", "name"), [(None, "desktop"), (PHONE, "phone")])
+def test_a_finished_run(
+    server: PageServer,
+    visit: Callable[..., Visit],
+    picture: Callable[..., Path],
+    size: dict[str, int] | None,
+    name: str,
+) -> None:
+    one = visit(f"http://127.0.0.1:{server.port}/", **({} if size is None else {"viewport": size}))
+    page = one.open(server.address)
+    wait_for(page, "finished", "yes")
+    assert drawn_share(pixels(page.locator(".map-figure svg"))) > 0.3
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    picture(page, f"run-{name}")
+
+
+def test_the_page_follows_a_sweep_from_begin_to_end(
+    visit: Callable[..., Visit], picture: Callable[..., Path], tmp_path: Path
+) -> None:
+    study, run = tmp_path / "study.toml", tmp_path / "run"
+    study.write_text(SWEEP)
+    words = ("calibrate", RECORDING, "--flow", FLOW, "--study", study, "--threads", 1, "-o", run)
+    sweep = start(*words)
+    while not (run / ".run.json").exists():
+        assert sweep.poll() is None, end(sweep)
+    with served("view", run) as server:
+        one = visit(f"http://127.0.0.1:{server.port}/")
+        page = one.open(server.address)
+        seen, pictures = [], []
+        map_image = page.locator(".map-figure svg image")
+        while data(page, "finished") == "no":
+            progress = float(data(page, "progress") or "nan")
+            if not seen or progress != seen[-1]:
+                seen.append(progress)
+                if map_image.count():
+                    pictures.append(map_image.first.get_attribute("href"))
+                if len(seen) == 2:
+                    picture(page, "sweep-under-way", whole=False)
+            page.wait_for_timeout(50)
+        assert end(sweep).code == 0
+        wait_for(page, "progress", "1")
+        # It went up all the time, from the beginning, and the map with it.
+        assert seen[0] < 0.3
+        assert len(seen) >= 4
+        assert all(np.diff(seen) > 0)
+        assert len(set(pictures)) >= 3
+        found = xr.load_dataset(run / "calibration.nc", engine="h5netcdf")
+        page.wait_for_selector("#manifest")
+        shown = page.locator("[data-part=map]")
+        row, column = (int(shown.get_attribute(f"data-{name}")) for name in ("row", "column"))
+        value = float(shown.get_attribute("data-value"))
+        assert value == float(found["ks_distance"][row, column])
+
+
+def test_the_page_comes_back_when_the_server_does(
+    visit: Callable[..., Visit], finished: Path
+) -> None:
+    port = free_port()
+    one = visit(f"http://127.0.0.1:{port}/")
+    with served("view", finished, port=port) as server:
+        page = one.open(server.address)
+        wait_for(page, "connection", "open")
+    wait_for(page, "connection", "lost")
+    # What was there stays readable meanwhile.
+    assert page.locator("section[data-kind=map]").is_visible()
+    with served("view", finished, port=port):
+        wait_for(page, "connection", "open")
+        assert page.locator("section[data-kind=map]").is_visible()
+
+
+def test_browsers_that_go_away_leave_the_server_well(
+    server: PageServer, browser: Any, visit: Callable[..., Visit]
+) -> None:
+    for wait in ("commit", "domcontentloaded", "load") * 3:
+        context = browser.new_context()
+        context.new_page().goto(server.address, wait_until=wait)
+        context.close()
+    page = visit(f"http://127.0.0.1:{server.port}/").open(server.address)
+    wait_for(page, "finished", "yes")
+    assert server.process.poll() is None
+
+
+@pytest.fixture(scope="module")
+def playground() -> Iterator[PageServer]:
+    """Serve the playground."""
+    with served("play", "--blocks", 3) as started:
+        yield started
+
+
+def turn(page: Any, name: str, share: float) -> None:
+    """Move a slider to a share of its way, as a hand would."""
+    slider = page.locator(f"input[name={name}]")
+    slider.scroll_into_view_if_needed()
+    box = slider.bounding_box()
+    page.mouse.click(box["x"] + box["width"] * share, box["y"] + box["height"] / 2)
+
+
+def test_a_slider_changes_the_picture(
+    playground: PageServer, visit: Callable[..., Visit], picture: Callable[..., Path]
+) -> None:
+    page = visit(f"http://127.0.0.1:{playground.port}/").open(playground.address)
+    canvas = page.locator("canvas.tank-canvas")
+    until_tank(page, "frames", 20)
+    assert canvas.get_attribute("data-blocks") == "3"
+    assert drawn_share(pixels(canvas)) > 0.1
+
+    page.click("[data-action=pause]")
+    page.wait_for_selector("[data-action=run]")
+    still = pixels(canvas)
+    page.wait_for_timeout(300)
+    # Paused: the same to the last pixel.
+    assert np.array_equal(pixels(canvas), still)
+    page.click("[data-action=run]")
+    page.wait_for_selector("[data-action=pause]")
+
+    turn(page, "blocks", 0.4)
+    until_tank(page, "blocks", 6)
+    assert np.abs(pixels(canvas) - still).max() > 0.2
+    turn(page, "speed", 0.9)
+    before = float(canvas.get_attribute("data-time"))
+    page.wait_for_timeout(1000)
+    # Much faster than real time, whatever else the machine does.
+    assert float(canvas.get_attribute("data-time")) - before > 3.0
+    page.wait_for_selector("[data-steps]")
+    picture(page, "play-desktop")
+
+
+def test_the_blocks_come_near_the_recording(
+    visit: Callable[..., Visit],
+) -> None:
+    """One block with the parameters of the recording's truth, then with another drag."""
+    with served("play", "--blocks", 1) as started:
+        page = visit(f"http://127.0.0.1:{started.port}/").open(started.address)
+        turn(page, "speed", 0.99)
+        panel = page.locator("[data-steps]")
+
+        def until_steps(condition: str) -> None:
+            page.wait_for_function(
+                f"() => +document.querySelector('[data-steps]')?.dataset.steps {condition}"
+            )
+
+        def distance() -> float:
+            return float(panel.get_attribute("data-ks-distance"))
+
+        until_steps("> 3000")
+        # Independent runs of half an hour are 0.016 apart; five minutes of one, three times that.
+        assert distance() < 0.1
+        turn(page, "drag_coefficient", 0.6)
+        until_steps("< 1500")
+        until_steps("> 1500")
+        assert distance() > 0.3
+
+
+def test_the_playground_on_a_phone(
+    playground: PageServer, visit: Callable[..., Visit], picture: Callable[..., Path]
+) -> None:
+    page = visit(f"http://127.0.0.1:{playground.port}/", viewport=PHONE).open(playground.address)
+    until_tank(page, "frames", 5)
+    page.wait_for_selector("[data-steps]")
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    picture(page, "play-phone")
+
+
+@pytest.fixture(scope="module")
+def video(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with a video of two blocks that meet, and the markers in it."""
+    pytest.importorskip("cv2")
+    time = 0.1 * np.arange(TRACKED_FRAMES)
+    apart = np.maximum(0.06 - 0.003 * time, 0.03)
+    x = np.stack([-0.02 + 0 * time, -0.02 + apart], axis=1)
+    y = np.stack([0.0005 * time, 0.0005 * time], axis=1)
+    theta = np.stack([0 * time, np.full(TRACKED_FRAMES, np.pi / 2)], axis=1)
+    place = tmp_path_factory.mktemp("video")
+    settings = dw.video_settings("moderate", width_px=480, height_px=360, px_per_m=1100.0)
+    dw.write_video(place / "video.mkv", build_trajectory(time, x, y, theta), settings)
+    done = here(
+        *("markers", "teach", place / "video.mkv", "--tank-diameter", "30cm", "--side", "3cm"),
+        *("-o", place / "m.toml"),
+    )
+    assert done.code == 0, done.err
+    return place
+
+
+def test_a_tracker_is_watched(
+    visit: Callable[..., Visit], picture: Callable[..., Path], video: Path
+) -> None:
+    port = free_port()
+    with served("view", "--live", f"127.0.0.1:{port}") as server:
+        page = visit(f"http://127.0.0.1:{server.port}/").open(server.address)
+        assert "waiting for a tracker" in page.locator(".live-tank .readout").inner_text()
+        tracker = start(
+            *("watch", video / "video.mkv", "--markers", video / "m.toml"),
+            *("--tank-diameter", "30cm", "--bodies", 2, "--side", "3cm", "--live", port),
+        )
+        canvas = page.locator("canvas.tank-canvas")
+        until_tank(page, "frames", 3)
+        plain = pixels(canvas)
+        assert drawn_share(plain) > 0.05
+        page.check("input[name=video]")
+        wait_for(page, "outcome", "1+1")
+        page.wait_for_timeout(500)
+        # The camera's picture lies under the blocks now.
+        assert np.abs(pixels(canvas) - plain).mean() > 0.02
+        picture(page, "live-desktop")
+        assert end(tracker).code == 0
+        wait_for(page, "outcome", "2")
+        assert "has ended" in page.locator(".live-tank .readout").inner_text()
+        assert float(canvas.get_attribute("data-time")) == pytest.approx(
+            0.1 * (TRACKED_FRAMES - 1), abs=0.01
+        )
+        assert "joined" in page.locator(".events").inner_text()
