@@ -3,7 +3,7 @@
 import { type Child, el, svg } from "./dom";
 import { rich } from "./symbols";
 
-export type Swatch = "line" | "dash" | "band" | "solid" | "dot" | "hatch" | "cross" | "star" | "ring" | "box";
+export type Swatch = "line" | "dash" | "band" | "solid" | "dot" | "hatch" | "cross" | "star" | "ring" | "diamond" | "box";
 
 /** Returns a legend; the colour of a swatch is a colour or a variable of the style sheet. */
 export function legend(
@@ -37,6 +37,7 @@ const SHAPES: Readonly<Record<Swatch, () => SVGElement[]>> = {
   cross: () => [svg("path", { d: "M5 2L13 10M13 2L5 10", class: "stroke" })],
   star: () => [svg("path", { d: starPath(9, 6, 5.5), class: "fill" })],
   ring: () => [svg("circle", { cx: 9, cy: 6, r: 4, class: "stroke" })],
+  diamond: () => [svg("path", { d: "M9 1L14 6L9 11L4 6Z", class: "fill" })],
   box: () => [svg("rect", { x: 2, y: 1.5, width: 14, height: 9, class: "stroke" })],
 };
 

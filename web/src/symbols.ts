@@ -52,3 +52,9 @@ export function spoken(text: string): string {
     .map((piece) => (piece.index === null ? piece.text : `${piece.text} ${piece.index}`))
     .join("");
 }
+
+/** Returns the symbol in a label when it has one, else the label up to its first comma. */
+export function shortName(label: string): string {
+  const symbol = pieces(label).find((piece) => piece.index !== null);
+  return symbol === undefined ? (label.split(", ")[0] ?? label) : `${symbol.text}_${symbol.index ?? ""}`;
+}

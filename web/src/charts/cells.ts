@@ -15,6 +15,7 @@ export function drawCells(
   xEdges: readonly number[],
   yEdges: readonly number[],
   colourAt: ColourAt,
+  into: SVGGElement = frame.plot,
 ): void {
   const canvas = document.createElement("canvas");
   canvas.width = Math.ceil(frame.width * FINENESS);
@@ -33,7 +34,7 @@ export function drawCells(
       context.fillRect(Math.min(x0, x1), Math.min(y0, y1), Math.abs(x1 - x0), Math.abs(y1 - y0));
     }
   }
-  frame.plot.append(
+  into.append(
     svg("image", {
       href: canvas.toDataURL("image/png"),
       x: frame.left,

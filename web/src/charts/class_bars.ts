@@ -26,7 +26,7 @@ export interface ClassRow {
 const BAR = 13;
 const GAP = 11;
 const SQUARE = 7;
-const LETTER = 7;
+const LETTER = 7.3;
 /** Width of the text behind a bar: share and interval. */
 const TEXT = 150;
 const NARROW_TEXT = 50;
@@ -37,7 +37,7 @@ export function drawClassBars(width: number, rows: readonly ClassRow[], label: s
   const sketches = rows.map((row) => sketchOf(row.cells.length > 0 ? row.cells : cellsOfName(row.name)));
   const sketchWidth = Math.max(0, ...sketches.map((sketch) => sketch.width * SQUARE));
   const nameWidth = Math.max(0, ...rows.map((row) => writtenName(row.name).length * LETTER));
-  const left = sketchWidth + nameWidth + 22;
+  const left = sketchWidth + nameWidth + 24;
   const text = wide ? TEXT : NARROW_TEXT;
   const right = Math.max(left + 60, width - text);
   const highest = Math.max(0.01, ...rows.flatMap((row) => row.bars.map((bar) => Math.max(bar?.share ?? 0, bar?.high ?? 0))));

@@ -8,7 +8,7 @@ import type { Frame } from "./frame";
 import { LETTER, ticksOf } from "./frame";
 
 /** Room that a colour bar needs at the right of a frame [px]. */
-export const BAR_ROOM = 80;
+export const BAR_ROOM = 84;
 const WIDTH = 13;
 const GAP = 12;
 
@@ -52,7 +52,7 @@ export function drawColourBar(frame: Frame, options: BarOptions): void {
     );
   }
   const middle = frame.top + frame.height / 2;
-  const right = left + WIDTH + 7 + widest * LETTER + 14;
+  const right = left + WIDTH + 7 + widest * LETTER + 17;
   group.append(
     svg(
       "text",

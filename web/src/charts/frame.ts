@@ -61,11 +61,13 @@ export function makeFrame(options: FrameOptions): Frame {
   const yTicks = ticksOf(options.y, guess / 46);
   const widest = Math.max(1, ...yTicks.map((tick) => tick.text.length));
   const yLabel = labelLines(options.y, guess);
-  const left = Math.ceil(widest * LETTER) + TICK + 6 + (options.y.label === "" ? 0 : LINE * yLabel.length + 5);
+  const written = yTicks.length === 0 ? 2 : Math.ceil(widest * LETTER) + TICK + 6;
+  const left = written + (yLabel.length === 0 ? 0 : LINE * yLabel.length + 5);
   const width = Math.max(40, options.width - left - right);
   const height = options.height ?? (width * spanOf(options.y)) / spanOf(options.x);
   const xLabel = labelLines(options.x, width + left);
-  const bottom = TICK + LINE + (options.x.label === "" ? 2 : LINE * xLabel.length + 6);
+  const ticked = options.x.ticks === undefined || options.x.ticks.length > 0;
+  const bottom = (ticked ? TICK + LINE : 0) + (xLabel.length === 0 ? 2 : LINE * xLabel.length + 6);
 
   const total = top + height + bottom;
   const picture = svg("svg", {
@@ -99,11 +101,11 @@ function scaleOf(axis: AxisOptions, from: number, to: number): Scale {
 
 /** Returns round ticks in the unit that is shown, all with the same number of decimals. */
 export function ticksOf(axis: AxisOptions, count: number): Tick[] {
-  if (axis.ticks !== undefined) return thinned(axis.ticks, count);
+  if (axis.ticks !== undefined) return [...axis.ticks];
   const { factor } = axis.display;
   const [one, other] = [axis.domain[0] * factor, axis.domain[1] * factor];
   const [low, high] = [Math.min(one, other), Math.max(one, other)];
-  const many = Math.max(2, Math.floor(count));
+  const many = Math.max(3, Math.floor(count));
   if (axis.log === true) {
     return logTicks(low, high, many).map((tick) => ({ at: tick / factor, text: short(tick, 3) }));
   }
@@ -114,11 +116,6 @@ export function ticksOf(axis: AxisOptions, count: number): Tick[] {
   const write = (tick: number): string =>
     large >= 1e5 || large < 1e-3 ? short(tick, 3) : fixed(tick, decimals);
   return ticks.map((tick) => ({ at: tick / factor, text: write(tick) }));
-}
-
-function thinned(ticks: readonly Tick[], count: number): Tick[] {
-  const every = Math.max(1, Math.ceil(ticks.length / Math.max(2, count)));
-  return ticks.filter((_, index) => index % every === 0);
 }
 
 function border(frame: Frame): SVGElement {

@@ -1,6 +1,6 @@
 /** A plot of the tank seen from above: equal scales, outline, optionally without axes. */
 
-import { svg } from "../dom";
+import { freshId, svg } from "../dom";
 import type { Arena } from "../page";
 import { type Box, closedPath, outline } from "../tank/outline";
 import { multiples, niceStep } from "../scale";
@@ -30,7 +30,7 @@ export function makeTankFrame(
 function commonTicks(box: Box, display: Display, width: number): { x: Tick[]; y: Tick[] } {
   const { factor } = display;
   const widest = Math.max(box.x[1] - box.x[0], box.y[1] - box.y[0]) * factor;
-  const step = niceStep(widest, Math.min(8, Math.max(3, width / 70)));
+  const step = niceStep(widest, Math.min(8, Math.max(3, (width - 100) / 46)));
   const decimals = stepDecimals(step);
   const along = (range: readonly [number, number]): Tick[] =>
     multiples(range[0] * factor, range[1] * factor, step).map((tick) => ({
@@ -38,6 +38,19 @@ function commonTicks(box: Box, display: Display, width: number): { x: Tick[]; y:
       text: fixed(tick, decimals),
     }));
   return { x: along(box.x), y: along(box.y) };
+}
+
+/** Returns a group in which nothing is seen outside of the tank. */
+export function insideTank(frame: Frame, arena: Arena | null): SVGGElement {
+  const d = closedPath(outline(arena), frame.x.px, frame.y.px);
+  const group = svg("g");
+  if (d !== "") {
+    const id = freshId("inside");
+    frame.defs.append(svg("clipPath", { id }, svg("path", { d })));
+    group.setAttribute("clip-path", `url(#${id})`);
+  }
+  frame.plot.append(group);
+  return group;
 }
 
 /** Draws the outline of the tank over what is there. */

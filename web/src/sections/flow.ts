@@ -6,7 +6,7 @@ import { BAR_ROOM, drawColourBar } from "../charts/colour_bar";
 import type { Frame } from "../charts/frame";
 import { onPointer } from "../charts/hover";
 import { figure } from "../charts/responsive";
-import { drawOutline, makeTankFrame } from "../charts/tank_frame";
+import { drawOutline, insideTank, makeTankFrame } from "../charts/tank_frame";
 import { colourScale } from "../colours";
 import { el, svg } from "../dom";
 import type { FlowSection } from "../page";
@@ -39,9 +39,12 @@ interface Field {
 export async function drawFlow(section: FlowSection, body: HTMLElement): Promise<void> {
   const field = await decodeField(section);
   const line = readout("Point at the field to read velocities.");
-  const holder = el("div", { class: "one" });
-  body.append(holder);
+  const { error } = field;
+  const holder = el("div", { class: "stack" });
+  const beside = el("div", { class: "stack" });
+  body.append(el("div", { class: error === null ? "one" : "columns" }, holder, error !== null && beside));
   figure(holder, "square", (width) => drawField(width, section, field, line));
+  if (error !== null) figure(beside, "square", (width) => drawError(width, section, field, error, line));
   const some = (kind: number): boolean => field.origin.data.includes(kind);
   holder.append(
     line.element,
@@ -79,20 +82,45 @@ function drawField(width: number, section: FlowSection, field: Field, line: Read
   });
   const columns = field.x.data.length;
   const scale = colourScale("speed", 0, top, { dark: isDark() });
-  drawCells(frame, field.xEdges, field.yEdges, (column, row) => scale.of(at(field.speed, row * columns + column)));
-  drawFilled(frame, field);
+  const inside = insideTank(frame, section.arena);
+  drawCells(frame, field.xEdges, field.yEdges, (column, row) => scale.of(at(field.speed, row * columns + column)), inside);
+  drawFilled(frame, field, inside);
   drawArrows(frame, field, top);
   drawOutline(frame, section.arena);
   drawColourBar(frame, { scale, label: `speed (${display.unit})`, display });
+  readAt(frame, field, line);
+  return frame.svg;
+}
+
+/** Draws how well each velocity is known; filled cells are hatched here too. */
+function drawError(width: number, section: FlowSection, field: Field, error: Grid, line: Readout): Element {
+  const known = error.data.map((value, index) => (at(field.origin.data, index) === OUTSIDE ? Number.NaN : value));
+  const top = extent(known.filter((_, index) => at(field.origin.data, index) === MEASURED))?.[1] ?? extent(known)?.[1] ?? 1;
+  const display = displayFor("m/s", [top]);
+  const frame = makeTankFrame(width, boxAround(section.arena, field.xEdges, field.yEdges), {
+    label: `Standard error of the flow, up to ${quantity(top, "m/s")} where it is measured`,
+    right: BAR_ROOM,
+  });
+  const columns = field.x.data.length;
+  const scale = colourScale("magnitude", 0, top);
+  const inside = insideTank(frame, section.arena);
+  drawCells(frame, field.xEdges, field.yEdges, (column, row) => scale.of(at(known, row * columns + column)), inside);
+  drawFilled(frame, field, inside);
+  drawOutline(frame, section.arena);
+  drawColourBar(frame, { scale, label: `standard error (${display.unit})`, display });
+  readAt(frame, field, line);
+  return frame.svg;
+}
+
+function readAt(frame: Frame, field: Field, line: Readout): void {
   onPointer(frame, (place) => {
     const column = place === null ? -1 : cellAt(field.xEdges, place.x);
     const row = place === null ? -1 : cellAt(field.yEdges, place.y);
     line.show(column < 0 || row < 0 ? null : reading(field, row, column));
   });
-  return frame.svg;
 }
 
-function drawFilled(frame: Frame, field: Field): void {
+function drawFilled(frame: Frame, field: Field, into: SVGGElement): void {
   const columns = field.x.data.length;
   const cells: [number, number][] = [];
   field.origin.data.forEach((kind, index) => {
@@ -100,7 +128,7 @@ function drawFilled(frame: Frame, field: Field): void {
   });
   const path = cellsPath(frame, field.xEdges, field.yEdges, cells);
   if (path !== "") {
-    frame.plot.append(svg("path", { d: path, fill: addHatch(frame, { class: "hatch orange", gap: 5 }) }));
+    into.append(svg("path", { d: path, fill: addHatch(frame, { class: "hatch orange", gap: 5 }) }));
   }
 }
 

@@ -6,13 +6,13 @@ import { BAR_ROOM, drawColourBar } from "../charts/colour_bar";
 import { type Frame, makeFrame } from "../charts/frame";
 import { onPointer } from "../charts/hover";
 import { figure } from "../charts/responsive";
-import { drawOutline, makeTankFrame } from "../charts/tank_frame";
+import { drawOutline, insideTank, makeTankFrame } from "../charts/tank_frame";
 import { type ColourScale, colourScale } from "../colours";
 import { el, svg } from "../dom";
 import type { ImageGridSection } from "../page";
 import { details, readout, table } from "../parts";
 import { cellAt, cellEdges } from "../scale";
-import { spoken } from "../symbols";
+import { shortName, spoken } from "../symbols";
 import { boxAround } from "../tank/outline";
 import { isDark } from "../theme";
 import { displayFor, inUnit, labelled, short } from "../units";
@@ -30,7 +30,8 @@ export async function drawImageGrid(section: ImageGridSection, body: HTMLElement
   figure(holder, "", (width) => {
     const scale = scaleOf(section, value);
     const frame = frameOf(width, section, xEdges, yEdges);
-    drawCells(frame, xEdges, yEdges, (column, row) => scale.of(at(value, row * columns + column)));
+    const inside = insideTank(frame, section.arena);
+    drawCells(frame, xEdges, yEdges, (column, row) => scale.of(at(value, row * columns + column)), inside);
     if (section.arena === null) drawMissing(frame, xEdges, yEdges, value, columns);
     else drawOutline(frame, section.arena);
     drawColourBar(frame, { scale, label: labelled(section.label, display), display });
@@ -40,8 +41,8 @@ export async function drawImageGrid(section: ImageGridSection, body: HTMLElement
       line.show(
         Number.isFinite(found)
           ? [
-              [y.label, inUnit(at(y.values, row), yDisplay)],
-              [x.label, inUnit(at(x.values, column), xDisplay)],
+              [shortName(y.label), inUnit(at(y.values, row), yDisplay)],
+              [shortName(x.label), inUnit(at(x.values, column), xDisplay)],
               [section.label, inUnit(found, display)],
             ]
           : null,

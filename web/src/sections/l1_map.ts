@@ -15,7 +15,7 @@ import type { Cell } from "../keyboard";
 import type { L1MapSection } from "../page";
 import { type Swatch, details, legend, readout, starPath, table } from "../parts";
 import { cellAt, cellEdges } from "../scale";
-import { rich, spoken } from "../symbols";
+import { rich, shortName, spoken } from "../symbols";
 import { type Display, displayFor, inUnit, percent, short } from "../units";
 import { useGridKeys } from "./grid_keys";
 
@@ -139,14 +139,14 @@ function drawPlot(
     const d = contourPath(contourLine(x.values, y.values, map.value, noise), frame.x.px, frame.y.px);
     frame.plot.append(svg("path", { class: "region edge", d }), svg("path", { class: "region", d }));
   }
-  if (reference !== null) {
-    const d = starPath(frame.x.px(reference.x), frame.y.px(reference.y), 8);
-    frame.front.append(svg("path", { class: "reference", d }));
-  }
   for (const [cell, name] of [[cursor, "cursor"], [selected, "selected"]] as const) {
     if (cell === null) continue;
     const d = cellsPath(frame, map.xEdges, map.yEdges, [[cell.column, cell.row]]);
     frame.front.append(svg("path", { class: `${name} edge`, d }), svg("path", { class: name, d }));
+  }
+  if (reference !== null) {
+    const d = starPath(frame.x.px(reference.x), frame.y.px(reference.y), 8);
+    frame.front.append(svg("path", { class: "reference", d }));
   }
   const marks = noise === null ? [] : [{ at: noise, label: "noise floor" }];
   drawColourBar(frame, { scale, label: map.section.label, display: { factor: 1, unit: "" }, marks });
@@ -161,8 +161,8 @@ function ends(edges: number[]): [number, number] {
 function reading(map: L1Data, { row, column }: Cell): [string, string][] {
   const { x, y, label } = map.section;
   return [
-    [y.label, inUnit(at(y.values, row), map.yDisplay, 4)],
-    [x.label, inUnit(at(x.values, column), map.xDisplay, 4)],
+    [shortName(y.label), inUnit(at(y.values, row), map.yDisplay, 4)],
+    [shortName(x.label), inUnit(at(x.values, column), map.xDisplay, 4)],
     [label, short(at(map.value, row * map.columns + column))],
   ];
 }
@@ -177,7 +177,7 @@ function showSetting(map: L1Data, panel: HTMLElement, grid: HTMLElement, cell: C
   });
   const title = reading(map, cell)
     .slice(0, 2)
-    .flatMap(([label, value], index) => [index > 0 && ", ", ...rich(label.split(", ")[0] ?? label), ` ${value}`]);
+    .flatMap(([label, value], index) => [index > 0 && ", ", ...rich(label), ` = ${value}`]);
   const words = Number.isFinite(distance) ? `${section.label} ${short(distance)}` : "not computed";
   panel.replaceChildren(el("div", { class: "setting-head" }, el("h3", {}, ...title), el("p", {}, words)));
   if (shares === null) return;

@@ -10,7 +10,7 @@ import { el, svg } from "../dom";
 import type { LinesSection } from "../page";
 import { details, legend, readout, table } from "../parts";
 import { niceDomain } from "../scale";
-import { spoken } from "../symbols";
+import { shortName, spoken } from "../symbols";
 import { type Display, displayFor, inUnit, labelled, short } from "../units";
 
 interface Series {
@@ -190,7 +190,7 @@ function drawMark(frame: Frame, mark: LinesSection["marks"][number]): void {
 }
 
 function reading(chart: Chart, place: Place): [string, string][] {
-  const pairs: [string, string][] = [[chart.section.x.label, inUnit(place.x, chart.xDisplay)]];
+  const pairs: [string, string][] = [[shortName(chart.section.x.label), inUnit(place.x, chart.xDisplay)]];
   for (const one of chart.series) {
     const index = one.style === "step" ? stepAt(one.x, place.x) : nearest(one.x, place.x);
     const value = at(one.y, index);

@@ -9,7 +9,7 @@ import type { Cell } from "../keyboard";
 import type { MapSection } from "../page";
 import { type Swatch, choices, details, legend, readout, table } from "../parts";
 import { cellAt, cellEdges } from "../scale";
-import { rich, spoken } from "../symbols";
+import { rich, shortName, spoken } from "../symbols";
 import { inUnit, labelled, percent, short } from "../units";
 import { useGridKeys } from "./grid_keys";
 import { type MapData, decodeMap, distanceAt, errorAt, excerptSource, failureAt } from "./map_data";
@@ -134,11 +134,6 @@ function settingPairs(map: MapData, { row, column }: Cell): Pairs {
   ];
 }
 
-/** Returns the symbol in a label when it has one, else the label. */
-function shortName(label: string): string {
-  return /(?:\p{L}|sigma)_\p{L}/u.exec(label)?.[0] ?? label;
-}
-
 function reading(map: MapData, cell: Cell): Pairs {
   const pairs = settingPairs(map, cell);
   const distance = distanceAt(map, cell.row, cell.column);
@@ -215,7 +210,7 @@ function mapLegend(map: MapData): HTMLElement {
   const { section } = map;
   const items: { swatch: Swatch; colour?: string; text: string }[] = [{ swatch: "box", colour: "var(--orange)", text: "selected" }];
   if (section.found !== null) items.push({ swatch: "ring", text: "found" });
-  if (section.best !== null) items.push({ swatch: "box", colour: "var(--muted)", text: "best cell" });
+  if (section.best !== null) items.push({ swatch: "diamond", text: "best cell" });
   if (section.region !== null) {
     const { confidence } = section.region;
     items.push({ swatch: "line", text: `${confidence === null ? "" : `${percent(confidence)} `}region` });

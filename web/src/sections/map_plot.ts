@@ -31,10 +31,10 @@ export function drawWholeMap(width: number, map: MapData, look: MapLook): Elemen
   drawCells(frame, map.xEdges, map.yEdges, (column, row) => scale.of(1 - distanceAt(map, row, column)));
   drawFailures(frame, map);
   drawRegion(frame, map);
-  drawBest(frame, map);
-  drawFound(frame, map);
   drawChosen(frame, map, look.cursor, "cursor");
   drawChosen(frame, map, look.selected, "selected");
+  drawBest(frame, map);
+  drawFound(frame, map);
   drawBar(frame, map, scale);
   onPointer(frame, look.pointed, look.pressed);
   return frame.svg;
@@ -113,7 +113,7 @@ function drawBest(frame: Frame, map: MapData): void {
   const { best } = map.section;
   if (best === null) return;
   const [x, y] = [frame.x.px(best.x), frame.y.px(best.y)];
-  frame.plot.append(svg("rect", { class: "best", x: x - 5, y: y - 5, width: 10, height: 10 }));
+  frame.front.append(svg("path", { class: "best", d: `M${x} ${y - 5}L${x + 5} ${y}L${x} ${y + 5}L${x - 5} ${y}Z` }));
 }
 
 function drawFound(frame: Frame, map: MapData): void {

@@ -51,7 +51,7 @@ export interface View {
 }
 
 /** The canvas is never higher than this share of the window. */
-const HIGHEST = 0.82;
+const HIGHEST = 0.7;
 const FINEST = 2;
 
 export class TankCanvas {
@@ -140,6 +140,7 @@ export class TankCanvas {
     if (context === null) return;
     const view = this.viewOf(context);
     const corners = outline(this.arena);
+    context.save();
     if (corners.length > 0) {
       context.beginPath();
       corners.forEach(([x, y], index) => {
@@ -149,8 +150,10 @@ export class TankCanvas {
       context.closePath();
       context.fillStyle = styleColour("water");
       context.fill();
+      context.clip();
     }
     if (this.arrows !== null) this.drawArrows(view, this.arrows);
+    context.restore();
     this.strokeOutline(view);
     this.drawScaleBar(view);
     this.stale = false;

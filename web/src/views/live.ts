@@ -15,12 +15,15 @@ import { connected } from "./connection";
 import { type Frame, type Hello, type LiveEvent, checkFrame, checkHello } from "./live_message";
 import { ShapeCounts, shapeColour } from "./shape_counts";
 import { newestWins } from "./newest";
+import { ShapeList } from "./shape_list";
 import type { Link, Message } from "./socket";
 
 const VIDEO_WIDTH = 640;
 /** How far back a trail goes [s], and how many events are listed. */
 const TRAIL_S = 10;
 const MOST_EVENTS = 200;
+/** Letters of an outcome class that is written out. */
+const LONGEST_OUTCOME = 24;
 
 export function showLive(first: Page): Promise<void> {
   const shell = makeShell(first);
@@ -42,6 +45,7 @@ class LiveStream {
   private readonly status = el("p", { class: "readout", role: "status" });
   private readonly outcome = el("p", { class: "outcome", "aria-live": "polite" });
   private readonly numbers = el("div");
+  private readonly shapes = new ShapeList(shapeColour);
   private readonly list = el("ol", { class: "events", reversed: true });
   private readonly counts: ShapeCounts;
   private readonly video = el("input", { type: "checkbox", name: "video" });
@@ -74,7 +78,7 @@ class LiveStream {
     place.append(options);
     this.tank = new TankCanvas(place, "The tank: blocks where the tracker sees them, dashed where it does not");
     place.append(this.status);
-    now.append(el("h2", {}, "Now"), this.outcome, this.numbers);
+    now.append(el("h2", {}, "Now"), this.outcome, this.shapes.element, this.numbers);
     counted.append(el("h2", {}, "Assemblies over time"));
     this.counts = new ShapeCounts(counted);
     events.append(el("h2", {}, "Joins and partings"), this.list);
@@ -173,7 +177,11 @@ class LiveStream {
     });
     this.link?.send({ type: "ready" });
     this.tank.element.dataset["time"] = String(frame.time_s);
-    if (frame.joined !== null) this.counts.add(frame.time_s, groups.map((group) => shapes.get(group[0] ?? "") ?? "1"));
+    if (frame.joined !== null) {
+      const counts = countOf(groups.map((group) => shapes.get(group[0] ?? "") ?? "1"));
+      this.counts.add(frame.time_s, counts);
+      this.shapes.show(counts);
+    }
     this.showNow(frame);
   }
 
@@ -212,7 +220,7 @@ class LiveStream {
       {},
       el("span", { class: "name" }, `${fixed(one.time_s, 1)} s`),
       ` ${one.bodies.join(" and ")} ${verb}`,
-      one.outcome !== null && el("b", {}, `, now ${one.outcome}`),
+      one.outcome !== null && el("b", {}, `, now ${outcomeWords(one.outcome)}`),
     );
     this.list.prepend(item);
     while (this.list.childElementCount > MOST_EVENTS) this.list.lastElementChild?.remove();
@@ -223,10 +231,22 @@ class LiveStream {
   }
 }
 
+/** Returns an outcome class as it can be read: of a long one only in how many parts it is. */
+function outcomeWords(outcome: string): string {
+  const parts = outcome.split("+").length;
+  return outcome.length <= LONGEST_OUTCOME && !outcome.includes("x") ? outcome : `${parts} ${parts === 1 ? "assembly" : "assemblies"}`;
+}
+
+function countOf(shapes: readonly string[]): Map<string, number> {
+  const counts = new Map<string, number>();
+  for (const shape of shapes) counts.set(shape, (counts.get(shape) ?? 0) + 1);
+  return counts;
+}
+
 function outcomeText(frame: Frame): string {
-  if (frame.outcome !== null) return frame.outcome;
+  if (frame.outcome !== null) return outcomeWords(frame.outcome);
   if (frame.joined === null) return "Who is joined is not observed.";
   if (frame.possible === null || frame.possible.length === 0) return "not known: a block is hidden";
-  return `${frame.possible.join(" or ")}: a block is hidden`;
+  return `${frame.possible.map(outcomeWords).join(" or ")}: a block is hidden`;
 }
 

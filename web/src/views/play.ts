@@ -4,7 +4,6 @@ import { decode } from "../arrays";
 import { list, nullable, number, object, record, text, withDefault, flag } from "../check";
 import { el } from "../dom";
 import { type ControlsSection, type Page, checkControls, checkPage, checkTank } from "../page";
-import { cellsOfName, sketchPicture, writtenName } from "../polyomino";
 import { type Shell, makeShell } from "../shell";
 import { TankCanvas, assemblyColours } from "../tank/canvas";
 import { onThemeChange } from "../theme";
@@ -13,6 +12,7 @@ import { connected } from "./connection";
 import { type Knobs, makeKnobs } from "./controls";
 import { DensityPanel } from "./density_panel";
 import { newestWins } from "./newest";
+import { ShapeList } from "./shape_list";
 import type { Link, Message } from "./socket";
 
 const tankMessage = object({
@@ -29,9 +29,6 @@ const tankMessage = object({
 });
 
 type Tank = ReturnType<typeof tankMessage>;
-
-/** Shapes of which the page counts assemblies; of more, the most frequent. */
-const MOST_SHAPES = 10;
 
 export function showPlay(first: Page): Promise<void> {
   const shell = makeShell(first);
@@ -58,7 +55,7 @@ class Playground {
   private readonly density: DensityPanel;
   private readonly pause = el("button", { type: "button" }, "Pause");
   private readonly clock = el("p", { class: "readout" });
-  private readonly shapes = el("ul", { class: "shapes", "aria-label": "Assemblies by shape" });
+  private readonly shapes = new ShapeList();
   private readonly note = el("p", { class: "fault", role: "status" });
   private readonly take: (state: Tank) => void;
   private readonly set: (wish: { name: string; value: unknown }) => void;
@@ -80,7 +77,7 @@ class Playground {
     shell.showState(null);
 
     this.tank = new TankCanvas(place, "The tank: blocks of one colour are joined, grey ones are alone");
-    place.append(this.clock, this.shapes, this.note);
+    place.append(this.clock, this.shapes.element, this.note);
     void this.showTank(section("tank"));
     // A knob sends at most once per picture of the screen; the newest value counts.
     const wishes = new Map<string, (value: unknown) => void>();
@@ -193,21 +190,6 @@ class Playground {
     this.clock.replaceChildren(
       ...pairs.map(([name, value]) => el("span", { class: "pair" }, el("span", { class: "name" }, name), " ", el("b", {}, value))),
     );
-    this.showShapes(state.counts);
-  }
-
-  private showShapes(counts: ReadonlyMap<string, number>): void {
-    const sorted = [...counts].sort(([, one], [, other]) => other - one);
-    const shown = sorted.slice(0, MOST_SHAPES);
-    const words = sorted.map(([name, count]) => `${count} ${name}`).join(", ");
-    if (this.shapes.dataset["counts"] === words) return;
-    this.shapes.dataset["counts"] = words;
-    const rest = sorted.length - shown.length;
-    this.shapes.replaceChildren(
-      ...shown.map(([name, count]) =>
-        el("li", { "aria-label": `${count} ${name}` }, el("b", {}, String(count)), sketchPicture(cellsOfName(name), 7), el("span", { class: "name" }, writtenName(name))),
-      ),
-      ...(rest > 0 ? [el("li", {}, `${rest} more`)] : []),
-    );
+    this.shapes.show(state.counts);
   }
 }

@@ -11,6 +11,7 @@ import { cellsOfName, sketchPicture, writtenName } from "../polyomino";
 
 const KNOWN = ["2", "I3", "L3", "I", "O", "T", "S", "L", "Z", "J"];
 const MOST_CHANGES = 4000;
+const MOST_LINES = 7;
 const DRAW_EVERY_MS = 400;
 
 /** Returns the colour of a shape; one block alone is grey. */
@@ -41,11 +42,9 @@ export class ShapeCounts {
     this.show();
   }
 
-  /** Takes the shapes of all assemblies at a moment. */
-  add(time: number, shapes: readonly string[]): void {
+  /** Takes how many assemblies of each shape there are at a moment. */
+  add(time: number, counts: ReadonlyMap<string, number>): void {
     if (time < (this.times.at(-1) ?? -Infinity)) this.clear();
-    const counts = new Map<string, number>();
-    for (const shape of shapes) counts.set(shape, (counts.get(shape) ?? 0) + 1);
     const last = this.counts.at(-1);
     this.until = time;
     if (last === undefined || !isSame(last, counts)) {
@@ -70,8 +69,12 @@ export class ShapeCounts {
     );
   }
 
+  /** Returns the shapes that have a line of their own: the most frequent, the small ones first. */
   private names(): string[] {
-    return [...new Set(this.counts.flatMap((counts) => [...counts.keys()]))].sort((one, other) => order(one) - order(other));
+    const total = new Map<string, number>();
+    for (const [name, count] of this.counts.flatMap((counts) => [...counts])) total.set(name, (total.get(name) ?? 0) + count);
+    const frequent = [...total].sort(([, one], [, other]) => other - one).slice(0, MOST_LINES);
+    return frequent.map(([name]) => name).sort((one, other) => order(one) - order(other));
   }
 
   private draw(width: number): Element {
