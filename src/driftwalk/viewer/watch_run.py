@@ -96,7 +96,7 @@ class RunSource(Source):
                 return [] if stamp == self._shown else self._show_finished(stamp)
             if state == "unfinished":
                 return self._look_at_running(stamp)
-        except DriftwalkError as error:
+        except (DriftwalkError, OSError) as error:
             # What was there when the page was opened has become unreadable; it may come back.
             return self._say(f"the run cannot be read: {error}")
         return self._say("the run is no longer there; the page waits for it")
