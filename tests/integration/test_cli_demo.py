@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from command_line import Done, apart, contents, here, refusal
+from page_reading import page_in
 
 TRUTH = {
     "drag_coefficient": 0.3867,
@@ -34,6 +35,9 @@ def test_both_answers_stand_beside_the_truth(finished: tuple[Path, Done]) -> Non
     assert rows["stochastic force σ_F [mN]"][0] == "0.6123"
     assert rows["tracking noise [mm]"][0] == "0.3"
     assert rows["model explains it"] == ["yes", "yes"]
+    for run in ("fit", "calibrate"):
+        document = (folder / run / "report.html").read_text(encoding="utf-8")
+        assert page_in(document)["subtitle"] == run
     for figure in ("fit/figures/check_steps.png", "calibrate/figures/ks_map.png"):
         assert (folder / figure).stat().st_size > 1000
 

@@ -61,8 +61,9 @@ def demo(
     with as_file(folder / "recording.csv") as path:
         fit, check = _fit(recording, study, path, out / FIT, overwrite=overwrite)
         calibration = _calibrate(recording, study, path, out, overwrite=overwrite, threads=threads)
-    for run in (FIT, CALIBRATION):
-        write_report(report_page(out / run), out / run / REPORT, existing="replace")
+    for run in (out / FIT, out / CALIBRATION):
+        if not (run / REPORT).exists():  # A finished run that is only read stays as it is.
+            write_report(report_page(run), run / REPORT)
     found = Found(fit, check, calibration, recording)
     if json:
         print_json(in_json(found))
