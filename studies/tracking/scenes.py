@@ -20,9 +20,9 @@ BLOCKS: Final = 4
 FOUR_S: Final = 60.0
 ONE_S: Final = 1800.0
 SEEDS: Final = {
-    "moderate": tuple(range(101, 111)),
-    "heavy": tuple(range(101, 111)),
-    "closed-loop": (201, 202),
+    "moderate": tuple(range(101, 107)),
+    "heavy": tuple(range(101, 107)),
+    "closed-loop": (201,),
 }
 """Seeds of motion and disturbances; none of them served to write the tracker."""
 
