@@ -93,7 +93,7 @@ export function table(
 ): HTMLElement {
   const head = el("tr", {}, ...columns.map((name, index) => el("th", { scope: "col", class: numeric(index) ? "number" : null }, name)));
   const body = rows.map((row) =>
-    el("tr", {}, ...row.map((value, index) => el("td", { class: numeric(index) ? "number" : null }, value))),
+    el("tr", {}, ...row.map((value, index) => el("td", { class: numeric(index) ? "number" : null }, ...rich(value)))),
   );
   return el(
     "div",

@@ -8,7 +8,7 @@ export interface Piece {
   readonly index: string | null;
 }
 
-const SYMBOL = /(?<![\p{L}\p{N}_])(\p{L}|sigma)_(\p{L}|\d+)(?![\p{L}\p{N}_])/gu;
+const SYMBOL = /(?<![\p{L}\p{Nd}_])(\p{L}|sigma)_(\p{L}|\d+)(?![\p{L}\p{Nd}_])/gu;
 
 /** Splits text into plain pieces and symbols with an index. */
 export function pieces(text: string): Piece[] {

@@ -65,7 +65,8 @@ export function makeFrame(options: FrameOptions): Frame {
   const left = written + (yLabel.length === 0 ? 0 : LINE * yLabel.length + 5);
   const width = Math.max(40, options.width - left - right);
   const height = options.height ?? (width * spanOf(options.y)) / spanOf(options.x);
-  const xLabel = labelLines(options.x, width + left);
+  // The label is centred on its axis: it may reach as far to both sides as there is room on the narrower.
+  const xLabel = labelLines(options.x, width + 2 * Math.min(left, right));
   const ticked = options.x.ticks === undefined || options.x.ticks.length > 0;
   const bottom = (ticked ? TICK + LINE : 0) + (xLabel.length === 0 ? 2 : LINE * xLabel.length + 6);
 
@@ -131,13 +132,17 @@ function gridLines(frame: Frame, options: FrameOptions, ticks: readonly Tick[]):
   });
 }
 
-/** Returns the label of an axis, in two lines when it is longer than its axis. */
 function labelLines(axis: AxisOptions, room: number): string[] {
-  if (axis.label === "") return [];
-  const label = labelled(axis.label, axis.display);
-  const comma = label.indexOf(", ");
-  if (label.length * LETTER <= room || comma < 0) return [label];
-  return [label.slice(0, comma + 1), label.slice(comma + 2)];
+  return axis.label === "" ? [] : twoLines(labelled(axis.label, axis.display), room);
+}
+
+/** Returns text in two lines when it is longer than its room [px]: behind a comma, or before a bracket. */
+export function twoLines(text: string, room: number): string[] {
+  if (text.length * LETTER <= room) return [text];
+  const comma = text.indexOf(", ");
+  if (comma >= 0) return [text.slice(0, comma + 1), text.slice(comma + 2)];
+  const bracket = text.lastIndexOf(" (");
+  return bracket < 0 ? [text] : [text.slice(0, bracket), text.slice(bracket + 1)];
 }
 
 function xAxis(frame: Frame, ticks: readonly Tick[], label: readonly string[]): SVGElement {

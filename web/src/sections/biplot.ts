@@ -102,7 +102,7 @@ function equalFrame(width: number, section: BiplotSection, points: Points, bar: 
     width,
     x: { domain: [across[0] - room, across[1] + room], label: label(0), display },
     // A flat cloud still gets a picture that is high enough for its arrows.
-    y: { domain: heightened([up[0] - room, up[1] + room], 0.5 * (across[1] - across[0] + 2 * room)), label: label(1), display },
+    y: { domain: heightened([up[0] - room, up[1] + room], (width < 500 ? 0.95 : 0.5) * (across[1] - across[0] + 2 * room)), label: label(1), display },
     ...(bar ? { right: BAR_ROOM } : {}),
     label: `Biplot of ${points.x.length} settings; arrows: ${arrows.map((arrow) => arrow.name).join(", ")}`,
   });

@@ -9,6 +9,7 @@ import { fillSection, sectionFrame } from "../sections/draw";
 import { type Shell, makeShell } from "../shell";
 import { drawSections } from "./report";
 import { connected } from "./connection";
+import { insertAfter, sameIds } from "./order";
 import type { Message } from "./socket";
 
 const cellMessage = object({
@@ -133,16 +134,4 @@ async function addSection(shell: Shell, all: RawSection[], section: RawSection, 
   shell.main.insertBefore(frame, shell.main.children[all.indexOf(section)] ?? null);
   shell.showContents(all);
   await fillSection(frame, section, context);
-}
-
-function sameIds(one: readonly RawSection[], other: readonly RawSection[]): boolean {
-  return one.length === other.length && one.every((section, index) => section.id === other[index]?.id);
-}
-
-/** Returns the sections with a new one behind the one that it names, else at the end. */
-export function insertAfter(sections: readonly RawSection[], section: RawSection): RawSection[] {
-  const content = section.content;
-  const after = typeof content === "object" && content !== null && "after" in content ? content.after : null;
-  const place = sections.findIndex((one) => one.id === after);
-  return place < 0 ? [...sections, section] : sections.toSpliced(place + 1, 0, section);
 }

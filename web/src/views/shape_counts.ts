@@ -5,7 +5,7 @@ import { linePath } from "../charts/paths";
 import { type Figure, figure } from "../charts/responsive";
 import { PALETTE } from "../colours";
 import { el, svg } from "../dom";
-import { niceDomain } from "../scale";
+import { linearTicks } from "../scale";
 import { styleColour } from "../theme";
 import { cellsOfName, sketchPicture, writtenName } from "../polyomino";
 
@@ -87,7 +87,8 @@ export class ShapeCounts {
       width,
       height: 130,
       x: { domain: [start, end], label: "time", display: { factor: 1, unit: "s" } },
-      y: { domain: [0, niceDomain(0, top, 4)[1]], label: "assemblies", display: { factor: 1, unit: "" } },
+      // A little room above, so that the highest line does not lie on the frame; whole numbers only.
+      y: { domain: [0, 1.08 * top], label: "assemblies", display: { factor: 1, unit: "" }, ticks: wholeTicks(top) },
       grid: "y",
       label: `Assemblies over time: now ${names.map((name) => `${this.counts.at(-1)?.get(name) ?? 0} ${name}`).join(", ")}`,
     });
@@ -106,6 +107,12 @@ export class ShapeCounts {
     });
     return frame.svg;
   }
+}
+
+function wholeTicks(top: number): { at: number; text: string }[] {
+  return linearTicks(0, top, 4)
+    .filter(Number.isInteger)
+    .map((tick) => ({ at: tick, text: String(tick) }));
 }
 
 function isSame(one: ReadonlyMap<string, number>, other: ReadonlyMap<string, number>): boolean {
