@@ -38,12 +38,20 @@ const LADDERS: Readonly<Record<string, readonly (readonly [number, number, strin
   ],
   rad: [[0, DEGREES, "°"]],
   "rad/s": [[0, DEGREES, "°/s"]],
+  // Densities, beside lengths in mm and angles in degrees.
+  "1/m": [
+    [20, 1e-3, "1/mm"],
+    [0, 1, "1/m"],
+  ],
+  "1/rad": [[0, 1 / DEGREES, "1/°"]],
 };
 
 const SAME: Readonly<Record<string, string>> = {
   "m s-1": "m/s",
   "m s^-1": "m/s",
   "rad s-1": "rad/s",
+  "m-1": "1/m",
+  "rad-1": "1/rad",
 };
 
 /** Returns the unit in which values up to a magnitude are shown. */

@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import test from "node:test";
 import { SECTIONS, checkPage, checkState } from "../src/page";
 import { checkFrame, checkHello } from "../src/views/live_message";
-import { insertAfter, sameIds } from "../src/views/order";
+import { besides, insertAfter, sameIds } from "../src/views/order";
 import { nextPause, parsed } from "../src/views/socket";
 import { sliderScale } from "../src/views/controls";
 
@@ -52,6 +52,12 @@ test("new sections stand where they say, else at the end", () => {
   assert.deepEqual(insertAfter(page, section("c", "a")).map((one) => one.id), ["a", "c", "b"]);
   assert.deepEqual(insertAfter(page, section("c")).map((one) => one.id), ["a", "b", "c"]);
   assert.ok(sameIds(page, [section("a"), section("b")]) && !sameIds(page, [section("b"), section("a")]));
+});
+
+test("small sections stand in pairs, what is left over stands alone", () => {
+  assert.deepEqual(besides(["map", "lines", "lines", "table", "flow", "lines"]), [false, true, true, false, false, false]);
+  assert.deepEqual(besides(["lines", "table", "biplot", "image_grid"]), [true, true, true, true]);
+  assert.deepEqual(besides([]), []);
 });
 
 test("only objects with a type are messages, and pauses grow to a limit", () => {

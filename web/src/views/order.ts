@@ -14,3 +14,24 @@ export function insertAfter(sections: readonly RawSection[], section: RawSection
   const place = sections.findIndex((one) => one.id === after);
   return place < 0 ? [...sections, section] : sections.toSpliced(place + 1, 0, section);
 }
+
+/** Kinds of sections that need only half of a wide page. */
+const SMALL: ReadonlySet<string> = new Set(["lines", "image_grid", "biplot", "table"]);
+
+/** Returns which sections stand beside another: small ones, in pairs. */
+export function besides(kinds: readonly string[]): boolean[] {
+  const beside = kinds.map(() => false);
+  for (let index = 0; index + 1 < kinds.length; index += 1) {
+    if (!SMALL.has(kinds[index] ?? "") || !SMALL.has(kinds[index + 1] ?? "")) continue;
+    beside[index] = beside[index + 1] = true;
+    index += 1;
+  }
+  return beside;
+}
+
+/** Puts small sections side by side. */
+export function arrange(main: HTMLElement): void {
+  const frames = [...main.children];
+  const beside = besides(frames.map((frame) => frame.getAttribute("data-kind") ?? ""));
+  frames.forEach((frame, index) => frame.classList.toggle("beside", beside[index] ?? false));
+}

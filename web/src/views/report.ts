@@ -4,6 +4,7 @@ import type { Context } from "../context";
 import type { Page } from "../page";
 import { fillSection, sectionFrame } from "../sections/draw";
 import { type Shell, makeShell } from "../shell";
+import { arrange } from "./order";
 
 export async function showReport(page: Page): Promise<void> {
   const shell = makeShell(page);
@@ -16,6 +17,7 @@ export async function drawSections(shell: Shell, page: Page, context: Context): 
   shell.showContents(page.sections);
   const frames = page.sections.map(sectionFrame);
   shell.main.replaceChildren(...frames);
+  arrange(shell.main);
   for (const [index, section] of page.sections.entries()) {
     const frame = frames[index];
     if (frame !== undefined) await fillSection(frame, section, context);

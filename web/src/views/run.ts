@@ -9,7 +9,7 @@ import { fillSection, sectionFrame } from "../sections/draw";
 import { type Shell, makeShell } from "../shell";
 import { drawSections } from "./report";
 import { connected } from "./connection";
-import { insertAfter, sameIds } from "./order";
+import { arrange, insertAfter, sameIds } from "./order";
 import type { Message } from "./socket";
 
 const cellMessage = object({
@@ -133,5 +133,6 @@ async function addSection(shell: Shell, all: RawSection[], section: RawSection, 
   const frame = sectionFrame(section);
   shell.main.insertBefore(frame, shell.main.children[all.indexOf(section)] ?? null);
   shell.showContents(all);
+  arrange(shell.main);
   await fillSection(frame, section, context);
 }
