@@ -108,17 +108,25 @@ export function isComplete(name: string): boolean {
   return name !== "" && name !== "other" && !name.includes("+");
 }
 
-/** Returns a colour for every class: hues for one assembly, greys for several. */
-export function classColours(names: readonly string[]): Map<string, string> {
-  const colours = new Map<string, string>();
-  let hues = 0;
-  let greys = 0;
-  for (const name of names) {
-    if (name === "other") colours.set(name, OTHER);
-    else if (isComplete(name)) colours.set(name, PALETTE[hues++ % PALETTE.length] ?? OTHER);
-    else colours.set(name, GREYS[greys++ % GREYS.length] ?? OTHER);
+/** A colour for every class, the same on a whole page: hues for one assembly, greys for several. */
+export class ClassColours {
+  private readonly given = new Map<string, string>();
+  private hues = 0;
+  private greys = 0;
+
+  of(name: string): string {
+    const known = this.given.get(name);
+    if (known !== undefined) return known;
+    const colour = this.next(name);
+    this.given.set(name, colour);
+    return colour;
   }
-  return colours;
+
+  private next(name: string): string {
+    if (name === "other") return OTHER;
+    if (isComplete(name)) return PALETTE[this.hues++ % PALETTE.length] ?? OTHER;
+    return GREYS[this.greys++ % GREYS.length] ?? OTHER;
+  }
 }
 
 /** Returns the colour of one of several series. */

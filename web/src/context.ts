@@ -1,6 +1,7 @@
 /** What a section is drawn with, beside its own data. */
 
 import type { Numbers } from "./arrays";
+import { ClassColours } from "./colours";
 
 /** What is kept of one setting of a map. */
 export interface CellExcerpt {
@@ -25,4 +26,9 @@ export interface Context {
 export function remembered<T>(context: Context, key: string, make: () => T): T {
   if (!context.memory.has(key)) context.memory.set(key, make());
   return context.memory.get(key) as T;
+}
+
+/** Returns the colours of the outcome classes, common to all sections of a page. */
+export function classColours(context: Context): ClassColours {
+  return remembered(context, "class colours", () => new ClassColours());
 }

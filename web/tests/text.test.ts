@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import test from "node:test";
-import { classColours, colourScale, css, isComplete, rgb } from "../src/colours";
+import { ClassColours, colourScale, css, isComplete, rgb } from "../src/colours";
 import { moveCell, moveSample } from "../src/keyboard";
 import { pieces, shortName, spoken } from "../src/symbols";
 
@@ -33,10 +33,9 @@ test("a colour scale goes from its first colour to its last", () => {
 });
 
 test("classes of one assembly have hues, those of several greys", () => {
-  const colours = classColours(["I", "2+2", "T", "other"]);
-  assert.equal(colours.get("I"), "#0072B2");
-  assert.equal(colours.get("T"), "#D55E00");
-  assert.equal(colours.get("2+2"), "#9a9a9a");
+  const colours = new ClassColours();
+  assert.deepEqual(["I", "2+2", "T"].map((name) => colours.of(name)), ["#0072B2", "#9a9a9a", "#D55E00"]);
+  assert.deepEqual(["T", "O", "I"].map((name) => colours.of(name)), ["#D55E00", "#009E73", "#0072B2"], "once given, it stays");
   assert.ok(isComplete("T") && !isComplete("2+2") && !isComplete("other"));
 });
 

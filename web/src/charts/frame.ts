@@ -110,7 +110,9 @@ export function ticksOf(axis: AxisOptions, count: number): Tick[] {
   if (axis.log === true) {
     return logTicks(low, high, many).map((tick) => ({ at: tick / factor, text: short(tick, 3) }));
   }
-  const ticks = linearTicks(low, high, many);
+  const few = linearTicks(low, high, many);
+  // A round step may leave one or two ticks, from which nobody can read a scale.
+  const ticks = few.length < 3 ? linearTicks(low, high, many + 2) : few;
   const step = ticks.length > 1 ? (ticks[1] ?? 0) - (ticks[0] ?? 0) : 1;
   const decimals = stepDecimals(step);
   const large = Math.max(Math.abs(low), Math.abs(high));

@@ -6,8 +6,7 @@ import { onPointer } from "../charts/hover";
 import { bandPath, linePath } from "../charts/paths";
 import { figure } from "../charts/responsive";
 import { classLegend } from "../class_legend";
-import { classColours } from "../colours";
-import { type Context, remembered } from "../context";
+import { type Context, classColours, remembered } from "../context";
 import { el, svg } from "../dom";
 import type { ClassTimesSection, Polyominoes } from "../page";
 import { choices, readout } from "../parts";
@@ -26,7 +25,7 @@ type Form = "stacked" | "lines";
 
 export async function drawClassTimes(section: ClassTimesSection, body: HTMLElement, context: Context): Promise<void> {
   const time = (await decode(section.time)).data;
-  const courses = await decodeCourses(section);
+  const courses = await decodeCourses(section, context);
   const form = remembered(context, `class times ${section.id}`, (): { now: Form } => ({ now: "stacked" }));
   const holder = el("div", { class: "wide" });
   body.append(holder);
@@ -46,13 +45,13 @@ export async function drawClassTimes(section: ClassTimesSection, body: HTMLEleme
   holder.append(classLegend(courses), line.element);
 }
 
-async function decodeCourses(section: ClassTimesSection): Promise<Course[]> {
-  const colours = classColours(section.classes.map((one) => one.class));
+async function decodeCourses(section: ClassTimesSection, context: Context): Promise<Course[]> {
+  const colours = classColours(context);
   return Promise.all(
     section.classes.map(async (one) => ({
       name: one.class,
       cells: one.cells,
-      colour: colours.get(one.class) ?? "var(--muted)",
+      colour: colours.of(one.class),
       share: (await decode(one.share)).data,
       low: await decodeMaybe(one.low),
       high: await decodeMaybe(one.high),

@@ -3,8 +3,8 @@
 import { type Grid, at, decode, lastUpTo } from "../arrays";
 import { figure } from "../charts/responsive";
 import { classLegend } from "../class_legend";
-import { classColours } from "../colours";
-import { type Context, remembered } from "../context";
+import type { ClassColours } from "../colours";
+import { type Context, classColours, remembered } from "../context";
 import { el, svg } from "../dom";
 import { moveSample } from "../keyboard";
 import type { ReplaySection } from "../page";
@@ -35,7 +35,7 @@ export async function drawReplay(section: ReplaySection, body: HTMLElement, cont
     return;
   }
   const kept = remembered(context, `replay ${section.id}`, () => ({ run: 0, speed: 5 }));
-  new Player(section, body, time, runs, kept);
+  new Player(section, body, time, runs, kept, classColours(context));
 }
 
 /** Returns poses by time and block, whichever of the two is stored first. */
@@ -90,6 +90,7 @@ class Player {
     private readonly time: Float64Array,
     private readonly runs: readonly Run[],
     private readonly kept: { run: number; speed: number },
+    private readonly colours: ClassColours,
   ) {
     this.run = runs[kept.run] ?? runs[0] ?? (undefined as never);
     this.slider = el("input", { type: "range", min: 0, max: time.length - 1, step: 1, value: 0, "aria-label": "Time" });
@@ -197,15 +198,14 @@ class Player {
   private addStrip(beside: HTMLElement): void {
     const names = [...new Set(this.runs.flatMap((run) => run.classes.map((change) => change.class)))];
     if (names.length === 0) return;
-    const colours = classColours(names);
-    this.strip = figure(beside, "strip", (width) => this.drawStrip(width, colours));
+    this.strip = figure(beside, "strip", (width) => this.drawStrip(width));
     beside.append(
-      classLegend(names.map((name) => ({ name, cells: [], colour: colours.get(name) ?? "var(--muted)" }))),
+      classLegend(names.map((name) => ({ name, cells: [], colour: this.colours.of(name) }))),
       el("p", { class: "note" }, "Band: outcome class over time; the line is now. Blocks of one colour are joined, grey ones are alone."),
     );
   }
 
-  private drawStrip(width: number, colours: ReadonlyMap<string, string>): SVGSVGElement {
+  private drawStrip(width: number): SVGSVGElement {
     const [start, end] = [at(this.time, 0), at(this.time, this.time.length - 1)];
     this.stripScale = (time) => ((time - start) / (end - start || 1)) * width;
     const words = this.run.classes.map((change) => `${change.class} from ${fixed(change.time, 1)} s`).join(", ");
@@ -214,7 +214,7 @@ class Player {
       const from = this.stripScale(Math.max(start, change.time));
       const to = this.stripScale(this.run.classes[index + 1]?.time ?? end);
       const piece = svg("rect", { x: from, y: 5, width: Math.max(0, to - from), height: 24 }, svg("title", {}, change.class));
-      piece.style.setProperty("fill", colours.get(change.class) ?? "var(--muted)");
+      piece.style.setProperty("fill", this.colours.of(change.class));
       picture.append(piece);
     });
     this.playhead.setAttribute("y1", "1");
