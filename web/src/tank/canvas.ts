@@ -53,6 +53,8 @@ export interface View {
 /** The canvas is never higher than this share of the window. */
 const HIGHEST = 0.7;
 const FINEST = 2;
+/** How opaque blocks are over a video, in which they are seen themselves. */
+const SEE_THROUGH = 0.45;
 
 export class TankCanvas {
   readonly element: HTMLCanvasElement;
@@ -103,7 +105,8 @@ export class TankCanvas {
       this.strokeOutline(view);
     } else context.drawImage(this.still, 0, 0);
     for (const trail of scene.trails ?? []) drawTrail(view, trail);
-    if (scene.blocks !== null) drawBlocks(view, scene.blocks, this.side);
+    const over = scene.under !== undefined && scene.under !== null;
+    if (scene.blocks !== null) drawBlocks(view, scene.blocks, this.side, over ? SEE_THROUGH : 1);
     this.frames += 1;
     this.element.dataset["frames"] = String(this.frames);
   }
@@ -259,7 +262,7 @@ function drawTrail(view: View, trail: Trail): void {
   context.globalAlpha = 1;
 }
 
-function drawBlocks(view: View, blocks: Blocks, side: number): void {
+function drawBlocks(view: View, blocks: Blocks, side: number, opacity: number): void {
   const { context } = view;
   const half = Math.max((side * view.zoom) / 2, 3 * fineness());
   context.lineWidth = Math.min(fineness() * 1.2, 0.22 * half);
@@ -282,7 +285,9 @@ function drawBlocks(view: View, blocks: Blocks, side: number): void {
       context.stroke();
     } else {
       context.fillStyle = colour;
+      context.globalAlpha = opacity;
       context.fill();
+      context.globalAlpha = 1;
       context.strokeStyle = ink;
       context.stroke();
       if (Number.isFinite(theta) && half > 7) drawHeading(context, half, ink);

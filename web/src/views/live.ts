@@ -22,6 +22,8 @@ const VIDEO_WIDTH = 640;
 /** How far back a trail goes [s], and how many events are listed. */
 const TRAIL_S = 10;
 const MOST_EVENTS = 200;
+/** Time after which frames are drawn over an old picture [ms]: no newer one has come. */
+const PICTURE_MS = 1000;
 /** Letters of an outcome class that is written out. */
 const LONGEST_OUTCOME = 24;
 
@@ -57,6 +59,7 @@ class LiveStream {
   private hello: Hello | null = null;
   private camera: Camera | null = null;
   private picture: HTMLImageElement | null = null;
+  private pictured = 0;
   private last: Frame | null = null;
 
   constructor(shell: Shell) {
@@ -99,7 +102,7 @@ class LiveStream {
     else if (message.type === "frame") {
       const frame = checkFrame(message);
       this.note(frame);
-      this.take(frame);
+      void this.schedule(frame);
     } else if (message.type === "lost") this.say(String(message["words"] ?? "the tracker is gone"));
     else if (message.type === "end") {
       const why = message["interrupted"];
@@ -142,14 +145,23 @@ class LiveStream {
       while (frame.time_s - (trail[0]?.time ?? frame.time_s) > TRAIL_S) trail.shift();
       this.past.set(body.id, trail);
     }
-    if (frame.jpeg_base64 !== null && this.video.checked) void this.load(frame.jpeg_base64);
   }
 
-  private async load(jpeg: string): Promise<void> {
-    const image = new Image();
-    image.src = `data:image/jpeg;base64,${jpeg}`;
-    await image.decode().catch(() => undefined);
-    if (image.naturalWidth > 0 && this.video.checked) this.picture = image;
+  /** Lets a frame be drawn; blocks and the picture under them are always of one frame. */
+  private async schedule(frame: Frame): Promise<void> {
+    if (frame.jpeg_base64 !== null && this.video.checked) {
+      const image = new Image();
+      image.src = `data:image/jpeg;base64,${frame.jpeg_base64}`;
+      await image.decode().catch(() => undefined);
+      if (image.naturalWidth > 0 && this.video.checked) {
+        this.picture = image;
+        this.pictured = performance.now();
+      }
+    } else if (this.picture !== null && performance.now() - this.pictured < PICTURE_MS) {
+      this.link?.send({ type: "ready" });
+      return;
+    }
+    this.take(frame);
   }
 
   private draw(frame: Frame): void {
