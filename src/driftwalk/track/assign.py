@@ -19,6 +19,9 @@ Integers = npt.NDArray[np.int64]
 
 # exp(-12): an alternative beyond that is no alternative.
 NO_ALTERNATIVE: Final = 12.0
+# exp(-20): two that could not be exchanged for each other, even after what was believed so far turns
+# out to be wrong.
+_OUT_OF_QUESTION: Final = 20.0
 # Costs of pairs without an edge; finite, because the solver wants that.
 _FORBIDDEN: Final = 1e9
 
@@ -31,8 +34,9 @@ class Assignment(NamedTuple):
     score: Floats
     """Likelihood of the best other assignment that gives this track another detection, or its
     detection to another track, relative to the one taken: 0 none, 1 as likely; shape (tracks,)."""
-    group: Integers
-    """Number of the connected group of each track, shape (tracks,)."""
+    exchanges: list[tuple[int, int]]
+    """Pairs of tracks of which one could have the other's detection, however unlikely, as long as
+    that is not out of the question."""
 
 
 def assign(cost: Floats) -> Assignment:
@@ -46,7 +50,7 @@ def assign(cost: Floats) -> Assignment:
     Returns
     -------
     Assignment
-        The detections, the scores of the alternatives, and the groups.
+        The detections, the scores of the alternatives, and who could be exchanged.
 
     Examples
     --------
@@ -56,9 +60,8 @@ def assign(cost: Floats) -> Assignment:
     tracks = len(cost)
     detection = np.full(tracks, -1, dtype=np.int64)
     score = np.zeros(tracks)
-    group = np.arange(tracks)
-    for number, (rows, columns) in enumerate(connected_groups(np.isfinite(cost))):
-        group[rows] = number
+    exchanges: list[tuple[int, int]] = []
+    for rows, columns in connected_groups(np.isfinite(cost)):
         if not columns:
             continue
         if len(rows) == len(columns) == 1:
@@ -72,8 +75,10 @@ def assign(cost: Floats) -> Assignment:
         part = cost[np.ix_(rows, columns)]
         taken = _solve(part)
         detection[rows] = np.where(taken >= 0, np.array(columns)[taken], -1)
-        score[rows] = _alternatives(part, taken)
-    return Assignment(detection, score, group)
+        excess = _excess(part, taken)
+        score[rows] = _scores(excess, taken)
+        exchanges += [(rows[one], rows[other]) for one, other in _pairs(excess, taken)]
+    return Assignment(detection, score, exchanges)
 
 
 def connected_groups(edges: npt.NDArray[np.bool_]) -> list[tuple[list[int], list[int]]]:
@@ -124,8 +129,8 @@ def _solve(cost: Floats) -> Integers:
     return np.where(taken < columns, taken, -1)
 
 
-def _alternatives(cost: Floats, taken: Integers) -> Floats:
-    """Return the score of each track of a group; see `Assignment`.
+def _excess(cost: Floats, taken: Integers) -> Floats:
+    """Return the cost of the best assignment with each edge that was not taken, less the least.
 
     Another assignment differs by cycles, in which each track takes the detection of the next one.
     The cheapest cycle through an edge is that edge and the shortest way back. One more node stands
@@ -147,10 +152,24 @@ def _alternatives(cost: Floats, taken: Integers) -> Floats:
         np.minimum(step, step[:, node, None] + step[node], out=step)
     owner = np.full(cost.shape[1], len(cost))
     owner[taken[has]] = tracks[has]
-    # Of each edge that was not taken: the cost of the cheapest assignment that has it, less the
-    # best one's.
     excess = cost - own[:, None] + step[owner, :-1].T
     excess[tracks[has], taken[has]] = math.inf
+    return np.asarray(excess)
+
+
+def _scores(excess: Floats, taken: Integers) -> Floats:
+    """Return the score of each track of a group; see `Assignment`."""
+    has = taken >= 0
     least = excess.min(axis=1)
     least[has] = np.minimum(least[has], excess[:, taken[has]].min(axis=0))
     return np.where(least < NO_ALTERNATIVE, np.exp(-np.maximum(least, 0.0)), 0.0)
+
+
+def _pairs(excess: Floats, taken: Integers) -> list[tuple[int, int]]:
+    """Return each track with the owner of another detection that it could have."""
+    owner = {column: row for row, column in enumerate(taken.tolist()) if column >= 0}
+    return [
+        (row, owner[column])
+        for row, column in np.argwhere(excess < _OUT_OF_QUESTION).tolist()
+        if column in owner
+    ]

@@ -61,13 +61,13 @@ class Marks:
         return score
 
     def note_company(
-        self, tracks: Sequence[Track], frame: int, group: npt.NDArray[np.int64]
+        self, tracks: Sequence[Track], frame: int, exchanges: Iterable[tuple[int, int]]
     ) -> None:
-        """Note which tracks are near each other, and since when."""
+        """Note which tracks are so near each other that they could be exchanged; since when."""
         before = {track: track.company for track in tracks}
         for track in tracks:
             track.company = {}
-        for one, other in self._near_pairs(tracks, group):
+        for one, other in self._near_pairs(tracks, exchanges):
             since = before[one].get(other, frame)
             one.company[other] = other.company[one] = since
         for track in tracks:
@@ -86,18 +86,10 @@ class Marks:
             track.lost_beside = {}
 
     def _near_pairs(
-        self, tracks: Sequence[Track], group: npt.NDArray[np.int64]
+        self, tracks: Sequence[Track], exchanges: Iterable[tuple[int, int]]
     ) -> list[tuple[Track, Track]]:
-        """Return pairs that compete for a detection, or are both unseen where they might meet."""
-        members: dict[int, list[int]] = {}
-        for index, number in enumerate(group.tolist()):
-            members.setdefault(number, []).append(index)
-        pairs = {
-            (one, other)
-            for inside in members.values()
-            for place, one in enumerate(inside)
-            for other in inside[place + 1 :]
-        }
+        """Return pairs that could be exchanged, or are both unseen where they might meet."""
+        pairs = {(min(i, j), max(i, j)) for i, j in exchanges}
         unseen = [index for index, track in enumerate(tracks) if track.measured is None]
         if len(unseen) > 1:
             at = np.array([tracks[index].mean[:2] for index in unseen])

@@ -197,7 +197,7 @@ class Tracker:
         pairs = [(track, int(j)) for track, j in zip(tracks, chosen.detection, strict=True)]
         parted = [t for t, j in pairs if j >= 0 and t.samples.last_frame < frame - 1]
         self._update(time, frame, [(t, j) for t, j in pairs if j >= 0], found, measured)
-        self._marks.note_company(tracks, frame, chosen.group)
+        self._marks.note_company(tracks, frame, chosen.exchanges)
         for track, score in zip(tracks, chosen.score, strict=True):
             track.score = float(score) if track.key is None else 0.0
         self._marks.doubt(tracks, parted, frame)
