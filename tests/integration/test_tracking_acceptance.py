@@ -22,7 +22,7 @@ import driftwalk as dw
 from driftwalk.record import save_trajectory
 from driftwalk.schema import build_trajectory
 
-cv2 = pytest.importorskip("cv2")
+pytest.importorskip("cv2")
 
 STUDY = Path(__file__).resolve().parents[2] / "studies" / "tracking"
 TANK = ("--tank-diameter", "30cm")
@@ -179,18 +179,12 @@ def test_a_fit_of_tracked_poses_is_that_of_the_true_ones(
 def test_the_mouse_beside_its_published_track(
     shared_data: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    """The first half minute, in which cloth moves in a corner of the picture."""
+    """The whole video: for the background the mouse has to be elsewhere most of the time."""
     folder = shared_data("tracktor-mouse-termite")
-    frames, short = 900, tmp_path / "mouse.mkv"
-    whole = cv2.VideoCapture(str(folder / "mouse_video.mp4"))
-    part = cv2.VideoWriter(str(short), cv2.VideoWriter_fourcc(*"FFV1"), 30.0, (640, 480))
-    for _ in range(frames):
-        part.write(whole.read()[1])
-    part.release()
     out = tmp_path / "recording.nc"
-    words = ("--markers", "blob", "--polarity", "dark", "--px-per-m", "500", "--bodies", "1")
-    run_driftwalk("track", short, *words, "-o", out)
+    words = ("--markers", "blob", "--px-per-m", "500", "--bodies", "1", "-o", out)
+    run_driftwalk("track", folder / "mouse_video.mp4", *words)
     found = import_module("mouse").beside_published(out, folder / "mouse_video_tracked.csv")
-    assert found["frames"] == frames
+    assert found["frames_published"] - found["frames"] == 4  # stale: the picture before once more
     assert found["lost"] == found["far"] == 0
     assert found["median_px"] <= 5.0
