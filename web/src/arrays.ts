@@ -1,6 +1,18 @@
 /** Arrays as a page carries them: packed base64, or plain lists with null for "not a number". */
 
-import { type Check, PageError, number, object, nullable, oneOf, list, flag, text, withDefault, plainObject } from "./check";
+import {
+  type Check,
+  PageError,
+  number,
+  object,
+  nullable,
+  oneOf,
+  list,
+  flag,
+  text,
+  withDefault,
+  plainObject,
+} from "./check";
 
 const packedShape = object({
   dtype: oneOf("f4", "f8", "i2", "i4", "u1"),
@@ -174,7 +186,5 @@ function toValues(raw: Raw, source: Packed): Float64Array {
   if (raw instanceof Float32Array || raw instanceof Float64Array) return Float64Array.from(raw);
   const scale = source.scale ?? 1;
   const offset = source.offset ?? 0;
-  return Float64Array.from(raw, (value) =>
-    value === source.missing ? Number.NaN : offset + scale * value,
-  );
+  return Float64Array.from(raw, (value) => (value === source.missing ? Number.NaN : offset + scale * value));
 }

@@ -11,7 +11,12 @@ export function classLegend(
   for (const one of classes) {
     const cells = one.cells.length > 0 ? one.cells : cellsOfName(one.name);
     list.append(
-      el("li", {}, cells.length > 0 ? sketchPicture(cells, 7, one.colour) : box(one.colour), el("span", {}, writtenName(one.name))),
+      el(
+        "li",
+        {},
+        cells.length > 0 ? sketchPicture(cells, 7, one.colour) : box(one.colour),
+        el("span", {}, writtenName(one.name)),
+      ),
     );
   }
   return list;

@@ -5,15 +5,7 @@ import { svg } from "./dom";
 export type Rgb = readonly [number, number, number];
 
 /** Okabe and Ito's palette for colour-blind readers, without black and the pale yellow. */
-export const PALETTE = [
-  "#0072B2",
-  "#D55E00",
-  "#009E73",
-  "#CC79A7",
-  "#E69F00",
-  "#56B4E9",
-  "#7A4B9A",
-] as const;
+export const PALETTE = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A4B9A"] as const;
 const GREYS = ["#9a9a9a", "#6b6b6b", "#bdbdbd", "#4d4d4d", "#848484"] as const;
 const OTHER = "#c9c9c9";
 
@@ -62,8 +54,7 @@ export function colourScale(
   const colours = coloursOf(palette, options.dark ?? false);
   const power = options.power ?? 1;
   const span = high > low ? high - low : 1;
-  const position = (value: number): number =>
-    Math.min(1, Math.max(0, (value - low) / span)) ** power;
+  const position = (value: number): number => Math.min(1, Math.max(0, (value - low) / span)) ** power;
   const at = (place: number): Rgb => between(colours, place);
   return {
     low,
@@ -147,11 +138,9 @@ export function gradient(scale: ColourScale, id: string): SVGLinearGradientEleme
 function between(colours: readonly Rgb[], place: number): Rgb {
   const along = Math.min(1, Math.max(0, place)) * (colours.length - 1);
   const index = Math.min(Math.floor(along), colours.length - 2);
-  const from = colours[index] ?? [0, 0, 0];
-  const to = colours[index + 1] ?? from;
+  const from: Rgb = colours[index] ?? [0, 0, 0];
+  const to: Rgb = colours[index + 1] ?? from;
   const share = along - index;
-  return [0, 1, 2].map((part) => {
-    const start = from[part] ?? 0;
-    return start + share * ((to[part] ?? 0) - start);
-  }) as unknown as Rgb;
+  const mixed = (part: 0 | 1 | 2): number => from[part] + share * (to[part] - from[part]);
+  return [mixed(0), mixed(1), mixed(2)];
 }

@@ -36,7 +36,12 @@ async function start(): Promise<void> {
   } catch (error) {
     const words = error instanceof Error ? error.message : String(error);
     pageHolder().replaceChildren(
-      el("main", { class: "stopped" }, el("h1", {}, "This page cannot be shown"), el("p", { role: "alert" }, words)),
+      el(
+        "main",
+        { class: "stopped" },
+        el("h1", {}, "This page cannot be shown"),
+        el("p", { role: "alert" }, words),
+      ),
     );
     if (!(error instanceof PageError)) console.error(error);
   }

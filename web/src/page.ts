@@ -153,10 +153,7 @@ const lines = object({
       style: withDefault(oneOf("line", "points", "step"), "line"),
     }),
   ),
-  marks: withDefault(
-    list(object({ x: nullable(number), y: nullable(number), label: text })),
-    [],
-  ),
+  marks: withDefault(list(object({ x: nullable(number), y: nullable(number), label: text })), []),
 });
 
 const imageGrid = object({
@@ -244,10 +241,7 @@ const replay = object({
       y: numbers,
       theta: numbers,
       assembly: numbers,
-      events: withDefault(
-        list(object({ time: number, blocks: list(number), class: nullable(text) })),
-        [],
-      ),
+      events: withDefault(list(object({ time: number, blocks: list(number), class: nullable(text) })), []),
       classes: withDefault(list(object({ time: number, class: text })), []),
     }),
   ),
@@ -259,10 +253,7 @@ const manifest = object({
   ...base,
   command: nullable(text),
   entries: anything,
-  inputs: withDefault(
-    list(object({ role: text, name: text, sha256: nullable(text) })),
-    [],
-  ),
+  inputs: withDefault(list(object({ role: text, name: text, sha256: nullable(text) })), []),
   cite: nullable(text),
   bibtex: nullable(text),
 });

@@ -3,7 +3,8 @@
 import { type Child, el, svg } from "./dom";
 import { rich } from "./symbols";
 
-export type Swatch = "line" | "dash" | "band" | "solid" | "dot" | "hatch" | "cross" | "star" | "ring" | "diamond" | "box";
+export type Swatch =
+  "line" | "dash" | "band" | "solid" | "dot" | "hatch" | "cross" | "star" | "ring" | "diamond" | "box";
 
 /** Returns a legend; the colour of a swatch is a colour or a variable of the style sheet. */
 export function legend(
@@ -19,7 +20,13 @@ export function legend(
 }
 
 function swatch(kind: Swatch): SVGSVGElement {
-  const picture = svg("svg", { class: `swatch ${kind}`, viewBox: "0 0 18 12", width: 18, height: 12, "aria-hidden": "true" });
+  const picture = svg("svg", {
+    class: `swatch ${kind}`,
+    viewBox: "0 0 18 12",
+    width: 18,
+    height: 12,
+    "aria-hidden": "true",
+  });
   picture.append(...SHAPES[kind]());
   return picture;
 }
@@ -75,7 +82,9 @@ export function readout(hint: string): Readout {
 }
 
 /** Returns a list of facts: label and value. */
-export function facts(items: readonly (readonly [label: string, value: string, note?: string | null])[]): HTMLElement {
+export function facts(
+  items: readonly (readonly [label: string, value: string, note?: string | null])[],
+): HTMLElement {
   const list = el("dl", { class: "facts" });
   for (const [label, value, note] of items) {
     const remark = note !== undefined && note !== null && note !== "" && el("small", {}, note);
@@ -91,14 +100,30 @@ export function table(
   rows: readonly (readonly string[])[],
   numeric: (column: number) => boolean,
 ): HTMLElement {
-  const head = el("tr", {}, ...columns.map((name, index) => el("th", { scope: "col", class: numeric(index) ? "number" : null }, name)));
+  const head = el(
+    "tr",
+    {},
+    ...columns.map((name, index) =>
+      el("th", { scope: "col", class: numeric(index) ? "number" : null }, name),
+    ),
+  );
   const body = rows.map((row) =>
-    el("tr", {}, ...row.map((value, index) => el("td", { class: numeric(index) ? "number" : null }, ...rich(value)))),
+    el(
+      "tr",
+      {},
+      ...row.map((value, index) => el("td", { class: numeric(index) ? "number" : null }, ...rich(value))),
+    ),
   );
   return el(
     "div",
     { class: "table", tabindex: 0, role: "region", "aria-label": caption },
-    el("table", {}, el("caption", { class: "unseen" }, caption), el("thead", {}, head), el("tbody", {}, ...body)),
+    el(
+      "table",
+      {},
+      el("caption", { class: "unseen" }, caption),
+      el("thead", {}, head),
+      el("tbody", {}, ...body),
+    ),
   );
 }
 
@@ -120,7 +145,11 @@ export function choices<T extends string>(
 ): HTMLElement {
   const group = el("div", { class: "choices", role: "group", "aria-label": label });
   for (const [value, text] of options) {
-    const button = el("button", { type: "button", "aria-pressed": String(value === chosen), "data-choice": value }, text);
+    const button = el(
+      "button",
+      { type: "button", "aria-pressed": String(value === chosen), "data-choice": value },
+      text,
+    );
     button.addEventListener("click", () => {
       for (const other of group.children) other.setAttribute("aria-pressed", String(other === button));
       changed(value);

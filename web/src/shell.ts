@@ -29,22 +29,23 @@ export function makeShell(page: Page): Shell {
   const header = el(
     "header",
     { class: "head" },
-    el(
-      "div",
-      { class: "titles" },
-      titles,
-      state,
-      bar,
-    ),
+    el("div", { class: "titles" }, titles, state, bar),
     el("div", { class: "tools" }, connection, saving, themeButton()),
   );
   const columns = el("div", { class: "layout" }, contents, main);
   const foot = el("footer", { class: "foot" });
-  pageHolder().replaceChildren(el("a", { class: "skip", href: "#main" }, "Skip to the content"), header, columns, foot);
+  pageHolder().replaceChildren(
+    el("a", { class: "skip", href: "#main" }, "Skip to the content"),
+    header,
+    columns,
+    foot,
+  );
   document.body.dataset["view"] = page.view;
   const showPage = (now: Page): void => {
-    document.title = now.subtitle === null || now.subtitle === "" ? now.title : `${now.title} · ${now.subtitle}`;
-    const subtitle = now.subtitle !== null && now.subtitle !== "" && el("p", { class: "subtitle" }, ...rich(now.subtitle));
+    document.title =
+      now.subtitle === null || now.subtitle === "" ? now.title : `${now.title} · ${now.subtitle}`;
+    const subtitle =
+      now.subtitle !== null && now.subtitle !== "" && el("p", { class: "subtitle" }, ...rich(now.subtitle));
     titles.replaceChildren(el("h1", {}, ...rich(now.title)), ...(subtitle === false ? [] : [subtitle]));
     foot.textContent = footText(now);
   };
@@ -71,7 +72,9 @@ function showState(now: State | null, words: HTMLElement, bar: HTMLProgressEleme
   bar.hidden = !running || now.progress === null;
   if (running && now.progress !== null) bar.value = now.progress;
   const share = running && now.progress !== null ? `${percent(now.progress)} done` : null;
-  const text = [running ? (share ?? "running") : null, now?.words ?? null].filter((part) => part !== null).join(" · ");
+  const text = [running ? (share ?? "running") : null, now?.words ?? null]
+    .filter((part) => part !== null)
+    .join(" · ");
   words.textContent = text;
   words.hidden = text === "";
   const root = document.documentElement.dataset;
@@ -96,7 +99,11 @@ function themeButton(): HTMLButtonElement {
     svg("circle", { cx: 10, cy: 10, r: 7.5, fill: "none", stroke: "currentColor", "stroke-width": 1.6 }),
     svg("path", { d: "M10 2.5A7.5 7.5 0 0 1 10 17.5Z", fill: "currentColor" }),
   );
-  const button = el("button", { type: "button", class: "theme", "aria-label": "Switch between light and dark", title: "light or dark" }, icon);
+  const button = el(
+    "button",
+    { type: "button", class: "theme", "aria-label": "Switch between light and dark", title: "light or dark" },
+    icon,
+  );
   button.addEventListener("click", toggleTheme);
   return button;
 }

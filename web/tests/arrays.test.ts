@@ -32,7 +32,13 @@ test("floats are read little-endian, not a number included", async () => {
 });
 
 test("integers are scaled, and the missing one is not a number", async () => {
-  const source = packed(int16([10, -32768, -4]), { dtype: "i2", shape: [3], scale: 0.5, offset: 1, missing: -32768 });
+  const source = packed(int16([10, -32768, -4]), {
+    dtype: "i2",
+    shape: [3],
+    scale: 0.5,
+    offset: 1,
+    missing: -32768,
+  });
   assert.deepEqual([...(await decode(source)).data], [6, Number.NaN, -1]);
 });
 
@@ -51,7 +57,15 @@ test("deflated bytes are inflated", async () => {
 });
 
 test("plain lists keep their shape, null is not a number", async () => {
-  const grid = await decode(numbers([[1, null, 3], [4, 5, 6]], "array"));
+  const grid = await decode(
+    numbers(
+      [
+        [1, null, 3],
+        [4, 5, 6],
+      ],
+      "array",
+    ),
+  );
   assert.deepEqual(grid.shape, [2, 3]);
   assert.deepEqual([...grid.data], [1, Number.NaN, 3, 4, 5, 6]);
   assert.deepEqual([...part(grid, 1)], [4, 5, 6]);
@@ -61,7 +75,10 @@ test("an array that is cut short or ragged is refused in words", async () => {
   await assert.rejects(decode(packed(int16([1, 2]), { dtype: "i2", shape: [3] })), /shape 3 holds 2/);
   await assert.rejects(decode(packed(Uint8Array.of(1), { dtype: "i2", shape: [1] })), /1 bytes/);
   await assert.rejects(decode(numbers([[1, 2], [3]], "array")), /rows .* differ/);
-  assert.throws(() => numbers({ dtype: "i8", shape: [], data: "" }, "map.value"), /'map.value.dtype' is not one of/);
+  assert.throws(
+    () => numbers({ dtype: "i8", shape: [], data: "" }, "map.value"),
+    /'map.value.dtype' is not one of/,
+  );
   assert.throws(() => numbers([1, "2"], "x"), /'x\[1\]' is not a number: got "2"/);
 });
 
@@ -71,7 +88,15 @@ test("extent, nearest and lastUpTo agree with their words", () => {
   assert.equal(nearest([0, 1, 2], 1.4), 1);
   assert.equal(nearest([], 1), -1);
   const times = [0, 1, 1, 4];
-  for (const [limit, expected] of [[-1, 0], [0, 0], [0.5, 0], [1, 2], [3.9, 2], [4, 3], [9, 3]] as const) {
+  for (const [limit, expected] of [
+    [-1, 0],
+    [0, 0],
+    [0.5, 0],
+    [1, 2],
+    [3.9, 2],
+    [4, 3],
+    [9, 3],
+  ] as const) {
     assert.equal(lastUpTo(times, limit), expected, `up to ${limit}`);
   }
 });

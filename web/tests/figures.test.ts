@@ -27,8 +27,14 @@ test("a contour has no pieces beside holes, and none where the level is not reac
 
 test("marginals add up, and a range holds all but the tails", () => {
   const share = { shape: [2, 3], data: Float64Array.from([0.1, 0.2, 0, 0.3, Number.NaN, 0.4]) };
-  assert.deepEqual(marginal(share, 0).map((sum) => Number(sum.toFixed(9))), [0.3, 0.7]);
-  assert.deepEqual(marginal(share, 1).map((sum) => Number(sum.toFixed(9))), [0.4, 0.2, 0.4]);
+  assert.deepEqual(
+    marginal(share, 0).map((sum) => Number(sum.toFixed(9))),
+    [0.3, 0.7],
+  );
+  assert.deepEqual(
+    marginal(share, 1).map((sum) => Number(sum.toFixed(9))),
+    [0.4, 0.2, 0.4],
+  );
   const edges = [0, 1, 2, 3, 4, 5];
   assert.deepEqual(filledRange([0, 0.5, 0.5, 0, 0], edges), [1, 3]);
   assert.deepEqual(filledRange([0.0001, 0.5, 0.4998, 0, 0.0001], edges), [1, 3]);
@@ -37,7 +43,9 @@ test("marginals add up, and a range holds all but the tails", () => {
 
 test("a thinned series keeps its extremes and its gaps", () => {
   const x = Array.from({ length: 1000 }, (_, index) => index);
-  const y = x.map((index) => (index === 437 ? 50 : index === 438 ? -50 : index === 700 ? Number.NaN : Math.sin(index)));
+  const y = x.map((index) =>
+    index === 437 ? 50 : index === 438 ? -50 : index === 700 ? Number.NaN : Math.sin(index),
+  );
   const thin = thinnedSeries(x, y, 20);
   assert.ok(thin.x.length <= 20 * 5);
   assert.ok(thin.y.includes(50) && thin.y.includes(-50) && thin.y.some(Number.isNaN));
@@ -54,7 +62,12 @@ test("outlines of tanks have their size and place", () => {
   const circle: Arena = { ...EMPTY, shape: "circle", diameter_m: 0.3, center_m: [0.1, -0.2] };
   for (const [x, y] of outline(circle)) assert.ok(Math.abs(Math.hypot(x - 0.1, y + 0.2) - 0.15) < 1e-12);
   const rectangle: Arena = { ...EMPTY, shape: "rectangle", width_m: 2, height_m: 1 };
-  assert.deepEqual(outline(rectangle), [[-1, -0.5], [1, -0.5], [1, 0.5], [-1, 0.5]]);
+  assert.deepEqual(outline(rectangle), [
+    [-1, -0.5],
+    [1, -0.5],
+    [1, 0.5],
+    [-1, 0.5],
+  ]);
   assert.deepEqual(boxAround(rectangle, [], [], 0.5), { x: [-2, 2], y: [-1.5, 1.5] });
   assert.deepEqual(boxAround(null, [0, 1], [0, 1], 0), { x: [0, 1], y: [0, 1] });
   assert.deepEqual(outline(null), []);
@@ -62,6 +75,12 @@ test("outlines of tanks have their size and place", () => {
 
 test("a label that is too long is broken where it can be read", () => {
   assert.deepEqual(twoLines("short", 100), ["short"]);
-  assert.deepEqual(twoLines("force (mN), drawn anew every 16 ms", 100), ["force (mN),", "drawn anew every 16 ms"]);
-  assert.deepEqual(twoLines("component 2 (11 % of the variance)", 100), ["component 2", "(11 % of the variance)"]);
+  assert.deepEqual(twoLines("force (mN), drawn anew every 16 ms", 100), [
+    "force (mN),",
+    "drawn anew every 16 ms",
+  ]);
+  assert.deepEqual(twoLines("component 2 (11 % of the variance)", 100), [
+    "component 2",
+    "(11 % of the variance)",
+  ]);
 });

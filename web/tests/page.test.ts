@@ -33,8 +33,14 @@ test("a section that is wrong says where", () => {
   const head = { id: "m", kind: "map", title: "Map" };
   const axis = { name: "a", label: "a", unit: "1", values: [1] };
   assert.throws(() => SECTIONS.map(head, ""), /'x' is not an object: got nothing/);
-  assert.throws(() => SECTIONS.map({ ...head, x: { ...axis, values: [1, "2"] }, y: axis }, ""), /'x.values\[1\]' is not a number/);
-  assert.throws(() => SECTIONS.map({ ...head, x: axis, y: axis, value: { dtype: "f2" } }, ""), /'value.dtype'/);
+  assert.throws(
+    () => SECTIONS.map({ ...head, x: { ...axis, values: [1, "2"] }, y: axis }, ""),
+    /'x.values\[1\]' is not a number/,
+  );
+  assert.throws(
+    () => SECTIONS.map({ ...head, x: axis, y: axis, value: { dtype: "f2" } }, ""),
+    /'value.dtype'/,
+  );
   const map = SECTIONS.map({ ...head, x: axis, y: axis, value: [[0.5]], statuses: { "1": "no motion" } }, "");
   assert.equal(map.statuses.get("1"), "no motion");
   assert.equal(map.cells, null);
@@ -42,27 +48,50 @@ test("a section that is wrong says where", () => {
 
 test("text stays text, whatever it looks like", () => {
   const hostile = "<img src=x onerror=alert(1)>";
-  const section = SECTIONS.summary({ id: "s", kind: "summary", title: hostile, paragraphs: [hostile], numbers: [] }, "");
+  const section = SECTIONS.summary(
+    { id: "s", kind: "summary", title: hostile, paragraphs: [hostile], numbers: [] },
+    "",
+  );
   assert.deepEqual(section.paragraphs, [hostile]);
 });
 
 test("new sections stand where they say, else at the end", () => {
-  const section = (id: string, after?: string) => ({ id, kind: "empty", title: id, note: null, content: { after } });
+  const section = (id: string, after?: string) => ({
+    id,
+    kind: "empty",
+    title: id,
+    note: null,
+    content: { after },
+  });
   const page = [section("a"), section("b")];
-  assert.deepEqual(insertAfter(page, section("c", "a")).map((one) => one.id), ["a", "c", "b"]);
-  assert.deepEqual(insertAfter(page, section("c")).map((one) => one.id), ["a", "b", "c"]);
+  assert.deepEqual(
+    insertAfter(page, section("c", "a")).map((one) => one.id),
+    ["a", "c", "b"],
+  );
+  assert.deepEqual(
+    insertAfter(page, section("c")).map((one) => one.id),
+    ["a", "b", "c"],
+  );
   assert.ok(sameIds(page, [section("a"), section("b")]) && !sameIds(page, [section("b"), section("a")]));
 });
 
 test("small sections stand in pairs, what is left over stands alone", () => {
-  assert.deepEqual(besides(["map", "lines", "lines", "table", "flow", "lines"]), [false, true, true, false, false, false]);
+  assert.deepEqual(besides(["map", "lines", "lines", "table", "flow", "lines"]), [
+    false,
+    true,
+    true,
+    false,
+    false,
+    false,
+  ]);
   assert.deepEqual(besides(["lines", "table", "biplot", "image_grid"]), [true, true, true, true]);
   assert.deepEqual(besides([]), []);
 });
 
 test("only objects with a type are messages, and pauses grow to a limit", () => {
   assert.deepEqual(parsed('{"type":"state","progress":1}'), { type: "state", progress: 1 });
-  for (const none of ["", "{", "[]", "3", "null", '{"type":3}', new ArrayBuffer(2)]) assert.equal(parsed(none), null);
+  for (const none of ["", "{", "[]", "3", "null", '{"type":3}', new ArrayBuffer(2)])
+    assert.equal(parsed(none), null);
   let pause = 250;
   const pauses = Array.from({ length: 8 }, () => (pause = nextPause(pause)));
   assert.deepEqual(pauses, [500, 1000, 2000, 4000, 5000, 5000, 5000, 5000]);
@@ -70,7 +99,14 @@ test("only objects with a type are messages, and pauses grow to a limit", () => 
 
 test("frames of a tracker are read, with what is unknown as null", () => {
   const body = { id: "3", seen: false, x_m: 0.1, y_m: null, theta_rad: null, column_px: null };
-  const frame = checkFrame({ type: "frame", frame: 7, time_s: 0.5, bodies: [body], joined: [["3", 0, "4", 2]], outcome: null });
+  const frame = checkFrame({
+    type: "frame",
+    frame: 7,
+    time_s: 0.5,
+    bodies: [body],
+    joined: [["3", 0, "4", 2]],
+    outcome: null,
+  });
   assert.deepEqual(frame.joined, [["3", 0, "4", 2]]);
   assert.equal(frame.bodies[0]?.y_m, null);
   assert.equal(checkFrame({ frame: 1, time_s: 0, bodies: [], joined: null }).joined, null);

@@ -1,9 +1,21 @@
 import assert from "node:assert/strict";
 import test from "node:test";
-import { cellAt, cellEdges, linearScale, linearTicks, logScale, logTicks, niceDomain, niceStep } from "../src/scale";
+import {
+  cellAt,
+  cellEdges,
+  linearScale,
+  linearTicks,
+  logScale,
+  logTicks,
+  niceDomain,
+  niceStep,
+} from "../src/scale";
 
 function near(actual: number, expected: number, message = ""): void {
-  assert.ok(Math.abs(actual - expected) <= 1e-9 * Math.max(1, Math.abs(expected)), `${message} ${actual} is not ${expected}`);
+  assert.ok(
+    Math.abs(actual - expected) <= 1e-9 * Math.max(1, Math.abs(expected)),
+    `${message} ${actual} is not ${expected}`,
+  );
 }
 
 test("a scale takes its ends to its ends, and back", () => {
@@ -17,7 +29,13 @@ test("a scale takes its ends to its ends, and back", () => {
 });
 
 test("ticks are round, inside, equally far apart, and no more than asked for", () => {
-  for (const [low, high] of [[0, 1], [-0.155, 0.155], [3.2e-4, 9.7e-4], [17, 17.3], [-5000, 120]] as const) {
+  for (const [low, high] of [
+    [0, 1],
+    [-0.155, 0.155],
+    [3.2e-4, 9.7e-4],
+    [17, 17.3],
+    [-5000, 120],
+  ] as const) {
     for (const count of [3, 5, 9]) {
       const ticks = linearTicks(low, high, count);
       assert.ok(ticks.length >= 1 && ticks.length <= count + 1, `${ticks.length} ticks for ${count}`);
@@ -25,7 +43,10 @@ test("ticks are round, inside, equally far apart, and no more than asked for", (
       const step = niceStep(high - low, count);
       ticks.slice(1).forEach((tick, index) => near(tick - (ticks[index] ?? 0), step));
       const mantissa = step / 10 ** Math.floor(Math.log10(step) + 1e-9);
-      assert.ok([1, 2, 2.5, 5, 10].some((round) => Math.abs(mantissa - round) < 1e-6), `${step} is not round`);
+      assert.ok(
+        [1, 2, 2.5, 5, 10].some((round) => Math.abs(mantissa - round) < 1e-6),
+        `${step} is not round`,
+      );
     }
   }
   assert.deepEqual(linearTicks(0, 1, 5), [0, 0.2, 0.4, 0.6, 0.8, 1]);
@@ -48,7 +69,15 @@ test("cells lie around their points, and are found again", () => {
   assert.deepEqual(cellEdges([1, 2, 4]), [0.5, 1.5, 3, 5]);
   assert.deepEqual(cellEdges([2]), [1, 3]);
   const edges = cellEdges([1, 2, 4]);
-  for (const [value, cell] of [[0.5, 0], [1.4, 0], [1.6, 1], [4, 2], [5, 2], [5.1, -1], [0.4, -1]] as const) {
+  for (const [value, cell] of [
+    [0.5, 0],
+    [1.4, 0],
+    [1.6, 1],
+    [4, 2],
+    [5, 2],
+    [5.1, -1],
+    [0.4, -1],
+  ] as const) {
     assert.equal(cellAt(edges, value), cell, `cell of ${value}`);
   }
   assert.equal(cellAt([3, 2, 1], 1.5), 1, "edges may descend");

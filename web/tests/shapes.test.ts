@@ -4,8 +4,20 @@ import { cellsOfName, sketchOf, writtenName } from "../src/polyomino";
 import { type Join, assemblies, code, shapeName } from "../src/tank/joined";
 
 test("names and codes give cells, other words none", () => {
-  assert.deepEqual(cellsOfName("2+1"), [[[0, 0], [1, 0]], [[0, 0]]]);
-  assert.deepEqual(cellsOfName("x./xx"), [[[0, 1], [0, 0], [1, 0]]]);
+  assert.deepEqual(cellsOfName("2+1"), [
+    [
+      [0, 0],
+      [1, 0],
+    ],
+    [[0, 0]],
+  ]);
+  assert.deepEqual(cellsOfName("x./xx"), [
+    [
+      [0, 1],
+      [0, 0],
+      [1, 0],
+    ],
+  ]);
   for (const none of ["other", "", "...", "Q", "2+Q"]) assert.deepEqual(cellsOfName(none), []);
   assert.equal(writtenName("L3+1"), "L3+1");
   assert.equal(writtenName("xxx/x.x"), "");
@@ -19,7 +31,10 @@ test("the squares of a sketch do not overlap and fill no more than its box", () 
     sketch.squares.forEach(([x, y], index) => {
       assert.ok(x >= 0 && y >= 0 && x + 1 <= sketch.width + 1e-9 && y + 1 <= sketch.height + 1e-9, name);
       for (const [otherX, otherY] of sketch.squares.slice(index + 1)) {
-        assert.ok(Math.max(Math.abs(x - otherX), Math.abs(y - otherY)) >= 1 - 1e-9, `${name}: squares overlap`);
+        assert.ok(
+          Math.max(Math.abs(x - otherX), Math.abs(y - otherY)) >= 1 - 1e-9,
+          `${name}: squares overlap`,
+        );
       }
     });
   }
@@ -27,24 +42,75 @@ test("the squares of a sketch do not overlap and fill no more than its box", () 
 
 test("the sketch of a class packs as the printed figure does", () => {
   // From the figures of the Python package: class_cells("2+1").
-  const squares = sketchOf(cellsOfName("2+1")).squares.map(([x, y]) => [Number(x.toFixed(9)), Number(y.toFixed(9))]);
-  assert.deepEqual(squares, [[0, 1.6], [1, 1.6], [0, 0]]);
+  const squares = sketchOf(cellsOfName("2+1")).squares.map(([x, y]) => [
+    Number(x.toFixed(9)),
+    Number(y.toFixed(9)),
+  ]);
+  assert.deepEqual(squares, [
+    [0, 1.6],
+    [1, 1.6],
+    [0, 0],
+  ]);
 });
 
 test("blocks that are joined, also by others, are one assembly", () => {
-  const joins: Join[] = [["a", 0, "b", 2], ["c", 1, "b", 3]];
-  assert.deepEqual(assemblies(["a", "b", "c", "d"], joins).map((group) => group.sort()), [["a", "b", "c"], ["d"]]);
+  const joins: Join[] = [
+    ["a", 0, "b", 2],
+    ["c", 1, "b", 3],
+  ];
+  assert.deepEqual(
+    assemblies(["a", "b", "c", "d"], joins).map((group) => group.sort()),
+    [["a", "b", "c"], ["d"]],
+  );
   assert.deepEqual(assemblies(["a"], [["a", 0, "gone", 2]]), [["a"]]);
 });
 
 test("joined faces give the shape, whichever way the blocks are turned", () => {
   assert.equal(shapeName(["a"], []), "1");
   assert.equal(shapeName(["a", "b"], [["a", 3, "b", 3]]), "2");
-  assert.equal(shapeName(["a", "b", "c"], [["a", 0, "b", 2], ["b", 0, "c", 1]]), "I3");
-  assert.equal(shapeName(["a", "b", "c"], [["a", 0, "b", 2], ["b", 1, "c", 0]]), "L3");
+  assert.equal(
+    shapeName(
+      ["a", "b", "c"],
+      [
+        ["a", 0, "b", 2],
+        ["b", 0, "c", 1],
+      ],
+    ),
+    "I3",
+  );
+  assert.equal(
+    shapeName(
+      ["a", "b", "c"],
+      [
+        ["a", 0, "b", 2],
+        ["b", 1, "c", 0],
+      ],
+    ),
+    "L3",
+  );
   // Three in a row and one on the side of the middle one.
-  assert.equal(shapeName(["a", "b", "c", "d"], [["a", 0, "b", 0], ["b", 2, "c", 3], ["d", 2, "b", 1]]), "T");
-  assert.equal(shapeName(["a", "b", "c", "d"], [["a", 0, "b", 2], ["b", 1, "c", 3], ["c", 2, "d", 0]]), "O");
+  assert.equal(
+    shapeName(
+      ["a", "b", "c", "d"],
+      [
+        ["a", 0, "b", 0],
+        ["b", 2, "c", 3],
+        ["d", 2, "b", 1],
+      ],
+    ),
+    "T",
+  );
+  assert.equal(
+    shapeName(
+      ["a", "b", "c", "d"],
+      [
+        ["a", 0, "b", 2],
+        ["b", 1, "c", 3],
+        ["c", 2, "d", 0],
+      ],
+    ),
+    "O",
+  );
   assert.equal(shapeName(["a", "b"], []), "2 blocks", "blocks that do not hang together have no shape");
 });
 
@@ -56,12 +122,26 @@ test("every placement of every tetromino has its name", () => {
       // Blocks that all look the same way: the face towards a neighbour is the direction itself.
       const joins: Join[] = cells.flatMap(([x, y], one) =>
         cells.flatMap(([otherX, otherY], other): Join[] => {
-          const face = [[1, 0], [0, 1], [-1, 0], [0, -1]].findIndex(([dx, dy]) => otherX - x === dx && otherY - y === dy);
-          return face < 0 || other < one ? [] : [[`b${one}`, (face + quarter) % 4, `b${other}`, (face + quarter + 2) % 4]];
+          const face = [
+            [1, 0],
+            [0, 1],
+            [-1, 0],
+            [0, -1],
+          ].findIndex(([dx, dy]) => otherX - x === dx && otherY - y === dy);
+          return face < 0 || other < one
+            ? []
+            : [[`b${one}`, (face + quarter) % 4, `b${other}`, (face + quarter + 2) % 4]];
         }),
       );
       assert.equal(shapeName(names, joins), name);
     }
   }
-  assert.equal(code([[0, 0], [1, 0], [0, 1]]), "x./xx");
+  assert.equal(
+    code([
+      [0, 0],
+      [1, 0],
+      [0, 1],
+    ]),
+    "x./xx",
+  );
 });

@@ -15,7 +15,12 @@ test("symbols with an index are found, names with underscores are not", () => {
   for (const plain of ["drag_coefficient", "ks_map.png", "a_bc", "_d", "<b>x</b>"]) {
     assert.deepEqual(pieces(plain), [{ text: plain, index: null }]);
   }
-  assert.equal(pieces("a C_d b").map((piece) => piece.text).join(""), "a C b");
+  assert.equal(
+    pieces("a C_d b")
+      .map((piece) => piece.text)
+      .join(""),
+    "a C b",
+  );
   assert.equal(spoken("sigma_F"), "σ F");
   assert.equal(shortName("stochastic force σ_F, drawn anew"), "σ_F");
   assert.equal(shortName("time, in a tank"), "time");
@@ -34,8 +39,15 @@ test("a colour scale goes from its first colour to its last", () => {
 
 test("classes of one assembly have hues, those of several greys", () => {
   const colours = new ClassColours();
-  assert.deepEqual(["I", "2+2", "T"].map((name) => colours.of(name)), ["#0072B2", "#9a9a9a", "#D55E00"]);
-  assert.deepEqual(["T", "O", "I"].map((name) => colours.of(name)), ["#D55E00", "#009E73", "#0072B2"], "once given, it stays");
+  assert.deepEqual(
+    ["I", "2+2", "T"].map((name) => colours.of(name)),
+    ["#0072B2", "#9a9a9a", "#D55E00"],
+  );
+  assert.deepEqual(
+    ["T", "O", "I"].map((name) => colours.of(name)),
+    ["#D55E00", "#009E73", "#0072B2"],
+    "once given, it stays",
+  );
   assert.ok(isComplete("T") && !isComplete("2+2") && !isComplete("other"));
 });
 

@@ -46,25 +46,53 @@ test("numbers have a real minus, no useless zeros, and powers of ten when they a
 });
 
 test("an interval decides how many decimals a value has", () => {
-  assert.deepEqual(valueAndInterval(0.3825, 0.37471, 0.39879, "1"), { value: "0.383", interval: "0.375 to 0.399", unit: "" });
-  assert.deepEqual(valueAndInterval(0.000665, 0.00053448, 0.00071217, "N"), { value: "0.67", interval: "0.53 to 0.71", unit: "mN" });
-  assert.deepEqual(valueAndInterval(17999, null, null, "1"), { value: "17\u202f999", interval: null, unit: "" });
+  assert.deepEqual(valueAndInterval(0.3825, 0.37471, 0.39879, "1"), {
+    value: "0.383",
+    interval: "0.375 to 0.399",
+    unit: "",
+  });
+  assert.deepEqual(valueAndInterval(0.000665, 0.00053448, 0.00071217, "N"), {
+    value: "0.67",
+    interval: "0.53 to 0.71",
+    unit: "mN",
+  });
+  assert.deepEqual(valueAndInterval(17999, null, null, "1"), {
+    value: "17\u202f999",
+    interval: null,
+    unit: "",
+  });
 });
 
 test("the unit of a label stands before what a comma adds", () => {
   const display = displayOf("N", 0.001);
-  assert.equal(labelled("force σ_F, drawn anew every 16 ms", display), "force σ_F (mN), drawn anew every 16 ms");
+  assert.equal(
+    labelled("force σ_F, drawn anew every 16 ms", display),
+    "force σ_F (mN), drawn anew every 16 ms",
+  );
   assert.equal(labelled("drag", displayOf("1", 1)), "drag");
 });
 
 test("steps are written in full", () => {
-  for (const [step, decimals] of [[1, 0], [0.5, 1], [0.25, 2], [0.1, 1], [0.025, 3], [20, 0]] as const) {
+  for (const [step, decimals] of [
+    [1, 0],
+    [0.5, 1],
+    [0.25, 2],
+    [0.1, 1],
+    [0.025, 3],
+    [20, 0],
+  ] as const) {
     assert.equal(stepDecimals(step), decimals, `step ${step}`);
   }
 });
 
 test("durations are read as people say them", () => {
-  for (const [seconds, text] of [[3.21, "3.21 s"], [119, "119 s"], [125, "2 min 5 s"], [3600, "60 min"], [7500, "2 h 5 min"]] as const) {
+  for (const [seconds, text] of [
+    [3.21, "3.21 s"],
+    [119, "119 s"],
+    [125, "2 min 5 s"],
+    [3600, "60 min"],
+    [7500, "2 h 5 min"],
+  ] as const) {
     assert.equal(duration(seconds), text);
   }
 });

@@ -40,7 +40,10 @@ export function drawClassBars(width: number, rows: readonly ClassRow[], label: s
   const left = sketchWidth + nameWidth + 24;
   const text = wide ? TEXT : NARROW_TEXT;
   const right = Math.max(left + 60, width - text);
-  const highest = Math.max(0.01, ...rows.flatMap((row) => row.bars.map((bar) => Math.max(bar?.share ?? 0, bar?.high ?? 0))));
+  const highest = Math.max(
+    0.01,
+    ...rows.flatMap((row) => row.bars.map((bar) => Math.max(bar?.share ?? 0, bar?.high ?? 0))),
+  );
   const scale = linearScale([0, highest], left, right - 8);
 
   const picture = svg("svg", { class: "plot classes", role: "img", "aria-label": label });
@@ -55,14 +58,18 @@ export function drawClassBars(width: number, rows: readonly ClassRow[], label: s
     const sketch = sketches[index] ?? { squares: [], width: 0, height: 0 };
     const height = Math.max(row.bars.length * BAR, sketch.height * SQUARE);
     const middle = top + height / 2;
-    picture.append(drawSketch(sketch, sketchWidth - sketch.width * SQUARE, middle - (sketch.height * SQUARE) / 2, SQUARE));
+    picture.append(
+      drawSketch(sketch, sketchWidth - sketch.width * SQUARE, middle - (sketch.height * SQUARE) / 2, SQUARE),
+    );
     picture.append(svg("text", { x: sketchWidth + 9, y: middle + 4 }, writtenName(row.name)));
     const first = middle - (row.bars.length * BAR) / 2;
     row.bars.forEach((bar, place) => {
       if (bar !== null) picture.append(drawBar(bar, scale.px, first + place * BAR, wide));
     });
     if (row.note !== null && wide) {
-      picture.append(svg("text", { class: "remark", x: width, y: middle + 4, "text-anchor": "end" }, row.note));
+      picture.append(
+        svg("text", { class: "remark", x: width, y: middle + 4, "text-anchor": "end" }, row.note),
+      );
     }
     top += height + GAP;
   });
@@ -73,7 +80,13 @@ export function drawClassBars(width: number, rows: readonly ClassRow[], label: s
       svg("text", { x, y: top + 14, "text-anchor": "middle" }, percent(tick)),
     );
   }
-  grid.append(svg("text", { class: "label", x: (left + right) / 2, y: top + 34, "text-anchor": "middle" }, "share of runs"));
+  grid.append(
+    svg(
+      "text",
+      { class: "label", x: (left + right) / 2, y: top + 34, "text-anchor": "middle" },
+      "share of runs",
+    ),
+  );
   const total = top + 42;
   picture.setAttribute("viewBox", `0 0 ${width} ${total}`);
   picture.setAttribute("width", String(width));
@@ -84,7 +97,13 @@ export function drawClassBars(width: number, rows: readonly ClassRow[], label: s
 function drawBar(bar: ClassBar, px: (share: number) => number, top: number, wide: boolean): SVGGElement {
   const group = svg("g");
   const [start, end, middle] = [px(0), px(bar.share), top + BAR / 2];
-  const rect = svg("rect", { class: "class-bar", x: start, y: top + 1, width: Math.max(0, end - start), height: BAR - 2 });
+  const rect = svg("rect", {
+    class: "class-bar",
+    x: start,
+    y: top + 1,
+    width: Math.max(0, end - start),
+    height: BAR - 2,
+  });
   rect.style.setProperty("fill", bar.colour);
   group.append(rect);
   let reach = end;

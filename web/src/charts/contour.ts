@@ -48,12 +48,27 @@ function inCell(
   // A saddle: the value in the middle says which corners belong together.
   const middle = around.reduce((sum, [, height]) => sum + height, 0) / 4;
   const lowFirst = around[0][1] < level;
-  return lowFirst === middle < level ? [[a, b], [c, d]] : [[a, d], [b, c]];
+  return lowFirst === middle < level
+    ? [
+        [a, b],
+        [c, d],
+      ]
+    : [
+        [a, d],
+        [b, c],
+      ];
 }
 
 /** Returns the data of a path of all pieces. */
-export function contourPath(segments: readonly Segment[], px: (x: number) => number, py: (y: number) => number): string {
+export function contourPath(
+  segments: readonly Segment[],
+  px: (x: number) => number,
+  py: (y: number) => number,
+): string {
   return segments
-    .map(([[x0, y0], [x1, y1]]) => `M${px(x0).toFixed(1)} ${py(y0).toFixed(1)}L${px(x1).toFixed(1)} ${py(y1).toFixed(1)}`)
+    .map(
+      ([[x0, y0], [x1, y1]]) =>
+        `M${px(x0).toFixed(1)} ${py(y0).toFixed(1)}L${px(x1).toFixed(1)} ${py(y1).toFixed(1)}`,
+    )
     .join("");
 }

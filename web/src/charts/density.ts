@@ -46,8 +46,7 @@ export function densityLook(bins: Bins, shares: readonly Grid[]): DensityLook {
   const angleDisplay = displayFor("rad", bins.angle);
   const lengths = shares.map((share) => filledRange(marginal(share, 0), bins.length));
   const angles = shares.map((share) => filledRange(marginal(share, 1), bins.angle));
-  const around = (ranges: (readonly [number, number])[]): [number, number] =>
-    extent(ranges.flat()) ?? [0, 1];
+  const around = (ranges: (readonly [number, number])[]): [number, number] => extent(ranges.flat()) ?? [0, 1];
   const sizes = { bins, lengthDisplay, angleDisplay };
   const tops = shares.map((share) => extent(densities(share, sizes))?.[1] ?? 0);
   return { ...sizes, length: around(lengths), angle: around(angles), top: Math.max(...tops) || 1 };
@@ -114,7 +113,10 @@ function crossAt(x: number, y: number): SVGElement {
 }
 
 /** Returns shares per bin as densities [% per shown unit], whatever the sizes of the bins. */
-function densities(share: Grid, look: Pick<DensityLook, "bins" | "lengthDisplay" | "angleDisplay">): Float64Array {
+function densities(
+  share: Grid,
+  look: Pick<DensityLook, "bins" | "lengthDisplay" | "angleDisplay">,
+): Float64Array {
   const angles = share.shape[1] ?? 0;
   const { bins, lengthDisplay, angleDisplay } = look;
   return share.data.map((value, index) => {

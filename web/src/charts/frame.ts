@@ -80,7 +80,11 @@ export function makeFrame(options: FrameOptions): Frame {
     "aria-label": options.label,
   });
   const clip = freshId("clip");
-  const defs = svg("defs", {}, svg("clipPath", { id: clip }, svg("rect", { x: left, y: top, width, height })));
+  const defs = svg(
+    "defs",
+    {},
+    svg("clipPath", { id: clip }, svg("rect", { x: left, y: top, width, height })),
+  );
   const plot = svg("g", { "clip-path": `url(#${clip})` });
   const front = svg("g");
   const x = scaleOf(options.x, left, left + width);
@@ -176,7 +180,9 @@ function yAxis(frame: Frame, ticks: readonly Tick[], label: readonly string[]): 
   const middle = frame.top + frame.height / 2;
   label.forEach((line, index) => {
     const turned = `translate(${12 + index * LINE} ${middle}) rotate(-90)`;
-    group.append(svg("text", { class: "label", transform: turned, "text-anchor": "middle" }, ...richSvg(line)));
+    group.append(
+      svg("text", { class: "label", transform: turned, "text-anchor": "middle" }, ...richSvg(line)),
+    );
   });
   return group;
 }

@@ -20,7 +20,10 @@ interface Points {
 }
 
 const NEAR = 14;
-const WORDS: Readonly<Record<string, string>> = { complete: "share of runs with one assembly", l1_distance: "l1 distance" };
+const WORDS: Readonly<Record<string, string>> = {
+  complete: "share of runs with one assembly",
+  l1_distance: "l1 distance",
+};
 
 export async function drawBiplot(section: BiplotSection, body: HTMLElement, context: Context): Promise<void> {
   const [x, y] = await Promise.all([decode(section.points.x), decode(section.points.y)]);
@@ -61,12 +64,18 @@ function drawPlot(
   const scale = values === undefined ? null : colourScale("score", ...(extent(values) ?? [0, 1]));
   drawAxes(frame);
   points.x.forEach((x, index) => {
-    const dot = svg("circle", { class: "dot", cx: frame.x.px(x), cy: frame.y.px(at(points.y, index)), r: 3.4 });
+    const dot = svg("circle", {
+      class: "dot",
+      cx: frame.x.px(x),
+      cy: frame.y.px(at(points.y, index)),
+      r: 3.4,
+    });
     dot.style.setProperty("fill", colourOf(scale, values, index));
     frame.plot.append(dot);
   });
   for (const arrow of section.arrows) drawArrow(frame, arrow);
-  if (scale !== null) drawColourBar(frame, { scale, label: wordsOf(shown), display: { factor: 1, unit: "" } });
+  if (scale !== null)
+    drawColourBar(frame, { scale, label: wordsOf(shown), display: { factor: 1, unit: "" } });
   const mark = svg("circle", { class: "mark", r: 6, visibility: "hidden" });
   frame.front.append(mark);
   onPointer(frame, (place) => {
@@ -75,7 +84,10 @@ function drawPlot(
     if (found < 0) return show(null);
     mark.setAttribute("cx", String(frame.x.px(at(points.x, found))));
     mark.setAttribute("cy", String(frame.y.px(at(points.y, found))));
-    const rest = [...points.values].map(([name, list]): [string, string] => [wordsOf(name), short(at(list, found))]);
+    const rest = [...points.values].map(([name, list]): [string, string] => [
+      wordsOf(name),
+      short(at(list, found)),
+    ]);
     return show([["", section.points.names[found] ?? ""], ...rest]);
   });
   return frame.svg;
@@ -102,7 +114,14 @@ function equalFrame(width: number, section: BiplotSection, points: Points, bar: 
     width,
     x: { domain: [across[0] - room, across[1] + room], label: label(0), display },
     // A flat cloud still gets a picture that is high enough for its arrows.
-    y: { domain: heightened([up[0] - room, up[1] + room], (width < 500 ? 0.95 : 0.5) * (across[1] - across[0] + 2 * room)), label: label(1), display },
+    y: {
+      domain: heightened(
+        [up[0] - room, up[1] + room],
+        (width < 500 ? 0.95 : 0.5) * (across[1] - across[0] + 2 * room),
+      ),
+      label: label(1),
+      display,
+    },
     ...(bar ? { right: BAR_ROOM } : {}),
     label: `Biplot of ${points.x.length} settings; arrows: ${arrows.map((arrow) => arrow.name).join(", ")}`,
   });

@@ -23,13 +23,20 @@ interface Course {
 
 type Form = "stacked" | "lines";
 
-export async function drawClassTimes(section: ClassTimesSection, body: HTMLElement, context: Context): Promise<void> {
+export async function drawClassTimes(
+  section: ClassTimesSection,
+  body: HTMLElement,
+  context: Context,
+): Promise<void> {
   const time = (await decode(section.time)).data;
   const courses = await decodeCourses(section, context);
   const form = remembered(context, `class times ${section.id}`, (): { now: Form } => ({ now: "stacked" }));
   const holder = el("div", { class: "wide" });
   body.append(holder);
-  const forms = [["stacked", "areas"], ["lines", "lines with intervals"]] as const;
+  const forms = [
+    ["stacked", "areas"],
+    ["lines", "lines with intervals"],
+  ] as const;
   holder.append(
     choices("Form of the chart", forms, form.now, (now) => {
       form.now = now;
@@ -59,16 +66,29 @@ async function decodeCourses(section: ClassTimesSection, context: Context): Prom
   );
 }
 
-function drawCourses(width: number, title: string, time: Float64Array, courses: readonly Course[], form: Form): Frame {
+function drawCourses(
+  width: number,
+  title: string,
+  time: Float64Array,
+  courses: readonly Course[],
+  form: Form,
+): Frame {
   const span = extent(time) ?? [0, 1];
-  const top = form === "stacked" ? 1 : Math.max(0.05, ...courses.flatMap((one) => [...one.share, ...(one.high?.data ?? [])].filter(Number.isFinite)));
+  const top =
+    form === "stacked"
+      ? 1
+      : Math.max(
+          0.05,
+          ...courses.flatMap((one) => [...one.share, ...(one.high?.data ?? [])].filter(Number.isFinite)),
+        );
+  const ends = courses.map((one) => `${one.name} ends at ${percent(at(one.share, one.share.length - 1))}`);
   const frame = makeFrame({
     width,
     height: Math.min(300, Math.max(190, width * 0.4)),
     x: { domain: span, label: "time", display: displayFor("s", span) },
     y: { domain: [0, Math.min(1, top)], label: "share of runs", display: { factor: 100, unit: "%" } },
     grid: form === "lines" ? "y" : "none",
-    label: `${title}: ${courses.map((one) => `${one.name} ends at ${percent(at(one.share, one.share.length - 1))}`).join(", ")}`,
+    label: `${title}: ${ends.join(", ")}`,
   });
   const px = time.map(frame.x.px);
   if (form === "stacked") drawStack(frame, px, courses);

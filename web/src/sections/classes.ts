@@ -17,11 +17,18 @@ export function drawClasses(section: ClassesSection, body: HTMLElement): void {
   }
   const holder = el("div", { class: "wide" });
   body.append(holder);
-  const label = `Shares of the outcome classes: ${rows.map((row) => `${row.name} ${percent(row.bars[0]?.share ?? Number.NaN)}`).join(", ")}`;
+  const shares = rows.map((row) => `${row.name} ${percent(row.bars[0]?.share ?? Number.NaN)}`);
+  const label = `Shares of the outcome classes: ${shares.join(", ")}`;
   figure(holder, "", (width) => drawClassBars(width, rows, label));
   if (section.series.length > 1) {
     holder.append(
-      legend(section.series.map((series, index) => ({ swatch: "solid" as const, colour: colourOf(index), text: series.name }))),
+      legend(
+        section.series.map((series, index) => ({
+          swatch: "solid" as const,
+          colour: colourOf(index),
+          text: series.name,
+        })),
+      ),
     );
   }
   holder.append(details("Values as a table", () => valueTable(section)));
@@ -60,5 +67,10 @@ function valueTable(section: ClassesSection): HTMLElement {
       item.high === null ? "–" : percent(item.high),
     ]),
   );
-  return table(section.title, ["series", "class", "runs", "share", "from", "to"], rows, (column) => column > 1);
+  return table(
+    section.title,
+    ["series", "class", "runs", "share", "from", "to"],
+    rows,
+    (column) => column > 1,
+  );
 }

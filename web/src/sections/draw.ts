@@ -21,7 +21,11 @@ import { drawTable } from "./table";
 import { drawTrajectory } from "./trajectory";
 import { drawWarnings } from "./warnings";
 
-type Draw<K extends Kind> = (section: SectionOf<K>, body: HTMLElement, context: Context) => void | Promise<void>;
+type Draw<K extends Kind> = (
+  section: SectionOf<K>,
+  body: HTMLElement,
+  context: Context,
+) => void | Promise<void>;
 
 const DRAWERS: Partial<{ [K in Kind]: Draw<K> }> = {
   summary: drawSummary,
@@ -88,7 +92,12 @@ function isKind(kind: string): kind is Kind {
   return Object.hasOwn(SECTIONS, kind);
 }
 
-async function drawKind<K extends Kind>(kind: K, content: unknown, body: HTMLElement, context: Context): Promise<void> {
+async function drawKind<K extends Kind>(
+  kind: K,
+  content: unknown,
+  body: HTMLElement,
+  context: Context,
+): Promise<void> {
   const draw: Draw<K> | undefined = DRAWERS[kind];
   const section = SECTIONS[kind](content, "") as SectionOf<K>;
   await draw?.(section, body, context);

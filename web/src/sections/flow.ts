@@ -51,7 +51,13 @@ export async function drawFlow(section: FlowSection, body: HTMLElement): Promise
     legend([
       ...(some(MEASURED) ? [{ swatch: "line" as const, colour: "var(--ink)", text: "measured" }] : []),
       ...(some(FILLED)
-        ? [{ swatch: "hatch" as const, colour: "var(--orange)", text: "filled in: the block was never there" }]
+        ? [
+            {
+              swatch: "hatch" as const,
+              colour: "var(--orange)",
+              text: "filled in: the block was never there",
+            },
+          ]
         : []),
     ]),
   );
@@ -83,7 +89,13 @@ function drawField(width: number, section: FlowSection, field: Field, line: Read
   const columns = field.x.data.length;
   const scale = colourScale("speed", 0, top, { dark: isDark() });
   const inside = insideTank(frame, section.arena);
-  drawCells(frame, field.xEdges, field.yEdges, (column, row) => scale.of(at(field.speed, row * columns + column)), inside);
+  drawCells(
+    frame,
+    field.xEdges,
+    field.yEdges,
+    (column, row) => scale.of(at(field.speed, row * columns + column)),
+    inside,
+  );
   drawFilled(frame, field, inside);
   drawArrows(frame, field, top);
   drawOutline(frame, section.arena);
@@ -94,8 +106,13 @@ function drawField(width: number, section: FlowSection, field: Field, line: Read
 
 /** Draws how well each velocity is known; filled cells are hatched here too. */
 function drawError(width: number, section: FlowSection, field: Field, error: Grid, line: Readout): Element {
-  const known = error.data.map((value, index) => (at(field.origin.data, index) === OUTSIDE ? Number.NaN : value));
-  const top = extent(known.filter((_, index) => at(field.origin.data, index) === MEASURED))?.[1] ?? extent(known)?.[1] ?? 1;
+  const known = error.data.map((value, index) =>
+    at(field.origin.data, index) === OUTSIDE ? Number.NaN : value,
+  );
+  const top =
+    extent(known.filter((_, index) => at(field.origin.data, index) === MEASURED))?.[1] ??
+    extent(known)?.[1] ??
+    1;
   const display = displayFor("m/s", [top]);
   const frame = makeTankFrame(width, boxAround(section.arena, field.xEdges, field.yEdges), {
     label: `Standard error of the flow, up to ${quantity(top, "m/s")} where it is measured`,
@@ -104,7 +121,13 @@ function drawError(width: number, section: FlowSection, field: Field, error: Gri
   const columns = field.x.data.length;
   const scale = colourScale("magnitude", 0, top);
   const inside = insideTank(frame, section.arena);
-  drawCells(frame, field.xEdges, field.yEdges, (column, row) => scale.of(at(known, row * columns + column)), inside);
+  drawCells(
+    frame,
+    field.xEdges,
+    field.yEdges,
+    (column, row) => scale.of(at(known, row * columns + column)),
+    inside,
+  );
   drawFilled(frame, field, inside);
   drawOutline(frame, section.arena);
   drawColourBar(frame, { scale, label: `standard error (${display.unit})`, display });
@@ -147,7 +170,12 @@ function drawArrows(frame: Frame, field: Field, top: number): void {
       const [x, y] = [frame.x.px(at(field.x.data, column)), frame.y.px(at(field.y.data, row))];
       const length = (ARROW_LENGTH * speed) / top;
       const angle = Math.atan2(-at(field.v.data, index), at(field.u.data, index));
-      paths[at(field.origin.data, index) === FILLED ? "filled" : "measured"] += arrowPath(x, y, length, angle);
+      paths[at(field.origin.data, index) === FILLED ? "filled" : "measured"] += arrowPath(
+        x,
+        y,
+        length,
+        angle,
+      );
     }
   }
   frame.plot.append(
@@ -185,7 +213,8 @@ function reading(field: Field, row: number, column: number): [string, string][] 
   if (field.error !== null && kind === MEASURED) {
     pairs.push(["standard error", inUnit(at(field.error.data, index), display)]);
   }
-  if (field.count !== null && kind === MEASURED) pairs.push(["samples", short(at(field.count.data, index), 4)]);
+  if (field.count !== null && kind === MEASURED)
+    pairs.push(["samples", short(at(field.count.data, index), 4)]);
   pairs.push(["", kind === FILLED ? "filled in" : "measured"]);
   return pairs;
 }

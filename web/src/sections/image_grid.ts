@@ -90,7 +90,13 @@ function ends(edges: number[]): [number, number] {
   return [edges[0] ?? 0, edges.at(-1) ?? 1];
 }
 
-function drawMissing(frame: Frame, xEdges: number[], yEdges: number[], value: Float64Array, columns: number): void {
+function drawMissing(
+  frame: Frame,
+  xEdges: number[],
+  yEdges: number[],
+  value: Float64Array,
+  columns: number,
+): void {
   const missing: [number, number][] = [];
   value.forEach((one, index) => {
     if (!Number.isFinite(one)) missing.push([index % columns, Math.floor(index / columns)]);

@@ -33,7 +33,9 @@ interface L1Data {
 
 export async function drawL1Map(section: L1MapSection, body: HTMLElement, context: Context): Promise<void> {
   const map = await decodeL1(section);
-  const choice = remembered(context, `l1 ${section.id}`, (): { selected: Cell | null } => ({ selected: null }));
+  const choice = remembered(context, `l1 ${section.id}`, (): { selected: Cell | null } => ({
+    selected: null,
+  }));
   let cursor: Cell | null = null;
   const first = choice.selected ?? startCell(map);
   const grid = el("div", { class: "map", "data-part": "l1-map" });
@@ -41,7 +43,10 @@ export async function drawL1Map(section: L1MapSection, body: HTMLElement, contex
   const panel = el("div", { class: "map-setting" });
   grid.append(shown, panel);
   body.append(grid);
-  const hint = map.shares === null ? "Point at a cell to read it." : "Point at a cell to read it; click it to see its outcomes.";
+  const hint =
+    map.shares === null
+      ? "Point at a cell to read it."
+      : "Point at a cell to read it; click it to see its outcomes.";
   const line = readout(hint);
   line.element.setAttribute("aria-live", "polite");
 
@@ -76,7 +81,11 @@ export async function drawL1Map(section: L1MapSection, body: HTMLElement, contex
     moved,
     select,
   });
-  shown.append(line.element, mapLegend(map), details("Values as a table", () => valueTable(map)));
+  shown.append(
+    line.element,
+    mapLegend(map),
+    details("Values as a table", () => valueTable(map)),
+  );
   showSetting(map, panel, grid, first);
 }
 
@@ -98,7 +107,8 @@ async function decodeL1(section: L1MapSection): Promise<L1Data> {
 
 function startCell(map: L1Data): Cell {
   const { reference, x, y } = map.section;
-  if (reference !== null) return { row: nearest(y.values, reference.y), column: nearest(x.values, reference.x) };
+  if (reference !== null)
+    return { row: nearest(y.values, reference.y), column: nearest(x.values, reference.x) };
   const lowest = extent(map.value)?.[0];
   const index = lowest === undefined ? 0 : map.value.indexOf(lowest);
   return { row: Math.floor(index / map.columns), column: index % map.columns };
@@ -128,7 +138,9 @@ function drawPlot(
   });
   const top = extent(map.value)?.[1] ?? 2;
   const scale = colourScale("distance", 0, top);
-  drawCells(frame, map.xEdges, map.yEdges, (column, row) => scale.of(at(map.value, row * map.columns + column)));
+  drawCells(frame, map.xEdges, map.yEdges, (column, row) =>
+    scale.of(at(map.value, row * map.columns + column)),
+  );
   const missing: [number, number][] = [];
   map.value.forEach((value, index) => {
     if (!Number.isFinite(value)) missing.push([index % map.columns, Math.floor(index / map.columns)]);
@@ -139,7 +151,10 @@ function drawPlot(
     const d = contourPath(contourLine(x.values, y.values, map.value, noise), frame.x.px, frame.y.px);
     frame.plot.append(svg("path", { class: "region edge", d }), svg("path", { class: "region", d }));
   }
-  for (const [cell, name] of [[cursor, "cursor"], [selected, "selected"]] as const) {
+  for (const [cell, name] of [
+    [cursor, "cursor"],
+    [selected, "selected"],
+  ] as const) {
     if (cell === null) continue;
     const d = cellsPath(frame, map.xEdges, map.yEdges, [[cell.column, cell.row]]);
     frame.front.append(svg("path", { class: `${name} edge`, d }), svg("path", { class: name, d }));
@@ -189,7 +204,8 @@ function showSetting(map: L1Data, panel: HTMLElement, grid: HTMLElement, cell: C
     bars: [{ share: at(found, index), low: null, high: null, count: null, colour: "var(--blue)" }],
   }));
   const known = rows.filter((row) => Number.isFinite(row.bars[0]?.share));
-  if (known.length === 0) panel.append(el("p", { class: "nothing" }, "There are no outcomes of this setting."));
+  if (known.length === 0)
+    panel.append(el("p", { class: "nothing" }, "There are no outcomes of this setting."));
   else {
     const label = known.map((row) => `${row.name} ${percent(row.bars[0]?.share ?? 0)}`).join(", ");
     figure(panel, "", (width) => drawClassBars(width, known, `Outcomes of this setting: ${label}`));
@@ -197,10 +213,14 @@ function showSetting(map: L1Data, panel: HTMLElement, grid: HTMLElement, cell: C
 }
 
 function mapLegend(map: L1Data): HTMLElement {
-  const items: { swatch: Swatch; colour?: string; text: string }[] = [{ swatch: "box", colour: "#d55e00", text: "selected" }];
+  const items: { swatch: Swatch; colour?: string; text: string }[] = [
+    { swatch: "box", colour: "#d55e00", text: "selected" },
+  ];
   if (map.section.reference !== null) items.push({ swatch: "star", colour: "#d55e00", text: "reference" });
-  if (map.section.noise !== null) items.push({ swatch: "line", text: `noise floor (${short(map.section.noise)})` });
-  if (map.value.some((value) => !Number.isFinite(value))) items.push({ swatch: "hatch", text: "not computed" });
+  if (map.section.noise !== null)
+    items.push({ swatch: "line", text: `noise floor (${short(map.section.noise)})` });
+  if (map.value.some((value) => !Number.isFinite(value)))
+    items.push({ swatch: "hatch", text: "not computed" });
   return legend(items);
 }
 
@@ -208,7 +228,10 @@ function valueTable(map: L1Data): HTMLElement {
   const { x, y } = map.section;
   return table(
     map.section.title,
-    [`${spoken(y.label)} \\ ${spoken(x.label)}`, ...x.values.map((value) => short(value * map.xDisplay.factor, 4))],
+    [
+      `${spoken(y.label)} \\ ${spoken(x.label)}`,
+      ...x.values.map((value) => short(value * map.xDisplay.factor, 4)),
+    ],
     y.values.map((value, row) => [
       short(value * map.yDisplay.factor, 4),
       ...x.values.map((_, column) => short(at(map.value, row * map.columns + column))),

@@ -63,7 +63,10 @@ export async function drawLines(section: LinesSection, body: HTMLElement): Promi
       ]),
     );
   }
-  holder.append(line.element, details("Values as a table", () => valueTable(chart)));
+  holder.append(
+    line.element,
+    details("Values as a table", () => valueTable(chart)),
+  );
 }
 
 async function decodeSeries(source: LinesSection["series"][number], index: number): Promise<Series> {
@@ -75,7 +78,15 @@ async function decodeSeries(source: LinesSection["series"][number], index: numbe
   ]);
   const data = (grid: Grid | null): Float64Array | null => grid?.data ?? null;
   const colour = index === 0 ? "var(--blue)" : index === 1 ? "var(--orange)" : seriesColour(index);
-  return { name: source.name, style: source.style, x: x.data, y: y.data, low: data(low), high: data(high), colour };
+  return {
+    name: source.name,
+    style: source.style,
+    x: x.data,
+    y: y.data,
+    low: data(low),
+    high: data(high),
+    colour,
+  };
 }
 
 function makeChart(section: LinesSection, series: Series[]): Chart | null {
@@ -84,7 +95,8 @@ function makeChart(section: LinesSection, series: Series[]): Chart | null {
     ...series.flatMap((one) => [...one.y, ...(one.low ?? []), ...(one.high ?? [])]),
     ...section.marks.map((mark) => mark.y ?? Number.NaN),
   ];
-  const positive = (values: number[], log: boolean | null): number[] => (log === true ? values.filter((v) => v > 0) : values);
+  const positive = (values: number[], log: boolean | null): number[] =>
+    log === true ? values.filter((v) => v > 0) : values;
   const across = extent(positive(xs, section.x.log));
   const up = extent(positive(ys, section.y.log));
   if (across === null || up === null) return null;
@@ -118,13 +130,24 @@ function withZero([low, high]: [number, number]): [number, number] {
 
 function drawChart(width: number, chart: Chart): Frame {
   const { section } = chart;
+  const names = chart.series.map((one) => one.name);
   const frame = makeFrame({
     width,
     height: Math.min(320, Math.max(190, width * 0.42)),
-    x: { domain: chart.xDomain, label: section.x.label, display: chart.xDisplay, log: section.x.log === true },
-    y: { domain: chart.yDomain, label: section.y.label, display: chart.yDisplay, log: section.y.log === true },
+    x: {
+      domain: chart.xDomain,
+      label: section.x.label,
+      display: chart.xDisplay,
+      log: section.x.log === true,
+    },
+    y: {
+      domain: chart.yDomain,
+      label: section.y.label,
+      display: chart.yDisplay,
+      log: section.y.log === true,
+    },
     grid: "y",
-    label: `${section.title}: ${spoken(section.y.label)} over ${spoken(section.x.label)}; ${chart.series.map((one) => one.name).join(", ")}`,
+    label: `${section.title}: ${spoken(section.y.label)} over ${spoken(section.x.label)}; ${names.join(", ")}`,
   });
   for (const one of chart.series) drawSeries(frame, one);
   for (const mark of section.marks) drawMark(frame, mark);
@@ -144,7 +167,8 @@ function drawSeries(frame: Frame, one: Series): void {
     }
     group.append(svg("path", { class: "series", d: linePath(x, y) }));
   } else {
-    if (low !== null && high !== null) group.append(svg("path", { class: "band", d: bandPath(px, low, high) }));
+    if (low !== null && high !== null)
+      group.append(svg("path", { class: "band", d: bandPath(px, low, high) }));
     group.append(svg("path", { class: "series", d: linePath(px, py) }));
   }
   frame.plot.append(group);
@@ -169,7 +193,10 @@ function drawPoints(
 ): void {
   let whiskers = "";
   x.forEach((px, index) => {
-    const [bottom, top] = [low === null ? Number.NaN : at(low, index), high === null ? Number.NaN : at(high, index)];
+    const [bottom, top] = [
+      low === null ? Number.NaN : at(low, index),
+      high === null ? Number.NaN : at(high, index),
+    ];
     if (Number.isFinite(bottom + top)) whiskers += `M${px.toFixed(1)} ${bottom.toFixed(1)}V${top.toFixed(1)}`;
   });
   if (whiskers !== "") group.append(svg("path", { class: "series thin", d: whiskers }));
@@ -185,8 +212,10 @@ function drawMark(frame: Frame, mark: LinesSection["marks"][number]): void {
   const x = mark.x === null ? null : frame.x.px(mark.x);
   const y = mark.y === null ? null : frame.y.px(mark.y);
   if (x !== null && y !== null) frame.front.append(svg("circle", { class: "mark", cx: x, cy: y, r: 5 }));
-  else if (x !== null) frame.plot.append(svg("line", { class: "mark", x1: x, x2: x, y1: frame.top, y2: bottom }));
-  else if (y !== null) frame.plot.append(svg("line", { class: "mark", x1: frame.left, x2: right, y1: y, y2: y }));
+  else if (x !== null)
+    frame.plot.append(svg("line", { class: "mark", x1: x, x2: x, y1: frame.top, y2: bottom }));
+  else if (y !== null)
+    frame.plot.append(svg("line", { class: "mark", x1: frame.left, x2: right, y1: y, y2: y }));
 }
 
 function reading(chart: Chart, place: Place): [string, string][] {
@@ -212,7 +241,13 @@ function stepAt(x: Float64Array, value: number): number {
 
 function valueTable(chart: Chart): HTMLElement {
   const { section } = chart;
-  const columns = ["series", labelled(spoken(section.x.label), chart.xDisplay), labelled(spoken(section.y.label), chart.yDisplay), "from", "to"];
+  const columns = [
+    "series",
+    labelled(spoken(section.x.label), chart.xDisplay),
+    labelled(spoken(section.y.label), chart.yDisplay),
+    "from",
+    "to",
+  ];
   const rows = chart.series.flatMap((one) =>
     Array.from(one.y, (value, index) => [
       one.name,

@@ -8,7 +8,10 @@ export function drawManifest(section: ManifestSection, body: HTMLElement): void 
   if (section.command !== null && section.command !== "") body.append(copyable("Command", section.command));
   if (section.inputs.length > 0) {
     const rows = section.inputs.map((input) => [input.role, input.name, input.sha256 ?? "–"]);
-    body.append(el("h3", { class: "space" }, "Inputs"), table("Inputs", ["role", "name", "SHA-256"], rows, () => false));
+    body.append(
+      el("h3", { class: "space" }, "Inputs"),
+      table("Inputs", ["role", "name", "SHA-256"], rows, () => false),
+    );
   }
   body.append(el("h3", { class: "space" }, "Settings"), tree(section.entries));
   if (section.cite !== null && section.cite !== "") {
@@ -70,7 +73,11 @@ function pairs(entries: unknown): [string, unknown][] {
 function isNested(value: unknown): boolean {
   if (typeof value !== "object" || value === null) return false;
   const items = Object.values(value);
-  return !Array.isArray(value) || items.length > 8 || items.some((item) => typeof item === "object" && item !== null);
+  return (
+    !Array.isArray(value) ||
+    items.length > 8 ||
+    items.some((item) => typeof item === "object" && item !== null)
+  );
 }
 
 function leaf(value: unknown): string {

@@ -23,7 +23,8 @@ interface Choice {
 
 export async function drawMap(section: MapSection, body: HTMLElement, context: Context): Promise<void> {
   const map = await decodeMap(section);
-  const refined = section.refined === null ? null : { ...section.refined, value: await decode(section.refined.value) };
+  const refined =
+    section.refined === null ? null : { ...section.refined, value: await decode(section.refined.value) };
   const choice = remembered<Choice>(context, `map ${section.id}`, () => ({ selected: null, view: "whole" }));
   if (refined === null) choice.view = "whole";
   const shown = el("div", { class: "map-plot" });
@@ -59,7 +60,10 @@ export async function drawMap(section: MapSection, body: HTMLElement, context: C
   });
 
   if (refined !== null) {
-    const views = [["whole", "whole box"], ["refined", "near the optimum"]] as const;
+    const views = [
+      ["whole", "whole box"],
+      ["refined", "near the optimum"],
+    ] as const;
     shown.append(
       choices("Part of the map", views, choice.view, (view) => {
         choice.view = view;
@@ -85,7 +89,11 @@ export async function drawMap(section: MapSection, body: HTMLElement, context: C
     moved,
     select,
   });
-  shown.append(line.element, mapLegend(map), details("Values as a table", () => valueTable(map)));
+  shown.append(
+    line.element,
+    mapLegend(map),
+    details("Values as a table", () => valueTable(map)),
+  );
 
   if (first === null) {
     panel.append(el("p", { class: "nothing" }, "No setting has been computed yet."));
@@ -201,14 +209,17 @@ function settingHead(map: MapData, cell: Cell): HTMLElement {
       "p",
       {},
       Number.isFinite(distance) && `1 − D = ${short(1 - distance, 3)}${spread}`,
-      failure !== null && el("strong", { class: "failure" }, Number.isFinite(distance) ? ` (${failure})` : failure),
+      failure !== null &&
+        el("strong", { class: "failure" }, Number.isFinite(distance) ? ` (${failure})` : failure),
     ),
   );
 }
 
 function mapLegend(map: MapData): HTMLElement {
   const { section } = map;
-  const items: { swatch: Swatch; colour?: string; text: string }[] = [{ swatch: "box", colour: "var(--orange)", text: "selected" }];
+  const items: { swatch: Swatch; colour?: string; text: string }[] = [
+    { swatch: "box", colour: "var(--orange)", text: "selected" },
+  ];
   if (section.found !== null) items.push({ swatch: "ring", text: "found" });
   if (section.best !== null) items.push({ swatch: "diamond", text: "best cell" });
   if (section.region !== null) {
@@ -221,7 +232,11 @@ function mapLegend(map: MapData): HTMLElement {
     const upper = section.noise_floor_upper;
     const reach = upper === null ? "" : `, ${short(1 - upper, 3)} is still likely`;
     list.append(
-      el("li", { class: "wide" }, `Line in the colour bar: two runs of one model reach ${short(1 - section.noise_floor, 3)} (noise floor${reach}).`),
+      el(
+        "li",
+        { class: "wide" },
+        `Line in the colour bar: two runs of one model reach ${short(1 - section.noise_floor, 3)} (noise floor${reach}).`,
+      ),
     );
   }
   return list;
@@ -232,7 +247,9 @@ function valueTable(map: MapData): HTMLElement {
   const corner = `${spoken(labelled(y.label, map.yDisplay))} \\ ${spoken(labelled(x.label, map.xDisplay))}`;
   const rows = y.values.map((value, row) => [
     short(value * map.yDisplay.factor, 4),
-    ...x.values.map((_, column) => failureText(map, row, column) ?? short(1 - distanceAt(map, row, column), 3)),
+    ...x.values.map(
+      (_, column) => failureText(map, row, column) ?? short(1 - distanceAt(map, row, column), 3),
+    ),
   ]);
   const heads = x.values.map((value) => short(value * map.xDisplay.factor, 4));
   return table("Values of 1 − D", [corner, ...heads], rows, () => true);

@@ -87,7 +87,8 @@ export function excerptSource(
         x: x === null ? [] : part(x, row, column),
         y: y === null ? [] : part(y, row, column),
         time,
-        density: density === null ? null : { shape: density.shape.slice(2), data: part(density, row, column) },
+        density:
+          density === null ? null : { shape: density.shape.slice(2), data: part(density, row, column) },
         ksStepLength: at(length?.data ?? [], cell),
         ksTurningAngle: at(angle?.data ?? [], cell),
       };

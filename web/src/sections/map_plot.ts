@@ -51,7 +51,11 @@ export function drawRefinedMap(
   const scores = refined.value.data.map((distance) => 1 - distance);
   const [low, high] = extent(scores) ?? [0, 1];
   const floor = map.section.noise_floor;
-  const scale = colourScale("score", low, Math.max(high, floor === null ? high : Math.min(1, 1 - 0.9 * floor)));
+  const scale = colourScale(
+    "score",
+    low,
+    Math.max(high, floor === null ? high : Math.min(1, 1 - 0.9 * floor)),
+  );
   const frame = mapFrame(width, map, xEdges, yEdges);
   drawCells(frame, xEdges, yEdges, (column, row) => scale.of(at(scores, row * refined.x.length + column)));
   drawRegion(frame, map);
@@ -113,13 +117,17 @@ function drawBest(frame: Frame, map: MapData): void {
   const { best } = map.section;
   if (best === null) return;
   const [x, y] = [frame.x.px(best.x), frame.y.px(best.y)];
-  frame.front.append(svg("path", { class: "best", d: `M${x} ${y - 5}L${x + 5} ${y}L${x} ${y + 5}L${x - 5} ${y}Z` }));
+  frame.front.append(
+    svg("path", { class: "best", d: `M${x} ${y - 5}L${x + 5} ${y}L${x} ${y + 5}L${x - 5} ${y}Z` }),
+  );
 }
 
 function drawFound(frame: Frame, map: MapData): void {
   const { found } = map.section;
   if (found === null) return;
-  frame.front.append(svg("circle", { class: "found", cx: frame.x.px(found.x), cy: frame.y.px(found.y), r: 5 }));
+  frame.front.append(
+    svg("circle", { class: "found", cx: frame.x.px(found.x), cy: frame.y.px(found.y), r: 5 }),
+  );
 }
 
 function drawChosen(frame: Frame, map: MapData, cell: Cell | null, name: string): void {

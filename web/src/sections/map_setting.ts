@@ -7,7 +7,7 @@ import { figure } from "../charts/responsive";
 import { drawOutline, makeTankFrame } from "../charts/tank_frame";
 import { el, svg } from "../dom";
 import type { Arena } from "../page";
-import { legend } from "../parts";
+import { type Swatch, legend } from "../parts";
 import { boxAround } from "../tank/outline";
 import { quantity } from "../units";
 import type { Excerpt, MapData } from "./map_data";
@@ -30,13 +30,24 @@ export async function decodeRecorded(map: MapData): Promise<Recorded | null> {
 }
 
 /** Draws into `body`, which has to be in the document. */
-export function drawSetting(body: HTMLElement, map: MapData, recorded: Recorded | null, excerpt: Excerpt): void {
+export function drawSetting(
+  body: HTMLElement,
+  map: MapData,
+  recorded: Recorded | null,
+  excerpt: Excerpt,
+): void {
   const pair = el("div", { class: "pair-grid" });
   body.append(pair);
   const { arena } = map.section;
   const span = excerptSpan(excerpt);
   if (recorded !== null && recorded.x !== null && recorded.y !== null) {
-    drawExcerpt(column(pair, "Recording"), arena, recorded.x.data, recorded.y.data, `Path of the recording${span}`);
+    drawExcerpt(
+      column(pair, "Recording"),
+      arena,
+      recorded.x.data,
+      recorded.y.data,
+      `Path of the recording${span}`,
+    );
   }
   drawExcerpt(column(pair, "This setting"), arena, excerpt.x, excerpt.y, `Path of this setting${span}`);
   const edges = map.section.recording;
@@ -48,13 +59,17 @@ export function drawSetting(body: HTMLElement, map: MapData, recorded: Recorded 
   body.append(densities);
   drawShare(densities, recorded.density, look, "Steps of the recording", cross);
   drawShare(densities, excerpt.density, look, "Steps of this setting", cross);
-  const drawn = [
-    { swatch: "dot" as const, colour: "var(--green)", text: `start of the path${span}` },
-    { swatch: "dot" as const, colour: "var(--orange)", text: "end" },
+  const drawn: { swatch: Swatch; colour: string; text: string }[] = [
+    { swatch: "dot", colour: "var(--green)", text: `start of the path${span}` },
+    { swatch: "dot", colour: "var(--orange)", text: "end" },
   ];
   if (Number.isFinite(cross.length + cross.angle)) {
     const place = `${quantity(cross.length, "m")}, ${quantity(cross.angle, "rad")}`;
-    drawn.push({ swatch: "cross" as never, colour: "var(--blue)", text: `the distributions differ most here (${place})` });
+    drawn.push({
+      swatch: "cross",
+      colour: "var(--blue)",
+      text: `the distributions differ most here (${place})`,
+    });
   }
   body.append(legend(drawn));
 }
@@ -78,7 +93,9 @@ function drawExcerpt(
   y: ArrayLike<number>,
   label: string,
 ): void {
-  const known = Array.from(x, (_, index) => index).filter((index) => Number.isFinite(at(x, index) + at(y, index)));
+  const known = Array.from(x, (_, index) => index).filter((index) =>
+    Number.isFinite(at(x, index) + at(y, index)),
+  );
   const [first, last] = [known[0], known.at(-1)];
   if (first === undefined || last === undefined) {
     parent.append(el("p", { class: "nothing" }, "No path was kept."));

@@ -30,12 +30,13 @@ const SPEEDS = [0.5, 1, 2, 5, 10, 20] as const;
 export async function drawReplay(section: ReplaySection, body: HTMLElement, context: Context): Promise<void> {
   const time = (await decode(section.time)).data;
   const runs = await Promise.all(section.runs.map((run) => decodeRun(run, time.length)));
-  if (runs.length === 0 || time.length === 0) {
+  const kept = remembered(context, `replay ${section.id}`, () => ({ run: 0, speed: 5 }));
+  const first = runs[kept.run] ?? runs[0];
+  if (first === undefined || time.length === 0) {
     body.append(el("p", { class: "nothing" }, "No run was kept."));
     return;
   }
-  const kept = remembered(context, `replay ${section.id}`, () => ({ run: 0, speed: 5 }));
-  new Player(section, body, time, runs, kept, classColours(context));
+  new Player(section, body, time, runs, first, kept, classColours(context));
 }
 
 /** Returns poses by time and block, whichever of the two is stored first. */
@@ -77,7 +78,6 @@ class Player {
   private readonly playhead = svg("line", { class: "playhead" });
   private strip: { redraw(): void } | null = null;
   private stripScale: (time: number) => number = () => 0;
-  private run: Run;
   private sample = 0;
   private playing = false;
   /** Moment that is shown while playing [s]; between two samples too. */
@@ -89,11 +89,18 @@ class Player {
     body: HTMLElement,
     private readonly time: Float64Array,
     private readonly runs: readonly Run[],
+    private run: Run,
     private readonly kept: { run: number; speed: number },
     private readonly colours: ClassColours,
   ) {
-    this.run = runs[kept.run] ?? runs[0] ?? (undefined as never);
-    this.slider = el("input", { type: "range", min: 0, max: time.length - 1, step: 1, value: 0, "aria-label": "Time" });
+    this.slider = el("input", {
+      type: "range",
+      min: 0,
+      max: time.length - 1,
+      step: 1,
+      value: 0,
+      "aria-label": "Time",
+    });
     const canvas = el("div", { class: "replay-tank" });
     const beside = el("div", { class: "replay-side" });
     this.root = el("div", { class: "replay", "data-part": "replay" }, canvas, beside);
@@ -177,9 +184,15 @@ class Player {
   private draw(sample: number): void {
     this.sample = sample;
     const { run } = this;
-    const of = (values: Float64Array): Float64Array => values.subarray(sample * run.blocks, (sample + 1) * run.blocks);
+    const of = (values: Float64Array): Float64Array =>
+      values.subarray(sample * run.blocks, (sample + 1) * run.blocks);
     this.tank.draw({
-      blocks: { x: of(run.x), y: of(run.y), theta: of(run.theta), colours: assemblyColours(of(run.assembly)) },
+      blocks: {
+        x: of(run.x),
+        y: of(run.y),
+        theta: of(run.theta),
+        colours: assemblyColours(of(run.assembly)),
+      },
     });
     const now = at(this.time, sample);
     const end = at(this.time, this.time.length - 1);
@@ -201,19 +214,36 @@ class Player {
     this.strip = figure(beside, "strip", (width) => this.drawStrip(width));
     beside.append(
       classLegend(names.map((name) => ({ name, cells: [], colour: this.colours.of(name) }))),
-      el("p", { class: "note" }, "Band: outcome class over time; the line is now. Blocks of one colour are joined, grey ones are alone."),
+      el(
+        "p",
+        { class: "note" },
+        "Band: outcome class over time; the line is now. Blocks of one colour are joined, grey ones are alone.",
+      ),
     );
   }
 
   private drawStrip(width: number): SVGSVGElement {
     const [start, end] = [at(this.time, 0), at(this.time, this.time.length - 1)];
     this.stripScale = (time) => ((time - start) / (end - start || 1)) * width;
-    const words = this.run.classes.map((change) => `${change.class} from ${fixed(change.time, 1)} s`).join(", ");
-    const picture = svg("svg", { class: "plot", viewBox: `0 0 ${width} 34`, width, height: 34, role: "img", "aria-label": words });
+    const words = this.run.classes
+      .map((change) => `${change.class} from ${fixed(change.time, 1)} s`)
+      .join(", ");
+    const picture = svg("svg", {
+      class: "plot",
+      viewBox: `0 0 ${width} 34`,
+      width,
+      height: 34,
+      role: "img",
+      "aria-label": words,
+    });
     this.run.classes.forEach((change, index) => {
       const from = this.stripScale(Math.max(start, change.time));
       const to = this.stripScale(this.run.classes[index + 1]?.time ?? end);
-      const piece = svg("rect", { x: from, y: 5, width: Math.max(0, to - from), height: 24 }, svg("title", {}, change.class));
+      const piece = svg(
+        "rect",
+        { x: from, y: 5, width: Math.max(0, to - from), height: 24 },
+        svg("title", {}, change.class),
+      );
       piece.style.setProperty("fill", this.colours.of(change.class));
       picture.append(piece);
     });

@@ -31,7 +31,9 @@ function card(item: Item): HTMLElement {
     { class: "number", "data-value": item.value },
     el("dt", {}, ...rich(item.label)),
     value,
-    shown !== null && shown.interval !== null && el("dd", { class: "interval" }, `${confidence}${shown.interval}${unit}`),
+    shown !== null &&
+      shown.interval !== null &&
+      el("dd", { class: "interval" }, `${confidence}${shown.interval}${unit}`),
     item.note !== null && item.note !== "" && el("dd", { class: "remark" }, ...rich(item.note)),
   );
 }

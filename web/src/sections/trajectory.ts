@@ -84,7 +84,13 @@ function drawPosition(
   for (const [from, to] of section.gaps) {
     const left = frame.x.px(from);
     frame.plot.append(
-      svg("rect", { class: "gap", x: left, y: frame.top, width: Math.max(1, frame.x.px(to) - left), height: frame.height }),
+      svg("rect", {
+        class: "gap",
+        x: left,
+        y: frame.top,
+        width: Math.max(1, frame.x.px(to) - left),
+        height: frame.height,
+      }),
     );
   }
   const line = thinnedSeries(time.data, values.data, frame.width);
@@ -112,7 +118,13 @@ function drawSpeeds(width: number, speed: { edges: number[]; density: (number | 
     const [left, right] = [frame.x.px(speed.edges[index] ?? 0), frame.x.px(speed.edges[index + 1] ?? 0)];
     const high = frame.y.px(value ?? 0);
     frame.plot.append(
-      svg("rect", { class: "bar", x: left, y: high, width: Math.max(0, right - left - 0.5), height: frame.top + frame.height - high }),
+      svg("rect", {
+        class: "bar",
+        x: left,
+        y: high,
+        width: Math.max(0, right - left - 0.5),
+        height: frame.top + frame.height - high,
+      }),
     );
   });
   return frame.svg;

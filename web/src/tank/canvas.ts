@@ -188,7 +188,13 @@ export class TankCanvas {
       const [u, v] = [at(arrows.u, index), at(arrows.v, index)];
       const length = (longest * Math.hypot(u, v)) / top;
       if (!(length > 1)) continue;
-      addArrow(context, view.px(at(arrows.x, index)), view.py(at(arrows.y, index)), length, Math.atan2(-v, u));
+      addArrow(
+        context,
+        view.px(at(arrows.x, index)),
+        view.py(at(arrows.y, index)),
+        length,
+        Math.atan2(-v, u),
+      );
     }
     context.strokeStyle = styleColour("flow");
     context.lineWidth = fineness() * 1.1;
@@ -222,14 +228,22 @@ export function assemblyColours(assembly: ArrayLike<number>): string[] {
   const list = Array.from(assembly);
   for (const index of list) sizes.set(index, (sizes.get(index) ?? 0) + 1);
   const alone = styleColour("block");
-  return list.map((index) => ((sizes.get(index) ?? 1) > 1 ? (PALETTE[index % PALETTE.length] ?? alone) : alone));
+  return list.map((index) =>
+    (sizes.get(index) ?? 1) > 1 ? (PALETTE[index % PALETTE.length] ?? alone) : alone,
+  );
 }
 
 function fineness(): number {
   return Math.min(FINEST, devicePixelRatio || 1);
 }
 
-function addArrow(context: CanvasRenderingContext2D, x: number, y: number, length: number, angle: number): void {
+function addArrow(
+  context: CanvasRenderingContext2D,
+  x: number,
+  y: number,
+  length: number,
+  angle: number,
+): void {
   const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
   const [tipX, tipY] = [x + (length / 2) * cos, y + (length / 2) * sin];
   const head = Math.min(5 * fineness(), 0.42 * length);
@@ -307,7 +321,14 @@ function drawHeading(context: CanvasRenderingContext2D, half: number, ink: strin
   context.stroke();
 }
 
-function drawName(context: CanvasRenderingContext2D, name: string, x: number, y: number, half: number, ink: string): void {
+function drawName(
+  context: CanvasRenderingContext2D,
+  name: string,
+  x: number,
+  y: number,
+  half: number,
+  ink: string,
+): void {
   context.fillStyle = ink;
   context.font = `600 ${Math.min(13 * fineness(), half)}px system-ui, sans-serif`;
   context.textAlign = "center";

@@ -54,7 +54,7 @@ function latticeCells(blocks: readonly string[], joins: readonly Join[]): Cell[]
       [one, face, other, otherFace],
       [other, otherFace, one, face],
     ]);
-  for (let found = true; found; ) {
+  for (let found = true; found;) {
     found = false;
     for (const [one, face, other, otherFace] of both) {
       const from = known.get(one);

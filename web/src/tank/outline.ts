@@ -55,7 +55,11 @@ export function boxAround(
 }
 
 /** Returns the data of a closed path through corners. */
-export function closedPath(corners: readonly Point[], px: (x: number) => number, py: (y: number) => number): string {
+export function closedPath(
+  corners: readonly Point[],
+  px: (x: number) => number,
+  py: (y: number) => number,
+): string {
   if (corners.length === 0) return "";
   return `M${corners.map(([x, y]) => `${px(x).toFixed(1)} ${py(y).toFixed(1)}`).join("L")}Z`;
 }

@@ -30,7 +30,8 @@ const ROUNDS = 12;
 
 /** Returns where a pixel of the image lies in the tank [m]; pixel centres are at whole numbers. */
 export function pixelToTank(camera: Camera, column: number, row: number): Point {
-  const [straightColumn, straightRow] = camera.lens === null ? [column, row] : straightened(camera.lens, column, row);
+  const [straightColumn, straightRow] =
+    camera.lens === null ? [column, row] : straightened(camera.lens, column, row);
   const [a = 0, b = 0, c = 0, d = 0, e = 0, f = 0, g = 0, h = 0, i = 1] = camera.homography;
   const scale = g * straightColumn + h * straightRow + i;
   return [
@@ -81,7 +82,12 @@ export function drawVideo(view: View, image: HTMLImageElement, camera: Camera): 
   };
   for (let down = 0; down < rows; down += 1) {
     for (let across = 0; across < columns; across += 1) {
-      const corners = [node(across, down), node(across + 1, down), node(across, down + 1), node(across + 1, down + 1)] as const;
+      const corners = [
+        node(across, down),
+        node(across + 1, down),
+        node(across, down + 1),
+        node(across + 1, down + 1),
+      ] as const;
       drawTriangle(view.context, image, corners[0], corners[1], corners[2]);
       drawTriangle(view.context, image, corners[3], corners[2], corners[1]);
     }
@@ -104,7 +110,12 @@ function drawTriangle(
   [fromB, toB]: readonly [Point, Point],
   [fromC, toC]: readonly [Point, Point],
 ): void {
-  const [bx, by, cx, cy] = [fromB[0] - fromA[0], fromB[1] - fromA[1], fromC[0] - fromA[0], fromC[1] - fromA[1]];
+  const [bx, by, cx, cy] = [
+    fromB[0] - fromA[0],
+    fromB[1] - fromA[1],
+    fromC[0] - fromA[0],
+    fromC[1] - fromA[1],
+  ];
   const area = bx * cy - cx * by;
   if (area === 0) return;
   const solve = (axis: 0 | 1): readonly [number, number, number] => {

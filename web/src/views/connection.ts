@@ -23,7 +23,10 @@ export function connected(shell: Shell, handlers: Handlers): Link {
     received: (message) => handlers.received(message, link),
     lost: (reason) => {
       root["connection"] = "lost";
-      shell.showConnection(reason === null ? "connection lost, trying again" : `${reason}; trying again`, false);
+      shell.showConnection(
+        reason === null ? "connection lost, trying again" : `${reason}; trying again`,
+        false,
+      );
       handlers.lost?.();
     },
   });

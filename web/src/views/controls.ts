@@ -77,7 +77,14 @@ export function sliderScale(low: number, high: number, step: number, log: boolea
 function rangeKnob(item: Item, changed: (name: string, value: unknown) => void): Knob {
   const [low, high] = [item.min ?? 0, item.max ?? 1];
   const scale = sliderScale(low, high, item.step ?? 0, item.log);
-  const input = el("input", { type: "range", min: 0, max: scale.steps, step: 1, name: item.name, "aria-label": spoken(item.label) });
+  const input = el("input", {
+    type: "range",
+    min: 0,
+    max: scale.steps,
+    step: 1,
+    name: item.name,
+    "aria-label": spoken(item.label),
+  });
   const shown = el("output", { class: "knob-value" });
   const show = (value: number): void => {
     shown.textContent = written(value, item);
@@ -88,7 +95,13 @@ function rangeKnob(item: Item, changed: (name: string, value: unknown) => void):
     show(value);
     changed(item.name, value);
   });
-  const element = el("label", { class: "knob" }, el("span", { class: "knob-label" }, ...rich(item.label)), shown, input);
+  const element = el(
+    "label",
+    { class: "knob" },
+    el("span", { class: "knob-label" }, ...rich(item.label)),
+    shown,
+    input,
+  );
   holdWhilePressed(element, input);
   const set = (value: unknown): void => {
     if (typeof value !== "number") return;
@@ -116,11 +129,22 @@ function holdWhilePressed(element: HTMLElement, input: HTMLInputElement): void {
 }
 
 function choiceKnob(item: Item, changed: (name: string, value: unknown) => void): Knob {
-  const options = item.choices.map((choice): [string, string] => [String(choice), String(choice).replaceAll("_", " ")]);
+  const options = item.choices.map((choice): [string, string] => [
+    String(choice),
+    String(choice).replaceAll("_", " "),
+  ]);
   const group = choices(spoken(item.label), options, String(item.value), (value) => {
-    changed(item.name, item.choices.find((choice) => String(choice) === value));
+    changed(
+      item.name,
+      item.choices.find((choice) => String(choice) === value),
+    );
   });
-  const element = el("div", { class: "knob" }, el("span", { class: "knob-label" }, ...rich(item.label)), group);
+  const element = el(
+    "div",
+    { class: "knob" },
+    el("span", { class: "knob-label" }, ...rich(item.label)),
+    group,
+  );
   const set = (value: unknown): void => {
     for (const button of group.children) {
       button.setAttribute("aria-pressed", String(button.getAttribute("data-choice") === String(value)));
@@ -133,7 +157,12 @@ function choiceKnob(item: Item, changed: (name: string, value: unknown) => void)
 function toggleKnob(item: Item, changed: (name: string, value: unknown) => void): Knob {
   const input = el("input", { type: "checkbox", name: item.name });
   input.addEventListener("change", () => changed(item.name, input.checked));
-  const element = el("label", { class: "knob toggle" }, input, el("span", { class: "knob-label" }, ...rich(item.label)));
+  const element = el(
+    "label",
+    { class: "knob toggle" },
+    input,
+    el("span", { class: "knob-label" }, ...rich(item.label)),
+  );
   const set = (value: unknown): void => {
     input.checked = value === true;
   };

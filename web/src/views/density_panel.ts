@@ -47,7 +47,10 @@ export class DensityPanel {
 
   async show(content: Message): Promise<void> {
     const message = densityMessage(content, "");
-    const [simulated, recording] = await Promise.all([decodeMaybe(message.simulated), decodeMaybe(message.recording)]);
+    const [simulated, recording] = await Promise.all([
+      decodeMaybe(message.simulated),
+      decodeMaybe(message.recording),
+    ]);
     this.shown = {
       simulated,
       recording,
@@ -68,7 +71,11 @@ export class DensityPanel {
     });
   }
 
-  private picture(parent: HTMLElement, title: string, which: "simulated" | "recording"): { holder: HTMLElement; drawn: Figure } {
+  private picture(
+    parent: HTMLElement,
+    title: string,
+    which: "simulated" | "recording",
+  ): { holder: HTMLElement; drawn: Figure } {
     const holder = el("div", {}, el("h4", {}, title));
     parent.append(holder);
     const drawn = figure(holder, "density", (width) => {
@@ -76,7 +83,10 @@ export class DensityPanel {
       if (this.shown === null || share === null) return el("p", { class: "nothing" }, "no steps yet");
       const both = [this.shown.simulated, this.shown.recording].filter((grid) => grid !== null);
       // One look for both, so that they can be compared; the recording's when there is one.
-      const look = densityLook(this.shown.bins, this.shown.recording === null ? both : [this.shown.recording]);
+      const look = densityLook(
+        this.shown.bins,
+        this.shown.recording === null ? both : [this.shown.recording],
+      );
       return drawDensity({ width, share, look, label: `${title}: density of step length and turning angle` });
     });
     return { holder, drawn };

@@ -79,7 +79,10 @@ class LiveStream {
       el("label", {}, this.trails, " trails"),
     );
     place.append(options);
-    this.tank = new TankCanvas(place, "The tank: blocks where the tracker sees them, dashed where it does not");
+    this.tank = new TankCanvas(
+      place,
+      "The tank: blocks where the tracker sees them, dashed where it does not",
+    );
     place.append(this.status);
     now.append(el("h2", {}, "Now"), this.outcome, this.shapes.element, this.numbers);
     counted.append(el("h2", {}, "Assemblies over time"));
@@ -117,7 +120,12 @@ class LiveStream {
     this.camera =
       image === null
         ? null
-        : { width: image.width_px, height: image.height_px, homography: image.homography_px_to_m, lens: image.lens };
+        : {
+            width: image.width_px,
+            height: image.height_px,
+            homography: image.homography_px_to_m,
+            lens: image.lens,
+          };
     this.picture = null;
     this.past.clear();
     this.counts.clear();
@@ -219,7 +227,10 @@ class LiveStream {
         ["source", this.hello?.source ?? "–"],
       ]),
     );
-    Object.assign(document.documentElement.dataset, { outcome: frame.outcome ?? "", frame: String(frame.frame) });
+    Object.assign(document.documentElement.dataset, {
+      outcome: frame.outcome ?? "",
+      frame: String(frame.frame),
+    });
   }
 
   private addEvent(one: LiveEvent): void {
@@ -246,7 +257,9 @@ class LiveStream {
 /** Returns an outcome class as it can be read: of a long one only in how many parts it is. */
 function outcomeWords(outcome: string): string {
   const parts = outcome.split("+").length;
-  return outcome.length <= LONGEST_OUTCOME && !outcome.includes("x") ? outcome : `${parts} ${parts === 1 ? "assembly" : "assemblies"}`;
+  return outcome.length <= LONGEST_OUTCOME && !outcome.includes("x")
+    ? outcome
+    : `${parts} ${parts === 1 ? "assembly" : "assemblies"}`;
 }
 
 function countOf(shapes: readonly string[]): Map<string, number> {
@@ -261,4 +274,3 @@ function outcomeText(frame: Frame): string {
   if (frame.possible === null || frame.possible.length === 0) return "not known: a block is hidden";
   return `${frame.possible.map(outcomeWords).join(" or ")}: a block is hidden`;
 }
-

@@ -70,6 +70,11 @@ export type Frame = Omit<ReturnType<typeof frame>, "joined"> & { readonly joined
 export function checkFrame(value: unknown): Frame {
   const found = frame(value, "");
   const joined =
-    found.joined?.map(([one, face, other, otherFace]): Join => [String(one), Number(face), String(other), Number(otherFace)]) ?? null;
+    found.joined?.map(([one, face, other, otherFace]): Join => [
+      String(one),
+      Number(face),
+      String(other),
+      Number(otherFace),
+    ]) ?? null;
   return { ...found, joined };
 }

@@ -82,13 +82,18 @@ class Playground {
     // A knob sends at most once per picture of the screen; the newest value counts.
     const wishes = new Map<string, (value: unknown) => void>();
     this.set = ({ name, value }) => {
-      const send = wishes.get(name) ?? newestWins<unknown>((now) => this.link.send({ type: "set", name, value: now }));
+      const send =
+        wishes.get(name) ?? newestWins<unknown>((now) => this.link.send({ type: "set", name, value: now }));
       wishes.set(name, send);
       send(value);
     };
     this.knobs = this.addKnobs(panel, section("controls"));
     const density = page.sections.find((one) => one.kind === "density");
-    this.density = new DensityPanel(motion, density?.title ?? "Step length and turning angle", density?.note ?? null);
+    this.density = new DensityPanel(
+      motion,
+      density?.title ?? "Step length and turning angle",
+      density?.note ?? null,
+    );
     this.take = newestWins((state) => this.draw(state));
     onThemeChange(() => this.last !== null && this.tank.element.isConnected && this.draw(this.last));
   }
@@ -111,7 +116,9 @@ class Playground {
     this.tank.setTank(section.arena, section.side);
     if (section.flow === null) this.tank.setArrows(null);
     else {
-      const [x, y, u, v] = await Promise.all([section.flow.x, section.flow.y, section.flow.u, section.flow.v].map(decode));
+      const [x, y, u, v] = await Promise.all(
+        [section.flow.x, section.flow.y, section.flow.u, section.flow.v].map(decode),
+      );
       if (x === undefined || y === undefined || u === undefined || v === undefined) return;
       const columns = x.data.length;
       this.tank.setArrows({
@@ -179,7 +186,11 @@ class Playground {
   }
 
   private showWords(state: Tank): void {
-    const speed = state.paused ? "paused" : state.speed === null ? "–" : `${short(state.speed, 2)} × real time`;
+    const speed = state.paused
+      ? "paused"
+      : state.speed === null
+        ? "–"
+        : `${short(state.speed, 2)} × real time`;
     const pairs: [string, string][] = [
       ["time", duration(state.time_s)],
       ["speed", speed],
@@ -188,7 +199,9 @@ class Playground {
     if (this.frames.rate > 0) pairs.push(["pictures", `${Math.round(this.frames.rate)}/s`]);
     if (state.waiting > 0) pairs.push(["waiting for room", String(state.waiting)]);
     this.clock.replaceChildren(
-      ...pairs.map(([name, value]) => el("span", { class: "pair" }, el("span", { class: "name" }, name), " ", el("b", {}, value))),
+      ...pairs.map(([name, value]) =>
+        el("span", { class: "pair" }, el("span", { class: "name" }, name), " ", el("b", {}, value)),
+      ),
     );
     this.shapes.show(state.counts);
   }

@@ -1,6 +1,6 @@
 /** A run that is watched: the sections of a report, drawn anew as they change. */
 
-import { type Numbers, numbers } from "../arrays";
+import { numbers } from "../arrays";
 import { nullable, number, object } from "../check";
 import type { CellExcerpt, Context } from "../context";
 import { el } from "../dom";
@@ -25,9 +25,17 @@ const cellMessage = object({
 
 /** Cells that were asked for and have not come yet. */
 class Requests {
-  private readonly waiting = new Map<string, { done(cell: CellExcerpt): void; failed(error: Error): void }[]>();
+  private readonly waiting = new Map<
+    string,
+    { done(cell: CellExcerpt): void; failed(error: Error): void }[]
+  >();
 
-  ask(id: string, row: number, column: number, send: (message: Record<string, unknown>) => void): Promise<CellExcerpt> {
+  ask(
+    id: string,
+    row: number,
+    column: number,
+    send: (message: Record<string, unknown>) => void,
+  ): Promise<CellExcerpt> {
     const key = `${id} ${row} ${column}`;
     return new Promise((done, failed) => {
       this.waiting.set(key, [...(this.waiting.get(key) ?? []), { done, failed }]);
@@ -39,7 +47,7 @@ class Requests {
     const cell = cellMessage(message, "");
     const key = `${String(message["id"])} ${cell.row} ${cell.column}`;
     const excerpt = {
-      time: cell.excerpt_time as Numbers | null,
+      time: cell.excerpt_time,
       x: cell.excerpt_x,
       y: cell.excerpt_y,
       density: cell.density,
@@ -129,7 +137,12 @@ async function redraw(shell: Shell, section: RawSection, context: Context): Prom
   if (frame instanceof HTMLElement) await fillSection(frame, section, context);
 }
 
-async function addSection(shell: Shell, all: RawSection[], section: RawSection, context: Context): Promise<void> {
+async function addSection(
+  shell: Shell,
+  all: RawSection[],
+  section: RawSection,
+  context: Context,
+): Promise<void> {
   const frame = sectionFrame(section);
   shell.main.insertBefore(frame, shell.main.children[all.indexOf(section)] ?? null);
   shell.showContents(all);

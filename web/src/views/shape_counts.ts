@@ -65,14 +65,22 @@ export class ShapeCounts {
     if (this.legend.dataset["names"] === names.join(" ")) return;
     this.legend.dataset["names"] = names.join(" ");
     this.legend.replaceChildren(
-      ...names.map((name) => el("li", {}, sketchPicture(cellsOfName(name), 7, shapeColour(name)), el("span", {}, writtenName(name)))),
+      ...names.map((name) =>
+        el(
+          "li",
+          {},
+          sketchPicture(cellsOfName(name), 7, shapeColour(name)),
+          el("span", {}, writtenName(name)),
+        ),
+      ),
     );
   }
 
   /** Returns the shapes that have a line of their own: the most frequent, the small ones first. */
   private names(): string[] {
     const total = new Map<string, number>();
-    for (const [name, count] of this.counts.flatMap((counts) => [...counts])) total.set(name, (total.get(name) ?? 0) + count);
+    for (const [name, count] of this.counts.flatMap((counts) => [...counts]))
+      total.set(name, (total.get(name) ?? 0) + count);
     const frequent = [...total].sort(([, one], [, other]) => other - one).slice(0, MOST_LINES);
     return frequent.map(([name]) => name).sort((one, other) => order(one) - order(other));
   }
@@ -83,14 +91,20 @@ export class ShapeCounts {
     const names = this.names();
     const top = Math.max(1, ...this.counts.flatMap((counts) => [...counts.values()]));
     const end = Math.max(this.until, start + 1);
+    const now = names.map((name) => `${this.counts.at(-1)?.get(name) ?? 0} ${name}`);
     const frame = makeFrame({
       width,
       height: 130,
       x: { domain: [start, end], label: "time", display: { factor: 1, unit: "s" } },
       // A little room above, so that the highest line does not lie on the frame; whole numbers only.
-      y: { domain: [0, 1.08 * top], label: "assemblies", display: { factor: 1, unit: "" }, ticks: wholeTicks(top) },
+      y: {
+        domain: [0, 1.08 * top],
+        label: "assemblies",
+        display: { factor: 1, unit: "" },
+        ticks: wholeTicks(top),
+      },
       grid: "y",
-      label: `Assemblies over time: now ${names.map((name) => `${this.counts.at(-1)?.get(name) ?? 0} ${name}`).join(", ")}`,
+      label: `Assemblies over time: now ${now.join(", ")}`,
     });
     names.forEach((name, index) => {
       const [x, y]: [number[], number[]] = [[], []];

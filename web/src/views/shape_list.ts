@@ -25,6 +25,12 @@ export class ShapeList {
 
   private item(name: string, count: number): HTMLElement {
     const picture = sketchPicture(cellsOfName(name), 7, this.colourOf?.(name));
-    return el("li", { "aria-label": `${count} ${name}` }, el("b", {}, String(count)), picture, el("span", { class: "name" }, writtenName(name)));
+    return el(
+      "li",
+      { "aria-label": `${count} ${name}` },
+      el("b", {}, String(count)),
+      picture,
+      el("span", { class: "name" }, writtenName(name)),
+    );
   }
 }

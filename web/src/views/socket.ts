@@ -57,7 +57,10 @@ export function parsed(data: unknown): Message | null {
   try {
     const content: unknown = JSON.parse(data);
     const isMessage =
-      typeof content === "object" && content !== null && "type" in content && typeof content.type === "string";
+      typeof content === "object" &&
+      content !== null &&
+      "type" in content &&
+      typeof content.type === "string";
     return isMessage ? (content as Message) : null;
   } catch {
     return null;
