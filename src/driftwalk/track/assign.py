@@ -19,7 +19,7 @@ Integers = npt.NDArray[np.int64]
 
 # exp(-12): an alternative beyond that is no alternative.
 NO_ALTERNATIVE: Final = 12.0
-# exp(-20): two that could not be exchanged for each other, even after what was believed so far turns
+# exp(-20): an exchange beyond that is out of the question, even if what was believed so far turns
 # out to be wrong.
 _OUT_OF_QUESTION: Final = 20.0
 # Costs of pairs without an edge; finite, because the solver wants that.
@@ -34,9 +34,9 @@ class Assignment(NamedTuple):
     score: Floats
     """Likelihood of the best other assignment that gives this track another detection, or its
     detection to another track, relative to the one taken: 0 none, 1 as likely; shape (tracks,)."""
-    exchanges: list[tuple[int, int]]
+    exchanges: list[tuple[int, int, float]]
     """Pairs of tracks of which one could have the other's detection, however unlikely, as long as
-    that is not out of the question."""
+    that is not out of the question; with its score."""
 
 
 def assign(cost: Floats) -> Assignment:
@@ -60,7 +60,7 @@ def assign(cost: Floats) -> Assignment:
     tracks = len(cost)
     detection = np.full(tracks, -1, dtype=np.int64)
     score = np.zeros(tracks)
-    exchanges: list[tuple[int, int]] = []
+    exchanges: list[tuple[int, int, float]] = []
     for rows, columns in connected_groups(np.isfinite(cost)):
         if not columns:
             continue
@@ -77,7 +77,9 @@ def assign(cost: Floats) -> Assignment:
         detection[rows] = np.where(taken >= 0, np.array(columns)[taken], -1)
         excess = _excess(part, taken)
         score[rows] = _scores(excess, taken)
-        exchanges += [(rows[one], rows[other]) for one, other in _pairs(excess, taken)]
+        exchanges += [
+            (rows[one], rows[other], likely) for one, other, likely in _pairs(excess, taken)
+        ]
     return Assignment(detection, score, exchanges)
 
 
@@ -165,11 +167,11 @@ def _scores(excess: Floats, taken: Integers) -> Floats:
     return np.where(least < NO_ALTERNATIVE, np.exp(-np.maximum(least, 0.0)), 0.0)
 
 
-def _pairs(excess: Floats, taken: Integers) -> list[tuple[int, int]]:
-    """Return each track with the owner of another detection that it could have."""
+def _pairs(excess: Floats, taken: Integers) -> list[tuple[int, int, float]]:
+    """Return each track with the owner of another detection that it could have, and the score."""
     owner = {column: row for row, column in enumerate(taken.tolist()) if column >= 0}
     return [
-        (row, owner[column])
+        (row, owner[column], math.exp(-max(float(excess[row, column]), 0.0)))
         for row, column in np.argwhere(excess < _OUT_OF_QUESTION).tolist()
         if column in owner
     ]

@@ -61,18 +61,29 @@ class Marks:
         return score
 
     def note_company(
-        self, tracks: Sequence[Track], frame: int, exchanges: Iterable[tuple[int, int]]
+        self, tracks: Sequence[Track], frame: int, exchanges: Sequence[tuple[int, int, float]]
     ) -> None:
         """Note which tracks are so near each other that they could be exchanged; since when."""
         before = {track: track.company for track in tracks}
         for track in tracks:
             track.company = {}
-        for one, other in self._near_pairs(tracks, exchanges):
-            since = before[one].get(other, frame)
-            one.company[other] = other.company[one] = since
+        meeting = self._meeting(tracks)
+        likely = {(i, j) for i, j, score in exchanges if score >= self._settings.ambiguous_above}
+        for one, other in sorted({(i, j) for i, j, _ in exchanges} | meeting):
+            first, second = tracks[one], tracks[other]
+            since = before[first].get(second, frame)
+            first.company[second] = second.company[first] = since
         for track in tracks:
             if track.measured is None and track.samples.last_frame == frame - 1:
-                track.lost_beside = dict(track.company)
+                track.lost_beside = {}
+        for one, other in likely | meeting:
+            self._note_loss(tracks[one], tracks[other], frame)
+
+    def _note_loss(self, one: Track, other: Track, frame: int) -> None:
+        """Note of two that may be taken for each other that they were, when one is lost now."""
+        for lost, beside in ((one, other), (other, one)):
+            if lost.measured is None and lost.samples.last_frame == frame - 1:
+                lost.lost_beside[beside] = lost.company[beside]
 
     def doubt(self, tracks: Iterable[Track], parted: Sequence[Track], frame: int) -> None:
         """Mark tracks whose assignment was a close thing, or that came back beside others."""
@@ -85,19 +96,16 @@ class Marks:
         for track in parted:
             track.lost_beside = {}
 
-    def _near_pairs(
-        self, tracks: Sequence[Track], exchanges: Iterable[tuple[int, int]]
-    ) -> list[tuple[Track, Track]]:
-        """Return pairs that could be exchanged, or are both unseen where they might meet."""
-        pairs = {(min(i, j), max(i, j)) for i, j in exchanges}
+    def _meeting(self, tracks: Sequence[Track]) -> set[tuple[int, int]]:
+        """Return pairs that are both unseen, and might meet where they are."""
         unseen = [index for index, track in enumerate(tracks) if track.measured is None]
-        if len(unseen) > 1:
-            at = np.array([tracks[index].mean[:2] for index in unseen])
-            spread = np.sqrt([tracks[index].covariance[0, 0] for index in unseen])
-            apart = np.hypot(*(at[:, None] - at).transpose(2, 0, 1))
-            near = apart <= self._settings.gate * (spread[:, None] + spread)
-            pairs |= {(unseen[i], unseen[j]) for i, j in np.argwhere(np.triu(near, 1)).tolist()}
-        return [(tracks[one], tracks[other]) for one, other in sorted(pairs)]
+        if len(unseen) < 2:
+            return set()
+        at = np.array([tracks[index].mean[:2] for index in unseen])
+        spread = np.sqrt([tracks[index].covariance[0, 0] for index in unseen])
+        apart = np.hypot(*(at[:, None] - at).transpose(2, 0, 1))
+        near = apart <= self._settings.gate * (spread[:, None] + spread)
+        return {(unseen[i], unseen[j]) for i, j in np.argwhere(np.triu(near, 1)).tolist()}
 
     def _doubt(self, track: Track, frame: int) -> None:
         """Mark a track whose assignment was a close thing, and go on until that has settled.
