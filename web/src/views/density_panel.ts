@@ -1,7 +1,7 @@
 /** The motion of the playground's blocks beside that of a recording. */
 
 import { type Grid, decodeMaybe, numbers } from "../arrays";
-import { type Bins, densityLook, drawDensity } from "../charts/density";
+import { type Bins, type DensityLook, densityLook, drawDensity } from "../charts/density";
 import { type Figure, figure } from "../charts/responsive";
 import { list, nullable, number, object, withDefault } from "../check";
 import { el } from "../dom";
@@ -81,14 +81,16 @@ export class DensityPanel {
     const drawn = figure(holder, "density", (width) => {
       const share = this.shown?.[which] ?? null;
       if (this.shown === null || share === null) return el("p", { class: "nothing" }, "no steps yet");
-      const both = [this.shown.simulated, this.shown.recording].filter((grid) => grid !== null);
-      // One look for both, so that they can be compared; the recording's when there is one.
-      const look = densityLook(
-        this.shown.bins,
-        this.shown.recording === null ? both : [this.shown.recording],
-      );
+      const look = commonLook(this.shown);
       return drawDensity({ width, share, look, label: `${title}: density of step length and turning angle` });
     });
     return { holder, drawn };
   }
+}
+
+/** Returns axes that hold both motions, and the recording's colours: few steps make large densities. */
+function commonLook({ simulated, recording, bins }: Shown): DensityLook {
+  const known = [simulated, recording].filter((grid) => grid !== null);
+  const look = densityLook(bins, known);
+  return recording === null ? look : { ...look, top: densityLook(bins, [recording]).top };
 }
