@@ -112,6 +112,10 @@ def test_nonsense_on_the_socket_is_survived(server: PageServer) -> None:
         received(channel, "page")
         for text in ("", "{", "[]", "null", '{"type":{}}', '{"type":"cell","row":"x"}', "[" * 9999):
             channel.send(text)
+        for depth in (300, 480, 900, 940, 960, 980):
+            nested = "[" * depth + "NaN" + "]" * depth
+            channel.send(f'{{"type":"cell","id":{nested},"row":{nested}}}')
+        channel.send(f'{{"type":"cell","id":"map","row":{10**400},"column":true}}')
         channel.send(b"\xff\x00")
         say(channel, type="cell", id="map", row=0, column=0)
         while received(channel, "cell")["row"] != 0:
@@ -273,8 +277,11 @@ def test_play_does_without_a_bundled_flow(tmp_path: Path) -> None:
             page = received(channel, "page")["page"]
             assert page["sections"][0]["arena"]["diameter_m"] == 0.6
             assert page["sections"][2]["recording"] is None
-        _, words = started.stop()
+        code, words = started.stop()
+    assert code == 0
     assert "the water moves in a random one" in words
+    # Not a word more than that: nothing complains at the end.
+    assert words.count("\n") == 2
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a directory cannot have this name elsewhere")

@@ -41,7 +41,7 @@ def make_app(source: Source, gate: Gate, *, failed: Failed) -> ASGIApp:
     failed : callable
         Told the error with which the source ended.
     """
-    hub = Hub()
+    hub = Hub(source.watched)
 
     @contextlib.asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:  # noqa: ARG001
@@ -137,6 +137,8 @@ async def _listen(websocket: WebSocket, box: Outbox, source: Source) -> None:
                 box.drawn()
             else:
                 await source.receive(content, reply)
+            # Whoever sends without pause must not keep the others waiting.
+            await asyncio.sleep(0)
     finally:
         await source.leave(reply)
 

@@ -45,6 +45,9 @@ class Source:
     async def leave(self, reply: Publish) -> None:
         """Forget a browser that has gone, known by its `reply`."""
 
+    def watched(self, browsers: int) -> None:
+        """Note how many browsers are connected, whenever that changes."""
+
     def file(self, name: str) -> Path | None:  # noqa: ARG002
         """Return a file that may be served, None where there is none of that name."""
         return None
@@ -55,10 +58,17 @@ class Source:
 
 
 class Hub:
-    """Hands every message to every browser."""
+    """Hands every message to every browser.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    watched : callable
+        Told how many browsers there are, whenever that changes.
+    """
+
+    def __init__(self, watched: Callable[[int], None]) -> None:
         self._boxes: list[Outbox] = []
+        self._watched = watched
 
     def join(self, greeting: Sequence[Content]) -> Outbox | None:
         """Return the outbox of a new browser, with the greeting in it; None when it is full."""
@@ -68,11 +78,13 @@ class Hub:
         for content in greeting:
             box.put(make_message(content))
         self._boxes.append(box)
+        self._watched(len(self._boxes))
         return box
 
     def leave(self, box: Outbox) -> None:
         """Forget a browser."""
         self._boxes.remove(box)
+        self._watched(len(self._boxes))
 
     def publish(self, content: Content) -> None:
         """Let a message wait for every browser; called in the server's own thread."""

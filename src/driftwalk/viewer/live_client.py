@@ -79,8 +79,12 @@ class LiveSource(Source):
     async def receive(self, content: Content, reply: Publish) -> None:
         """Ask the tracker for its images, or no longer."""
         width = content.get("width")
-        if content.get("type") == "video" and isinstance(width, int):
-            self._widths[reply] = width if width in WIDTHS else 0
+        if content.get("type") != "video" or not isinstance(width, int):
+            return
+        wanted = width if width in WIDTHS else 0
+        # The tracker answers every request: it must not be asked again for the same.
+        if self._widths.get(reply, 0) != wanted:
+            self._widths[reply] = wanted
             await self._ask()
 
     async def leave(self, reply: Publish) -> None:
@@ -98,8 +102,9 @@ class LiveSource(Source):
         self._writer = writer
         try:
             return await self._read(reader, publish)
-        except (OSError, ValueError):
-            # ValueError: a line that is longer than any frame.
+        except (OSError, ValueError, RecursionError):
+            # ValueError: a line that is longer than any frame. RecursionError: one that is nested
+            # so deep that it can be read, but not written again.
             return None
         finally:
             self._writer = None

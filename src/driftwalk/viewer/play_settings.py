@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, Self
@@ -67,7 +66,8 @@ class Knob:
             return value
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise InputError(f"{self.label}: expected a number")
-        if not (math.isfinite(value) and self.least <= value <= self.most):
+        # A comparison, not isfinite: a whole number may be too large for any float.
+        if not self.least <= value <= self.most:
             raise InputError(
                 f"{self.label}: expected a number from {self.least:g} to {self.most:g}"
             )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import gc
 import math
-import queue
 import threading
 import time as clock
 from collections import Counter, deque
@@ -53,7 +52,13 @@ ROUNDING: Final = 1e-6
 FLOW_ARROWS: Final = 25
 POSITION_DIGITS: Final = 5
 ANGLE_DIGITS: Final = 4
-ACTIONS: Final = ("restart", "pause", "run", "clear")
+ACTIONS: Final[dict[str, str]] = {
+    "restart": "restart",
+    "pause": "pause",
+    "run": "pause",
+    "clear": "clear",
+}
+"""What a browser may ask for, and which wish it replaces."""
 
 
 class Stream(Protocol):
@@ -122,7 +127,9 @@ class PlaySource(Source):
         self._left = 0.0
         self._settled = math.inf
         self._pace: deque[tuple[float, float]] = deque()
-        self._wishes: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._wishes: dict[str, Callable[[], None]] = {}
+        self._wishes_lock = threading.Lock()
+        self._watched = threading.Event()
         self._over = threading.Event()
 
     def stream_to(self, stream: Stream) -> None:
@@ -134,6 +141,14 @@ class PlaySource(Source):
             A `driftwalk.LiveServer` that greets with `hello_line`.
         """
         self._stream = stream
+        self._watched.set()
+
+    def watched(self, browsers: int) -> None:
+        """Let the tank rest while nobody sees it."""
+        if browsers or self._stream is not None:
+            self._watched.set()
+        else:
+            self._watched.clear()
 
     def greeting(self) -> Sequence[Content]:
         """Return the page, the tank and the density."""
@@ -156,9 +171,12 @@ class PlaySource(Source):
             await asyncio.gather(*(asyncio.to_thread(work, publish_from_thread) for work in works))
         finally:
             self._over.set()
+            self._watched.set()
+            # What is frozen would stay when the program ends, and the native core would complain.
+            gc.unfreeze()
 
     async def receive(self, content: Content, reply: Publish) -> None:
-        """Change a setting, or do what was asked."""
+        """Change a setting, or do what was asked, at the next picture."""
         kind, name = content.get("type"), content.get("name")
         if kind == "set":
             try:
@@ -166,8 +184,8 @@ class PlaySource(Source):
             except DriftwalkError as error:
                 reply({"type": "note", "words": str(error)})
             self._settled = clock.perf_counter() + SETTLED_S
-        elif kind == "action" and name in ACTIONS:
-            self._wishes.put(lambda: self._act(str(name)))
+        elif kind == "action" and isinstance(name, str) and name in ACTIONS:
+            self._wish(ACTIONS[name], lambda: self._act(name))
 
     def _set(self, name: str, value: Any) -> None:
         if name not in self._knobs:
@@ -175,8 +193,26 @@ class PlaySource(Source):
         wanted = self._knobs[name].read(value)
         if name == "speed":
             self._speed = wanted
-            return
-        self.tank.set(**{name: wanted})
+        else:
+            self._wish(name, lambda: self._change(name, wanted))
+
+    def _wish(self, name: str, do: Callable[[], None]) -> None:
+        """Have something done before the next picture, in place of the last wish of this name."""
+        with self._wishes_lock:
+            self._wishes[name] = do
+
+    def _fulfil(self, publish: Publish) -> None:
+        """Do what has been wished for since the last picture."""
+        with self._wishes_lock:
+            wishes, self._wishes = self._wishes, {}
+        for do in wishes.values():
+            try:
+                do()
+            except InputError as error:
+                publish({"type": "note", "words": str(error)})
+
+    def _change(self, name: str, value: Any) -> None:
+        self.tank.set(**{name: value})
         self._motion.clear()
 
     def _act(self, name: str) -> None:
@@ -192,13 +228,12 @@ class PlaySource(Source):
 
     def _move(self, publish: Publish) -> None:
         """Advance the tank with the clock, picture by picture, until the server ends."""
-        last = clock.perf_counter()
-        while not self._over.is_set():
+        last = -math.inf
+        while self._watched.wait() and not self._over.is_set():
             began = clock.perf_counter()
             wall, last = min(began - last, LONGEST_ADVANCE_S), began
+            self._fulfil(publish)
             try:
-                while not self._wishes.empty():
-                    self._wishes.get()()
                 if not self._paused:
                     self._advance(wall * self._speed, until=began + LONGEST_ADVANCE_S)
             except InputError as error:
@@ -250,7 +285,7 @@ class PlaySource(Source):
 
     def _compare(self, publish: Publish) -> None:
         """Compare the motion with the recording's now and then, until the server ends."""
-        while not self._over.wait(DENSITY_S):
+        while self._watched.wait() and not self._over.wait(DENSITY_S):
             publish(self._motion.message())
 
     def _note_pace(self, now: float) -> None:

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from driftwalk.compare import apply_steps, joint_density, plan_steps
 from driftwalk.schema import body_track
+from driftwalk.simulate.run import without_gaps
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,7 +41,7 @@ class RecordedSteps(NamedTuple):
     angle_edge: Floats
     """[rad]"""
     excerpt_time: Floats
-    """Times [s] of the first half minute, from the first sample on."""
+    """Times [s] of a world's first half minute, from its first sample on."""
 
     def density(self, points: Floats | None = None) -> Floats:
         """Return the share of steps in every bin: of the recording, or of others."""
@@ -78,11 +79,13 @@ def recorded_steps(
     length_limit = LENGTH_REACH * float(np.quantile(points[:, 0], LENGTH_SHARE))
     angle_limit = ANGLE_REACH * float(np.quantile(np.abs(points[:, 1]), ANGLE_SHARE))
     angle_limit = min(np.pi, angle_limit) or np.pi
+    # The samples of the worlds, which need not have the recording's gaps.
+    sampled = without_gaps(time) if study.observation.gaps == "none" else time
     return RecordedSteps(
         name=str(recording.attrs.get("source", "recording")),
         step_interval=plan.step_interval,
         points=points,
         length_edge=np.linspace(0.0, length_limit or 1.0, BINS + 1),
         angle_edge=np.linspace(-angle_limit, angle_limit, BINS + 1),
-        excerpt_time=time[time <= EXCERPT_S],
+        excerpt_time=sampled[sampled <= EXCERPT_S],
     )

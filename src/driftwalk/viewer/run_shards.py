@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+import time
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from driftwalk.core.errors import RunDirectoryError
-from driftwalk.core.run_layout import SHARD_FOLDER
+from driftwalk.core.run_layout import RECORD_FILE, SHARD_FOLDER
 from driftwalk.core.shards import (
     SHARD_SUFFIX,
     SPECIFICATION_FILE,
@@ -99,3 +100,32 @@ def store_readers(run: Path, known: dict[str, StoreReader]) -> dict[str, StoreRe
             except RunDirectoryError:
                 continue
     return readers
+
+
+def quiet_time(run: Path) -> float:
+    """Return for how long a run has given nothing new [s].
+
+    The lock of the run would tell whether a process holds it, but not without taking it, nor on
+    another machine that shares the folder.
+
+    Parameters
+    ----------
+    run : Path
+        A run directory.
+    """
+    times = []
+    shards = run / SHARD_FOLDER
+    for path in (run / RECORD_FILE, shards, *_folders(shards)):
+        try:
+            # A folder changes when a finished unit is moved into it.
+            times.append(path.stat().st_mtime)
+        except OSError:
+            continue
+    return max(time.time() - max(times), 0.0) if times else 0.0
+
+
+def _folders(shards: Path) -> list[Path]:
+    try:
+        return list(shards.iterdir())
+    except OSError:
+        return []

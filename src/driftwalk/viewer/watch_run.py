@@ -12,6 +12,7 @@ from driftwalk.core.provenance import MANIFEST_VERSION, read_manifest
 from driftwalk.core.run_layout import MANIFEST_FILE, RECORD_FILE, state_of
 from driftwalk.core.shards import read_specification
 from driftwalk.viewer.hub import Content, Publish, Source
+from driftwalk.viewer.run_shards import quiet_time
 from driftwalk.viewer.running import NO_CELL, RunningOther
 from driftwalk.viewer.shell import page_frame
 
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
 LOOK_EVERY_S: Final = 0.25
 """Time between two looks at the run directory [s]."""
 MOST_NAMED: Final = 3
+QUIET_S: Final = 60.0
+"""Time without a result [s] after which the page says how long it has been."""
+SPANS: Final = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))
+"""Units in which that is said, each from two of it on; the last from one."""
 
 
 class RunSource(Source):
@@ -52,6 +57,7 @@ class RunSource(Source):
         self._page = page_frame(self.view, self.title)
         self._running: Running | None = None
         self._shown: tuple[Any, ...] = ()
+        self._refused: tuple[Any, ...] = ()
         self.look()
 
     def greeting(self) -> Sequence[Content]:
@@ -73,7 +79,12 @@ class RunSource(Source):
         found = dict(NO_CELL)
         if self._running is not None and isinstance(row, int) and isinstance(column, int):
             found = self._running.cell(row, column)
-        asked = {key: content.get(key) for key in ("id", "row", "column")}
+        # Only what can be a setting goes back: whatever else a browser sends may not be writable.
+        named = {"id": str, "row": int, "column": int}
+        asked = {
+            key: value if isinstance(value := content.get(key), kind) else None
+            for key, kind in named.items()
+        }
         reply({"type": "cell", **asked, **found})
 
     def file(self, name: str) -> Path | None:
@@ -93,7 +104,8 @@ class RunSource(Source):
         try:
             state, stamp = state_of(self._folder), _stamp(self._folder)
             if state == "finished":
-                return [] if stamp == self._shown else self._show_finished(stamp)
+                stamp = _stamp(self._folder, (MANIFEST_FILE, *_results(self._folder)))
+                return [] if stamp in (self._shown, self._refused) else self._show_finished(stamp)
             if state == "unfinished":
                 return self._look_at_running(stamp)
         except (DriftwalkError, OSError) as error:
@@ -104,9 +116,10 @@ class RunSource(Source):
     def _show_finished(self, stamp: tuple[Any, ...]) -> list[Content]:
         from driftwalk.report import report_page
 
-        refuse_other_version(self._folder)
+        # Should it fail, then not again before something has changed.
+        self._refused = stamp
         self._page = {**report_page(self._folder), "view": self.view}
-        self._running, self._shown = None, stamp
+        self._running, self._shown, self._refused = None, stamp, ()
         return [{"type": "page", "page": self._page}]
 
     def _look_at_running(self, stamp: tuple[Any, ...]) -> list[Content]:
@@ -128,6 +141,7 @@ class RunSource(Source):
 
     def _page_of(self, running: Running) -> dict[str, Any]:
         progress, words = running.state()
+        words += quiet_words(quiet_time(self._folder))
         return page_frame(
             self.view,
             running.title,
@@ -143,6 +157,21 @@ class RunSource(Source):
         self._page = {**self._page, "state": state}
         self._shown = ()
         return [{"type": "state", "state": state}]
+
+
+def quiet_words(duration_s: float) -> str:
+    """Return what there is to say about a run that has given nothing new for some time.
+
+    Examples
+    --------
+    >>> quiet_words(200.0)
+    '; the last result came 3 min ago (if it was stopped, the same command continues it)'
+    """
+    if duration_s < QUIET_S:
+        return ""
+    length, unit = next((s for s in SPANS if duration_s >= 2.0 * s[0]), SPANS[-1])
+    ago = f"{duration_s // length:.0f} {unit}"
+    return f"; the last result came {ago} ago (if it was stopped, the same command continues it)"
 
 
 def running_view(folder: Path) -> Running:
@@ -264,13 +293,18 @@ def _holds_run(path: Path) -> bool:
     return path.is_dir() and state_of(path) != "new"
 
 
-def _stamp(folder: Path) -> tuple[Any, ...]:
-    """Return what changes when the run in a folder is another one, or has finished."""
+def _results(folder: Path) -> list[str]:
+    """Return the names of the datasets of a run, which may be replaced under the same manifest."""
+    return sorted(path.name for path in folder.glob("*.nc"))
+
+
+def _stamp(folder: Path, names: Sequence[str] = (MANIFEST_FILE, RECORD_FILE)) -> tuple[Any, ...]:
+    """Return what changes when files of a folder do: those that say which run it is, or others."""
     stamps = []
-    for name in (MANIFEST_FILE, RECORD_FILE):
+    for name in names:
         try:
             stat = (folder / name).stat()
-            stamps.append((name, stat.st_mtime_ns, stat.st_ino))
+            stamps.append((name, stat.st_mtime_ns, stat.st_ino, stat.st_size))
         except OSError:
-            stamps.append((name, 0, 0))
+            stamps.append((name, 0, 0, 0))
     return tuple(stamps)

@@ -170,6 +170,15 @@ def test_a_run_of_another_version_names_both(
     assert "version 0.0.7;" in part_of(page, "manifest")["cite"]
 
 
+def test_a_manifest_of_another_version_is_refused(
+    tmp_path: Path, datasets: dict[str, xr.Dataset]
+) -> None:
+    later = {"manifest_version": 99, "software": {"driftwalk": "9.9.9"}}
+    folder = make_run(tmp_path / "run", datasets, **later)
+    with pytest.raises(InputError, match=r"driftwalk 9\.9\.9 \(manifest version 99, .* reads 1\)"):
+        report_page(folder)
+
+
 def test_a_damaged_file_costs_its_sections_and_is_named(
     tmp_path: Path, datasets: dict[str, xr.Dataset]
 ) -> None:

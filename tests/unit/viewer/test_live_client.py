@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import socket
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, closing
@@ -14,6 +15,7 @@ import pytest
 from driftwalk.core.errors import InputError
 from driftwalk.track import LiveServer
 from driftwalk.viewer.live_client import LiveSource, stream_line
+from driftwalk.viewer.messages import make_message
 
 HELLO = {"type": "hello", "format": "driftwalk live", "version": 1, "source": "test"}
 
@@ -162,6 +164,61 @@ def test_others_are_named(line: bytes, words: str) -> None:
         server = await asyncio.start_server(answer, "127.0.0.1", 0)
         async with server, listening(server.sockets[0].getsockname()[1]) as (_, heard):
             assert words in (await heard.until(kind("lost")))["words"]
+
+    asyncio.run(run())
+
+
+def test_a_line_nested_too_deep_ends_nothing() -> None:
+    """Some depths can be read, but not written again: the page goes on without such a line."""
+
+    async def run() -> None:
+        async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            writer.write(json.dumps(HELLO).encode() + b"\n")
+            depth = next(depths, None)
+            nested = b"[" * (depth or 0) + b"1e999" + b"]" * (depth or 0)
+            writer.write(b'{"type": "frame", "frame": %d, "x": %s}\n' % (depth or -1, nested))
+            await writer.drain()
+            if depth is None:
+                await reader.read()
+            writer.close()
+
+        depths = iter((300, 450, 480, 600, 900, 940, 970, 990, 2000))
+        server = await asyncio.start_server(answer, "127.0.0.1", 0)
+        # What is published is written, as the hub does.
+        heard = Heard()
+        source = LiveSource("127.0.0.1", server.sockets[0].getsockname()[1])
+
+        def publish(content: Any) -> None:
+            make_message(content)
+            heard.append(content)
+
+        async with server:
+            task = asyncio.create_task(source.run(publish))
+            await heard.until(lambda content: content.get("frame") == -1)
+            assert not task.done()
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+
+    asyncio.run(run())
+
+
+def test_the_same_wish_for_images_is_passed_on_once() -> None:
+    async def run() -> None:
+        asked: list[bytes] = []
+
+        async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            writer.write(json.dumps(HELLO).encode() + b"\n")
+            while line := await reader.readline():
+                asked.append(line)
+            writer.close()
+
+        server = await asyncio.start_server(answer, "127.0.0.1", 0)
+        async with server, listening(server.sockets[0].getsockname()[1]) as (source, heard):
+            await heard.until(kind("hello"))
+            for width in (*[64] * 500, 0, 0, 64, 64):
+                await source.receive({"type": "video", "width": width}, heard.append)
+            await asyncio.sleep(0.1)
+            assert len(asked) == 2
 
     asyncio.run(run())
 

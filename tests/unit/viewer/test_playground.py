@@ -62,6 +62,8 @@ def test_values_that_a_knob_takes(name: str, value: Any, read: Any) -> None:
         *[("drag_coefficient", v) for v in (-0.1, 1.6, math.nan, math.inf, "0.4", None, True, [])],
         *[("force_std", v) for v in (-1e-9, 1.0, {}, "1mN")],
         *[("blocks", v) for v in (0, 2.5, 10**9, "3")],
+        # Whole numbers that no float can hold, as JSON may have them.
+        *[(name, v) for name in ("drag_coefficient", "blocks") for v in (10**400, -(10**400))],
         *[("latching", v) for v in ("", "glue", 1, None, ["none"])],
         *[("speed", v) for v in (0.0, 61.0, 0.2)],
     ],
@@ -195,6 +197,7 @@ def test_positions_are_taken_at_the_recording_s_interval(interval: float) -> Non
 def test_messages_and_actions() -> None:
     async def run() -> list[Any]:
         source = PlaySource(Study(), dw.random_tank_flow(1), blocks=3)
+        source.watched(1)
         heard: list[Any] = []
         task = asyncio.create_task(source.run(heard.append))
 
@@ -238,9 +241,95 @@ def test_messages_and_actions() -> None:
     json.dumps(heard, allow_nan=False)
 
 
+def test_a_flood_of_wishes_is_one_wish() -> None:
+    """Whoever presses a button ten thousand times must not stop the tank for the others."""
+
+    async def run() -> list[Any]:
+        source = PlaySource(Study(), STILL, blocks=12)
+        heard: list[Any] = []
+        for number in range(10_000):
+            await source.receive({"type": "action", "name": "restart"}, heard.append)
+            wanted = {"type": "set", "name": "blocks", "value": 1 + number % 12}
+            await source.receive(wanted, heard.append)
+        source.watched(1)
+        task = asyncio.create_task(source.run(heard.append))
+        async with asyncio.timeout(4):
+            while not heard or heard[-1].get("time_s", 0.0) < 0.05:
+                await asyncio.sleep(0.01)
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        return heard
+
+    heard = asyncio.run(run())
+    # The last of them holds: 10,000 is 4 more than a multiple of 12.
+    assert len(heard[-1]["x"]) == 4
+
+
+def test_the_tank_rests_while_nobody_watches() -> None:
+    async def run() -> None:
+        source = PlaySource(Study(), STILL, blocks=2)
+        heard: list[Any] = []
+        task = asyncio.create_task(source.run(heard.append))
+
+        async def moves() -> bool:
+            await asyncio.sleep(0.2)
+            before = source.tank.time
+            heard.clear()
+            await asyncio.sleep(0.8)
+            assert bool(heard) == (source.tank.time > before)
+            return bool(heard)
+
+        assert not await moves()
+        source.watched(2)
+        assert await moves()
+        source.watched(1)
+        assert await moves()
+        source.watched(0)
+        assert not await moves()
+        source.watched(1)
+        assert await moves()
+        # A rest of a second is not caught up with.
+        assert source.tank.time < 4.0
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"force_std": 0.0},
+        {"force_std": 0.0, "drag_coefficient": 0.0},
+        {"force_std": 0.0, "flow_scale": 0.0},
+        {"flow_scale": 3.0, "drag_coefficient": 1.5},
+        {"blocks": 31, "latching": "connector"},
+        {"latching": "none", "hidden_face_drag": "full"},
+    ],
+)
+def test_every_corner_of_the_knobs_has_a_picture_and_a_density(change: dict[str, Any]) -> None:
+    """Motion without end, motion without steps: what is sent stays finite and of one shape."""
+    source = PlaySource(Study(), dw.random_tank_flow(1), blocks=4)
+    for name, value in change.items():
+        source._set(name, value)
+    source._fulfil(lambda content: pytest.fail(str(content)))
+    for _ in range(30):
+        source._advance(0.5, until=math.inf)
+    sent = [source._tank_message(), source._motion.message(), source._controls()]
+    json.dumps(sent, allow_nan=False)
+    assert sent[0]["time_s"] == pytest.approx(15.0, abs=0.02)
+    assert len(sent[0]["x"]) + sent[0]["waiting"] == change.get("blocks", 4)
+    assert np.hypot(sent[0]["x"], sent[0]["y"]).max() < 0.15
+    values = {item["name"]: item["value"] for item in sent[2]["items"]}
+    assert {name: values[name] for name in change} == change
+    shares = dw.decode_array(sent[1]["simulated"])
+    assert shares.sum() == pytest.approx(1.0 if sent[1]["steps"] else 0.0)
+
+
 def test_real_time_is_kept() -> None:
     async def run() -> tuple[float, float]:
         source = PlaySource(Study(), STILL, blocks=2)
+        source.watched(1)
         heard: list[Any] = []
         task = asyncio.create_task(source.run(heard.append))
         await asyncio.sleep(0.5)

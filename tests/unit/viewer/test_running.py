@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
+import time
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,6 +21,7 @@ from driftwalk.core.shards import ShardStore
 from driftwalk.model import Study
 from driftwalk.sweep import grid
 from driftwalk.viewer.run_shards import StoreReader
+from driftwalk.viewer.shell import page_frame
 from driftwalk.viewer.watch_run import RunSource
 
 DRAG, FORCE = [0.2, 0.3, 0.4], [1e-4, 2e-4, 3e-4, 4e-4]
@@ -268,6 +272,106 @@ def test_a_run_that_vanishes_and_comes_back(run: RunDirectory) -> None:
     aside.rename(run.path)
     assert [content["type"] for content in source.look()] == ["page"]
     assert source.look() == []
+
+
+def age(run: RunDirectory, duration_s: float) -> None:
+    """Let everything in a run be older."""
+    past = time.time() - duration_s
+    for path in (*run.path.rglob("*"), run.path, *run.path.glob(".*"), *run.path.glob(".*/*")):
+        os.utime(path, (past, past))
+
+
+@pytest.mark.parametrize(
+    ("duration_s", "ago"),
+    [
+        *((0.0, None), (50.0, None), (65.0, "1 min ago"), (200.0, "3 min ago")),
+        *((7100.0, "118 min ago"), (7300.0, "2 h ago"), (4e5, "4 days ago")),
+    ],
+)
+def test_a_killed_run_says_since_when_nothing_came(
+    run: RunDirectory, duration_s: float, ago: str | None
+) -> None:
+    coarse(run).write(UNITS[0], arrays(UNITS[0]))
+    age(run, duration_s)
+    state = page(RunSource(run.path))["state"]
+    assert state["progress"] == pytest.approx(0.4 * 5 / 12)
+    assert state["words"].startswith("map: 42 %")
+    if ago is None:
+        assert state["words"] == "map: 42 %"
+    else:
+        assert f"the last result came {ago} (" in state["words"]
+
+
+def test_a_run_that_goes_on_is_no_longer_quiet(run: RunDirectory) -> None:
+    store = coarse(run)
+    store.write(UNITS[0], arrays(UNITS[0]))
+    age(run, 500.0)
+    source = RunSource(run.path)
+    assert "8 min ago" in page(source)["state"]["words"]
+    assert source.look() == []
+    store.write(UNITS[1], arrays(UNITS[1]))
+    assert [content["type"] for content in source.look()] == ["section", "state"]
+    assert page(source)["state"]["words"] == "map: 83 %"
+
+
+def test_a_finished_run_that_cannot_be_shown_is_read_once(
+    run: RunDirectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run.write("calibration.nc", b"damaged")
+    run.finish({"kind": "driftwalk manifest", "manifest_version": 1})
+    source = RunSource(run.path)
+    assert "cannot be read" in page(source)["state"]["words"]
+    looked = []
+
+    def report_page(folder: Path) -> dict[str, Any]:
+        looked.append(folder)
+        return page_frame("report", "Calibration")
+
+    monkeypatch.setattr("driftwalk.report.report_page", report_page)
+    assert source.look() == source.look() == []
+    assert looked == []
+    # Another file in its place is looked at.
+    (run.path / "calibration.nc").write_bytes(b"restored")
+    assert [content["type"] for content in source.look()] == ["page"]
+    assert source.look() == []
+    assert len(looked) == 1
+
+
+def test_a_one_by_one_search(run: RunDirectory, tmp_path: Path) -> None:
+    one = {name: 0.3 for name in SEARCH if "drag" in name} | {
+        name: 2e-4 for name in SEARCH if "force" in name
+    }
+    study = dw.apply_overrides(Study(), {**one, "calibration.bootstrap": 0})
+    specification = {**run.specification, "study": study.to_dict()}
+    with RunDirectory(tmp_path / "one", specification=specification) as opened:
+        source = RunSource(opened.path)
+        assert page(source)["state"] == {"finished": False, "progress": 0.0, "words": "map: 0 %"}
+        store = opened.store("coarse-x", fingerprint={"axes": [[0.3], [2e-4]], "replicates": 2})
+        unit = grid(drag_coefficient=[0.3], force_std=[2e-4]).units(5)[0]
+        store.write(unit, arrays(unit))
+        source.look()
+        assert page(source)["state"]["words"] == "map: 100 %"
+        found = dw.decode_array(the_map(source)["value"])
+        np.testing.assert_allclose(found, [[DISTANCE[0].mean()]], rtol=1e-6)
+
+
+def test_a_folder_with_any_name_and_no_right_to_write(run: RunDirectory, tmp_path: Path) -> None:
+    coarse(run).write(UNITS[0], arrays(UNITS[0]))
+    odd = tmp_path / "ünï 日本 #1?a=b&c%41%2e <b>"
+    shutil.copytree(run.path, odd)
+    before = sorted((path, path.stat().st_mtime_ns) for path in odd.rglob("*"))
+    for path in (odd, odd / ".shards", *odd.glob(".shards/*")):
+        path.chmod(0o500)
+    try:
+        source = RunSource(odd)
+        assert source.look() == []
+        assert page(source)["subtitle"] == odd.name
+        assert np.isfinite(dw.decode_array(the_map(source)["value"])).sum() == 5
+        # Looking changes nothing; for root no folder is read-only, so this is what is checked.
+        assert sorted((path, path.stat().st_mtime_ns) for path in odd.rglob("*")) == before
+    finally:
+        for path in (odd, odd / ".shards", *odd.glob(".shards/*")):
+            path.chmod(0o700)
 
 
 def test_another_version_is_refused(run: RunDirectory) -> None:
