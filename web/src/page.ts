@@ -18,8 +18,8 @@ import {
   withDefault,
 } from "./check";
 
-export const FORMAT = "driftwalk page";
-export const VERSION = 1;
+const FORMAT = "driftwalk page";
+const VERSION = 1;
 
 const pair: Check<[number, number]> = (value, where) => {
   const ends = list(number)(value, where);
@@ -283,10 +283,8 @@ const arrows = object({ x: numbers, y: numbers, u: numbers, v: numbers });
 /** The tank of the playground. */
 const tank = object({ ...base, arena: nullable(arena), side: number, flow: nullable(arrows) });
 
-export type TankSection = Checked<typeof tank>;
 export { tank as checkTank, controls as checkControls };
 export type Arena = Checked<typeof arena>;
-export type Axis = Checked<typeof axis>;
 export type Polyominoes = Checked<typeof polyominoes>;
 export type SummarySection = Checked<typeof summary>;
 export type WarningsSection = Checked<typeof warnings>;

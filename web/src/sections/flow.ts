@@ -185,7 +185,7 @@ function drawArrows(frame: Frame, field: Field, top: number): void {
 }
 
 /** Returns the data of an arrow whose middle is at (x, y) [px]. */
-export function arrowPath(x: number, y: number, length: number, angle: number): string {
+function arrowPath(x: number, y: number, length: number, angle: number): string {
   const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
   const point = (along: number, aside: number): string =>
     `${(x + along * cos - aside * sin).toFixed(1)} ${(y + along * sin + aside * cos).toFixed(1)}`;

@@ -13,11 +13,11 @@ import { closedPath } from "../tank/outline";
 import { spoken } from "../symbols";
 import { type MapData, distanceAt, failureAt } from "./map_data";
 
-export const PLAIN = { factor: 1, unit: "" } as const;
+const PLAIN = { factor: 1, unit: "" } as const;
 /** Slants of the hatches of different reasons [°]. */
 const SLANTS = [45, -45, 0, 90] as const;
 
-export interface MapLook {
+interface MapLook {
   readonly selected: Cell | null;
   readonly cursor: Cell | null;
   readonly pointed: (place: Place | null) => void;
