@@ -80,6 +80,11 @@ class AssemblyObserver:
     join_distance, join_angle, release_distance, release_angle, min_duration, hold : float, optional
         As in `driftwalk.classify` [m, rad, s].
 
+    Raises
+    ------
+    InputError
+        When there is no block, or chirality is another word.
+
     Examples
     --------
     >>> observer = AssemblyObserver(["0", "1"], side=0.03)
@@ -137,6 +142,16 @@ class AssemblyObserver:
         poses : mapping
             From the name of each block that is seen to x, y [m] and theta [rad]; one without an
             angle is not seen.
+
+        Returns
+        -------
+        AssemblySeen
+            Who is joined now, the classes that are possible, and what has become known.
+
+        Raises
+        ------
+        InputError
+            When a block is seen that is none of the bodies.
         """
         sample = len(self._times)
         self._times.append(time)
