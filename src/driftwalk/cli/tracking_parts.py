@@ -72,7 +72,13 @@ def _check(options: TrackingOptions) -> None:
 
 
 def find_camera(options: TrackingOptions, images: Sequence[Any]) -> Camera:
-    """Return the camera with a scale: from its file, the rim, or the scale that is stated."""
+    """Return the camera with a scale: from its file, the rim, or the scale that is stated.
+
+    Raises
+    ------
+    InputError
+        When nothing gives a scale, two things do, or the rim is not found.
+    """
     from driftwalk.track import Camera, camera_from_rim, load_camera, median_background
 
     known = load_camera(options.camera) if options.camera is not None else None

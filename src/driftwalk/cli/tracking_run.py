@@ -118,7 +118,13 @@ class TrackingRun:
             print_note(f"wrote {self.out}: {self.frames} frames up to here")
 
     def recording(self, *, complete: bool = True) -> xr.Dataset:
-        """Return what was tracked up to now."""
+        """Return what was tracked up to now.
+
+        Raises
+        ------
+        InputError
+            When that is nothing; it says what was seen instead.
+        """
         attrs: dict[str, Any] = {
             "source": self.source_name,
             # `source` is the recording's own name once it is read from a file.
