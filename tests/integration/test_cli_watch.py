@@ -18,6 +18,7 @@ from driftwalk.schema import build_trajectory
 
 cv2 = pytest.importorskip("cv2")
 
+from drawn_blocks import moving_blocks  # noqa: E402
 from filmed_blocks import TANK, film  # noqa: E402
 
 SIDE = 0.03
@@ -153,3 +154,12 @@ def test_watching_takes_what_it_needs(tmp_path: Path) -> None:
     assert done.code == 2
     assert "nothing was tracked in 6 frames" in done.err
     assert not (tmp_path / "none.nc").exists()
+
+
+def test_a_single_class_is_named_alone_before_its_block_was_seen(tmp_path: Path) -> None:
+    """A block is believed with its third frame; whatever it is, one block is the class 1."""
+    done = here("watch", *film(tmp_path, moving_blocks(5, bodies=1)), "--bodies", "1")
+    assert done.code == 0, done.err
+    first, second = done.out.splitlines()[:2]
+    assert first.endswith("class  1  (hidden: unseen 0)")
+    assert second.endswith("no block is followed yet")

@@ -112,7 +112,7 @@ class _Printer:
             print(f"{frame.time:9.2f} s  class  {_classes(observed)}{hidden}")
         if frame.time >= self._next:
             self._next = frame.time + 1.0
-            poses = "  ".join(_pose(state) for state in states)
+            poses = "  ".join(_pose(state) for state in states) or "no block is followed yet"
             print(f"{frame.time:9.2f} s  {poses}", flush=True)
 
 
@@ -122,6 +122,8 @@ def _classes(observed: AssemblySeen) -> str:
     names = sorted(observed.possible)
     if not names:
         return f"unknown: {len(observed.hidden)} blocks are hidden, any class is possible"
+    if len(names) == 1:
+        return names[0]
     more = f" and {len(names) - _MOST_CLASSES} more" if len(names) > _MOST_CLASSES else ""
     return "one of " + ", ".join(names[:_MOST_CLASSES]) + more
 
