@@ -17,24 +17,19 @@ FAR_PX: Final = 20.0
 """Half a mouse."""
 TRACK: Final = ("--markers", "blob", "--px-per-m", f"{PX_PER_M:g}", "--bodies", "1")
 STUDY: Final = ("--study", Path(__file__).with_suffix(".toml"))
-VARIANTS: Final = {"dark": ("--polarity", "dark"), "either": ()}
 
 
 def track_mouse(out: Path, video: Path, published: Path) -> dict[str, Any]:
     """Track the mouse, and let the other commands run on the result as it is."""
-    folder = out / "recordings"
-    folder.mkdir(exist_ok=True)
-    line: dict[str, Any] = {}
-    for name, words in VARIANTS.items():
-        recording = folder / f"mouse-{name}.nc"
-        how = (*TRACK, *words, "-o", recording, "--overwrite")
-        said, seconds = driftwalk_json("track", video, *how)
-        line[name] = beside_published(recording, published) | {
-            "counts": said["counts"],
-            "frames_per_s": said["frames_per_s"],
-            "seconds": round(seconds, 1),
-        }
-    return line | then(folder / "mouse-dark.nc")
+    recording = out / "recordings" / "mouse.nc"
+    recording.parent.mkdir(exist_ok=True)
+    said, seconds = driftwalk_json("track", video, *TRACK, "-o", recording, "--overwrite")
+    tracked = {
+        "counts": said["counts"],
+        "frames_per_s": said["frames_per_s"],
+        "seconds": round(seconds, 1),
+    }
+    return beside_published(recording, published) | tracked | then(recording)
 
 
 def then(recording: Path) -> dict[str, Any]:

@@ -124,8 +124,7 @@ def in_words(line: dict[str, Any]) -> str:
     if "error" in line:
         return f"{head}{line['error']}"
     if line["set"] == "mouse":
-        dark = line["dark"]
-        return f"{head}median {dark['median_px']:.2f} px, {dark['lost']} frames lost"
+        return f"{head}median {line['median_px']:.2f} px, {line['lost']} frames lost"
     words = head + (
         f"{line['position_rms_mm']:.3f} mm, {line['angle_rms_deg']:.2f} deg, recall "
         f"{line['recall_visible']:.2%}, {line['false']} false, {line['swaps']} swaps, "

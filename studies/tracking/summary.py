@@ -146,18 +146,13 @@ def loop_bars(line: Line) -> list[list[str]]:
 
 def mouse_bars(line: Line) -> list[list[str]]:
     """Return the rows of the mouse."""
-    rows = []
-    for name, words in (("dark", " --polarity dark"), ("either", "")):
-        found = line[name]
-        median = f"{found['median_px']:.2f} px"
-        lost = f"{found['lost']} of {found['frames']}, {found['far']} elsewhere"
-        kept = found["lost"] == found["far"] == 0
-        rows += [
-            ["mouse", f"--markers blob{words}: median ≤ 5 px", median, "",
-             "holds" if found["median_px"] <= 5.0 else "FAILS"],
-            ["mouse", f"--markers blob{words}: no loss", lost, "", "holds" if kept else "FAILS"],
-        ]  # fmt: skip
-    return rows
+    lost = f"{line['lost']} of {line['frames']}, {line['far']} elsewhere"
+    kept = line["lost"] == line["far"] == 0
+    near = "holds" if line["median_px"] <= 5.0 else "FAILS"
+    return [
+        ["mouse", "median ≤ 5 px", f"{line['median_px']:.2f} px", "", near],
+        ["mouse", "no loss", lost, "", "holds" if kept else "FAILS"],
+    ]
 
 
 def markdown(name: str, lines: list[Line], together: Line) -> str:
