@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import shutil
@@ -17,7 +18,7 @@ import xarray as xr
 from command_line import here, refusal
 from finished_run import write_finished_run
 from page_server import PageServer, received, say, served
-from websockets.exceptions import InvalidStatus
+from websockets.exceptions import ConnectionClosedError, InvalidStatus
 
 import driftwalk as dw
 from driftwalk.core.rundir import RunDirectory
@@ -136,6 +137,42 @@ def test_a_browser_that_goes_away_is_forgotten(server: PageServer) -> None:
         received(channel, "page")
 
 
+def test_an_origin_that_is_given_twice_is_refused(server: PageServer) -> None:
+    own = f"127.0.0.1:{server.port}"
+    for origins in (
+        ("http://evil.example", f"http://{own}"),
+        (f"http://{own}", "http://e.example"),
+    ):
+        head = "".join(f"Origin: {origin}\r\n" for origin in origins)
+        with closing(socket.create_connection(("127.0.0.1", server.port))) as raw:
+            raw.sendall(f"GET / HTTP/1.1\r\nHost: {own}\r\n{head}\r\n".encode())
+            assert raw.recv(12) == b"HTTP/1.1 403"
+
+
+def test_a_message_without_measure_ends_only_its_sender(server: PageServer) -> None:
+    with server.socket() as other, server.socket() as channel:
+        received(channel, "page")
+        channel.send("x" * 70_000)
+        with pytest.raises(ConnectionClosedError, match="1009"):
+            received(channel, "never")
+        received(other, "page")
+        say(other, type="cell", id="map", row=0, column=0)
+        received(other, "cell")
+
+
+def test_so_many_browsers_and_no_more(server: PageServer) -> None:
+    """Fifty that never read: the first 32 are let in, and whoever leaves makes room."""
+    with contextlib.ExitStack() as stalled:
+        for _ in range(50):
+            stalled.enter_context(server.socket())
+        with server.socket() as channel, pytest.raises(ConnectionClosedError, match="1013"):
+            received(channel, "page")
+        # Other requests are answered all the same.
+        assert server.get("/").status == 200
+    with server.socket() as channel:
+        received(channel, "page")
+
+
 def test_ctrl_c_ends_it(finished: Path) -> None:
     with served("view", finished) as started, started.socket() as channel:
         received(channel, "page")
@@ -157,6 +194,10 @@ def test_away_from_loopback_a_token_is_asked_for(finished: Path) -> None:
             received(channel, "page")
         with pytest.raises(InvalidStatus, match="403"), started.socket():
             pass
+        code, words = started.stop()
+        assert code == 0
+        # It stands in the address that was printed, and nowhere else.
+        assert token.removeprefix("token=") not in words
 
 
 def test_a_port_in_use(finished: Path) -> None:

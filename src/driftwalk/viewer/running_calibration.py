@@ -129,9 +129,8 @@ class RunningCalibration:
         """Return the progress and the stage."""
         words, begin, end = STAGES[self._stage]
         share = self._share()
-        if self._stage == "bootstrap" and share >= 1.0:
-            words = "halves and figures"
-        return begin + share * (end - begin), f"{words}: {100.0 * share:.0f} %"
+        how_far = f"{100.0 * share:.0f} %" if share < 1.0 else "done, the next step is under way"
+        return begin + share * (end - begin), f"{words}: {how_far}"
 
     def cell(self, row: int, column: int) -> dict[str, Any]:
         """Return the kept excerpt and step density of a setting."""

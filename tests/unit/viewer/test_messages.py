@@ -12,8 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from driftwalk.viewer.app import parsed
-from driftwalk.viewer.messages import Outbox, make_message
+from driftwalk.viewer.app import _listen, parsed
+from driftwalk.viewer.hub import Source
+from driftwalk.viewer.messages import Outbox, make_message, to_json
 
 loop: asyncio.Runner
 
@@ -128,3 +129,37 @@ def test_every_message_is_json(value: Any) -> None:
 @pytest.mark.parametrize("text", ["", "{", "[1]", "1", "null", '"text"', "[" * 100_000, "\0"])
 def test_what_is_no_message_is_nothing(text: str) -> None:
     assert parsed(text) is None
+
+
+def test_numbers_that_json_lacks_are_null_at_any_depth() -> None:
+    content = {"a": [math.nan, (1.5, math.inf)], "b": {"c": -math.inf, "d": True, "e": 10**400}}
+    found = json.loads(to_json(content))
+    assert found == {"a": [None, [1.5, None]], "b": {"c": None, "d": True, "e": 10**400}}
+
+
+def test_a_flood_of_messages_lets_others_have_their_turn() -> None:
+    class Flood:
+        """A WebSocket on which there is always another message."""
+
+        left = 200
+
+        async def receive(self) -> dict[str, Any]:
+            self.left -= 1
+            kind = "receive" if self.left else "disconnect"
+            return {"type": f"websocket.{kind}", "text": '{"type": "any"}'}
+
+    async def run() -> int:
+        turns = 0
+
+        async def others() -> None:
+            nonlocal turns
+            while True:
+                turns += 1
+                await asyncio.sleep(0)
+
+        task = asyncio.create_task(others())
+        await _listen(Flood(), Outbox(), Source())  # type: ignore[arg-type]
+        task.cancel()
+        return turns
+
+    assert asyncio.run(run()) > 150

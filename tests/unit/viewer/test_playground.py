@@ -6,6 +6,7 @@ import asyncio
 import json
 import math
 import time
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from driftwalk.schema import build_trajectory
 from driftwalk.viewer.play_motion import MotionWindow, beside
 from driftwalk.viewer.play_settings import FILLED, KNOBS
 from driftwalk.viewer.play_stream import frame_line, hello_line, joined_faces
-from driftwalk.viewer.playground import PlaySource
+from driftwalk.viewer.playground import PlaySource, flow_arrows
 
 STILL = dw.uniform_flow(0.0, 0.0)
 KNOB = {knob.name: knob for knob in KNOBS}
@@ -78,6 +79,15 @@ def test_a_knob_reaches_the_study_s_value() -> None:
     source = PlaySource(study, STILL, blocks=1)
     assert source._knobs["drag_coefficient"].most == 4.0
     assert source._knobs["force_std"].most == KNOB["force_std"].most
+
+
+def test_arrows_are_the_flow() -> None:
+    arrows = flow_arrows(dw.uniform_flow(0.1, -0.2))
+    assert arrows is not None
+    for name, value in (("u", 0.1), ("v", -0.2)):
+        found = dw.decode_array(arrows[name])
+        assert found.shape == (len(arrows["y"]), len(arrows["x"]))
+        np.testing.assert_allclose(found, value, rtol=1e-6)
 
 
 def test_blocks_offered_have_room() -> None:
@@ -272,12 +282,13 @@ def test_the_tank_rests_while_nobody_watches() -> None:
         task = asyncio.create_task(source.run(heard.append))
 
         async def moves() -> bool:
-            await asyncio.sleep(0.2)
+            await asyncio.sleep(0.4)
             before = source.tank.time
             heard.clear()
-            await asyncio.sleep(0.8)
-            assert bool(heard) == (source.tank.time > before)
-            return bool(heard)
+            await asyncio.sleep(0.6)
+            pictures = [content for content in heard if content["type"] == "tank"]
+            assert bool(pictures) == (source.tank.time > before)
+            return bool(pictures)
 
         assert not await moves()
         source.watched(2)
@@ -315,6 +326,8 @@ def test_every_corner_of_the_knobs_has_a_picture_and_a_density(change: dict[str,
     source._fulfil(lambda content: pytest.fail(str(content)))
     for _ in range(30):
         source._advance(0.5, until=math.inf)
+    lone = Counter(source.tank.outcome.split("+"))
+    assert source._tank_message()["counts"] == lone
     sent = [source._tank_message(), source._motion.message(), source._controls()]
     json.dumps(sent, allow_nan=False)
     assert sent[0]["time_s"] == pytest.approx(15.0, abs=0.02)

@@ -178,6 +178,7 @@ def test_refined_map_and_bootstrap(run: RunDirectory) -> None:
     assert [content["type"] for content in source.look()] == ["page"]
     lines = next(s for s in page(source)["sections"] if s["id"] == "bootstrap")
     assert lines["series"][0]["y"] == [0.3, 0.4]
+    assert lines["series"][0]["x"] == [1e-4, 2e-4]
     assert page(source)["state"]["progress"] == pytest.approx(0.65 + 0.28 * 0.5)
 
 
@@ -350,7 +351,7 @@ def test_a_one_by_one_search(run: RunDirectory, tmp_path: Path) -> None:
         unit = grid(drag_coefficient=[0.3], force_std=[2e-4]).units(5)[0]
         store.write(unit, arrays(unit))
         source.look()
-        assert page(source)["state"]["words"] == "map: 100 %"
+        assert page(source)["state"]["words"] == "map: done, the next step is under way"
         found = dw.decode_array(the_map(source)["value"])
         np.testing.assert_allclose(found, [[DISTANCE[0].mean()]], rtol=1e-6)
 
