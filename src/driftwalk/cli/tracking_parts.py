@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 # Images that are looked at before: the median of many hides what moves, that of a few glare.
 _FOR_BACKGROUND: Final = 25
 _FOR_RIM: Final = 7
+# Detections of something else in a frame: 1 per square metre in a tank of 30 cm.
+_CLUTTER_PER_FRAME: Final = 0.07
 _FOR_COLOURS: Final = 60
 _LEAST_DISC_PX: Final = 2.0
 # A rim that stands a little above the water is seen larger.
@@ -54,7 +56,7 @@ def build_parts(options: TrackingOptions) -> TrackingParts:
     camera.check_size(images[0].shape[1], images[0].shape[0])
     detector, side = _detector(options, camera, images)
     diameter = options.tank_diameter or camera.tank_diameter_m
-    tracker = _tracker(options, camera, diameter)
+    tracker = tracker_for(options, camera, diameter)
     side = options.side if options.side is not None else side
     return TrackingParts(camera, detector, tracker, _observer(options, side), diameter, side)
 
@@ -187,7 +189,8 @@ def _check_colours(
             raise InputError(f"{options.markers}: {missing} (driftwalk markers teach)")
 
 
-def _tracker(options: TrackingOptions, camera: Camera, diameter: float | None) -> Tracker:
+def tracker_for(options: TrackingOptions, camera: Camera, diameter: float | None) -> Tracker:
+    """Return the tracker; its scales of speed and of clutter are those of the picture."""
     from driftwalk.track import Tracker, TrackerSettings
 
     wide = _width(camera, diameter)
@@ -195,6 +198,9 @@ def _tracker(options: TrackingOptions, camera: Camera, diameter: float | None) -
         "max_speed": options.max_speed if options.max_speed is not None else wide,
         "bodies": options.bodies,
         "lost_after": options.lost_after,
+        # A number for each picture, whatever the scale: how often something is mistaken for a body
+        # hangs on the pixels, not on the metres.
+        "clutter_density": _CLUTTER_PER_FRAME / (math.pi / 4.0 * wide**2),
     }
     settings: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
     return Tracker(TrackerSettings(**settings))

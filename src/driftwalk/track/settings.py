@@ -34,7 +34,8 @@ class TrackerSettings:
     bounce_probability : float
         Chance that a body collides between two frames, and has any velocity afterwards.
     clutter_density : float
-        Detections of something else [1/m^2], in each frame.
+        Detections of something else [1/m^2], in each frame. The default fits a tank of 30 cm;
+        scale it with the inverse of the area (`driftwalk track` does).
     gate : float
         How many standard deviations from its prediction a body may be found.
     ambiguous_above : float
