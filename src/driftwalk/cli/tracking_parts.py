@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 # Images that are looked at before: the median of many hides what moves, that of a few glare.
 _FOR_BACKGROUND: Final = 25
 _FOR_RIM: Final = 7
-# Detections of something else in a frame: 1 per square metre in a tank of 30 cm.
-_CLUTTER_PER_FRAME: Final = 0.07
 _FOR_COLOURS: Final = 60
 _LEAST_DISC_PX: Final = 2.0
+# Detections of something else in a frame: 1 per square metre in a tank of 30 cm.
+_CLUTTER_PER_FRAME: Final = 0.07
 # A rim that stands a little above the water is seen larger.
 _RIM_OFF: Final = 0.03
 

@@ -108,11 +108,15 @@ class Track:
     """A body that is followed, or what may become one."""
 
     mean: Floats
+    """The filter's x, y [m], theta [rad] and their rates [m/s, rad/s], shape (6,)."""
     covariance: Floats
+    """Its covariance, shape (6, 6)."""
     time: float
-    """Of mean and covariance."""
+    """Of mean and covariance [s]."""
     seen_at: Floats
+    """Position last measured [m], shape (2,)."""
     seen: float
+    """When that was [s]."""
     began: int
     """Frame of the first sample."""
     key: str | None = None
@@ -122,6 +126,7 @@ class Track:
     measured: Detection | None = None
     samples: Samples = field(default_factory=Samples)
     doubt: float = 0.0
+    """Score of the last assignment that was in doubt, 0 to 1."""
     settles_in: int = 0
     """Measurements after which an assignment that was in doubt has settled."""
     company: dict[Track, int] = field(default_factory=dict)

@@ -16,7 +16,6 @@ from driftwalk.track.two_colour_pairs import Pair, pair_discs
 from driftwalk.track.two_colour_pose import SMOOTHING_PX, Measured, weighted_centres
 from driftwalk.track.types import Array, Detection, Image, PixelToWorld, Rejected
 
-_LEAST_DIAMETER_PX: Final = 3.0
 _COARSE_DIAMETER_PX: Final = 6.0
 _FINE_DIAMETER_PX: Final = 12.0
 _MOST_FACTOR: Final = 4
