@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
+import json
 import socket
+import socketserver
+import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
@@ -26,7 +32,7 @@ from driftwalk.sweep import grid
 pytestmark = pytest.mark.browser
 
 HOSTILE = "<script>document.title='taken'<|script><img src=x onerror=alert(1)>&\"'"
-# 441 settings, seven work units: some seconds.
+# 441 settings, seven work units: a few seconds.
 SWEEP = """\
 [calibration]
 drag_coefficient_min = 0.2
@@ -35,11 +41,11 @@ drag_coefficient_step = 0.02
 force_std_min_N = "0.2mN"
 force_std_max_N = "1mN"
 force_std_step_N = "0.04mN"
-replicates = 2
+replicates = 1
 refine = "none"
 bootstrap = 0
 """
-TRACKED_FRAMES = 240
+TRACKED_FRAMES = 160
 PICTURES_A_SECOND = """() => new Promise((done) => {
   const tank = document.querySelector('.tank-canvas');
   const [frames, began] = [+tank.dataset.frames, performance.now()];
@@ -343,3 +349,62 @@ def test_a_tracker_is_watched(
             0.1 * (TRACKED_FRAMES - 1), abs=0.01
         )
         assert "joined" in page.locator(".events").inner_text()
+
+
+class OddTracker(socketserver.StreamRequestHandler):
+    """A tracker every word of which is hostile."""
+
+    def handle(self) -> None:
+        def say(**content: Any) -> None:
+            self.wfile.write(json.dumps(content).encode() + b"\n")
+
+        with contextlib.suppress(OSError):
+            say(
+                **{"type": "hello", "format": "driftwalk live", "version": 1, "source": HOSTILE},
+                **{"markers": HOSTILE, "tank": {"shape": "circle", "diameter_m": 0.3}},
+                **{"block_side_m": 0.03, "body_count": 2, "observed": True, "note": HOSTILE},
+                image={
+                    **{"width_px": 64, "height_px": 48, "lens": None, "words": HOSTILE},
+                    "homography_px_to_m": [0.005, 0, -0.16, 0, -0.005, 0.12, 0, 0, 1],
+                },
+            )
+            for number in itertools.count():
+                bodies = [
+                    {
+                        **{"id": f"{HOSTILE}{body}", "seen": True, "x_m": 0.04 * body, "y_m": 0.0},
+                        **{"theta_rad": 0.0, "column_px": None, "row_px": None, "ambiguous": 0.0},
+                    }
+                    for body in range(2)
+                ]
+                names = [body["id"] for body in bodies]
+                event = {"time_s": 0.0, "kind": HOSTILE, "bodies": names, "outcome": HOSTILE}
+                say(
+                    **{"type": "frame", "frame": number, "time_s": 0.1 * number, "bodies": bodies},
+                    **{"joined": [[names[0], 0, names[1], 2]], "outcome": HOSTILE},
+                    **{"possible": [HOSTILE, "2"], "hidden": [HOSTILE], "dropped_frames": 0},
+                    **{"events": [{**event, "faces": [0, 2]}], "latency_s": 0.0},
+                    jpeg_base64='" onerror="window.taken=1',
+                )
+                time.sleep(0.05)
+
+
+def test_the_words_of_a_tracker_are_only_text(visit: Callable[..., Visit]) -> None:
+    """With the page's own policy switched off: nothing but the front end itself stands guard."""
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), OddTracker) as tracker:
+        tracker.daemon_threads = True
+        threading.Thread(target=tracker.serve_forever, daemon=True).start()
+        with served("view", "--live", f"127.0.0.1:{tracker.server_address[1]}") as server:
+            one = visit(f"http://127.0.0.1:{server.port}/", bypass_csp=True)
+            dialogs: list[str] = []
+            one.page.on("dialog", lambda dialog: (dialogs.append(dialog.message), dialog.dismiss()))
+            page = one.open(server.address)
+            until_tank(page, "frames", 5)
+            assert HOSTILE in page.locator("body").inner_text()
+            assert page.evaluate("[window.taken, document.title.includes('taken')]") == [
+                None,
+                False,
+            ]
+            assert page.locator("img").count() == 0
+            assert page.locator("script").count() == 2
+            assert dialogs == []
+        tracker.shutdown()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 import xarray as xr
 
 import driftwalk as dw
+from browser.all_kinds import every_kind, page_of, with_texts
 from browser.conftest import PHONE, Visit
 from browser.pictures import assert_same_path, drawn_share, path_points, pixels
 
@@ -44,8 +46,8 @@ def page(visit: Callable[..., Visit], report: Path) -> Any:
 
 def click_cell(page: Any, row: int, column: int, shape: tuple[int, int]) -> None:
     """Click into the middle of a cell of the map."""
-    page.locator(".map-figure").scroll_into_view_if_needed()
-    area = page.locator(".map-figure svg image").bounding_box()
+    page.locator(".map-figure").first.scroll_into_view_if_needed()
+    area = page.locator(".map-figure svg image").first.bounding_box()
     rows, columns = shape
     x = area["x"] + area["width"] * (column + 0.5) / columns
     y = area["y"] + area["height"] * (rows - row - 0.5) / rows
@@ -152,3 +154,53 @@ def test_hostile_words_stay_words(
     assert page.locator("h1").inner_text() == hostile
     assert page.locator("img").count() == 0
     assert np.all([hostile in words for words in page.locator("h2").all_inner_texts()])
+
+
+HOSTILE = [
+    "</script><script>window.taken=1</script>",
+    "\"'><img src=x onerror=window.taken=1><svg onload=window.taken=1>",
+    "javascript:window.taken=1",
+    "<!--<script>{{constructor.constructor('window.taken=1')()}}${window.taken=1}",
+    "__proto__",
+    "url(http://127.0.0.1:1/x);color:red",
+]
+INTRUDERS = """() => [...document.querySelectorAll('*')].filter((e) =>
+  ['IMG', 'IFRAME', 'OBJECT', 'EMBED', 'BASE', 'FORM', 'VIDEO'].includes(e.tagName)
+  || [...e.attributes].some((a) => a.name.startsWith('on')
+    || (['href', 'src', 'xlink:href', 'action'].includes(a.name)
+      && !/^(#|data:image|blob:)/.test(a.value)))).map((e) => e.outerHTML)"""
+
+
+@pytest.mark.parametrize("hostile", [False, True])
+def test_no_text_of_any_section_becomes_more_than_text(
+    visit: Callable[..., Visit], tmp_path: Path, hostile: bool
+) -> None:
+    """With the page's own policy switched off: nothing but the front end itself stands guard."""
+    numbers = itertools.count()
+    page_data = page_of(every_kind())
+    if hostile:
+        # Another number each, so that names that have to differ do.
+        page_data = with_texts(
+            page_data, lambda: f"{HOSTILE[(n := next(numbers)) % len(HOSTILE)]}{n or ''}"
+        )
+        assert next(numbers) > 100
+    path = tmp_path / "report.html"
+    dw.write_report(page_data, path)
+    one = visit(path.as_uri(), bypass_csp=True)
+    page = one.open(path.as_uri())
+    shown = page.locator("section[data-kind]")
+    assert shown.count() == len(page_data["sections"])
+    assert "cannot be shown" not in page.locator("body").inner_text()
+    # Everything that can be pressed, and the map's cells.
+    for button in page.locator("button").all():
+        if button.is_visible():
+            button.click()
+    for summary in page.locator("summary").all():
+        summary.click()
+    click_cell(page, 0, 1, (2, 2))
+    page.mouse.move(300, 300)
+    assert page.evaluate("window.taken") is None
+    assert page.evaluate("Object.keys(Object.prototype)") == []
+    assert page.evaluate(INTRUDERS) == []
+    assert page.locator("script").count() == 2
+    assert one.requests == [path.as_uri()]
