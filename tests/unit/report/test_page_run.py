@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import time
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import xarray as xr
 from made_up_fit import made_up_fit
@@ -19,7 +21,8 @@ from driftwalk import __version__
 from driftwalk.core.errors import InputError, RunDirectoryError
 from driftwalk.core.provenance import manifest
 from driftwalk.core.rundir import RunDirectory
-from driftwalk.report import manifest_section, report_html, report_page
+from driftwalk.model import Study
+from driftwalk.report import manifest_section, report_html, report_page, write_report
 from driftwalk.report.page_manifest import (
     PAPER_AUTHORS,
     PAPER_TITLE,
@@ -29,6 +32,7 @@ from driftwalk.report.page_manifest import (
     bibtex,
     citation,
 )
+from driftwalk.schema import build_trajectory
 
 HOSTILE = "<script>alert('1')</script> & \"quotes\""
 SPECIFICATION = {"study": {"seed": 1}, "recording_sha256": "0", "body": None}
@@ -268,3 +272,25 @@ def test_a_hostile_name_is_only_text(
     text = report_html(page)
     assert "<script>alert" not in text
     assert text.count("<script") == 2
+
+
+def test_the_report_of_a_default_search_is_quick_and_small(tmp_path: Path) -> None:
+    """As many settings, excerpts and bins as `driftwalk calibrate` keeps without any option."""
+    search, generator = Study().calibration, np.random.default_rng(7)
+    shape = (len(search.drag_coefficients), len(search.force_stds_N))
+    assert shape == (41, 41)
+    found = synthetic_calibration(points=shape[0]).assign_attrs(kind="calibration")
+    # Half a minute at ten pictures a second, of a path as rough as a block's can be.
+    walk = generator.normal(0.0, 2e-3, (2, *shape, 301)).cumsum(axis=-1)
+    for name, values in zip("xy", np.clip(walk, -0.15, 0.15), strict=True):
+        found[f"excerpt_{name}"] = (("drag_coefficient", "force_std", "excerpt_sample"), values)
+    found["excerpt_time"] = ("excerpt_sample", 0.1 * np.arange(301))
+    x, y = generator.normal(0.0, 1e-3, (2, 18_000)).cumsum(axis=-1)
+    recording = build_trajectory(0.1 * np.arange(18_000), x, y, 0 * x)
+    parts = {"calibration.nc": found, "flow.nc": bundled_flow(), "recording.nc": recording}
+    folder = make_run(tmp_path / "run", parts)
+    begin = time.perf_counter()
+    path = write_report(report_page(folder), tmp_path / "report.html")
+    assert time.perf_counter() - begin < 10.0
+    assert 1e6 < path.stat().st_size < 5e6
+    assert part_of(report_page(folder), "map")["cells"]["excerpt_x"]["shape"] == [*shape, 301]
