@@ -114,6 +114,28 @@ test("frames of a tracker are read, with what is unknown as null", () => {
   assert.equal(checkHello({ tank: { shape: "circle", diameter_m: 0.3 } }, "").tank?.shape, "circle");
 });
 
+test("an image that cannot be placed costs the video, not the stream", () => {
+  const tank = { shape: "circle", diameter_m: 0.3 };
+  const image = { width_px: 640, height_px: 480, homography_px_to_m: [1, 0, 0, 0, 1, 0, 0, 0, 1] };
+  const good = checkHello({ tank, image }, "");
+  assert.equal(good.image?.width_px, 640);
+  assert.equal(good.imageFault, null);
+  assert.equal(checkHello({ tank }, "").imageFault, null);
+  for (const [odd, reason] of [
+    [{ ...image, width_px: undefined }, "'image.width_px' is not a number: got nothing"],
+    [{ ...image, height_px: 0 }, "'image.height_px' is not above 0: got 0"],
+    [{ ...image, homography_px_to_m: undefined }, "'image.homography_px_to_m' is not a list: got nothing"],
+    [{ ...image, homography_px_to_m: [1, 2] }, "'image.homography_px_to_m' does not have 9 numbers: got 2"],
+    ["640x480", "'image' is not an object: got \"640x480\""],
+  ] as const) {
+    const hello = checkHello({ tank, image: odd }, "");
+    assert.equal(hello.tank?.shape, "circle");
+    assert.equal(hello.image, null);
+    assert.equal(hello.imageFault, reason);
+  }
+  assert.throws(() => checkHello({ tank: 3, image }, ""), /'tank'/);
+});
+
 test("a slider reaches both ends and gives values that can be read", () => {
   const drag = sliderScale(0, 1.5, 0.01, false);
   assert.equal(drag.steps, 150);

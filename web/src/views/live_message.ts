@@ -1,6 +1,6 @@
 /** The messages of a tracker's stream, checked. */
 
-import { anything, flag, list, nullable, number, object, text, withDefault } from "../check";
+import { type Check, PageError, anything, flag, list, nullable, number, object, text, withDefault } from "../check";
 import { checkArena } from "../page";
 import type { Join } from "../tank/joined";
 
@@ -16,23 +16,52 @@ const lens = object({
   p2: withDefault(number, 0),
 });
 
-export const checkHello = object({
+const HOMOGRAPHY_ENTRIES = 9;
+
+const image = object({
+  width_px: size,
+  height_px: size,
+  homography_px_to_m: homography,
+  lens: nullable(lens),
+});
+
+const hello = object({
   source: nullable(text),
   markers: nullable(text),
   tank: nullable(checkArena),
   block_side_m: nullable(number),
   body_count: nullable(number),
   observed: withDefault(flag, false),
-  image: nullable(
-    object({
-      width_px: number,
-      height_px: number,
-      homography_px_to_m: list(number),
-      lens: nullable(lens),
-    }),
-  ),
 });
-export type Hello = ReturnType<typeof checkHello>;
+export type Hello = ReturnType<typeof hello> & {
+  readonly image: ReturnType<typeof image> | null;
+  /** Why there is no video although the tracker described one. */
+  readonly imageFault: string | null;
+};
+
+/** Checks the first message of a stream; an image that cannot be placed costs the video only. */
+export const checkHello: Check<Hello> = (value, where) => {
+  const found = hello(value, where);
+  const given = (value as Record<string, unknown>)["image"];
+  try {
+    return { ...found, image: nullable(image)(given, "image"), imageFault: null };
+  } catch (error) {
+    if (!(error instanceof PageError)) throw error;
+    return { ...found, image: null, imageFault: error.message };
+  }
+};
+
+function size(value: unknown, where: string): number {
+  const found = number(value, where);
+  if (found <= 0) throw new PageError(`'${where}' is not above 0: got ${found}`);
+  return found;
+}
+
+function homography(value: unknown, where: string): number[] {
+  const found = list(number)(value, where);
+  if (found.length === HOMOGRAPHY_ENTRIES) return found;
+  throw new PageError(`'${where}' does not have ${HOMOGRAPHY_ENTRIES} numbers: got ${found.length}`);
+}
 
 const body = object({
   id: text,
