@@ -125,6 +125,7 @@ def test_without_a_given_flow_it_is_extracted_from_the_recording():
     assert found.attrs["simulated_recording"] == "yes"
 
 
+@pytest.mark.slow
 def test_an_interval_that_reaches_the_end_of_the_refined_grid_is_warned_of():
     # Steps so small that the refined grid is narrower than what a minute can tell.
     study = apply_overrides(

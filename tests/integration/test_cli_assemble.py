@@ -317,6 +317,7 @@ def wait_for_shards(folder: Path, count: int, process: subprocess.Popen[str]) ->
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.slow
 def test_killed_interrupted_and_continued(
     whole: tuple[Path, Done], calibrated: Path, tmp_path: Path
 ) -> None:

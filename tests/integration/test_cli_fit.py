@@ -81,6 +81,7 @@ def test_a_finished_run_is_not_done_again(finished: tuple[Path, Done]) -> None:
     assert "--overwrite" in done.err
 
 
+@pytest.mark.slow
 def test_several_recordings(finished: tuple[Path, Done], tmp_path: Path) -> None:
     done = here("fit", RECORDING, SECOND, *SHORT, "-o", tmp_path / "two", "--json")
     both, one = answer(done), answer(finished[1])

@@ -174,6 +174,7 @@ def test_noise_that_is_louder_in_one_half_of_the_tank_is_found() -> None:
     assert any("mean square" in text and "x = " in text for text in findings)
 
 
+@pytest.mark.slow
 def test_several_recordings_with_holes() -> None:
     first, second = recording(200.0), recording(200.0, "second")
     lost = np.random.default_rng(7).random(first.sizes["time"]) < 0.2

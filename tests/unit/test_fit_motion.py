@@ -116,6 +116,7 @@ def test_two_recordings_are_better_than_one(track: xr.Dataset, fit: xr.Dataset) 
     assert np.abs(deviations(both)).max() < 4.0
 
 
+@pytest.mark.slow
 def test_without_angles_the_drag_is_averaged(track: xr.Dataset) -> None:
     blind = track.copy(deep=True)
     blind["theta"].values[:] = np.nan

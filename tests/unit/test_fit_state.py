@@ -174,6 +174,7 @@ def test_a_column_that_is_only_filled_is_no_orientation(track: xr.Dataset, angle
         dw.fit_motion(short, coarse_study(), angle="state")
 
 
+@pytest.mark.slow
 def test_an_angle_that_is_off_warns_of_the_lever(track: xr.Dataset) -> None:
     """Five degrees: some 0.4 mm, where the true angle gives 0.06 mm."""
     assert not any("from its centre" in one for one in warnings_in(track))

@@ -47,6 +47,7 @@ def test_only_what_is_given_is_drawn(tmp_path) -> None:
     assert [path.name for path in written] == ["outcomes.png"]
 
 
+@pytest.mark.slow
 def test_every_figure_of_a_study_is_written_the_same_each_time(study, tmp_path) -> None:
     first, again = (
         write_sensitivity_figures(
