@@ -178,14 +178,14 @@ def _drag_by_speed(check: xr.Dataset) -> Section:
 
 
 def _step_lengths(check: xr.Dataset) -> Section:
-    return _density(check, "step_length", label("step length", "m"), "density (1/m)")
+    return _density(check, "step_length", label("step length", "m"), "1/m")
 
 
 def _turning_angles(check: xr.Dataset) -> Section:
-    return _density(check, "turning_angle", label("turning angle", "rad"), "density (1/rad)")
+    return _density(check, "turning_angle", label("turning angle", "rad"), "1/rad")
 
 
-def _density(check: xr.Dataset, name: str, along: dict[str, Any], words: str) -> Section:
+def _density(check: xr.Dataset, name: str, along: dict[str, Any], unit: str) -> Section:
     if f"{name}_edge" not in check:
         reason = f"No recordings were simulated: {check.attrs.get('ks_left_out', 'left out')}."
         return empty_section("", "", reason)
@@ -196,7 +196,7 @@ def _density(check: xr.Dataset, name: str, along: dict[str, Any], words: str) ->
     band = value_of(check, "band")
     share = "" if band is None else f" and band of {percent(band)}"
     return chart(
-        "", "", None, x=along, y=label(words),
+        "", "", None, x=along, y=label("density", unit),
         series=[
             series(f"simulated: median{share}", edge, median, ends=(low, high), style="step"),
             series("recording", edge, real, style="step"),

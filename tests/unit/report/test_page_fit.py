@@ -87,8 +87,10 @@ def test_the_check_of_a_fit(sections: list[dict[str, Any]]) -> None:
     np.testing.assert_allclose(values(time["high"]) - values(time["y"]), 0.0196)
     speed = part_of(sections, "check-drag-speed")["series"][0]
     np.testing.assert_allclose(values(speed["x"]), [0.01, 0.035])
-    for name in ("step-length", "turning-angle"):
-        simulated, real = part_of(sections, f"check-{name}")["series"]
+    for name, unit in (("step-length", "1/m"), ("turning-angle", "1/rad")):
+        part = part_of(sections, f"check-{name}")
+        assert (part["y"]["label"], part["y"]["unit"]) == ("density", unit)
+        simulated, real = part["series"]
         assert values(simulated["x"]).size == values(simulated["y"]).size + 1
         assert values(simulated["low"]).tolist() == [0.9] * 6
         assert values(real["y"]).tolist() == [1.0] * 6
