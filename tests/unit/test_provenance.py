@@ -22,6 +22,7 @@ from driftwalk.core.provenance import (
     manifest,
     plain,
     read_manifest,
+    refuse_other_version,
     write_manifest,
 )
 
@@ -106,6 +107,16 @@ def test_fingerprints_differ_exactly_when_keys_do(
     one: dict[str, object], other: dict[str, object]
 ) -> None:
     assert (fingerprint_of(one) == fingerprint_of(other)) == (differing_keys(one, other) == [])
+
+
+def test_a_manifest_of_another_version_is_refused_with_both_versions() -> None:
+    refuse_other_version("run", manifest(command="demo", study={}, seeds={}, inputs={}))
+    made = {"manifest_version": 99, "software": {"driftwalk": "9.9.9"}}
+    with pytest.raises(InputError, match=r"run: .* 9\.9\.9 \(manifest version 99, .* reads 1\)"):
+        refuse_other_version("run", made)
+    for odd in ({}, {"manifest_version": "1"}, {"manifest_version": 2, "software": "1.0"}):
+        with pytest.raises(InputError, match="driftwalk of another version"):
+            refuse_other_version("run", odd)
 
 
 def test_differing_keys_are_dotted() -> None:

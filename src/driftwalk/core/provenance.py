@@ -149,6 +149,35 @@ def read_manifest(path: str | Path) -> dict[str, Any]:
     return values
 
 
+def refuse_other_version(folder: str | Path, values: Mapping[str, Any]) -> None:
+    """Refuse a run whose manifest is of another version than this one reads.
+
+    Parameters
+    ----------
+    folder : path-like
+        The run directory, for the message.
+    values : mapping
+        Its manifest.
+
+    Raises
+    ------
+    InputError
+        Names both versions.
+
+    Examples
+    --------
+    >>> refuse_other_version("run", {"manifest_version": MANIFEST_VERSION})
+    """
+    version = values.get("manifest_version")
+    if version != MANIFEST_VERSION:
+        software = values.get("software")
+        made = software.get("driftwalk") if isinstance(software, Mapping) else None
+        raise InputError(
+            f"{folder}: this run was made by driftwalk {made or 'of another version'} (manifest "
+            f"version {version}, this one reads {MANIFEST_VERSION}); open it with that version"
+        )
+
+
 def fingerprint_of(specification: Mapping[str, Any]) -> str:
     """Return the SHA-256 of a specification: everything that determines a set of numbers.
 

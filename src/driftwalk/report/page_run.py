@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import DriftwalkError, InputError
-from driftwalk.core.provenance import MANIFEST_VERSION, read_manifest
+from driftwalk.core.provenance import read_manifest, refuse_other_version
 from driftwalk.core.run_layout import MANIFEST_FILE, RECORD_FILE, State, state_of, visible
 from driftwalk.core.shards import read_specification
 
@@ -119,7 +119,7 @@ def open_run_folder(folder: Path) -> Run:
     manifest: dict[str, Any]
     if state == "finished":
         manifest = read_manifest(folder / MANIFEST_FILE)
-        _refuse_later_version(folder, manifest)
+        refuse_other_version(folder, manifest)
     else:
         stored = read_specification(folder / RECORD_FILE)
         manifest = {key: stored[key] for key in ("started_utc", "specification") if key in stored}
@@ -146,17 +146,6 @@ def read_dataset(path: Path) -> xr.Dataset:
             return dataset.load()
     except (OSError, ValueError, KeyError, RuntimeError) as error:
         raise InputError(f"{path.name} cannot be read: {error}") from error
-
-
-def _refuse_later_version(folder: Path, manifest: Mapping[str, Any]) -> None:
-    version = manifest.get("manifest_version")
-    if version != MANIFEST_VERSION:
-        software = manifest.get("software")
-        made = software.get("driftwalk") if isinstance(software, Mapping) else None
-        raise InputError(
-            f"{folder}: this run was made by driftwalk {made or 'of another version'} (manifest "
-            f"version {version}, this one reads {MANIFEST_VERSION}); open it with that version"
-        )
 
 
 def _kind_of(specification: Mapping[str, Any]) -> str | None:

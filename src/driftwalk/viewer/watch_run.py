@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import DriftwalkError, InputError, RunDirectoryError
-from driftwalk.core.provenance import MANIFEST_VERSION, read_manifest
+from driftwalk.core.provenance import read_manifest, refuse_other_version
 from driftwalk.core.run_layout import MANIFEST_FILE, RECORD_FILE, state_of
 from driftwalk.core.shards import read_specification
 from driftwalk.viewer.hub import Content, Publish, Source
@@ -205,32 +205,13 @@ def require_run(folder: Path) -> None:
         raise InputError(f"{folder}: {what}{'' if folder.exists() else 'directory'}")
     state = state_of(folder)
     if state == "finished":
-        refuse_other_version(folder)
+        refuse_other_version(folder, read_manifest(folder / MANIFEST_FILE))
     elif state == "unfinished":
         unfinished_specification(folder)
     else:
         inside = [path.name for path in sorted(folder.iterdir()) if _holds_run(path)]
         hint = f"; there are runs in it: {', '.join(inside[:MOST_NAMED])}" if inside else ""
         raise InputError(f"{folder}: this directory holds no run of driftwalk{hint}")
-
-
-def refuse_other_version(folder: Path) -> None:
-    """Refuse a finished run whose manifest is of a later version.
-
-    Raises
-    ------
-    InputError
-        Names both versions.
-    """
-    values = read_manifest(folder / MANIFEST_FILE)
-    version = values.get("manifest_version")
-    if version != MANIFEST_VERSION:
-        software = values.get("software")
-        made = software.get("driftwalk") if isinstance(software, Mapping) else None
-        raise InputError(
-            f"{folder}: this run was made by driftwalk {made or 'of another version'} (manifest "
-            f"version {version}, this one reads {MANIFEST_VERSION}); open it with that version"
-        )
 
 
 def unfinished_specification(folder: Path) -> dict[str, Any]:
