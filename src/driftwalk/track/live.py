@@ -21,6 +21,7 @@ from typing import Any, Final, NamedTuple, Self
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.opencv import require_opencv
+from driftwalk.core.provenance import finite_or_none
 from driftwalk.track.types import Image
 
 LOOPBACK: Final = "127.0.0.1"
@@ -241,7 +242,7 @@ class _Client:
 
 def json_line(content: Mapping[str, Any]) -> str:
     """Return a message as one line of JSON; a number that is not finite becomes null."""
-    return json.dumps(_finite(content), separators=(",", ":"), allow_nan=False) + "\n"
+    return json.dumps(finite_or_none(content), separators=(",", ":"), allow_nan=False) + "\n"
 
 
 def requested_width(line: bytes) -> int | None:
@@ -325,16 +326,6 @@ def nmea_frame(number: int, particles: Iterable[Particle]) -> str:
 
 def _checksum(line: str) -> int:
     return reduce(lambda total, byte: total ^ byte, line.encode("ascii"), 0)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(item) for item in value]
-    return value
 
 
 def _listen(host: str, port: int) -> socket.socket:

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import asyncio
 import json
-import math
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
+
+from driftwalk.core.provenance import finite_or_none
 
 PACED: Final = frozenset({"tank", "frame"})
 """Kinds that wait until the browser has drawn the last one."""
@@ -56,17 +57,7 @@ def to_json(content: Any) -> str:
     try:
         return json.dumps(content, separators=(",", ":"), allow_nan=False)
     except ValueError:
-        return json.dumps(_finite(content), separators=(",", ":"), allow_nan=False)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(item) for item in value]
-    return value
+        return json.dumps(finite_or_none(content), separators=(",", ":"), allow_nan=False)
 
 
 class Outbox:
