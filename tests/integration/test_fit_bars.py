@@ -66,6 +66,7 @@ def test_half_an_hour_of_the_bundled_recording(
     assert error <= most_flow
 
 
+@pytest.mark.slow
 def test_a_real_recording_comes_to_an_end(
     shared_data: Callable[[str], Path], tmp_path: Path
 ) -> None:

@@ -188,6 +188,7 @@ def test_several_recordings_with_holes() -> None:
     assert found.attrs["ks_distance"] < 0.2
 
 
+@pytest.mark.slow
 def test_without_orientations_the_errors_are_still_white() -> None:
     """Averaged over orientations the drag is wrong for a block that turns, yet leaves no memory."""
     track = recording(200.0)

@@ -92,6 +92,7 @@ def test_the_flow_is_taken_by_the_others(fit: xr.Dataset) -> None:
     assert np.isfinite(run["x"].values).all()
 
 
+@pytest.mark.slow
 def test_a_recording_with_holes_gives_the_same_within_errors(track: xr.Dataset) -> None:
     """A fifth of the samples and 100 s are missing; the rest are the same noise, so 3 sd."""
     generator = np.random.default_rng(7)
@@ -106,6 +107,7 @@ def test_a_recording_with_holes_gives_the_same_within_errors(track: xr.Dataset) 
     assert found.attrs["samples"] == np.count_nonzero(~lost)
 
 
+@pytest.mark.slow
 def test_two_recordings_are_better_than_one(track: xr.Dataset, fit: xr.Dataset) -> None:
     both = dw.fit_motion([track, recording(600.0, "second")], coarse_study())
     ratio = np.sqrt(np.diag(both["covariance"].values) / np.diag(fit["covariance"].values))

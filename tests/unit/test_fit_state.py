@@ -129,6 +129,7 @@ def test_missing_angles_are_no_errors_of_prediction(holed_fit: xr.Dataset) -> No
     assert holed_fit.attrs["chi_squared_per_dof"] == pytest.approx(1.0, abs=0.06)
 
 
+@pytest.mark.slow
 def test_turns_of_the_recorded_angle_do_not_matter(track: xr.Dataset) -> None:
     """A tracker may count turns or not, and which side of the square it follows is its own."""
     short = track.isel(time=slice(0, 1000))
