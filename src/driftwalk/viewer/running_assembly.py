@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.assemble import class_cells, outcome_distribution, world_class
-from driftwalk.simulate.backend import STATUS
+from driftwalk.assemble.dataset import BROKEN
 from driftwalk.viewer.run_shards import FinishedUnit, StoreReader, store_readers
 from driftwalk.viewer.running import NO_CELL, Section
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
 
-BROKEN: Final = STATUS["non_finite"] | STATUS["escaped"]
 NAMES: Final = {"fixed": "parameters found", "drawn": "parameters drawn"}
 """The sweeps of such a run, and what their bars are called."""
 
