@@ -1,6 +1,6 @@
 /** Reads the page that is embedded in the document and shows it. */
 
-import "./style.css";
+import "./style/index.css";
 import { PageError } from "./check";
 import { el } from "./dom";
 import { type Page, checkPage } from "./page";
