@@ -14,6 +14,7 @@ from driftwalk.assemble.distribution import is_complete, outcome_distribution
 from driftwalk.assemble.l1 import l1_in_floors, l1_noise_floor, pairwise_l1
 from driftwalk.assemble.outcome import listed_classes, sort_classes
 from driftwalk.assemble.sensitivity_axes import Axes
+from driftwalk.assemble.sensitivity_times import map_courses, reference_courses
 from driftwalk.assemble.settings import Outcomes, Settings
 from driftwalk.core.errors import InputError
 
@@ -52,7 +53,9 @@ def reference_dataset(plan: Plan, outcomes: Outcomes) -> xr.Dataset:
             "broke down; use a smaller time step"
         )
     total = dict(zip(names, count.sum(axis=0).tolist(), strict=True))
+    courses, times = reference_courses(plan, outcomes.courses)
     found = outcome_distribution(total, confidence=assembly.confidence)
+    found = found.assign_coords(times).assign(courses)
     share = count / runs[:, None]
     forces = plan.study.forces
     about = {"units": "1"}
@@ -101,6 +104,8 @@ def map_dataset(
     known = reference.reindex({"class": list(names)}, fill_value=0.0)["proportion"].values
     distance, in_floors = _distances(settings, share, runs, known, reference)
     dims = tuple(axes.values)
+    sizes = dict(zip(dims, axes.shape, strict=True))
+    courses, times = map_courses(settings.worlds[0], outcomes.courses, reference, dims=sizes)
     of_setting: dict[str, tuple[npt.NDArray[Any], str, str]] = {
         "runs": (runs, "1", "runs with an outcome"),
         "left_out": (outcomes.left_out, "1", "runs without an outcome"),
@@ -127,10 +132,12 @@ def map_dataset(
                 for name, (values, unit, words) in of_setting.items()
             },
             "reference": ("class", known, {"units": "1", "long_name": "share in the reference"}),
+            **courses,
         },
         coords={
             **axes.coordinates(),
             "class": ("class", np.array(names, dtype=object), {"long_name": "outcome class"}),
+            **times,
         },
         attrs={
             **_common_attrs(axes, settings.worlds[0]),

@@ -17,9 +17,9 @@ import numpy.typing as npt
 
 from driftwalk.assemble.address import stream_keys
 from driftwalk.assemble.dataset import BROKEN, completion_step, times_of
-from driftwalk.assemble.final_class import final_classes
+from driftwalk.assemble.events import replay_events
 from driftwalk.assemble.plan import Arrays, Plan, make_plan, simulate_rows
-from driftwalk.assemble.polyomino import Chirality
+from driftwalk.assemble.sensitivity_times import Courses, added, courses_of, courses_to_text
 from driftwalk.assemble.start import place_blocks
 from driftwalk.core.errors import DriftwalkError
 from driftwalk.core.shards import Unit, UnitT
@@ -37,6 +37,8 @@ Progress = Callable[[int, int], None]
 BLOCK_STEPS_PER_UNIT: Final = 2_000_000_000
 """Steps of single blocks in a work unit, if no run ends early: about half a minute on two
 processors, so that a kill loses no more, and enough runs at once to keep all lanes busy."""
+NUMBERS: Final = ("left_out", "first_contact_median", "completion_median")
+"""What is one number of a setting."""
 BLOCKS_AT_ONCE: Final = 1_000_000
 """Blocks of one call of the native core: about 100 MB."""
 
@@ -86,12 +88,15 @@ class Outcomes:
         Runs without an outcome.
     first_contact_median, completion_median : ndarray
         Time at which it has happened in half of the runs [s], NaN when not reached.
+    courses : list of str
+        Numbers of runs by class over time, see `driftwalk.assemble.sensitivity_times`.
     """
 
     count: list[dict[str, int]]
     left_out: Integers
     first_contact_median: Floats
     completion_median: Floats
+    courses: list[str]
 
 
 def world_plan(study: Study, flow: xr.Dataset, *, threads: int | None) -> Plan:
@@ -133,7 +138,8 @@ def simulate_settings(
         raise
     return Outcomes(
         [json.loads(text) for text in found["count"]],
-        *(found[name] for name in ("left_out", "first_contact_median", "completion_median")),
+        **{name: found[name] for name in NUMBERS},
+        courses=found["courses"].tolist(),
     )
 
 
@@ -159,16 +165,17 @@ class _Tally:
         self.left_out = 0
         self.first_contact: list[Integers] = []
         self.completion: list[Integers] = []
+        self.courses: list[Courses] = []
 
-    def add(self, found: Arrays, chirality: Chirality) -> None:
-        """Add runs, as the native core returns them."""
+    def add(self, found: Arrays, classes: Sequence[str], plan: Plan) -> None:
+        """Add runs, as `_simulate` returns them."""
         sound = (found["status"].astype(np.int64) & BROKEN) == 0
         self.left_out += int((~sound).sum())
-        names, index = final_classes(
-            found["cell"][sound], found["assembly"][sound], chirality=chirality
-        )
-        number = np.bincount(index, minlength=len(names)).tolist()
-        self.count.update(dict(zip(names, number, strict=True)))
+        occurred, number = np.unique(found["outcome"][sound], return_counts=True)
+        names = [classes[place] for place in occurred.tolist()]
+        self.count.update(dict(zip(names, number.tolist(), strict=True)))
+        step, became = (found[f"event_{what}"][sound] for what in ("step", "class"))
+        self.courses.append(courses_of(step, became, classes, plan))
         self.first_contact.append(found["first_contact_step"][sound])
         self.completion.append(completion_step(found)[sound])
 
@@ -181,12 +188,12 @@ def _compute(settings: Settings, unit: WorkUnit) -> Arrays:
         plan = settings.worlds[world]
         same = rows[settings.world[rows] == world].tolist()
         for pieces in _calls(same, plan.index.size, BLOCKS_AT_ONCE // plan.study.assembly.blocks):
-            found = _simulate(plan, settings, pieces)
+            found, classes = _simulate(plan, settings, pieces)
             begin = 0
             for piece in pieces:
                 part = slice(begin, begin + len(piece.runs))
                 mine = {name: values[part] for name, values in found.items()}
-                tally[piece.setting].add(mine, plan.study.assembly.chirality)
+                tally[piece.setting].add(mine, classes, plan)
                 begin = part.stop
     return _arrays(list(tally.values()), settings.worlds[0].study.time_step_s)
 
@@ -213,8 +220,18 @@ def _calls(settings: list[int], runs: int, most: int) -> Iterator[list[_Piece]]:
     yield group
 
 
-def _simulate(plan: Plan, settings: Settings, pieces: list[_Piece]) -> Arrays:
-    """Simulate the runs of some settings in one call."""
+def _simulate(
+    plan: Plan, settings: Settings, pieces: list[_Piece]
+) -> tuple[Arrays, tuple[str, ...]]:
+    """Simulate the runs of some settings in one call.
+
+    Returns
+    -------
+    found : dict of ndarray
+        What the native core returns, and ``event_class`` and ``outcome`` of every run.
+    classes : tuple of str
+        Names of the classes, into which these are indices.
+    """
     model = plan.model(plan.flow)
     keys = [_keys(plan, int(settings.trial[piece.setting]), piece.runs) for piece in pieces]
     start = [place_blocks(plan.study, model, own, threads=plan.threads) for own in keys]
@@ -226,7 +243,14 @@ def _simulate(plan: Plan, settings: Settings, pieces: list[_Piece]) -> Arrays:
         drag_coefficient=np.repeat(settings.drag_coefficient[chosen], length),
         force_std=np.repeat(settings.force_std[chosen], length),
     )
-    return simulate_rows(filled, np.concatenate(start), slice(None), plan.flow)
+    found = simulate_rows(filled, np.concatenate(start), slice(None), plan.flow)
+    replayed = replay_events(
+        *(found[f"event_{name}"] for name in ("count", "block", "face")),
+        **{name: found[name] for name in ("cell", "quarter", "assembly")},
+        chirality=plan.study.assembly.chirality,
+    )
+    made = {"event_class": replayed.event_class, "outcome": replayed.outcome}
+    return found | made, replayed.classes
 
 
 def _keys(plan: Plan, trial: int, runs: range) -> npt.NDArray[np.uint64]:
@@ -243,6 +267,7 @@ def _arrays(tallies: list[_Tally], time_step: float) -> Arrays:
         "count": np.array([json.dumps(tally.count) for tally in tallies], dtype=object),
         "left_out": np.array([tally.left_out for tally in tallies]),
         **{f"{name}_median": values for name, values in medians.items()},
+        "courses": np.array([courses_to_text(added(t.courses)) for t in tallies], dtype=object),
     }
 
 

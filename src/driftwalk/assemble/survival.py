@@ -114,7 +114,7 @@ def class_times(
     runs = int(sound.sum())
     if runs == 0:
         raise InputError("there is no run with an outcome: times need at least one")
-    count = _class_counts(
+    count = class_counts(
         assembly["event_time"].values[sound],
         assembly["event_class"].values[sound],
         start=names.index(all_single(assembly)),
@@ -271,7 +271,7 @@ def _reached(knot: Floats, curve: Floats) -> float:
     return float(knot[down[0]]) if down.size else float("nan")
 
 
-def _class_counts(
+def class_counts(
     event_time: Floats, event_class: Integers, *, start: int, time: Floats, classes: int
 ) -> Integers:
     """Return how many runs are in each class at each time, shape (time, class).

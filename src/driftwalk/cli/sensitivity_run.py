@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 DRAWN_AXES: Final = 2
 """Axes that a figure has; a study of more has a folder of figures for each value of the others."""
+SHARD_FORM: Final = 2
+"""What a work unit keeps of a setting; in the second form also the classes over time."""
 
 
 @dataclass(frozen=True)
@@ -238,4 +240,5 @@ def _specification(work: SensitivityWork) -> dict[str, Any]:
         "flow_sha256": dataset_hash(work.flow, ("u", "v")),
         "flows_sha256": {name: dataset_hash(flow, ("u", "v")) for name, flow in work.flows.items()},
         "sobol_samples": work.samples,
+        "shard_form": SHARD_FORM,
     }

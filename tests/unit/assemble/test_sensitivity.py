@@ -15,7 +15,6 @@ import xarray as xr
 
 import driftwalk as dw
 from driftwalk.assemble import settings as engine
-from driftwalk.assemble.final_class import final_classes
 from driftwalk.assemble.run import assemble
 from driftwalk.core.errors import InputError
 from driftwalk.core.shards import ShardStore
@@ -262,31 +261,6 @@ def test_many_blocks_list_what_occurred(reference: xr.Dataset) -> None:
         assert {n: c for n, c in seen.items() if c} == dict(counts(alone))
         occurred |= set(counts(alone))
     assert set(found["class"].values) == occurred | set(own["class"].values)
-
-
-@pytest.mark.parametrize("chirality", ["merged", "distinct"])
-def test_classes_of_many_worlds_are_those_of_one(chirality: Any) -> None:
-    """Random worlds on the lattice: assemblies grown cell by cell, anywhere and in any order."""
-    rng = np.random.default_rng(2)
-    runs, blocks = 300, 6
-    cell, label = np.zeros((runs, blocks, 2), dtype=int), np.zeros((runs, blocks), dtype=int)
-    for run in range(runs):
-        order = rng.permutation(blocks)
-        cuts = np.sort(rng.choice(np.arange(1, blocks), size=rng.integers(0, 4), replace=False))
-        for members in np.split(order, cuts):
-            taken = [tuple(rng.integers(-5, 5, size=2))]
-            while len(taken) < members.size:
-                x, y = taken[rng.integers(len(taken))]
-                dx, dy = [(1, 0), (0, 1), (-1, 0), (0, -1)][rng.integers(4)]
-                if (x + dx, y + dy) not in taken:
-                    taken.append((x + dx, y + dy))
-            cell[run, members], label[run, members] = taken, members.min()
-    names, index = final_classes(cell, label, chirality=chirality)
-    assert len(set(names)) == len(names) > 10
-    expected = [
-        dw.world_class(*world, chirality=chirality) for world in zip(cell, label, strict=True)
-    ]
-    assert [names[i] for i in index] == expected
 
 
 def test_sobol_outputs_are_the_shares(study: dw.Study) -> None:
