@@ -366,6 +366,43 @@ def test_a_tracker_is_watched(
         assert "joined" in page.locator(".events").inner_text()
 
 
+@contextlib.contextmanager
+def watched(tracker: type[socketserver.StreamRequestHandler]) -> Iterator[PageServer]:
+    """Serve the live page of a tracker of the test's own."""
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), tracker) as listening:
+        listening.daemon_threads = True
+        threading.Thread(target=listening.serve_forever, daemon=True).start()
+        with served("view", "--live", f"127.0.0.1:{listening.server_address[1]}") as server:
+            yield server
+        listening.shutdown()
+
+
+class CarelessTracker(socketserver.StreamRequestHandler):
+    """A tracker that sends one of three blocks with a number that is none, and an odd greeting."""
+
+    def handle(self) -> None:
+        good = {"seen": True, "x_m": 0.05, "y_m": 0.0, "theta_rad": 0.0}
+        bodies = [{**good, "id": "a"}, {**good, "id": "b", "x_m": "?"}, {**good, "id": "c"}]
+        hello = {"type": "hello", "format": "driftwalk live", "version": 1, "tank": "round"}
+        with contextlib.suppress(OSError):
+            self.wfile.write(json.dumps(hello).encode() + b"\n")
+            for number in itertools.count():
+                frame = {"type": "frame", "frame": number, "time_s": 0.1 * number}
+                self.wfile.write(json.dumps({**frame, "bodies": bodies}).encode() + b"\n")
+                time.sleep(0.05)
+
+
+def test_one_odd_block_does_not_cost_the_others(visit: Callable[..., Visit]) -> None:
+    with watched(CarelessTracker) as server:
+        page = visit(f"http://127.0.0.1:{server.port}/").open(server.address)
+        until_tank(page, "frames", 5)
+        assert "2 of 2" in page.locator(".live-side").inner_text()
+        assert "The tank is not drawn: 'tank'" in page.locator(".live-tank .readout").inner_text()
+        left_out = page.locator(".live-tank .fault")
+        expect(left_out).to_contain_text("frames (x_m is not a number)", timeout=10_000)
+        assert drawn_share(pixels(page.locator("canvas.tank-canvas"))) > 0.0005
+
+
 class OddTracker(socketserver.StreamRequestHandler):
     """A tracker every word of which is hostile."""
 
@@ -405,21 +442,17 @@ class OddTracker(socketserver.StreamRequestHandler):
 
 def test_the_words_of_a_tracker_are_only_text(visit: Callable[..., Visit]) -> None:
     """With the page's own policy switched off: nothing but the front end itself stands guard."""
-    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), OddTracker) as tracker:
-        tracker.daemon_threads = True
-        threading.Thread(target=tracker.serve_forever, daemon=True).start()
-        with served("view", "--live", f"127.0.0.1:{tracker.server_address[1]}") as server:
-            one = visit(f"http://127.0.0.1:{server.port}/", bypass_csp=True)
-            dialogs: list[str] = []
-            one.page.on("dialog", lambda dialog: (dialogs.append(dialog.message), dialog.dismiss()))
-            page = one.open(server.address)
-            until_tank(page, "frames", 5)
-            assert HOSTILE in page.locator("body").inner_text()
-            assert page.evaluate("[window.taken, document.title.includes('taken')]") == [
-                None,
-                False,
-            ]
-            assert page.locator("img").count() == 0
-            assert page.locator("script").count() == 2
-            assert dialogs == []
-        tracker.shutdown()
+    with watched(OddTracker) as server:
+        one = visit(f"http://127.0.0.1:{server.port}/", bypass_csp=True)
+        dialogs: list[str] = []
+        one.page.on("dialog", lambda dialog: (dialogs.append(dialog.message), dialog.dismiss()))
+        page = one.open(server.address)
+        until_tank(page, "frames", 5)
+        assert HOSTILE in page.locator("body").inner_text()
+        assert page.evaluate("[window.taken, document.title.includes('taken')]") == [
+            None,
+            False,
+        ]
+        assert page.locator("img").count() == 0
+        assert page.locator("script").count() == 2
+        assert dialogs == []

@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import time as clock
 from collections.abc import Sequence
 from typing import Any, Final
 
 from driftwalk.core.errors import InputError
 from driftwalk.viewer.hub import Content, Publish, Source
 from driftwalk.viewer.shell import page_frame
+from driftwalk.viewer.sound_frame import SoundFrames
 
 FORMAT: Final = "driftwalk live"
 VERSION: Final = 1
@@ -125,14 +127,32 @@ class LiveSource(Source):
         self._events.clear()
         self._note(hello, publish)
         await self._ask()
+        frames = SoundFrames()
         while line := await reader.readline():
-            content = stream_line(line)
-            if content is None or content.get("type") not in ("frame", "end"):
-                continue
-            self._note(self._with_events(content), publish)
+            await self._take(line, frames, publish)
+        self._say_left_out(frames, publish, last=True)
+        return None
+
+    async def _take(self, line: bytes, frames: SoundFrames, publish: Publish) -> None:
+        """Hand on what a line says, as far as it can be drawn."""
+        content = stream_line(line)
+        kind = "" if content is None else content["type"]
+        if content is None:
+            frames.note_unreadable()
+        elif kind == "end":
+            self._note(content, publish)
+        elif kind == "frame":
+            sound = frames.take(content)
+            if sound is not None:
+                self._note(self._with_events(sound), publish)
             if "jpeg_base64" in content:
                 await self._ask()
-        return None
+        self._say_left_out(frames, publish, last=kind == "end")
+
+    def _say_left_out(self, frames: SoundFrames, publish: Publish, *, last: bool = False) -> None:
+        words = frames.words(now=clock.monotonic(), last=last)
+        if words is not None:
+            self._note({"type": "note", "words": words}, publish)
 
     def _with_events(self, content: dict[str, Any]) -> dict[str, Any]:
         """Return a frame with the last events of all frames before it."""
@@ -176,11 +196,7 @@ def stream_line(line: bytes) -> dict[str, Any] | None:
     ({'type': 'end'}, None)
     """
     try:
-        content = json.loads(line, parse_constant=_refuse)
+        content = json.loads(line)
     except (ValueError, RecursionError):
         return None
     return content if isinstance(content, dict) and isinstance(content.get("type"), str) else None
-
-
-def _refuse(word: str) -> Any:
-    raise ValueError(f"{word} is no JSON")

@@ -18,7 +18,7 @@ PACED: Final = frozenset({"tank", "frame"})
 """Kinds that wait until the browser has drawn the last one."""
 REPLACED_BY: Final[dict[str, tuple[str, ...]]] = {
     "page": ("section", "state"),
-    "hello": ("frame", "lost", "end"),
+    "hello": ("frame", "lost", "end", "note"),
     "lost": ("frame",),
 }
 """Kinds that a message makes void: a page contains its sections, another stream has its frames."""

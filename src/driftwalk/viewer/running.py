@@ -37,6 +37,7 @@ NO_CELL: Final[dict[str, Any]] = dict.fromkeys(
         "density",
         "ks_step_length",
         "ks_turning_angle",
+        "over_time",
     )
 )
 """What is answered of a setting that has not been simulated."""

@@ -11,8 +11,16 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assemble import l1_distance
+from driftwalk.assemble import l1_distance, sort_classes
+from driftwalk.assemble.sensitivity_times import (
+    Courses,
+    added,
+    course_table,
+    courses_from_text,
+    kept_times,
+)
 from driftwalk.report import encode_array
+from driftwalk.report.page_sensitivity_times import over_time_part
 from driftwalk.viewer.run_shards import StoreReader, store_readers
 from driftwalk.viewer.running import NO_CELL, Section
 
@@ -52,6 +60,8 @@ class RunningSensitivity:
         self._shape = tuple(len(values) for values in self._axes.values())
         self._readers: dict[str, StoreReader] = {}
         self._count: dict[str, dict[int, Counter[str]]] = {"reference": {}, "map": {}}
+        # As text: few of the settings are ever asked for.
+        self._courses: dict[str, dict[int, bytes]] = {"reference": {}, "map": {}}
 
     def look(self) -> list[Section]:
         """Read the new shards; return the map if it has changed."""
@@ -64,6 +74,9 @@ class RunningSensitivity:
                 changed = True
                 for row, text in enumerate(unit.arrays["count"]):
                     self._count[name][unit.start + row] = Counter(json.loads(text))
+                # A run that an earlier version began keeps none.
+                for row, text in enumerate(unit.arrays.get("courses", ())):
+                    self._courses[name][unit.start + row] = text
         return self.sections() if changed else []
 
     def sections(self) -> list[Section]:
@@ -101,9 +114,35 @@ class RunningSensitivity:
             return None, f"{words}; Sobol' indices under way"
         return 0.95 * done / wanted, words
 
-    def cell(self, row: int, column: int) -> dict[str, Any]:  # noqa: ARG002
-        """Return nothing: a setting of this map keeps no excerpt."""
-        return dict(NO_CELL)
+    def cell(self, row: int, column: int) -> dict[str, Any]:
+        """Return the classes of a setting over time, beside those of the reference so far."""
+        rows, columns = ([1, 1, *self._shape])[-2:]
+        if not (0 <= row < rows and 0 <= column < columns):
+            return dict(NO_CELL)
+        text = self._courses["map"].get(row * columns + column)
+        known = added(map(courses_from_text, self._courses["reference"].values()))
+        if text is None:
+            return dict(NO_CELL)
+        return NO_CELL | {"over_time": self._over_time(courses_from_text(text), known)}
+
+    def _over_time(self, courses: Courses, known: Courses) -> dict[str, Any] | None:
+        """Return the courses of one setting as a page has those of a map of one cell."""
+        import xarray as xr
+
+        names = sort_classes({*courses, *known})
+        count = course_table(courses, names)[None, None]
+        one = xr.Dataset(
+            {
+                "count_over_time": (("y", "x", "time", "class_over_time"), count),
+                "runs": (("y", "x"), count[:, :, 0].sum(axis=-1)),
+            },
+            coords={"time": kept_times(self._study), "class_over_time": list(names)},
+        )
+        if known:
+            table = course_table(known, names)
+            share = table / table.sum(axis=1, keepdims=True)
+            one["reference_over_time"] = (("time", "class_over_time"), share)
+        return over_time_part(one, "x", "y")
 
     def _distances(self) -> npt.NDArray[np.float64]:
         """Return the l1 distance of every setting to the pooled reference, NaN where unknown."""

@@ -1,5 +1,6 @@
 /** A tracker's stream: blocks in the tank, over the video when wanted, and what they make. */
 
+import { PageError } from "../check";
 import { el } from "../dom";
 import type { Page } from "../page";
 import { facts } from "../parts";
@@ -12,7 +13,7 @@ import { onThemeChange } from "../theme";
 import { duration, fixed, quantity, whole } from "../units";
 import { checkPage } from "../page";
 import { connected } from "./connection";
-import { type Frame, type Hello, type LiveEvent, checkFrame, checkHello } from "./live_message";
+import { type Frame, type Hello, type LiveEvent, UNKNOWN, checkFrame, checkHello } from "./live_message";
 import { ShapeCounts, shapeColour } from "./shape_counts";
 import { newestWins } from "./newest";
 import { ShapeList } from "./shape_list";
@@ -45,6 +46,7 @@ export function showLive(first: Page): Promise<void> {
 class LiveStream {
   private readonly tank: TankCanvas;
   private readonly status = el("p", { class: "readout", role: "status" });
+  private readonly leftOut = el("p", { class: "fault", role: "status" });
   private readonly outcome = el("p", { class: "outcome", "aria-live": "polite" });
   private readonly numbers = el("div");
   private readonly shapes = new ShapeList(shapeColour);
@@ -83,7 +85,7 @@ class LiveStream {
       place,
       "The tank: blocks where the tracker sees them, dashed where it does not",
     );
-    place.append(this.status);
+    place.append(this.status, this.leftOut);
     now.append(el("h2", {}, "Now"), this.outcome, this.shapes.element, this.numbers);
     counted.append(el("h2", {}, "Assemblies over time"));
     this.counts = new ShapeCounts(counted);
@@ -101,15 +103,27 @@ class LiveStream {
   }
 
   receive(message: Message): void {
-    if (message.type === "hello") this.meet(checkHello(message, ""));
+    if (message.type === "hello") this.greet(message);
     else if (message.type === "frame") {
       const frame = checkFrame(message);
       this.note(frame);
       void this.schedule(frame);
-    } else if (message.type === "lost") this.say(String(message["words"] ?? "the tracker is gone"));
+    } else if (message.type === "note") this.leftOut.textContent = String(message["words"] ?? "");
+    else if (message.type === "lost") this.say(String(message["words"] ?? "the tracker is gone"));
     else if (message.type === "end") {
       const why = message["interrupted"];
       this.say(typeof why === "string" ? `The stream has ended: ${why}` : "The stream has ended.");
+    }
+  }
+
+  private greet(message: Message): void {
+    this.leftOut.textContent = "";
+    try {
+      this.meet(checkHello(message, ""));
+    } catch (error) {
+      if (!(error instanceof PageError)) throw error;
+      this.meet(UNKNOWN);
+      this.say(`The tank is not drawn: ${error.message}.`);
     }
   }
 

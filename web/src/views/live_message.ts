@@ -27,16 +27,22 @@ const image = object({
 
 const hello = object({
   source: nullable(text),
-  markers: nullable(text),
   tank: nullable(checkArena),
   block_side_m: nullable(number),
-  body_count: nullable(number),
-  observed: withDefault(flag, false),
 });
 export type Hello = ReturnType<typeof hello> & {
   readonly image: ReturnType<typeof image> | null;
   /** Why there is no video although the tracker described one. */
   readonly imageFault: string | null;
+};
+
+/** A stream of whose tank and camera nothing is known. */
+export const UNKNOWN: Hello = {
+  source: null,
+  tank: null,
+  block_side_m: null,
+  image: null,
+  imageFault: null,
 };
 
 /** Checks the first message of a stream; an image that cannot be placed costs the video only. */
@@ -69,7 +75,6 @@ const body = object({
   x_m: nullable(number),
   y_m: nullable(number),
   theta_rad: nullable(number),
-  ambiguous: nullable(number),
 });
 
 const event = object({
@@ -91,7 +96,6 @@ const frame = object({
   events: nullable(list(event)),
   latency_s: nullable(number),
   dropped_frames: nullable(number),
-  frames_lost_by_client: nullable(number),
   jpeg_base64: nullable(text),
 });
 export type Frame = Omit<ReturnType<typeof frame>, "joined"> & { readonly joined: Join[] | null };
