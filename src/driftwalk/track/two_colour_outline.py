@@ -11,10 +11,13 @@ import math
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from driftwalk.track.chroma import Weights
 from driftwalk.track.two_colour_pose import Measured
 from driftwalk.track.types import Array
+
+Whole = npt.NDArray[np.intp]
 
 _LEVEL: Final = 0.5
 _SCALE_PX: Final = 0.6
@@ -59,8 +62,7 @@ def outlined_centres(
     along = start[1] - start[0]
     first = np.array([*start.mean(axis=0), math.atan2(along[1], along[0])])
     tried = _search(points, side, first, diameter, spacing)
-    fits = [_refine(points, side, pose, diameter, spacing) for pose in tried]
-    pose, _, normal, rms = min(fits, key=lambda fit: fit[1])
+    pose, normal, rms = _refine(points, side, tried, diameter, spacing)
     half = np.array([math.cos(pose[2]), math.sin(pose[2])]) * spacing / 2
     centres = np.stack([pose[:2] - half, pose[:2] + half])
     variance = _CORRELATED * max(rms, _LEAST_STD_PX) ** 2 * np.linalg.inv(normal)
@@ -73,78 +75,112 @@ def outlined_centres(
 
 def _outline(weight: Weights, at: Array, diameter: float) -> Array:
     """Return where a colour's weight crosses half of its height, shape (n, 2)."""
-    rows, columns = np.ogrid[: weight.shape[0], : weight.shape[1]]
-    near = (columns - at[0]) ** 2 + (rows - at[1]) ** 2 < (1.2 * diameter) ** 2
+    reach = 1.2 * diameter
+    left, top = (max(math.floor(place - reach), 0) for place in at.tolist())
+    right, bottom = (math.ceil(place + reach) + 2 for place in at.tolist())
+    weight = weight[top:bottom, left:right]
+    rows, columns = weight.shape
+    across, down = np.arange(left, left + columns) - at[0], np.arange(top, top + rows) - at[1]
+    near = across**2 + (down**2)[:, None] < reach**2
     inside = weight[near & (weight > _LEVEL)]
     level = _LEVEL * (float(np.median(inside)) if inside.size else 1.0)
     over = weight > level
-    found = []
-    for axis in (0, 1):
-        low = weight[:-1] if axis == 0 else weight[:, :-1]
-        high = weight[1:] if axis == 0 else weight[:, 1:]
-        crossed = np.logical_xor(
-            *((over[:-1], over[1:]) if axis == 0 else (over[:, :-1], over[:, 1:]))
-        )
-        crossed &= near[:-1] if axis == 0 else near[:, :-1]
-        row, column = np.nonzero(crossed)
-        part = (level - low[crossed]) / (high[crossed] - low[crossed])
-        step = np.stack([column + part * axis, row + part * (1 - axis)], axis=-1)
-        found.append(step)
-    return np.concatenate(found)
+    down_row, down_column = np.nonzero((over[:-1] != over[1:]) & near[:-1])
+    along_row, along_column = np.nonzero((over[:, :-1] != over[:, 1:]) & near[:, :-1])
+    below = _part(weight, level, down_row, down_column, (1, 0))
+    beside = _part(weight, level, along_row, along_column, (0, 1))
+    found = np.empty((len(below) + len(beside), 2))
+    found[:, 0] = np.concatenate([down_column, along_column + beside])
+    found[:, 1] = np.concatenate([down_row + below, along_row])
+    return np.asarray(found + np.array([left, top]))
 
 
-def _search(
-    points: Array, side: Array, first: Array, diameter: float, spacing: float
-) -> list[Array]:
-    """Return the best poses of a grid around the first one."""
+def _part(weight: Weights, level: float, row: Whole, column: Whole, step: tuple[int, int]) -> Array:
+    """Return which part of the way from pixels to the next ones a level is reached."""
+    low, high = weight[row, column], weight[row + step[0], column + step[1]]
+    return np.asarray((level - low) / (high - low), dtype=np.float64)
+
+
+def _search(points: Array, side: Array, first: Array, diameter: float, spacing: float) -> Array:
+    """Return the best poses of a grid around the first one, shape (n, 3)."""
     shift = _SHIFTS * diameter
-    grid = np.stack(np.meshgrid(shift, shift, _TURNS, indexing="ij"), axis=-1).reshape(-1, 3)
-    poses = first + grid
-    reach = side[None, :] * spacing
-    column = points[None, :, 0] - poses[:, None, 0] - reach * np.cos(poses[:, None, 2])
-    row = points[None, :, 1] - poses[:, None, 1] - reach * np.sin(poses[:, None, 2])
+    turned = first[2] + _TURNS[:, None]
+    # Shifts along columns and along rows apart: a distance takes one sum a pose and point. Single
+    # precision is plenty to find where to begin.
+    column = (points[:, 0] - first[0] - side * spacing * np.cos(turned)).astype(np.float32)
+    row = (points[:, 1] - first[1] - side * spacing * np.sin(turned)).astype(np.float32)
+    moved = shift.astype(np.float32)[:, None, None]
+    across, down = (column - moved) ** 2, (row - moved) ** 2
     # A coarse grid is searched with a coarse scale.
-    cost = _cost(np.hypot(column, row) - diameter / 2, 2.0 * _SCALE_PX)[0].sum(axis=1)
-    return list(poses[np.argsort(cost)[:_STARTS]])
-
-
-def _cost(beyond: Array, scale: float) -> tuple[Array, Array]:
-    """Return cost and weight of points at a distance beyond their circle [px]."""
-    square = (beyond / scale) ** 2
-    limit = np.where(beyond > 0.0, _OUTSIDE, 1.0)
-    return limit * square / (limit + square), (limit / (limit + square)) ** 2
+    scale = 2.0 * _SCALE_PX
+    beyond = across[:, None] + down
+    np.sqrt(beyond, out=beyond)
+    beyond -= np.float32(diameter / 2)
+    beyond *= np.float32(1.0 / scale)
+    limit = np.where(beyond > 0.0, np.float32(_OUTSIDE), np.float32(1.0))
+    beyond *= beyond
+    cost = limit * beyond
+    beyond += limit
+    cost /= beyond
+    best = np.argsort(cost.sum(axis=-1), axis=None)[:_STARTS]
+    i, j, k = np.unravel_index(best, cost.shape[:-1])
+    return np.asarray(first + np.stack([shift[i], shift[j], _TURNS[k]], axis=-1))
 
 
 def _refine(
-    points: Array, side: Array, pose: Array, diameter: float, spacing: float
-) -> tuple[Array, float, Array, float]:
-    """Return the pose of least cost near one, its cost, normal matrix and residual [px]."""
+    points: Array, side: Array, poses: Array, diameter: float, spacing: float
+) -> tuple[Array, Array, float]:
+    """Return the pose of least cost near some, its normal matrix and its residual [px].
+
+    All are moved together, each until it stands still.
+    """
+    poses = poses.copy()
+    costs = np.empty(len(poses))
+    normals, residuals = np.empty((len(poses), 3, 3)), np.empty(len(poses))
+    steadied = np.diag([1e-3, 1e-3, 1e-3 * spacing**2])
+    moving = np.arange(len(poses))
+    lever = side * spacing
     for step in range(_ROUNDS):
         scale = _SCALE_PX * max(2.0 - step / 3.0, 1.0)
-        cos, sin = math.cos(pose[2]), math.sin(pose[2])
-        away = points - pose[:2] - side[:, None] * spacing * np.array([cos, sin])
-        radius = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-6)
+        pose = poses[moving]
+        cos, sin = np.cos(pose[:, 2:]), np.sin(pose[:, 2:])
+        out = np.empty((len(moving), 3, len(points)))
+        out[:, 0] = points[:, 0] - pose[:, :1] - lever * cos
+        out[:, 1] = points[:, 1] - pose[:, 1:2] - lever * sin
+        radius = np.maximum(np.sqrt(out[:, 0] ** 2 + out[:, 1] ** 2), 1e-6)
         beyond = radius - diameter / 2
-        cost, weight = _cost(beyond, scale)
-        out = away / radius[:, None]
-        turn = side * spacing * (-sin * out[:, 0] + cos * out[:, 1])
-        slopes = np.column_stack([out, turn])
-        normal = slopes.T @ (slopes * weight[:, None]) + np.diag([1e-3, 1e-3, 1e-3 * spacing**2])
-        change = np.linalg.solve(normal, slopes.T @ (weight * beyond))
-        change *= min(1.0, 0.1 * diameter / max(float(np.abs(change[:2]).max()), 1e-9))
-        change[2] = min(max(change[2], -0.15), 0.15)
-        pose = pose + change
-        if scale == _SCALE_PX and np.abs(change).max() < 1e-3:
-            break
-    rms = math.sqrt(float((weight * beyond**2).sum() / max(weight.sum(), 1e-9)))
-    return pose, float(cost.sum()), normal, rms
+        out[:, :2] /= radius[:, None]
+        out[:, 2] = lever * (cos * out[:, 1] - sin * out[:, 0])
+        square = (beyond / scale) ** 2
+        limit = np.where(beyond > 0.0, _OUTSIDE, 1.0)
+        held = limit / (limit + square)
+        weight = held**2
+        pulled = out * weight[:, None]
+        normal = pulled @ out.transpose(0, 2, 1) + steadied
+        change = np.linalg.solve(normal, pulled @ beyond[..., None])[..., 0]
+        furthest = np.maximum(np.abs(change[:, :2]).max(axis=1), 1e-9)
+        change *= np.minimum(1.0, 0.1 * diameter / furthest)[:, None]
+        change[:, 2] = np.clip(change[:, 2], -0.15, 0.15)
+        poses[moving] = pose + change
+        costs[moving], normals[moving] = (held * square).sum(axis=1), normal
+        residuals[moving] = (weight * beyond**2).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-9)
+        if scale == _SCALE_PX:
+            moving = moving[np.abs(change).max(axis=1) >= 1e-3]
+            if not len(moving):
+                break
+    best = int(np.argmin(costs))
+    return poses[best], normals[best], math.sqrt(float(residuals[best]))
 
 
 def _shares(weights: list[Weights], centres: Array, diameter: float) -> Array:
     """Return how much of each disc is seen."""
+    reach = diameter / 2 + 1.0
     seen = []
-    for weight, centre in zip(weights, centres, strict=True):
-        rows, columns = np.ogrid[: weight.shape[0], : weight.shape[1]]
-        disc = np.hypot(columns - centre[0], rows - centre[1]) < diameter / 2 + 1.0
-        seen.append(float(np.count_nonzero(disc & (weight > _LEVEL))))
+    for weight, (column, row) in zip(weights, centres.tolist(), strict=True):
+        left, top = max(math.floor(column - reach), 0), max(math.floor(row - reach), 0)
+        around = weight[top : math.ceil(row + reach) + 1, left : math.ceil(column + reach) + 1]
+        rows, columns = around.shape
+        across, down = np.arange(left, left + columns) - column, np.arange(top, top + rows) - row
+        disc = across**2 + (down**2)[:, None] < reach**2
+        seen.append(float(np.count_nonzero(disc & (around > _LEVEL))))
     return np.array(seen) / (math.pi * diameter**2 / 4.0)
