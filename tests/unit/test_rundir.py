@@ -181,6 +181,17 @@ def test_leftovers_of_a_killed_finish_are_removed(tmp_path: Path) -> None:
     assert visible(tmp_path / "run") == ["manifest.json"]
 
 
+def test_a_figure_half_written_by_a_killed_run_is_removed(tmp_path: Path) -> None:
+    """It would stay with the results for ever, and stand in the manifest."""
+    leave_unfinished(tmp_path / "run")
+    (tmp_path / "run" / "figures").mkdir()
+    (tmp_path / "run" / "figures" / ".map.driftwalk-partial-1-ab.svg").write_text("<svg")
+    finish(tmp_path / "run")
+    assert [path.name for path in (tmp_path / "run" / "figures").iterdir()] == ["map.svg"]
+    files = read_manifest(tmp_path / "run" / "manifest.json")["files"]
+    assert [file["path"] for file in files] == ["calibration.nc", "figures/map.svg"]
+
+
 def test_stores_of_one_run_are_apart(tmp_path: Path) -> None:
     with RunDirectory(tmp_path / "run", specification=SPECIFICATION) as run:
         coarse = run.store("coarse")

@@ -83,6 +83,13 @@ def visible_files(path: Path) -> Iterator[Path]:
             yield entry
 
 
+def remove_leftovers(path: Path) -> None:
+    """Remove the temporary files that a killed run left among its results, subfolders included."""
+    remove_partials(path)
+    for folder in (entry for entry in visible(path) if entry.is_dir()):
+        remove_partials(folder)
+
+
 def lock_folder(path: Path) -> BaseFileLock:
     """Take the lock of a folder, which the system opens when the process ends in any way."""
     from filelock import FileLock, Timeout

@@ -35,6 +35,7 @@ from driftwalk.core.run_layout import (
     lock_folder,
     move_aside,
     refuse_foreign,
+    remove_leftovers,
     remove_traces,
     state_of,
     visible_files,
@@ -199,7 +200,7 @@ class RunDirectory:
     def _take_over(self) -> None:
         """Decide what to do with what is there; called with the lock held."""
         complete_move(self.path)
-        remove_partials(self.path)
+        remove_leftovers(self.path)
         state = state_of(self.path)
         if state == "finished":
             # What a kill in `finish` may have left; the manifest says that it is not needed.
