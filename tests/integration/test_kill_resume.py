@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from signals_at_units import after_units, go_on, halted
 
 import driftwalk
 from driftwalk.core.provenance import read_manifest
@@ -23,7 +24,7 @@ UNITS = 24
 
 # A run with two sweeps, the second depending on the first, as a calibration's refinement does.
 PROGRAM = f"""
-import sys, time
+import os, signal, sys, time
 sys.path.insert(0, {SOURCE!r})
 import numpy as np
 from concurrent.futures import ThreadPoolExecutor
@@ -31,9 +32,13 @@ from driftwalk.core.errors import DriftwalkError
 from driftwalk.core.rundir import RunDirectory
 from driftwalk.sweep import grid, run_sweep
 
+INTERRUPTED_AT = None
+
 
 def function(unit):
     time.sleep(PAUSE_S)
+    if unit.start == INTERRUPTED_AT:
+        os.kill(os.getpid(), signal.SIGINT)
     rows = [np.random.default_rng([SEED, i]).normal(size=64) for i in range(unit.start, unit.stop)]
     return {{"x": np.array(rows) * unit.settings["scale"][:, None]}}
 
@@ -55,10 +60,7 @@ def compute(path, seed, mode="resume", pause_s=0.0, threads=0, units={UNITS}):
 """
 
 # SIGINT is set because a program started in the background inherits that it is ignored.
-COMMAND = (
-    PROGRAM
-    + """
-import signal
+MAIN = """
 signal.signal(signal.SIGINT, signal.default_int_handler)
 path, seed, mode, pause_s, threads = sys.argv[1:]
 try:
@@ -69,7 +71,7 @@ except DriftwalkError as error:
     print(error, file=sys.stderr)
     sys.exit(2)
 """
-)
+COMMAND = PROGRAM + MAIN
 
 
 def start(
@@ -96,14 +98,6 @@ def shards(path: Path) -> list[Path]:
     return sorted((path / ".shards" / "coarse").glob("0*.npz"))
 
 
-def wait_for_shards(path: Path, count: int, process: subprocess.Popen[str]) -> None:
-    deadline = time.monotonic() + 60
-    while len(shards(path)) < count:
-        assert process.poll() is None, process.communicate()[1]
-        assert time.monotonic() < deadline, "the run makes no progress"
-        time.sleep(0.002)
-
-
 def results(path: Path) -> dict[str, bytes]:
     return {name: (path / name).read_bytes() for name in ("trajectory.bin", "figures/refined.bin")}
 
@@ -120,19 +114,20 @@ def test_killed_twice_and_resumed(
     tmp_path: Path, uninterrupted: dict[str, bytes], threads: int
 ) -> None:
     path = tmp_path / "run"
-    for count in (5, 11):
-        process = start(path, pause_s=0.01, threads=threads)
-        wait_for_shards(path, count, process)
-        process.send_signal(signal.SIGKILL)
+    for more in (5, 6):
+        killed = PROGRAM + after_units(signal.SIGKILL, more) + MAIN
+        process = start(path, pause_s=0.01, threads=threads, program=killed)
         assert end(process)[0] == -signal.SIGKILL
         assert state_of(path) == "unfinished"
     kept = {shard: shard.stat().st_mtime_ns for shard in shards(path)}
-    assert 11 <= len(kept) < UNITS
-    # Slow enough that the shards can be seen while they are there.
-    process = start(path, pause_s=0.01, threads=threads)
-    wait_for_shards(path, len(kept) + 1, process)
-    assert {s: s.stat().st_mtime_ns for s in shards(path) if s in kept} == kept
-    assert end(process) == (0, "")
+    assert len(kept) == 11
+    # At its last unit all shards can be seen; after it they are joined and go.
+    halting = PROGRAM + after_units(signal.SIGSTOP, UNITS - len(kept)) + MAIN
+    with halted(start(path, pause_s=0.01, threads=threads, program=halting)) as process:
+        assert len(shards(path)) == UNITS
+        assert {s: s.stat().st_mtime_ns for s in shards(path) if s in kept} == kept
+        go_on(process)
+        assert end(process) == (0, "")
     assert results(path) == uninterrupted
     assert sorted(p.name for p in path.iterdir()) == [
         ".lock",
@@ -146,12 +141,13 @@ def test_killed_twice_and_resumed(
 def test_interrupt_loses_nothing(
     tmp_path: Path, uninterrupted: dict[str, bytes], threads: int
 ) -> None:
+    """Ctrl-C in the sixth unit; with two threads the one before it may be under way too."""
     path = tmp_path / "run"
-    process = start(path, pause_s=0.02, threads=threads)
-    wait_for_shards(path, 4, process)
-    process.send_signal(signal.SIGINT)
+    interrupted = f"{PROGRAM}\nINTERRUPTED_AT = 10\n{MAIN}"
+    process = start(path, pause_s=0.02, threads=threads, program=interrupted)
     assert end(process) == (130, "")
-    assert len(shards(path)) >= 4
+    kept = len(shards(path))
+    assert kept >= 4 if threads else kept == 5
     assert end(start(path, threads=threads)) == (0, "")
     assert results(path) == uninterrupted
 
@@ -160,19 +156,17 @@ def test_second_process_is_refused_and_the_first_unharmed(
     tmp_path: Path, uninterrupted: dict[str, bytes]
 ) -> None:
     path = tmp_path / "run"
-    first = start(path, pause_s=0.04)
-    wait_for_shards(path, 1, first)
     # Halted, it cannot be done before the others have started, however slow the machine.
-    first.send_signal(signal.SIGSTOP)
-    for mode in ("resume", "overwrite"):
-        code, errors = end(start(path, mode=mode))
-        assert code == 2
-        assert errors.splitlines() == [
-            f"{path} is in use by another process; wait until it is done or choose another "
-            "directory"
-        ]
-    first.send_signal(signal.SIGCONT)
-    assert end(first) == (0, "")
+    with halted(start(path, program=PROGRAM + after_units(signal.SIGSTOP, 1) + MAIN)) as first:
+        for mode in ("resume", "overwrite"):
+            code, errors = end(start(path, mode=mode))
+            assert code == 2
+            assert errors.splitlines() == [
+                f"{path} is in use by another process; wait until it is done or choose another "
+                "directory"
+            ]
+        go_on(first)
+        assert end(first) == (0, "")
     assert results(path) == uninterrupted
 
 
@@ -211,10 +205,7 @@ def test_disk_that_fills_in_the_middle(tmp_path: Path, uninterrupted: dict[str, 
 
 def test_damaged_shards_are_computed_again(tmp_path: Path, uninterrupted: dict[str, bytes]) -> None:
     path = tmp_path / "run"
-    process = start(path, pause_s=0.01)
-    wait_for_shards(path, 6, process)
-    process.kill()
-    end(process)
+    assert end(start(path, program=PROGRAM + after_units(signal.SIGKILL, 6) + MAIN))[0] < 0
     cut, changed, emptied = shards(path)[:3]
     cut.write_bytes(cut.read_bytes()[:-100])
     content = bytearray(changed.read_bytes())
@@ -328,10 +319,7 @@ def test_results_are_the_numbers(uninterrupted: dict[str, bytes]) -> None:
 
 def test_manifest_of_a_resumed_run(tmp_path: Path) -> None:
     path = tmp_path / "run"
-    process = start(path, pause_s=0.01)
-    wait_for_shards(path, 2, process)
-    process.kill()
-    end(process)
+    assert end(start(path, program=PROGRAM + after_units(signal.SIGKILL, 2) + MAIN))[0] < 0
     assert end(start(path)) == (0, "")
     values = read_manifest(path / "manifest.json")
     assert values["seeds"] == {"calibration": 1}
