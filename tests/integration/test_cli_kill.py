@@ -11,7 +11,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -30,21 +29,12 @@ from command_line import (
     refusal,
     start,
 )
+from signals_at_units import after_units, go_on, halted
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
 # Figures take most of the time of a short run, and come after everything that resumes.
 PLAIN = "import driftwalk.report\ndriftwalk.report.write_figures = lambda *a, **k: []\n"
-# A moment after every finished unit, so that a test can see it and act in it.
-SLOW = """
-import time
-from driftwalk.core import shards
-write = shards.ShardStore.write
-def slow(self, unit, arrays):
-    write(self, unit, arrays)
-    time.sleep(0.25)
-shards.ShardStore.write = slow
-"""
 
 
 @pytest.fixture(scope="module")
@@ -76,14 +66,6 @@ def shards(folder: Path) -> dict[Path, int]:
     return {path: path.stat().st_mtime_ns for path in folder.glob(".shards/*/[0-9]*.npz")}
 
 
-def wait_for_shards(folder: Path, count: int, process: subprocess.Popen[str]) -> None:
-    deadline = time.monotonic() + 300
-    while len(shards(folder)) < count:
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline, "the run makes no progress"
-        time.sleep(0.005)
-
-
 def assert_whole(folder: Path, expected: xr.Dataset) -> None:
     assert_same_bits(calibration(folder), expected)
     assert json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["files"]
@@ -93,18 +75,17 @@ def assert_whole(folder: Path, expected: xr.Dataset) -> None:
 
 def test_interrupted_and_continued(study: Path, uninterrupted: xr.Dataset, tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    process = start(*words(study, folder), before=PLAIN + SLOW)
-    wait_for_shards(folder, 2, process)
-    process.send_signal(signal.SIGINT)
-    done = end(process)
+    done = apart(*words(study, folder), before=PLAIN + after_units(signal.SIGINT, 2))
     assert (done.code, done.out, done.err) == (130, "", "driftwalk: interrupted\n")
     kept = shards(folder)
-    assert len(kept) >= 2
-    process = start(*words(study, folder), before=PLAIN + SLOW)
-    wait_for_shards(folder, len(kept) + 1, process)
-    # What had been finished is not computed again.
-    assert {path: shards(folder)[path] for path in kept} == kept
-    assert end(process).code == 0
+    assert len(kept) == 2
+    halting = PLAIN + after_units(signal.SIGSTOP, 1)
+    with halted(start(*words(study, folder), before=halting)) as process:
+        assert len(shards(folder)) == 3
+        # What had been finished is not computed again.
+        assert {path: shards(folder)[path] for path in kept} == kept
+        go_on(process)
+        assert end(process).code == 0
     assert_whole(folder, uninterrupted)
 
 
@@ -113,17 +94,16 @@ def test_killed_at_several_moments(study: Path, uninterrupted: xr.Dataset, tmp_p
     folder = tmp_path / "run"
     count = 0
     for more in (1, 2, 3):
-        process = start(*words(study, folder), before=PLAIN + SLOW)
-        wait_for_shards(folder, count + more, process)
-        process.kill()
-        assert end(process).code == -signal.SIGKILL
-        count = len(shards(folder))
+        killed = PLAIN + after_units(signal.SIGKILL, more)
+        assert apart(*words(study, folder), before=killed).code == -signal.SIGKILL
+        count += more
+        assert len(shards(folder)) == count
         assert not (folder / "manifest.json").exists()
     assert apart(*words(study, folder), before=PLAIN).code == 0
     assert_whole(folder, uninterrupted)
 
 
-# Kills itself before the n-th change of the file system under the run directory.
+# Kills itself before the n-th change of the file system, in the run directory or a part of it.
 KILL = """
 import os, signal, sys
 left = {count}
@@ -164,13 +144,11 @@ def test_killed_between_any_two_changes(
 def test_killed_while_the_figures_are_drawn(
     study: Path, uninterrupted: xr.Dataset, tmp_path: Path
 ) -> None:
+    """Killed before the folder of figures is changed for the fifth time, amid a figure."""
     folder = tmp_path / "run"
-    process = start(*words(study, folder))
-    while not list(folder.glob("figures/steps*")):
-        assert process.poll() is None, process.communicate()
-        time.sleep(0.01)
-    process.kill()
-    end(process)
+    killed = KILL.format(count=4, folder=str(folder / "figures"))
+    assert apart(*words(study, folder), before=killed).code == -signal.SIGKILL
+    assert 0 < len(list(folder.glob("figures/*"))) < 14
     assert apart(*words(study, folder)).code == 0
     assert len(list(folder.glob("figures/*"))) == 14
     assert_whole(folder, uninterrupted)
@@ -179,16 +157,14 @@ def test_killed_while_the_figures_are_drawn(
 @pytest.mark.slow
 def test_two_processes_at_once(study: Path, uninterrupted: xr.Dataset, tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    first = start(*words(study, folder), before=PLAIN + SLOW)
-    wait_for_shards(folder, 1, first)
+    halting = PLAIN + after_units(signal.SIGSTOP, 1)
     # Halted, it holds the folder for as long as the others need, however busy the machine.
-    first.send_signal(signal.SIGSTOP)
-    for more in ([], ["--overwrite"]):
-        line = refusal(apart(*words(study, folder), *more, before=PLAIN))
-        assert f"{folder} is in use by another process" in line
-    assert first.poll() is None
-    first.send_signal(signal.SIGCONT)
-    assert end(first).code == 0
+    with halted(start(*words(study, folder), before=halting)) as first:
+        for more in ([], ["--overwrite"]):
+            line = refusal(apart(*words(study, folder), *more, before=PLAIN))
+            assert f"{folder} is in use by another process" in line
+        go_on(first)
+        assert end(first).code == 0
     assert_whole(folder, uninterrupted)
 
 
@@ -197,10 +173,8 @@ def test_other_parameters_do_not_continue_a_run(
     study: Path, uninterrupted: xr.Dataset, tmp_path: Path
 ) -> None:
     folder = tmp_path / "run"
-    process = start(*words(study, folder), before=PLAIN + SLOW)
-    wait_for_shards(folder, 2, process)
-    process.kill()
-    end(process)
+    killed = PLAIN + after_units(signal.SIGKILL, 2)
+    assert apart(*words(study, folder), before=killed).code == -signal.SIGKILL
     before = contents(folder)
     line = refusal(here(*words(study, folder), "--seed", "2"))
     assert "seed" in line
