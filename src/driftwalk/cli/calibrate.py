@@ -93,7 +93,6 @@ def calibrate(
     from driftwalk.cli.calibration_run import Work, run_calibration
     from driftwalk.cli.tank import require_inside, study_in_arena
     from driftwalk.flow import load_flow
-    from driftwalk.model import Tank
 
     overrides = study_overrides(
         keys=CALIBRATION_KEYS,
@@ -114,7 +113,8 @@ def calibrate(
     )
     chosen = resolve_study(study, overrides, keys=CALIBRATION_KEYS)
     unsaid = study is None and tank_diameter is None and how.arena is None
-    trajectory = load_for_run(recording, chosen, how, tank="unsaid" if unsaid else "stated")
+    loaded = load_for_run(recording, chosen, how, tank="unsaid" if unsaid else "stated")
+    trajectory = loaded.trajectory
     require_motion(trajectory, recording, body=how.body)
     chosen = study_in_arena(chosen, trajectory)
     require_inside(chosen, trajectory, how.body)
@@ -125,7 +125,7 @@ def calibrate(
     if flow is not None:
         given = load_flow(flow, arena=chosen.tank.to_arena(), own_flags="keep")
     remark = None
-    if unsaid and chosen.tank == Tank():
+    if not loaded.has_tank:
         remark = f"the tank is the default study's, a {chosen.tank.describe()}"
     work = Work(trajectory, chosen, given, how.body, inputs, threads, remark)
     found = run_calibration(work, out, overwrite=overwrite)

@@ -119,7 +119,6 @@ def fit(
     """
     from driftwalk.cli.fit_run import FitWork, run_fit
     from driftwalk.cli.tank import require_inside, study_in_arena
-    from driftwalk.model import Tank
 
     overrides = study_overrides(
         keys=FIT_KEYS,
@@ -137,16 +136,16 @@ def fit(
     )
     chosen = resolve_study(study, overrides, keys=FIT_KEYS)
     unsaid = study is None and tank_diameter is None and how.arena is None
-    trajectories = []
+    loaded = []
     for path in recordings:
-        one = load_for_run(path, chosen, how, tank="unsaid" if unsaid else "stated")
-        require_motion(one, path, body=how.body)
-        trajectories.append(one)
+        loaded.append(load_for_run(path, chosen, how, tank="unsaid" if unsaid else "stated"))
+        require_motion(loaded[-1].trajectory, path, body=how.body)
+    trajectories = [one.trajectory for one in loaded]
     chosen = study_in_arena(chosen, trajectories[0])
     for one in trajectories:
         require_inside(chosen, one, how.body)
     remark = None
-    if unsaid and chosen.tank == Tank():
+    if not loaded[0].has_tank:
         remark = f"the tank is the default study's, a {chosen.tank.describe()}"
     inputs = {"recording" if n == 0 else f"recording-{n + 1}": p for n, p in enumerate(recordings)}
     inputs.update({"study": study} if study is not None else {})

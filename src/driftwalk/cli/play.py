@@ -138,5 +138,5 @@ def _recording(
 
     if path is not None:
         how = RecordingOptions(body=body)
-        return load_for_run(path, study, how, tank="unsaid" if bundled else "stated")
+        return load_for_run(path, study, how, tank="unsaid" if bundled else "stated").trajectory
     return tank30_recording() if bundled else None

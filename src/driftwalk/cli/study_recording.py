@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from driftwalk.cli.recording_options import RecordingOptions
 
@@ -45,9 +45,16 @@ def load_with_study(path: Path, study: Study, how: RecordingOptions) -> xr.Datas
     return trajectory
 
 
+class RunRecording(NamedTuple):
+    """A recording for a run, and whether anything but the default study says its tank."""
+
+    trajectory: xr.Dataset
+    has_tank: bool
+
+
 def load_for_run(
     path: Path, study: Study, how: RecordingOptions, *, tank: Literal["stated", "unsaid"]
-) -> xr.Dataset:
+) -> RunRecording:
     """Load a recording; where nobody said the tank, an arena that the file itself holds is used.
 
     Parameters
@@ -62,8 +69,8 @@ def load_for_run(
     if tank == "unsaid" and path.suffix.lower() == ".nc":
         own = load_with_study(path, apply_overrides(study, {"recording.arena": "file"}), how)
         if "arena" in own.attrs:
-            return own
-    return load_with_study(path, study, how)
+            return RunRecording(own, has_tank=True)
+    return RunRecording(load_with_study(path, study, how), has_tank=tank == "stated")
 
 
 def completed(how: RecordingOptions, study: Study) -> RecordingOptions:
