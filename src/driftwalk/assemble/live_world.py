@@ -58,6 +58,8 @@ class _Wishes(NamedTuple):
 
     study: Study
     flow_scale: float
+    part: bool = False
+    """Whether what is joined then is to be parted."""
 
 
 class LiveTank:
@@ -67,8 +69,11 @@ class LiveTank:
     run 0 of `assembly_path` with the same seed, bit for bit, in whatever pieces it is advanced. It
     goes on when all blocks have become one assembly, and has no end.
 
-    `advance` does not hold the interpreter lock, and another thread may read the state and call
-    `set` meanwhile: it sees what was there before.
+    Everything may be called from several threads at once. `advance`, `part`, `events` and `restart`
+    wait for each other. `set` and the properties do not wait for them, and `advance` does not hold
+    the interpreter lock: while it runs, other threads see the state before it. No change is lost
+    when several threads call `set` at once. Each property is read on its own, though: when another
+    thread advances in between, `x` and `y` are those of two moments.
 
     Parameters
     ----------
@@ -111,6 +116,8 @@ class LiveTank:
         plan = make_plan(study, flow, settings={"blocks": blocks, "seed": seed}, index=np.arange(1))
         self._flow = flow
         self._lock = Lock()
+        # Never held while the world advances. Where both are held, this one is taken second.
+        self._wishes_lock = Lock()
         self._wishes = _Wishes(plan.study, 1.0)
         self._model = plan.model(flow)
         self.restart(start=start)
@@ -130,11 +137,10 @@ class LiveTank:
         InputError
             As the class.
         """
-        with self._lock:
+        with self._lock, self._wishes_lock:
             plan = make_plan(
                 self._wishes.study, self._flow, settings={"seed": seed}, index=np.arange(1)
             )
-            self._wishes = self._active = _Wishes(plan.study, self._wishes.flow_scale)
             rules, forces = plan.study.assembly, plan.study.forces
             self._world = _core.LiveWorld(
                 self._model,
@@ -149,6 +155,7 @@ class LiveTank:
                 block_restitution=rules.block_restitution,
                 block_friction=rules.block_friction,
             )
+            self._wishes = self._active = _Wishes(plan.study, self._wishes.flow_scale)
             self._set_forces()
             self._steps_per_interval = round(forces.force_interval_s / plan.study.time_step_s)
             self._due = 0.0
@@ -200,6 +207,7 @@ class LiveTank:
         latching: Latching | None = None,
         hidden_face_drag: HiddenFaceDrag | None = None,
         blocks: int | None = None,
+        part: bool = False,
     ) -> None:
         """Change parameters from the next force interval on; None leaves one as it is.
 
@@ -212,13 +220,16 @@ class LiveTank:
         flow_scale : float
             Factor on the velocity of the water, from 0 (still water); 1 at first.
         latching : {"collision", "connector", "none"}
-            How blocks latch from then on. What is joined stays so, even with "none": see `part`.
+            How blocks latch from then on. What is joined stays so, even with "none", unless it is
+            parted.
         hidden_face_drag : {"none", "full"}
             Drag on faces that are joined.
         blocks : int
             Number of blocks. The last ones are removed; what is left of their assemblies goes on as
             it was moving, as several where it no longer hangs together. New ones come to rest at
             random free places; those for which there is none yet wait (`waiting`).
+        part : bool
+            Whether all assemblies are parted into their blocks at that moment, as by `part`.
 
         Raises
         ------
@@ -235,13 +246,14 @@ class LiveTank:
             "assembly.blocks": blocks,
         }
         overrides = {key: value for key, value in given.items() if value is not None}
-        study = apply_overrides(self._wishes.study, overrides)
-        require_room(study)
-        if flow_scale is None:
-            flow_scale = self._wishes.flow_scale
-        if not 0.0 <= flow_scale < math.inf:
-            raise InputError(f"flow_scale must be a finite number from 0 on, got {flow_scale}")
-        self._wishes = _Wishes(study, float(flow_scale))
+        with self._wishes_lock:
+            wishes = self._wishes
+            study = apply_overrides(wishes.study, overrides)
+            require_room(study)
+            scale = wishes.flow_scale if flow_scale is None else flow_scale
+            if not 0.0 <= scale < math.inf:
+                raise InputError(f"flow_scale must be a finite number from 0 on, got {scale}")
+            self._wishes = _Wishes(study, float(scale), part or wishes.part)
 
     def part(self) -> None:
         """Part all assemblies into their blocks, which move on as they did.
@@ -344,11 +356,17 @@ class LiveTank:
 
     def _fulfil(self) -> None:
         """Give the world what is wished, at the beginning of a force interval."""
-        before, self._active = self._active, self._wishes
-        if before is not self._active:
+        with self._wishes_lock:
+            wished = self._wishes
+            changed = wished is not self._active
+            self._wishes = self._active = wished._replace(part=False) if wished.part else wished
+        if changed:
             self._set_forces()
             rules = self._active.study.assembly
             self._world.set_rules(latching=rules.latching, hidden_face_drag=rules.hidden_face_drag)
+        if wished.part:
+            self._world.part()
+            self._look()
         if self._active.study.assembly.blocks != self.blocks:
             self._world.set_blocks(self._active.study.assembly.blocks)
             self._look()

@@ -145,7 +145,8 @@ def controls_section(knobs: Mapping[str, Knob], values: Mapping[str, Any]) -> di
         "id": "controls",
         "kind": "controls",
         "title": "Settings",
-        "note": "A change holds from the next draw of the stochastic force on.",
+        "note": "A change holds from the next draw of the stochastic force on. Without latching, "
+        "what is joined parts too.",
         "items": [knob.item(values[name]) for name, knob in knobs.items()],
     }
 

@@ -131,6 +131,7 @@ class PlaySource(Source):
         self._wishes_lock = threading.Lock()
         self._watched = threading.Event()
         self._over = threading.Event()
+        self._picture = self._tank_message()
 
     def stream_to(self, stream: Stream) -> None:
         """Publish the tank in the form of a tracker's stream too.
@@ -152,7 +153,7 @@ class PlaySource(Source):
 
     def greeting(self) -> Sequence[Content]:
         """Return the page, the tank and the density."""
-        return [{"type": "page", "page": self._page()}, self._tank_message()]
+        return [{"type": "page", "page": self._page()}, self._picture]
 
     async def run(self, publish: Publish) -> None:
         """Advance the tank in a thread of its own, and compare its motion in another."""
@@ -212,7 +213,8 @@ class PlaySource(Source):
                 publish({"type": "note", "words": str(error)})
 
     def _change(self, name: str, value: Any) -> None:
-        self.tank.set(**{name: value})
+        # Without latching nothing would hold together: whoever turns it off wants to see that.
+        self.tank.set(**{name: value}, part=name == "latching" and value == "none")
         self._motion.clear()
 
     def _act(self, name: str) -> None:
@@ -245,7 +247,9 @@ class PlaySource(Source):
                 # Not while a knob is turned: it would be turned back under the user's hand.
                 self._settled = math.inf
                 publish({"type": "section", "section": self._controls()})
-            publish(self._tank_message())
+            # Whoever comes gets this one: only this thread can look at the tank between two steps.
+            self._picture = self._tank_message()
+            publish(self._picture)
             self._publish_line(began)
             self._over.wait(max(began + FRAME_S - clock.perf_counter(), 0.0))
 

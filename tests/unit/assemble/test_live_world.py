@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import threading
+import time
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -267,6 +269,78 @@ def test_switching_latching_off_parts_nothing_and_part_parts_all() -> None:
     tank.part()
     tank.advance(0.5)
     assert tank.events()
+
+
+def test_parting_with_a_change_waits_for_it_and_nothing_latches_again() -> None:
+    study = tank_study(forces={"force_std_N": 0.0, "force_interval_s": 0.04})
+    tank = dw.LiveTank(study, STILL, blocks=4, start=row(4, gap=-1e-10))
+    tank.advance(0.02)
+    tank.set(latching="none", part=True)
+    # A later change does not undo what is still to come.
+    tank.set(drag_coefficient=0.5)
+    tank.advance(0.02)
+    assert tank.outcome == "I"
+    tank.events()
+    tank.advance(0.01)
+    assert (tank.outcome, tank.events()) == ("1+1+1+1", [])
+    # It happens once: from then on what latches stays together.
+    tank.set(latching="connector")
+    tank.advance(0.5)
+    assert (tank.outcome, len(tank.events())) == ("I", 3)
+    tank.set(drag_coefficient=0.6)
+    tank.advance(0.5)
+    assert (tank.outcome, tank.events()) == ("I", [])
+
+
+def test_no_change_is_lost_when_two_threads_make_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both look at what is wanted before either has changed it, if nothing keeps them apart."""
+    from driftwalk.model import apply_overrides
+
+    def slow(*given: Any) -> Any:
+        found = apply_overrides(*given)
+        time.sleep(0.05)
+        return found
+
+    tank = dw.LiveTank(tank_study(), STILL, blocks=2)
+    monkeypatch.setattr("driftwalk.model.apply_overrides", slow)
+    changes: list[Callable[[], None]] = [
+        lambda: tank.set(drag_coefficient=0.77),
+        lambda: tank.set(force_std=3e-4),
+        lambda: tank.set(flow_scale=2.0),
+        lambda: tank.set(blocks=5),
+        lambda: tank.restart(seed=9),
+        lambda: tank.advance(0.5),
+    ]
+    threads = [threading.Thread(target=change) for change in changes]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    wanted = tank.study
+    assert (wanted.forces.drag_coefficient, wanted.forces.force_std_N) == (0.77, 3e-4)
+    assert (tank.flow_scale, wanted.assembly.blocks, wanted.assembly.seed) == (2.0, 5, 9)
+    tank.advance(0.1)
+    assert tank.blocks + tank.waiting == 5
+
+
+def test_a_change_does_not_wait_for_an_advance() -> None:
+    study = tank_study(forces={"force_std_N": 1e-3})
+    tank = dw.LiveTank(study, swirl(study), blocks=4)
+    thread = threading.Thread(target=tank.advance, args=(400.0,))
+    thread.start()
+    tank.set(flow_scale=2.0)
+    assert thread.is_alive()
+    assert tank.flow_scale == 2.0
+    thread.join()
+
+
+def test_a_restart_that_is_refused_loses_no_change() -> None:
+    tank = dw.LiveTank(tank_study(forces={"force_std_N": 0.0}), STILL, blocks=2, start=START[:2])
+    tank.set(force_std=1e-3)
+    with pytest.raises(InputError):
+        tank.restart(start=[(0.0, 0.0)])
+    tank.advance(0.1)
+    assert np.abs(tank.vx).min() > 0.0
 
 
 def test_what_is_left_of_an_assembly_is_one_or_several() -> None:

@@ -339,6 +339,43 @@ def test_every_corner_of_the_knobs_has_a_picture_and_a_density(change: dict[str,
     assert shares.sum() == pytest.approx(1.0 if sent[1]["steps"] else 0.0)
 
 
+def test_latching_off_parts_what_is_joined_and_says_so() -> None:
+    source = PlaySource(dw.apply_overrides(exact(), {"forces.force_std_N": 1e-3}), STILL, blocks=12)
+    while source.tank.outcome.count("+") > 8:
+        source.tank.advance(1.0)
+    assert "parts" in source._controls()["note"]
+    source._set("latching", "none")
+    source._fulfil(lambda content: pytest.fail(str(content)))
+    source._advance(0.5, until=math.inf)
+    assert source.tank.outcome == "+".join(12 * ["1"])
+    source._advance(20.0, until=math.inf)
+    assert source.tank.outcome == "+".join(12 * ["1"])
+
+
+def test_whoever_comes_gets_a_picture_of_one_moment() -> None:
+    """A greeting is asked for while another thread moves the tank: as many x as angles."""
+    source = PlaySource(Study(), STILL, blocks=2)
+    source.watched(1)
+
+    async def run() -> None:
+        heard: list[Any] = []
+        task = asyncio.create_task(source.run(heard.append))
+        sent = []
+        for number in range(400):
+            blocks = {"type": "set", "name": "blocks", "value": 2 + 20 * (number % 2)}
+            await source.receive(blocks, heard.append)
+            sent.append(source.greeting()[1])
+            await asyncio.sleep(0.002)
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        pictures = [content for content in heard if content["type"] == "tank"]
+        assert len({len(one["x"]) for one in sent}) > 1
+        # It is one of those that all have seen, not another look in the middle of a step.
+        assert all(one in [sent[0], *pictures] for one in sent)
+
+    asyncio.run(run())
+
+
 def test_real_time_is_kept() -> None:
     async def run() -> tuple[float, float]:
         source = PlaySource(Study(), STILL, blocks=2)
