@@ -5,16 +5,15 @@ from __future__ import annotations
 import json
 import shutil
 import signal
-import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import FLOW, Done, end, here, refusal, start
+from command_line import FLOW, Done, apart, end, here, refusal, start
+from signals_at_units import after_units, go_on, halted
 
 import driftwalk as dw
 
@@ -113,35 +112,27 @@ def test_killed_and_continued_with_another_number_of_processes(
     sent: signal.Signals, truth: Path, finished: tuple[Path, Done], tmp_path: Path
 ) -> None:
     folder = tmp_path / "run"
-    process = start(*words(truth, folder, "--threads", "2"))
-    wait_for_shards(folder, 2, process)
-    process.send_signal(sent)
-    done = end(process)
+    done = apart(*words(truth, folder, "--threads", "2"), before=after_units(sent, 2))
     if sent is signal.SIGINT:
         assert (done.code, done.out) == (130, "")
         assert done.err.endswith("driftwalk: interrupted\n")
         assert "Traceback" not in done.err
     assert not (folder / "manifest.json").exists()
     kept = shards(folder)
-    assert 2 <= len(kept) < 6
-    process = start(*words(truth, folder, "--threads", "1"))
-    wait_for_shards(folder, len(kept) + 1, process)
-    # What had been finished is not computed again.
-    assert {path: shards(folder)[path] for path in kept} == kept
-    assert end(process).code == 0
+    # Ctrl-C keeps what the other process had just finished too.
+    assert len(kept) == 2 or (sent is signal.SIGINT and 2 < len(kept) < 6)
+    halting = after_units(signal.SIGSTOP, 1)
+    with halted(start(*words(truth, folder, "--threads", "1"), before=halting)) as process:
+        # What had been finished is not computed again.
+        assert {path: shards(folder)[path] for path in kept} == kept
+        assert len(shards(folder)) == len(kept) + 1
+        go_on(process)
+        assert end(process).code == 0
     assert_same_numbers(recovery(folder), recovery(finished[0]))
 
 
 def shards(folder: Path) -> dict[Path, int]:
     return {path: path.stat().st_mtime_ns for path in folder.glob(".shards/*/[0-9]*.npz")}
-
-
-def wait_for_shards(folder: Path, count: int, process: subprocess.Popen[str]) -> None:
-    deadline = time.monotonic() + 300
-    while len(shards(folder)) < count:
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline, "the run makes no progress"
-        time.sleep(0.005)
 
 
 def test_people_read_a_table_of_random_flows_without_orientation(tmp_path: Path) -> None:
