@@ -9,9 +9,7 @@ import hashlib
 import json
 import shutil
 import signal
-import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -25,11 +23,10 @@ from command_line import (
     apart,
     assert_same_bits,
     contents,
-    end,
     here,
     refusal,
-    start,
 )
+from signals_at_units import after_units
 
 CLASSES = ["I", "O", "T", "S", "L", "I3+1", "L3+1", "2+2", "2+1+1", "1+1+1+1"]
 REQUIRED = {"proportions", "intervals", "complete", "runs"}
@@ -287,33 +284,18 @@ def test_a_finished_run_is_kept_until_overwrite(calibrated: Path, tmp_path: Path
     assert [len(list(folder.glob("*.nc"))) for folder in moved] == [6]
 
 
-# Small units, and a moment after each, so that a test can see it and act in it.
-SLOW = """
-import time
+# Small units, without figures.
+SMALL = """
 import driftwalk.report
 import driftwalk.assemble.run
-from driftwalk.core import shards
 driftwalk.report.write_assembly_figures = lambda *folders, **datasets: []
 driftwalk.assemble.run.BLOCKS_PER_UNIT = 100
 driftwalk.assemble.run.FEWEST_RUNS_PER_UNIT = 1
-write = shards.ShardStore.write
-def slow(self, unit, arrays):
-    write(self, unit, arrays)
-    time.sleep(0.2)
-shards.ShardStore.write = slow
 """
 
 
 def shards(folder: Path) -> dict[Path, int]:
     return {path: path.stat().st_mtime_ns for path in folder.glob(".shards/*/[0-9]*.npz")}
-
-
-def wait_for_shards(folder: Path, count: int, process: subprocess.Popen[str]) -> None:
-    deadline = time.monotonic() + 120
-    while len(shards(folder)) < count:
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline, "the run makes no progress"
-        time.sleep(0.005)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
@@ -324,21 +306,16 @@ def test_killed_interrupted_and_continued(
     """Killed among the fixed runs, interrupted among the drawn ones: the same bits in the end."""
     folder = tmp_path / "run"
     words = ["assemble", calibrated, *SIZE, "--json", "-o", folder]
-    process = start(*words, before=SLOW)
-    wait_for_shards(folder, 2, process)
-    process.kill()
-    assert end(process).code == -signal.SIGKILL
+    killed = apart(*words, before=SMALL + after_units(signal.SIGKILL, 2))
+    assert killed.code == -signal.SIGKILL
     first = shards(folder)
-    process = start(*words, before=SLOW)
-    wait_for_shards(folder, 4, process)
-    process.send_signal(signal.SIGINT)
-    done = end(process)
+    done = apart(*words, before=SMALL + after_units(signal.SIGINT, 2))
     assert (done.code, done.out, done.err) == (130, "", "driftwalk: interrupted\n")
     kept = shards(folder)
     assert {path: kept[path] for path in first} == first
     other = refusal(here(*words, "--seed", "2"))
     assert "seed" in other
-    done = apart(*words, before=SLOW)
+    done = apart(*words, before=SMALL)
     assert done.code == 0, done.err
     assert json.loads(done.out) == json.loads(whole[1].out)
     for name in (*RESULTS, *DRAWN):
