@@ -10,7 +10,6 @@ import json
 import shutil
 import signal
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +24,10 @@ from command_line import (
     apart,
     assert_same_bits,
     contents,
-    end,
     here,
     refusal,
-    start,
 )
+from signals_at_units import after_units
 
 SIZE = ["--blocks", "3", "--runs", "15", "--realisations", "3", "--duration", "60s"]
 MAP = ["--vary", "drag-coefficient=0.2:1:0.4", "--vary", "force-std=0.2mN,1mN"]
@@ -270,33 +268,18 @@ def test_an_unfinished_run_whose_units_keep_less_is_refused(
     assert here(*words, "--overwrite").code == 0
 
 
-# One setting per unit, and a moment after each, so that a test can see it and act in it.
-SLOW = """
-import time
+# One setting per unit, without figures.
+SMALL = """
 import driftwalk.report
 from driftwalk.assemble import settings
-from driftwalk.core import shards
 driftwalk.report.write_assembly_figures = lambda *folders, **datasets: []
 driftwalk.report.write_sensitivity_figures = lambda *folders, **datasets: []
 settings.BLOCK_STEPS_PER_UNIT = 1
-write = shards.ShardStore.write
-def slow(self, unit, arrays):
-    write(self, unit, arrays)
-    time.sleep(0.2)
-shards.ShardStore.write = slow
 """
 
 
 def shards(folder: Path) -> dict[Path, int]:
     return {path: path.stat().st_mtime_ns for path in folder.glob(".shards/*/[0-9]*.npz")}
-
-
-def wait_for_shards(folder: Path, count: int, process: Any) -> None:
-    deadline = time.monotonic() + 120
-    while len(shards(folder)) < count:
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline, "the run makes no progress"
-        time.sleep(0.005)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
@@ -306,20 +289,15 @@ def test_killed_interrupted_and_continued(
     """Killed in the reference, interrupted in the map: the same bits in the end."""
     folder = tmp_path / "run"
     words = ["sensitivity", calibrated, *SIZE, *MAP, "--json", "-o", folder]
-    process = start(*words, before=SLOW)
-    wait_for_shards(folder, 2, process)
-    process.kill()
-    assert end(process).code == -signal.SIGKILL
+    killed = apart(*words, before=SMALL + after_units(signal.SIGKILL, 2))
+    assert killed.code == -signal.SIGKILL
     first = shards(folder)
-    process = start(*words, before=SLOW)
-    wait_for_shards(folder, 5, process)
-    process.send_signal(signal.SIGINT)
-    done = end(process)
+    done = apart(*words, before=SMALL + after_units(signal.SIGINT, 3))
     assert (done.code, done.out, done.err) == (130, "", "driftwalk: interrupted\n")
     kept = shards(folder)
     assert {path: kept[path] for path in first} == first
     assert "seed" in refusal(here(*words, "--seed", "2"))
-    done = apart(*words, before=SLOW)
+    done = apart(*words, before=SMALL)
     assert done.code == 0, done.err
     assert done.out == whole[1].out
     for name in ("reference.nc", "sensitivity.nc", "components.nc"):
