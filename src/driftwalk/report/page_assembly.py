@@ -12,13 +12,13 @@ from driftwalk.report.page_classes import class_times_section, classes_section
 from driftwalk.report.page_parts import (
     Section,
     attempt,
-    empty_section,
+    empty_head,
     figure,
+    head_sections,
     require,
     required,
     section,
     value_of,
-    warnings_section,
 )
 from driftwalk.report.page_replay import replay_section
 from driftwalk.report.page_words import count, percent, quantity
@@ -66,18 +66,16 @@ def assembly_sections(
     ['empty']
     """
     if distribution is None:
-        made = [empty_section("summary", "What was found", "There are no outcomes yet.")]
+        made = empty_head("There are no outcomes yet.")
     else:
         found = {FOUND: distribution}
         found |= {} if distribution_drawn is None else {DRAWN: distribution_drawn}
         if len(found) == 1:
             found = {"runs": distribution}
-        made = attempt(
-            "summary",
-            "What was found",
+        made = head_sections(
             lambda: assembly_summary(distribution, distribution_drawn, class_times, assembly),
+            lambda: _left_out(found),
         )
-        made.append(warnings_section(_left_out(found)))
         made += attempt("classes", "What the blocks built", lambda: classes_section(found))
     if class_times is not None:
         made += attempt(

@@ -14,16 +14,17 @@ from driftwalk.report.page_parts import (
     SIMULATED,
     Section,
     attempt,
+    empty_head,
     empty_section,
     estimate,
     figure,
+    head_sections,
     is_simulated,
     require,
     required,
     section,
     texts_of,
     value_of,
-    warnings_section,
 )
 from driftwalk.report.page_recording import Noise, recording_sections
 from driftwalk.report.page_words import count, quantity, with_interval
@@ -66,14 +67,12 @@ def calibration_sections(
     >>> [part["kind"] for part in calibration_sections(None)]
     ['empty']
     """
-    made: list[Section] = []
     noise = None
     if calibration is None:
-        made.append(empty_section("summary", "What was found", "There is no calibration yet."))
+        made = empty_head("There is no calibration yet.")
     else:
-        made += attempt("summary", "What was found", lambda: calibration_summary(calibration))
-        made += attempt(
-            "warnings", "Warnings", lambda: warnings_section(texts_of(calibration, "warnings"))
+        made = head_sections(
+            lambda: calibration_summary(calibration), lambda: texts_of(calibration, "warnings")
         )
         noise = _noise(calibration)
     if recording is not None:

@@ -11,16 +11,16 @@ from driftwalk.report.page_flow import flow_sections
 from driftwalk.report.page_parts import (
     SIMULATED,
     Section,
-    attempt,
+    empty_head,
     empty_section,
     estimate,
     figure,
+    head_sections,
     is_simulated,
     required,
     section,
     texts_of,
     value_of,
-    warnings_section,
 )
 from driftwalk.report.page_recording import Noise, recording_sections
 from driftwalk.report.page_words import count, percent, quantity, with_interval
@@ -59,13 +59,11 @@ def fit_sections(
     >>> [part["kind"] for part in fit_sections(None)]
     ['empty']
     """
-    made: list[Section] = []
     noise = None
     if fit is None:
-        made.append(empty_section("summary", "What was found", "There is no fit yet."))
+        made = empty_head("There is no fit yet.")
     else:
-        made += attempt("summary", "What was found", lambda: fit_summary(fit, check))
-        made += attempt("warnings", "Warnings", lambda: warnings_section(_warnings(fit, check)))
+        made = head_sections(lambda: fit_summary(fit, check), lambda: _warnings(fit, check))
         noise = _noise(fit)
     for number_of, recording in enumerate(recordings, start=1):
         parts = recording_sections(recording, body=body, noise=noise)

@@ -24,6 +24,7 @@ _ARENA_KEYS: Final = {
     "rectangle": ("width_m", "height_m"),
     "polygon": ("vertices_m",),
 }
+FOUND_TITLE: Final = "What was found"
 SIMULATED: Final = "The recording was simulated: it is no measurement."
 
 
@@ -53,6 +54,21 @@ def attempt(id: str, title: str, make: Callable[[], Section | list[Section]]) ->
     except DriftwalkError as error:
         return [empty_section(id, title, str(error))]
     return made if isinstance(made, list) else [made]
+
+
+def head_sections(
+    summary: Callable[[], Section], warnings: Callable[[], Sequence[str]]
+) -> list[Section]:
+    """Return what the page of every kind of run begins with: what was found, and its warnings."""
+    return [
+        *attempt("summary", FOUND_TITLE, summary),
+        *attempt("warnings", "Warnings", lambda: warnings_section(warnings())),
+    ]
+
+
+def empty_head(reason: str) -> list[Section]:
+    """Return what stands there while nothing has been found, and why."""
+    return [empty_section("summary", FOUND_TITLE, reason)]
 
 
 def require(dataset: xr.Dataset, *names: str) -> None:

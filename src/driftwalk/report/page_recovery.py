@@ -12,13 +12,13 @@ from driftwalk.report.page_chart import chart, label, mark, series
 from driftwalk.report.page_parts import (
     Section,
     attempt,
-    empty_section,
+    empty_head,
     figure,
+    head_sections,
     require,
     required,
     section,
     value_of,
-    warnings_section,
 )
 from driftwalk.report.page_words import count, percent, quantity
 
@@ -61,13 +61,11 @@ def recovery_sections(recovery: xr.Dataset | None) -> list[Section]:
     ['empty']
     """
     if recovery is None:
-        return [empty_section("summary", "What was found", "There are no estimates yet.")]
+        return empty_head("There are no estimates yet.")
     missing = [name for name in COORDINATES if name not in recovery.variables]
     if missing:
-        reason = f"the recovery holds no {', '.join(missing)}"
-        return [empty_section("summary", "What was found", reason)]
-    made = attempt("summary", "What was found", lambda: recovery_summary(recovery))
-    made += attempt("warnings", "Warnings", lambda: warnings_section(_warnings(recovery)))
+        return empty_head(f"the recovery holds no {', '.join(missing)}")
+    made = head_sections(lambda: recovery_summary(recovery), lambda: _warnings(recovery))
     made += attempt("errors", "Errors and intervals", lambda: errors_section(recovery))
     made += attempt("by-length", "Error by length", lambda: by_length_section(recovery))
     for name, (_, _, words) in PARAMETERS.items():

@@ -12,12 +12,13 @@ from driftwalk.report.page_classes import classes_section
 from driftwalk.report.page_parts import (
     Section,
     attempt,
+    empty_head,
     empty_section,
     figure,
+    head_sections,
     require,
     section,
     value_of,
-    warnings_section,
 )
 from driftwalk.report.page_settings import l1_sections, setting_sections
 from driftwalk.report.page_sobol import sobol_section
@@ -57,15 +58,12 @@ def sensitivity_sections(
     >>> [part["kind"] for part in sensitivity_sections()]
     ['empty']
     """
-    made: list[Section] = []
     if sensitivity is None:
-        reason = "The map of settings is not there yet."
-        made.append(empty_section("summary", "What was found", reason))
+        made = empty_head("The map of settings is not there yet.")
     else:
-        made += attempt(
-            "summary", "What was found", lambda: sensitivity_summary(sensitivity, reference)
+        made = head_sections(
+            lambda: sensitivity_summary(sensitivity, reference), lambda: _warnings(sensitivity)
         )
-        made += attempt("warnings", "Warnings", lambda: warnings_section(_warnings(sensitivity)))
         made += attempt("l1", "Distance to the reference", lambda: l1_sections(sensitivity))
         made += attempt("medians", "Over the settings", lambda: setting_sections(sensitivity))
     if reference is not None:
