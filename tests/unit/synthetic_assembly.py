@@ -223,6 +223,23 @@ def _study(axes: dict[str, np.ndarray], blocks: int, chirality: str) -> xr.Datas
     )  # fmt: skip
 
 
+def with_courses(study: xr.Dataset, *, samples: int = 11) -> xr.Dataset:
+    """Return a `sensitivity` with its classes over time, each setting at a pace of its own."""
+    runs = study["runs"].values[..., None, None]
+    pace = np.linspace(0.2, 3.0, study["runs"].size).reshape(runs.shape)
+    time = np.linspace(0.0, 300.0, samples)
+    joined = 1.0 - np.exp(-pace * time[:, None] / 60.0)
+    count = np.round(runs * study["proportion"].values[..., None, :] * joined).astype(np.int32)
+    count[..., -1] += (runs[..., 0] - count.sum(axis=-1)).astype(np.int32)
+    share = study["reference"].values * joined[(0,) * (joined.ndim - 2)]
+    share[:, -1] += 1.0 - share.sum(axis=1)
+    dims = ("time", "class_over_time")
+    return study.assign(
+        count_over_time=((*study["runs"].dims, *dims), count),
+        reference_over_time=(dims, share),
+    ).assign_coords(time=time, class_over_time=study["class"].values)
+
+
 def components(study: xr.Dataset) -> xr.Dataset:
     """Return the `components` of a study, by singular value decomposition."""
     share = study["proportion"].values

@@ -2,6 +2,7 @@
 
 import type { Numbers } from "./arrays";
 import { ClassColours } from "./colours";
+import type { OverTime } from "./page";
 
 /** What is kept of one setting of a map. */
 export interface CellExcerpt {
@@ -11,6 +12,8 @@ export interface CellExcerpt {
   readonly density: Numbers | null;
   readonly ksStepLength: number | null;
   readonly ksTurningAngle: number | null;
+  /** Its outcome classes, as of a map of one cell. */
+  readonly overTime: OverTime | null;
 }
 
 export interface Context {

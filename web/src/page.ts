@@ -204,6 +204,16 @@ const classTimes = object({
   ),
 });
 
+/** Classes of the settings of a map over time; a live page asks for those of one setting at a time. */
+const overTime = object({
+  time: numbers,
+  classes: list(text),
+  cells: withDefault(list(polyominoes), []),
+  count: numbers,
+  runs: numbers,
+  reference: nullable(numbers),
+});
+
 const l1Map = object({
   ...base,
   x: axis,
@@ -215,6 +225,7 @@ const l1Map = object({
   classes: withDefault(list(text), []),
   cells: withDefault(list(polyominoes), []),
   shares: nullable(numbers),
+  over_time: nullable(overTime),
 });
 
 const biplot = object({
@@ -283,7 +294,7 @@ const arrows = object({ x: numbers, y: numbers, u: numbers, v: numbers });
 /** The tank of the playground. */
 const tank = object({ ...base, arena: nullable(arena), side: number, flow: nullable(arrows) });
 
-export { tank as checkTank, controls as checkControls };
+export { tank as checkTank, controls as checkControls, overTime as checkOverTime };
 export type Arena = Checked<typeof arena>;
 export type Polyominoes = Checked<typeof polyominoes>;
 export type SummarySection = Checked<typeof summary>;
@@ -295,6 +306,7 @@ export type LinesSection = Checked<typeof lines>;
 export type ImageGridSection = Checked<typeof imageGrid>;
 export type ClassesSection = Checked<typeof classes>;
 export type ClassTimesSection = Checked<typeof classTimes>;
+export type OverTime = Checked<typeof overTime>;
 export type L1MapSection = Checked<typeof l1Map>;
 export type BiplotSection = Checked<typeof biplot>;
 export type ReplaySection = Checked<typeof replay>;

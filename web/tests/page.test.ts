@@ -46,6 +46,18 @@ test("a section that is wrong says where", () => {
   assert.equal(map.cells, null);
 });
 
+test("a map of outcomes may have its classes over time, or none", () => {
+  const axis = { name: "a", label: "a", unit: "1", values: [1] };
+  const head = { id: "m", kind: "l1_map", title: "Map", x: axis, y: axis, value: [[0.5]], label: "l1" };
+  assert.equal(SECTIONS.l1_map(head, "").over_time, null);
+  const kept = { time: [0, 1], classes: ["2"], count: [[[[0, 3]]]], runs: [[3]] };
+  assert.equal(SECTIONS.l1_map({ ...head, over_time: kept }, "").over_time?.reference, null);
+  assert.throws(
+    () => SECTIONS.l1_map({ ...head, over_time: { ...kept, runs: "3" } }, ""),
+    /'over_time.runs' is not an object: got "3"/,
+  );
+});
+
 test("text stays text, whatever it looks like", () => {
   const hostile = "<img src=x onerror=alert(1)>";
   const section = SECTIONS.summary(

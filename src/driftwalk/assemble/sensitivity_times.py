@@ -11,12 +11,13 @@ import numpy.typing as npt
 
 from driftwalk.assemble.dataset import DECIMALS, times_of
 from driftwalk.assemble.outcome import class_name, sort_classes
+from driftwalk.assemble.plan import Plan, whole_steps
 from driftwalk.assemble.survival import class_counts
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.assemble.plan import Plan
+    from driftwalk.model import Study
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -31,9 +32,9 @@ OTHER: Final = "other"
 DIMS: Final = ("time", "class_over_time")
 
 
-def kept_times(plan: Plan) -> Floats:
+def kept_times(study: Study) -> Floats:
     """Return the times of the grid [s]: from 0 to the end of the runs, rounded as events are."""
-    last = float(times_of(np.array(plan.steps), time_step=plan.study.time_step_s))
+    last = float(times_of(np.array(whole_steps(study)), time_step=study.time_step_s))
     return np.round(np.linspace(0.0, last, TIMES), DECIMALS)
 
 
@@ -60,7 +61,7 @@ def courses_of(
         times_of(np.asarray(event_step), time_step=plan.study.time_step_s),
         event_class.astype(np.int64),
         start=list(classes).index(_all_single(plan)),
-        time=kept_times(plan),
+        time=kept_times(plan.study),
         classes=len(classes),
     )
     occurred = np.flatnonzero(count.any(axis=0)).tolist()
@@ -102,7 +103,7 @@ def time_coordinates(plan: Plan, names: Sequence[str]) -> dict[str, Any]:
     about = {"units": "s", "long_name": "time from the start of the run"}
     classes = {"long_name": "outcome class"}
     return {
-        "time": ("time", kept_times(plan), about),
+        "time": ("time", kept_times(plan.study), about),
         "class_over_time": ("class_over_time", np.array(names, dtype=object), classes),
     }
 
@@ -146,7 +147,7 @@ def map_courses(
     ranked = sorted(sort_classes(largest), key=lambda name: -largest[name])
     names = sort_classes(ranked[:MOST_CLASSES])
     listed = (*names, OTHER) if len(ranked) > len(names) else names
-    count = np.stack([_table(courses_from_text(text), listed) for text in texts])
+    count = np.stack([course_table(courses_from_text(text), listed) for text in texts])
     shape = (*dims.values(), TIMES, len(listed))
     variables: dict[str, Any] = {
         "count_over_time": (
@@ -156,7 +157,7 @@ def map_courses(
         )
     }
     if known:
-        table = _table(known, listed)
+        table = course_table(known, listed)
         about = {"units": "1", "long_name": "share in the reference at this time"}
         variables["reference_over_time"] = (DIMS, table / table.sum(axis=1, keepdims=True), about)
     return variables, time_coordinates(plan, listed)
@@ -166,8 +167,8 @@ def _all_single(plan: Plan) -> str:
     return class_name(["1"] * plan.study.assembly.blocks)
 
 
-def _table(courses: Courses, listed: Sequence[str]) -> Integers:
-    """Return courses as numbers of runs by time and class, shape (time, class)."""
+def course_table(courses: Courses, listed: Sequence[str]) -> Integers:
+    """Return courses as numbers of runs, shape (time, class); "other" at the end is the rest."""
     nobody = np.zeros(TIMES, dtype=np.int64)
     table = np.stack([courses.get(name, nobody) for name in listed], axis=1)
     if listed[-1] == OTHER:
@@ -178,7 +179,7 @@ def _table(courses: Courses, listed: Sequence[str]) -> Integers:
 def _known_courses(plan: Plan, reference: xr.Dataset) -> Courses:
     """Return the courses of a reference, none where it does not say or has other times."""
     if "count_over_time" not in reference or not np.array_equal(
-        reference["time"].values, kept_times(plan)
+        reference["time"].values, kept_times(plan.study)
     ):
         return {}
     names = [str(name) for name in reference["class_over_time"].values]

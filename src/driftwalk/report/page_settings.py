@@ -23,6 +23,7 @@ from driftwalk.report.page_axes import (
 from driftwalk.report.page_chart import chart, label, mark, series
 from driftwalk.report.page_classes import cells_of
 from driftwalk.report.page_parts import Section, section, value_of
+from driftwalk.report.page_sensitivity_times import over_time_part, with_fewer_times
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,7 +51,7 @@ def l1_sections(sensitivity: xr.Dataset) -> list[Section]:
     """
     require_axes(sensitivity)
     made: list[Section] = []
-    for number_of, (words, part) in enumerate(_slices(sensitivity)):
+    for number_of, (words, part) in enumerate(_slices(with_fewer_times(sensitivity))):
         if number_of == MOST_SLICES:
             made[-1]["note"] += " More are in the file."
             break
@@ -118,6 +119,7 @@ def _l1_map(part: xr.Dataset, x: str, y: str, id: str, title: str) -> Section:
         classes=shown,
         cells=[cells_of(name) for name in shown],
         shares=shares,
+        over_time=over_time_part(part, x, y),
     )  # fmt: skip
 
 

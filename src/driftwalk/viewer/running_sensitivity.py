@@ -130,6 +130,8 @@ class RunningSensitivity:
         import xarray as xr
 
         names = sort_classes({*courses, *known})
+        if not names:
+            return None
         count = course_table(courses, names)[None, None]
         one = xr.Dataset(
             {

@@ -17,6 +17,7 @@ from synthetic_assembly import (
     components,
     distribution,
     sensitivity,
+    with_courses,
 )
 from synthetic_calibration import bundled_recording, synthetic_calibration
 
@@ -45,7 +46,7 @@ def with_excerpts(calibration: xr.Dataset) -> xr.Dataset:
     )
 
 
-STUDY = sensitivity(points=(3, 3))
+STUDY = with_courses(sensitivity(points=(3, 3)))
 RECORDING = bundled_recording(rows=100)
 CASES: dict[str, tuple[xr.Dataset, Callable[[xr.Dataset], list[dict[str, Any]]]]] = {
     "calibration": (

@@ -21,6 +21,7 @@ from driftwalk.core.shards import ShardStore
 from driftwalk.model import Study
 from driftwalk.sweep import grid
 from driftwalk.viewer.run_shards import StoreReader
+from driftwalk.viewer.running_sensitivity import RunningSensitivity
 from driftwalk.viewer.shell import page_frame
 from driftwalk.viewer.watch_run import RunSource
 
@@ -253,6 +254,62 @@ def test_sensitivity_fills_its_map(tmp_path: Path) -> None:
         assert section["x"]["name"] == "force_std"
         assert section["y"]["values"] == [0.2, 0.3]
         assert page(source)["state"]["words"] == "6 of 8 settings"
+
+
+def test_a_setting_of_a_running_sensitivity_has_its_classes_over_time(tmp_path: Path) -> None:
+    """Cells and values against the shards by hand; nothing of a setting that is not there yet."""
+    chosen = {
+        "assembly.blocks": 2,
+        "assembly.duration_s": 50.0,
+        "sensitivity.latching": ["collision", "none"],
+        "sensitivity.drag_coefficient": [0.2, 0.3],
+        "sensitivity.force_std_N": [1e-4, 2e-4, 3e-4],
+        "sensitivity.reference_realisations": 2,
+    }
+    study = dw.apply_overrides(Study(), chosen)
+    specification = {"study": study.to_dict(), "flow_sha256": "0", "flows_sha256": {}}
+
+    def courses(*joined: tuple[int, int]) -> dict[str, np.ndarray]:
+        """Return what a unit keeps: how many runs of ten join, and at which of the times."""
+        kept = [{"2": [[at], [runs]], "1+1": [[0, at], [10, -runs]]} for runs, at in joined]
+        counts = [{"2": runs, "1+1": 10 - runs} for runs, _ in joined]
+        return {
+            name: np.array([json.dumps(one).encode() for one in texts])
+            for name, texts in (("count", counts), ("courses", kept))
+        }
+
+    with RunDirectory(tmp_path / "run", specification=specification) as opened:
+        running = RunningSensitivity(opened.path, specification)
+        settings = opened.store("map")
+        settings.write(
+            grid(setting=np.arange(12)).units(5)[0], courses(*[(k, 10 * k) for k in range(1, 6)])
+        )
+        running.look()
+        alone = running.cell(0, 2)["over_time"]
+        assert alone["reference"] is None
+        opened.store("reference").write(
+            grid(setting=np.arange(2)).units(2)[0], courses((4, 50), (8, 50))
+        )
+        running.look()
+        for row, column, runs, at in ((0, 0, 1, 10), (0, 2, 3, 30), (1, 1, 5, 50)):
+            found = running.cell(row, column)["over_time"]
+            json.dumps(found, allow_nan=False)
+            assert found["classes"] == ["2", "1+1"]
+            assert found["cells"][0] == [[[0, 0], [1, 0]]]
+            time = dw.decode_array(found["time"])
+            np.testing.assert_allclose(time, 0.5 * np.arange(101))
+            expected = np.where(np.arange(101) >= at, runs, 0)
+            np.testing.assert_array_equal(
+                dw.decode_array(found["count"])[0, 0], [expected, 10 - expected]
+            )
+            assert found["runs"] == [[10]]
+            # Twelve of twenty runs of the reference have joined from half of the time on.
+            both = np.where(np.arange(101) >= 50, 0.6, 0.0)
+            np.testing.assert_allclose(
+                dw.decode_array(found["reference"]), [both, 1.0 - both], atol=1e-7
+            )
+        for row, column in ((1, 2), (2, 0), (0, 3), (-1, 0), (0, -1), (10**9, 10**9)):
+            assert running.cell(row, column)["over_time"] is None
 
 
 def test_a_kind_without_pictures_says_so(tmp_path: Path) -> None:

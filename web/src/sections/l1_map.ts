@@ -1,4 +1,4 @@
-/** The l1 distance to the reference over two axes; a click shows the classes of a setting. */
+/** The l1 distance to the reference over two axes; a click shows the classes of a setting, over time too. */
 
 import { type Grid, at, decode, decodeMaybe, extent, nearest, part } from "../arrays";
 import { addHatch, cellsPath, drawCells } from "../charts/cells";
@@ -18,6 +18,7 @@ import { cellAt, cellEdges } from "../scale";
 import { rich, shortName, spoken } from "../symbols";
 import { type Display, displayFor, inUnit, percent, short } from "../units";
 import { useGridKeys } from "./grid_keys";
+import { drawSettingTimes, timesSource } from "./setting_times";
 
 interface L1Data {
   readonly section: L1MapSection;
@@ -41,19 +42,19 @@ export async function drawL1Map(section: L1MapSection, body: HTMLElement, contex
   const grid = el("div", { class: "map", "data-part": "l1-map" });
   const shown = el("div", { class: "map-plot" });
   const panel = el("div", { class: "map-setting" });
-  grid.append(shown, panel);
+  const below = el("div", { class: "setting-times" });
+  grid.append(shown, panel, below);
   body.append(grid);
-  const hint =
-    map.shares === null
-      ? "Point at a cell to read it."
-      : "Point at a cell to read it; click it to see its outcomes.";
+  const more = map.shares !== null || section.over_time !== null || context.fetchCell !== null;
+  const hint = `Point at a cell to read it${more ? "; click it to see its outcomes" : ""}.`;
   const line = readout(hint);
   line.element.setAttribute("aria-live", "polite");
 
+  const show = settingPanel(map, panel, below, grid, context);
   const select = (cell: Cell): void => {
     choice.selected = cell;
-    showSetting(map, panel, grid, cell);
     plot.redraw();
+    void show(cell);
   };
   const moved = (cell: Cell | null): void => {
     cursor = cell;
@@ -86,7 +87,7 @@ export async function drawL1Map(section: L1MapSection, body: HTMLElement, contex
     mapLegend(map),
     details("Values as a table", () => valueTable(map)),
   );
-  showSetting(map, panel, grid, first);
+  await show(first);
 }
 
 async function decodeL1(section: L1MapSection): Promise<L1Data> {
@@ -182,7 +183,41 @@ function reading(map: L1Data, { row, column }: Cell): [string, string][] {
   ];
 }
 
-function showSetting(map: L1Data, panel: HTMLElement, grid: HTMLElement, cell: Cell): void {
+/** Returns what shows a setting in the panel; of several calls the last one counts. */
+function settingPanel(
+  map: L1Data,
+  panel: HTMLElement,
+  below: HTMLElement,
+  grid: HTMLElement,
+  context: Context,
+): (cell: Cell) => Promise<void> {
+  const source = timesSource(map.section, context);
+  let newest = 0;
+  return async (cell) => {
+    newest += 1;
+    const mine = newest;
+    const times = await source(cell).catch(() => null);
+    if (mine !== newest) return;
+    const some = showSetting(map, panel, grid, cell);
+    // What is there keeps its room until the new picture stands, so that the page does not jump.
+    below.style.setProperty("min-height", `${below.clientHeight}px`);
+    below.replaceChildren();
+    if (times !== null && some) drawSettingTimes(below, times, context);
+    else if (some) below.append(el("p", { class: "nothing" }, withoutTimes(map, cell, context)));
+    below.style.removeProperty("min-height");
+    grid.dataset["shown"] = `${cell.row},${cell.column}`;
+  };
+}
+
+function withoutTimes(map: L1Data, { row, column }: Cell, context: Context): string {
+  const waits = context.fetchCell !== null && !Number.isFinite(at(map.value, row * map.columns + column));
+  return waits
+    ? "The outcome classes of this setting are not there yet."
+    : "This run kept no outcome classes over time; a new run keeps them.";
+}
+
+/** Shows the outcomes of a setting at the end of its runs; returns false where it is known to have none. */
+function showSetting(map: L1Data, panel: HTMLElement, grid: HTMLElement, cell: Cell): boolean {
   const { section, shares } = map;
   const distance = at(map.value, cell.row * map.columns + cell.column);
   Object.assign(grid.dataset, {
@@ -195,7 +230,7 @@ function showSetting(map: L1Data, panel: HTMLElement, grid: HTMLElement, cell: C
     .flatMap(([label, value], index) => [index > 0 && ", ", ...rich(label), ` = ${value}`]);
   const words = Number.isFinite(distance) ? `${section.label} ${short(distance)}` : "not computed";
   panel.replaceChildren(el("div", { class: "setting-head" }, el("h3", {}, ...title), el("p", {}, words)));
-  if (shares === null) return;
+  if (shares === null) return true;
   const found = part(shares, cell.row, cell.column);
   const rows = section.classes.map((name, index) => ({
     name,
@@ -204,12 +239,13 @@ function showSetting(map: L1Data, panel: HTMLElement, grid: HTMLElement, cell: C
     bars: [{ share: at(found, index), low: null, high: null, count: null, colour: "var(--blue)" }],
   }));
   const known = rows.filter((row) => Number.isFinite(row.bars[0]?.share));
-  if (known.length === 0)
+  if (known.length === 0) {
     panel.append(el("p", { class: "nothing" }, "There are no outcomes of this setting."));
-  else {
-    const label = known.map((row) => `${row.name} ${percent(row.bars[0]?.share ?? 0)}`).join(", ");
-    figure(panel, "", (width) => drawClassBars(width, known, `Outcomes of this setting: ${label}`));
+    return false;
   }
+  const label = known.map((row) => `${row.name} ${percent(row.bars[0]?.share ?? 0)}`).join(", ");
+  figure(panel, "", (width) => drawClassBars(width, known, `Outcomes of this setting: ${label}`));
+  return true;
 }
 
 function mapLegend(map: L1Data): HTMLElement {

@@ -4,7 +4,7 @@ import { numbers } from "../arrays";
 import { nullable, number, object } from "../check";
 import type { CellExcerpt, Context } from "../context";
 import { el } from "../dom";
-import { type Page, type RawSection, checkPage, checkSectionHead, checkState } from "../page";
+import { type Page, type RawSection, checkOverTime, checkPage, checkSectionHead, checkState } from "../page";
 import { fillSection, sectionFrame } from "../sections/draw";
 import { type Shell, makeShell } from "../shell";
 import { drawSections } from "./report";
@@ -21,6 +21,7 @@ const cellMessage = object({
   density: nullable(numbers),
   ks_step_length: nullable(number),
   ks_turning_angle: nullable(number),
+  over_time: nullable(checkOverTime),
 });
 
 /** Cells that were asked for and have not come yet. */
@@ -53,6 +54,7 @@ class Requests {
       density: cell.density,
       ksStepLength: cell.ks_step_length,
       ksTurningAngle: cell.ks_turning_angle,
+      overTime: cell.over_time,
     };
     for (const one of this.waiting.get(key) ?? []) one.done(excerpt);
     this.waiting.delete(key);

@@ -1,0 +1,88 @@
+"""The classes of every setting over time on a page: the numbers of the dataset, packed and back."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from page_reading import part_of, values
+from synthetic_assembly import outcome_classes, sensitivity, with_courses
+
+import driftwalk as dw
+from driftwalk.report import page_sensitivity_times, sensitivity_sections
+from driftwalk.report.page_classes import cells_of
+
+
+@pytest.fixture(scope="module")
+def study() -> xr.Dataset:
+    return with_courses(sensitivity(points=(4, 3)))
+
+
+def test_every_setting_has_its_numbers(study: xr.Dataset) -> None:
+    found = part_of(sensitivity_sections(sensitivity=study), "l1")["over_time"]
+    json.dumps(found, allow_nan=False)
+    assert found["classes"] == study["class_over_time"].values.tolist()
+    assert found["cells"] == [cells_of(name) for name in found["classes"]]
+    np.testing.assert_array_equal(values(found["time"]), study["time"])
+    np.testing.assert_array_equal(values(found["runs"]), study["runs"])
+    count, known = values(found["count"]), values(found["reference"])
+    # By hand: setting by setting, class by class, as the page has its axes.
+    for row in range(4):
+        for column in range(3):
+            one = study.isel(drag_coefficient=row, force_std=column)
+            for place, name in enumerate(found["classes"]):
+                course = one["count_over_time"].sel(class_over_time=name)
+                np.testing.assert_array_equal(count[row, column, place], course)
+    for place, name in enumerate(found["classes"]):
+        course = study["reference_over_time"].sel(class_over_time=name)
+        np.testing.assert_allclose(known[place], course, atol=1e-7)
+    np.testing.assert_array_equal(dw.decode_array(found["count"]), count)
+
+
+def test_axes_in_another_order_are_the_same_map(study: xr.Dataset) -> None:
+    turned = study.transpose("class_over_time", "force_std", "time", ...)
+    made = [part_of(sensitivity_sections(sensitivity=one), "l1") for one in (study, turned)]
+    assert made[0]["over_time"] == made[1]["over_time"]
+
+
+def test_rare_classes_are_summed_with_what_is_summed_already() -> None:
+    """Five blocks, a class of the dataset being "other" itself: shares add up, nothing twice."""
+    names = outcome_classes(5)
+    study = with_courses(sensitivity(5, points=(3, 3)))
+    # The first class moves to the end, and is the sum of what the study has left out.
+    listed = [*names[1:], "other"]
+    count = np.roll(study["count_over_time"].values, -1, axis=-1)
+    study = study.drop_vars("reference_over_time").assign_coords(class_over_time=listed)
+    study["count_over_time"] = (study["count_over_time"].dims, count)
+    found = part_of(sensitivity_sections(sensitivity=study), "l1")["over_time"]
+    assert found["reference"] is None
+    assert found["classes"][-1] == "other"
+    assert found["classes"].count("other") == 1
+    assert len(found["classes"]) <= 21
+    assert found["cells"][-1] == []
+    shares = values(found["count"])
+    np.testing.assert_array_equal(shares.sum(axis=2), np.full((3, 3, 11), 1000))
+    shown = [listed.index(name) for name in found["classes"][:-1]]
+    np.testing.assert_array_equal(shares[:, :, :-1], np.moveaxis(count[..., shown], -1, 2))
+
+
+def test_a_study_of_before_has_none(study: xr.Dataset) -> None:
+    older = study.drop_dims(["time", "class_over_time"])
+    assert part_of(sensitivity_sections(sensitivity=older), "l1")["over_time"] is None
+
+
+def test_maps_without_end_have_fewer_times(
+    study: xr.Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every second time, every fifth, ... : the first and the last stay, and so do the numbers."""
+    size = study["count_over_time"].size
+    for most, every in ((size, 1), (size - 1, 2), (size // 4, 5), (1, 10)):
+        monkeypatch.setattr(page_sensitivity_times, "MOST_COUNTS", most)
+        found = part_of(sensitivity_sections(sensitivity=study), "l1")["over_time"]
+        thinned = study.isel(time=slice(None, None, every))
+        np.testing.assert_array_equal(values(found["time"]), thinned["time"])
+        assert values(found["time"])[-1] == 300.0
+        exact = thinned["count_over_time"].transpose(..., "class_over_time", "time")
+        np.testing.assert_array_equal(values(found["count"]), exact)
