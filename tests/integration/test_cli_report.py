@@ -225,6 +225,24 @@ def test_a_trajectory_file(run: Path, tmp_path: Path) -> None:
     assert part_of(page, "recording-1")["kind"] == "trajectory"
 
 
+def test_a_simulation(tmp_path: Path) -> None:
+    """The first replicate, and the page says that nobody measured it."""
+    simulation = tmp_path / "sim.nc"
+    made = here(
+        *("simulate", "--flow", FLOW, "--duration", "5s", "--replicates", "2", "-o", simulation)
+    )
+    assert made.code == 0, made.err
+    page = report_of(simulation, tmp_path / "report.html")
+    part = part_of(page, "recording-1")
+    with xr.open_dataset(simulation, engine="h5netcdf") as stored:
+        first = stored.isel(replicate=0, body=0).load()
+    np.testing.assert_allclose(values(part["x"]), first["x"], atol=1e-5)
+    assert part["arena"]["diameter_m"] == 0.3
+    assert any("simulated" in text for text in part_of(page, "warnings")["items"])
+    line = refusal(here("report", simulation, "-o", tmp_path / "r.html", *TANK))
+    assert "--tank-diameter: for a recording" in line
+
+
 def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
     out = tmp_path / "report.html"
     (tmp_path / "folder").mkdir()

@@ -32,18 +32,39 @@ def load_motion(path: Path, how: RecordingOptions, *, replicate: int = 0) -> xr.
     InputError
         When the file cannot be read, has no such replicate, or the body never moves.
     """
+    simulated = load_simulation(path, replicate=replicate)
+    if simulated is not None:
+        return simulated
+    recording = how.load(path)
+    require_motion(recording, path, body=how.body)
+    return recording
+
+
+def load_simulation(path: Path, *, replicate: int = 0) -> xr.Dataset | None:
+    """Load a `trajectory` from a file that `driftwalk simulate` wrote; None of any other file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    replicate : int
+        Which replicate, counted from 0.
+
+    Raises
+    ------
+    InputError
+        When it has no such replicate.
+    """
     simulation = _open_simulation(path)
     if simulation is None:
-        recording = how.load(path)
-        require_motion(recording, path, body=how.body)
-        return recording
+        return None
     count = simulation.sizes["replicate"]
     if not 0 <= replicate < count:
         raise InputError(
             f"{path}: no replicate {replicate}; it has {count}, counted from 0 (--replicate)"
         )
     chosen = simulation[["x", "y", "theta"]].isel(replicate=replicate, drop=True)
-    return chosen.assign_attrs(kind="trajectory", source=path.name)
+    return chosen.assign_attrs(kind="trajectory", source=path.name, simulated="yes")
 
 
 def _open_simulation(path: Path) -> xr.Dataset | None:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from driftwalk.cli.options import quantity_parser
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import FormatError, InputError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -119,9 +119,10 @@ class RecordingOptions:
         Raises
         ------
         InputError
-            As `driftwalk.load`; when no row holds a position; when ``--arena`` and
-            ``--tank-diameter`` are both given.
+            As `driftwalk.load`, and it says what a file is that is no recording; when no row holds
+            a position; when ``--arena`` and ``--tank-diameter`` are both given.
         """
+        from driftwalk.cli.other_files import what_else
         from driftwalk.cli.require_motion import require_positions
         from driftwalk.record import load
 
@@ -134,7 +135,13 @@ class RecordingOptions:
         values["columns"] = parse_columns(self.columns or [])
         words = {"tab": "\t", "\\t": "\t", "space": " "}
         values["delimiter"] = words.get(self.delimiter or "", self.delimiter)
-        recording = load(path, block_side=side, **values)
+        try:
+            recording = load(path, block_side=side, **values)
+        except FormatError as error:
+            other = what_else(path)
+            if other is None:
+                raise
+            raise InputError(f"{path} {other}") from error
         require_positions(recording, path)
         return recording
 

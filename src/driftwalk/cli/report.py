@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from driftwalk.cli.motion import load_simulation
 from driftwalk.cli.options import TankDiameter
 from driftwalk.cli.output import print_note, require_place
 from driftwalk.cli.recording_options import RecordingOptions, with_recording_options
@@ -17,7 +18,10 @@ from driftwalk.core.errors import InputError
 @with_recording_options
 def report(
     run: Annotated[
-        Path, typer.Argument(metavar="RUN", help="Run directory, finished or not, or a recording.")
+        Path,
+        typer.Argument(
+            metavar="RUN", help="Run directory, finished or not, a recording, or a simulation."
+        ),
     ],
     how: RecordingOptions,
     out: Annotated[
@@ -32,7 +36,8 @@ def report(
 
     For what calibrate, fit, assemble, sensitivity and study recover make: the answer in words with
     its uncertainty, recording, flow, maps to click, outcomes to replay, the manifest and how to
-    cite. It opens by a double click, without a network. The options on reading are for a recording.
+    cite. It opens by a double click, without a network. Of a simulation it shows the first
+    replicate. The options on reading are for a recording.
     """
     from driftwalk.report import write_report
 
@@ -52,17 +57,22 @@ def _page(path: Path, how: RecordingOptions, tank_diameter: float | None) -> dic
     from driftwalk.report import recording_page, report_page
 
     if not path.is_file():
-        _refuse_reading_options(path, how, tank_diameter)
+        if path.is_dir():
+            _refuse_reading_options(f"{path} is a directory, read as a run", how, tank_diameter)
         return report_page(path)
-    trajectory = how.load(path, tank_diameter=tank_diameter)
+    trajectory = load_simulation(path)
+    if trajectory is None:
+        trajectory = how.load(path, tank_diameter=tank_diameter)
+    else:
+        _refuse_reading_options(f"{path} is a simulation", how, tank_diameter)
     return recording_page(trajectory, describe(trajectory))
 
 
-def _refuse_reading_options(path: Path, how: RecordingOptions, tank_diameter: float | None) -> None:
-    """Refuse options that have no meaning for a run directory."""
+def _refuse_reading_options(what: str, how: RecordingOptions, tank_diameter: float | None) -> None:
+    """Refuse options that have no meaning for a run directory or a simulation."""
     given = [field.name for field in fields(how) if getattr(how, field.name) not in (None, False)]
     given += [] if tank_diameter is None else ["tank_diameter"]
     words = {"start": "from", "stop": "to"}
-    if path.is_dir() and given:
+    if given:
         names = ", ".join(f"--{words.get(name, name).replace('_', '-')}" for name in given)
-        raise InputError(f"{names}: for a recording; {path} is a directory, read as a run")
+        raise InputError(f"{names}: for a recording; {what}")

@@ -1,0 +1,51 @@
+"""What a file is that is no recording, and which command takes it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+VIDEOS: Final = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpeg", ".mpg", ".webm", ".wmv")
+KINDS: Final = {
+    "simulation": "a simulation: driftwalk report and driftwalk compare take it",
+    "assembly_path": "the motion of runs of driftwalk assemble: driftwalk classify takes it, and "
+    "driftwalk report its run directory",
+    "flow_field": "a flow field, and no positions: it is for --flow",
+}
+_OTHER: Final = "no recording but a result of kind '{}': driftwalk report takes its run directory"
+
+
+def what_else(path: Path) -> str | None:
+    """Return what a file is instead of a recording and what to do with it, None when unknown.
+
+    Parameters
+    ----------
+    path : Path
+        What no reader of recordings could read.
+
+    Examples
+    --------
+    >>> from importlib.resources import files
+    >>> what_else(Path(str(files("driftwalk.datasets") / "tank30_ode_a" / "recording.csv")))
+    """
+    if not path.is_file():
+        return None
+    if path.suffix.lower() in VIDEOS:
+        return "is a video: driftwalk track makes a recording of it"
+    kind = _netcdf_kind(path)
+    return None if kind is None else f"holds {KINDS.get(kind, _OTHER.format(kind))}"
+
+
+def _netcdf_kind(path: Path) -> str | None:
+    """Return which kind of driftwalk's own datasets a file holds, None for any other file."""
+    import xarray as xr
+
+    if path.suffix.lower() != ".nc":
+        return None
+    try:
+        with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as stored:
+            kind = stored.attrs.get("kind")
+    except (OSError, ValueError, KeyError):
+        # Damaged, or no NetCDF of version 4.
+        return None
+    return None if kind in (None, "trajectory") else str(kind)
