@@ -242,6 +242,9 @@ def test_a_calibration_that_cannot_be_used(calibrated: Path, tmp_path: Path) -> 
     (unfinished / ".run.json").write_text("{}", encoding="utf-8")
     shutil.copytree(calibrated, other)
     (other / "calibration.nc").unlink()
+    fit = tmp_path / "fit"
+    shutil.copytree(other, fit)
+    (fit / "fit.nc").touch()
     damaged = tmp_path / "damaged"
     shutil.copytree(calibrated, damaged)
     (damaged / "calibration.nc").write_bytes(b"\x89HDF\r\n\x1a\n")
@@ -254,6 +257,8 @@ def test_a_calibration_that_cannot_be_used(calibrated: Path, tmp_path: Path) -> 
         tmp_path / "nowhere": "does not exist",
         RECORDING: "is no run directory",
         other: "no calibration: its calibration (calibration.nc) is not there",
+        fit: f"holds a fit, not a calibration: calibrate on its flow (driftwalk calibrate "
+        f"RECORDING --flow {fit / 'flow.nc'})",
         damaged: "cannot be read as NetCDF",
         wrong: "is no calibration: its kind is 'flow_field'",
     }

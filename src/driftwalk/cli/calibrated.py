@@ -89,6 +89,12 @@ def _require_finished(folder: Path, files: dict[str, Path]) -> None:
             f"{folder} {what}: give the directory that 'driftwalk calibrate --out' made, or a flow "
             "field (--flow)"
         )
+    if (folder / "fit.nc").is_file() and not files["calibration"].is_file():
+        raise InputError(
+            f"{folder} holds a fit, not a calibration: calibrate on its flow (driftwalk calibrate "
+            f"RECORDING --flow {files['flow']}) and give that run, or give the fit's own flow and "
+            f"numbers (--flow {files['flow']} --drag-coefficient --force-std --force-interval)"
+        )
     for role, path in files.items():
         if not path.is_file():
             raise InputError(
