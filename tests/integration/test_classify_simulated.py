@@ -122,6 +122,10 @@ def test_command_reads_a_simulated_path(
     done = here("classify", file, "--run", str(run), *tight, "--json")
     assert done.code == 0, done.err
     events = json.loads(done.out)["events"]
+    # Of a file with this one run, it is the run that nobody has to name.
+    path.sel(run=[run]).to_netcdf(tmp_path / "one.nc", engine="h5netcdf")
+    alone = here("classify", tmp_path / "one.nc", *tight, "--json")
+    assert json.loads(alone.out)["events"] == events
     count = int(told["event_count"][run])
     assert [event["kind"] for event in events] == ["join"] * count
     times = told["event_time"].values[run, :count]

@@ -73,7 +73,10 @@ def classify(
     run: Annotated[
         int | None,
         typer.Option(
-            "--run", min=0, help="Run of a simulated path.nc (default: 0).", show_default=False
+            "--run",
+            min=0,
+            help="Run of a simulated path.nc (default: its first).",
+            show_default=False,
         ),
     ] = None,
     out: Annotated[
@@ -160,7 +163,8 @@ def _load(
 
     simulated = _simulated_path(path)
     if simulated is not None:
-        return path_recording(simulated, run=run or 0), float(simulated.attrs["block_side_m"])
+        chosen = int(simulated["run"][0]) if run is None else run
+        return path_recording(simulated, run=chosen), float(simulated.attrs["block_side_m"])
     if run is not None:
         raise InputError(f"{path}: --run is for a simulated path.nc of driftwalk assemble")
     if study is None:
