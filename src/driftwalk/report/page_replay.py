@@ -74,7 +74,7 @@ def _run(path: xr.Dataset, index: int, assembly: xr.Dataset | None, step: float)
     events = [] if assembly is None else _events(assembly, number_of)
     turned = np.angle(np.exp(1j * theta.astype(np.float64)))
     return {
-        "name": f"run {number_of + 1}",
+        "name": f"run {number_of}",
         "x": encode_array(x, dtype="i2", resolution=step, delta=True),
         "y": encode_array(y, dtype="i2", resolution=step, delta=True),
         "theta": encode_array(turned, dtype="i2", resolution=ANGLE_STEP, delta=True),

@@ -164,6 +164,7 @@ def test_the_replay_has_the_poses_and_what_joined_when(sections: list[dict[str, 
     np.testing.assert_allclose(values(part["time"]), path["time"].values, atol=1e-4)
     for index, run in enumerate(part["runs"]):
         one = path.isel(run=index).transpose("block", "time")
+        assert run["name"] == f"run {index}"
         for name in "xy":
             np.testing.assert_allclose(
                 values(run[name]), one[name].values, rtol=0, atol=0.5001 * run[name]["scale"]
@@ -176,6 +177,12 @@ def test_the_replay_has_the_poses_and_what_joined_when(sections: list[dict[str, 
         assert run["events"][0] == {"time": times[0], "blocks": [0, 1], "class": "2+1+1"}
         assert run["classes"][0] == {"time": 0.0, "class": "1+1+1+1"}
         assert run["classes"][-1] == {"time": times[-1], "class": "I"}
+
+
+def test_a_run_has_the_number_by_which_it_is_asked_for() -> None:
+    path = assembly_path().isel(run=slice(1, 2)).assign_coords(run=[7])
+    (run,) = part_of(assembly_sections(path=path), "replay")["runs"]
+    assert run["name"] == "run 7"
 
 
 def test_a_long_path_of_many_blocks_is_thinned() -> None:
