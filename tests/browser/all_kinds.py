@@ -94,11 +94,15 @@ def l1_map() -> dict[str, Any]:
         **{"kind": "l1_map", "x": axis("force_std"), "y": axis("drag_coefficient"), "value": GRID},
         **{"reference": {"x": 0.1, "y": 0.1}, "noise": 0.05, "label": "l1 distance"},
         **{"classes": ["2", "1+1"], "cells": [PAIR, []], "shares": [[[0.5, 0.5]] * 2] * 2},
-        "over_time": {
-            **{"time": [0.0, 1.0], "classes": ["2", "other"], "cells": [PAIR, []]},
-            **{"count": [[[[0, 6], [10, 4]]] * 2] * 2, "runs": [[10, 10], [10, 10]]},
-            "reference": [[0.0, 0.5], [1.0, 0.5]],
-        },
+        "over_time": over_time(2),
+    }
+
+
+def over_time(rows: int) -> dict[str, Any]:
+    return {
+        **{"time": [0.0, 1.0], "classes": ["2", "other"], "cells": [PAIR, []]},
+        **{"count": [[[[0, 6], [10, 4]]] * 2] * rows, "runs": [[10, 10]] * rows},
+        "reference": [[0.0, 0.5], [1.0, 0.5]],
     }
 
 
@@ -143,6 +147,7 @@ def every_kind() -> list[dict[str, Any]]:
             ],
         },
         l1_map(),
+        {"kind": "setting_times", "settings": ["one", "another"], "over_time": over_time(1)},
         {
             "kind": "biplot",
             "axes": [{"label": "first", "share": 0.7}, {"label": "second", "share": 0.2}],

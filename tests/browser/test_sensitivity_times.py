@@ -15,9 +15,11 @@ from command_line import FLOW, here
 from page_server import served
 
 import driftwalk as dw
+from browser.all_kinds import page_of
 from browser.conftest import PHONE, Visit
 from browser.pictures import drawn_share, path_points, pixels
 from driftwalk.core.rundir import RunDirectory
+from driftwalk.report import sensitivity_sections
 
 pytestmark = pytest.mark.browser
 
@@ -227,6 +229,35 @@ def test_a_running_analysis_shows_the_settings_that_are_there(
                 assert_areas_are(charts.nth(1), found["reference_over_time"].values.T)
             click_cell(page, 2, 2)
             assert "are not there yet" in page.locator(".setting-times").inner_text()
+
+
+def test_settings_on_no_map_are_chosen_from_a_list(
+    visit: Callable[..., Visit], picture: Callable[..., Path], tmp_path: Path
+) -> None:
+    """Words along an axis: each setting by its name, with the keyboard."""
+    study = dw.Study(
+        assembly={"blocks": 2, "duration_s": 20.0},
+        sensitivity={"runs": 20, "reference_realisations": 2, "latching": ["none", "collision"]},
+    )
+    found = dw.sensitivity_map(study, dw.load_flow(FLOW), threads=1)
+    path = tmp_path / "words.html"
+    sections = sensitivity_sections(sensitivity=found)
+    dw.write_report(page_of(sections), path)
+    one = visit(path.as_uri())
+    page = one.open(path.as_uri())
+    shown = page.locator("section[data-kind=setting_times]")
+    choice = shown.get_by_role("combobox", name="Setting")
+    names = choice.locator("option").all_inner_texts()
+    assert names == ["latching none", "latching collision"]
+    choice.focus()
+    for setting, key in ((0, "Home"), (1, "ArrowDown")):
+        page.keyboard.press(key)
+        shown.locator(f'[data-shown="{setting}"]').wait_for()
+        counts = found["count_over_time"].isel(latching=setting) / 20
+        share = counts.transpose("class_over_time", "time").values
+        assert_areas_are(shown.locator("svg.plot").nth(0), share)
+        assert_areas_are(shown.locator("svg.plot").nth(1), found["reference_over_time"].values.T)
+    picture(page, "sensitivity-words")
 
 
 def stop_at(settings: int) -> Callable[[int, int], None]:

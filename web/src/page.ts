@@ -228,6 +228,8 @@ const l1Map = object({
   over_time: nullable(overTime),
 });
 
+const settingTimes = object({ ...base, settings: list(text), over_time: overTime });
+
 const biplot = object({
   ...base,
   axes: list(object({ label: text, share: nullable(number) })),
@@ -308,6 +310,7 @@ export type ClassesSection = Checked<typeof classes>;
 export type ClassTimesSection = Checked<typeof classTimes>;
 export type OverTime = Checked<typeof overTime>;
 export type L1MapSection = Checked<typeof l1Map>;
+export type SettingTimesSection = Checked<typeof settingTimes>;
 export type BiplotSection = Checked<typeof biplot>;
 export type ReplaySection = Checked<typeof replay>;
 export type TableSection = Checked<typeof table>;
@@ -327,6 +330,7 @@ export const SECTIONS = {
   classes,
   class_times: classTimes,
   l1_map: l1Map,
+  setting_times: settingTimes,
   biplot,
   replay,
   table,

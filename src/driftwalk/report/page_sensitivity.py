@@ -20,7 +20,7 @@ from driftwalk.report.page_parts import (
     section,
     value_of,
 )
-from driftwalk.report.page_settings import l1_sections, setting_sections
+from driftwalk.report.page_settings import l1_sections, setting_sections, times_sections
 from driftwalk.report.page_sobol import sobol_section
 from driftwalk.report.page_words import count, quantity
 
@@ -66,6 +66,7 @@ def sensitivity_sections(
         )
         made += attempt("l1", "Distance to the reference", lambda: l1_sections(sensitivity))
         made += attempt("medians", "Over the settings", lambda: setting_sections(sensitivity))
+        made += attempt("times", "Outcome classes over time", lambda: times_sections(sensitivity))
     if reference is not None:
         made += attempt(
             "reference",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -9,7 +10,9 @@ import numpy.typing as npt
 
 from driftwalk.report.assembly_labels import OTHER, classes_to_show
 from driftwalk.report.page_arrays import encode_array, numbers
+from driftwalk.report.page_axes import axis_words, value_words
 from driftwalk.report.page_classes import cells_of
+from driftwalk.report.page_parts import Section, empty_section, section
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,6 +60,34 @@ def over_time_part(part: xr.Dataset, x: str, y: str) -> dict[str, Any] | None:
         "runs": numbers(runs, dtype="i4"),
         "reference": None if known is None else encode_array(_summed(known, shown, rest, axis=0)),
     }
+
+
+def setting_times_section(part: xr.Dataset, id: str, where: str) -> Section:
+    """Return the classes over time of settings that are on no map, one to be chosen by its name.
+
+    Parameters
+    ----------
+    part : xarray.Dataset
+        A `sensitivity` over any axes.
+    id : str
+        Name of the section in its page.
+    where : str
+        What the title says of the axes that the part does not have, or nothing.
+    """
+    title = f"Outcome classes over time{where}"
+    dims = [str(dim) for dim in part["l1_distance"].dims]
+    row = part.drop_vars(dims).stack(x=dims, create_index=False)
+    of_each = [name for name in ("count_over_time", "runs") if name in row]
+    row = row.assign({name: row[name].expand_dims("y") for name in of_each})
+    found = over_time_part(row, "x", "y")
+    if found is None:
+        reason = "This run kept no outcome classes over time; a new run keeps them."
+        return empty_section(id, title, reason)
+    settings = [
+        ", ".join(f"{axis_words(n)} {value_words(n, v)}" for n, v in zip(dims, place, strict=True))
+        for place in product(*(part[name].values.tolist() for name in dims))
+    ]
+    return section(id, "setting_times", title, None, settings=settings, over_time=found)
 
 
 def with_fewer_times(sensitivity: xr.Dataset) -> xr.Dataset:

@@ -23,7 +23,11 @@ from driftwalk.report.page_axes import (
 from driftwalk.report.page_chart import chart, label, mark, series
 from driftwalk.report.page_classes import cells_of
 from driftwalk.report.page_parts import Section, section, value_of
-from driftwalk.report.page_sensitivity_times import over_time_part, with_fewer_times
+from driftwalk.report.page_sensitivity_times import (
+    over_time_part,
+    setting_times_section,
+    with_fewer_times,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,7 +41,8 @@ MOST_SLICES: Final = 12
 def l1_sections(sensitivity: xr.Dataset) -> list[Section]:
     """Return the distance to the reference over the axes: maps, or lines where they are no map.
 
-    A study of more than two axes has a map for each value of the others, at most 12.
+    A study of more than two axes has a map for each value of the others, at most 12. A map holds
+    the classes of its settings over time; those of lines are in `times_sections`.
 
     Parameters
     ----------
@@ -53,16 +58,27 @@ def l1_sections(sensitivity: xr.Dataset) -> list[Section]:
     made: list[Section] = []
     for number_of, (words, part) in enumerate(_slices(with_fewer_times(sensitivity))):
         if number_of == MOST_SLICES:
-            made[-1]["note"] += " More are in the file."
+            made[-1]["note"] = f"{made[-1]['note'] or ''} More are in the file.".strip()
             break
         id = "l1" if number_of == 0 else f"l1-{number_of + 1}"
         x, y = map_axes(part)
         title = f"Distance to the reference{words}"
-        if y is None or is_words(part, x) or is_words(part, y):
+        if y is None or not _is_map(part):
             made.append(_lines(part, "l1_distance", id, title, "l1 distance", noise=True))
         else:
             made.append(_l1_map(part, x, y, id, title))
     return made
+
+
+def times_sections(sensitivity: xr.Dataset) -> list[Section]:
+    """Return the classes over time of the settings of a study that is no map, one to be chosen."""
+    require_axes(sensitivity)
+    parts = _slices(with_fewer_times(sensitivity))[:MOST_SLICES]
+    return [
+        setting_times_section(part, "times" if place == 0 else f"times-{place + 1}", words)
+        for place, (words, part) in enumerate(parts)
+        if not _is_map(part)
+    ]
 
 
 def setting_sections(sensitivity: xr.Dataset) -> list[Section]:
@@ -81,7 +97,7 @@ def setting_sections(sensitivity: xr.Dataset) -> list[Section]:
             continue
         x, y = map_axes(sensitivity)
         id = name.replace("_", "-")
-        if y is None or is_words(sensitivity, x) or is_words(sensitivity, y):
+        if y is None or not _is_map(sensitivity):
             made.append(_lines(sensitivity, name, id, title, words, unit=unit))
             continue
         made.append(
@@ -93,6 +109,12 @@ def setting_sections(sensitivity: xr.Dataset) -> list[Section]:
             )
         )  # fmt: skip
     return made
+
+
+def _is_map(part: xr.Dataset) -> bool:
+    """Return whether a part of a study lies over two axes of numbers."""
+    x, y = map_axes(part)
+    return y is not None and not is_words(part, x) and not is_words(part, y)
 
 
 def _l1_map(part: xr.Dataset, x: str, y: str, id: str, title: str) -> Section:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 from page_reading import part_of, values
-from synthetic_assembly import outcome_classes, sensitivity, with_courses
+from synthetic_assembly import one_axis, outcome_classes, sensitivity, with_courses
 
 import driftwalk as dw
 from driftwalk.report import page_sensitivity_times, sensitivity_sections
@@ -66,6 +67,64 @@ def test_rare_classes_are_summed_with_what_is_summed_already() -> None:
     np.testing.assert_array_equal(shares.sum(axis=2), np.full((3, 3, 11), 1000))
     shown = [listed.index(name) for name in found["classes"][:-1]]
     np.testing.assert_array_equal(shares[:, :, :-1], np.moveaxis(count[..., shown], -1, 2))
+
+
+@pytest.mark.parametrize(
+    ("axis", "along", "names"),
+    [
+        ("blocks", [3, 4, 5], ["blocks 3", "blocks 4", "blocks 5"]),
+        ("tank_diameter", [0.25, 0.3], ["tank diameter 25 cm", "tank diameter 30 cm"]),
+        ("latching", ["collision", "none"], ["latching collision", "latching none"]),
+    ],
+)
+def test_settings_on_no_map_are_chosen_by_their_names(
+    axis: str, along: list[Any], names: list[str]
+) -> None:
+    study = with_courses(one_axis(axis, along))
+    made = sensitivity_sections(sensitivity=study)
+    part = part_of(made, "times")
+    assert part["kind"] == "setting_times"
+    assert part["settings"] == names
+    count = values(part["over_time"]["count"])
+    exact = study["count_over_time"].transpose(axis, "class_over_time", "time")
+    np.testing.assert_array_equal(count[0], exact)
+    older = study.drop_dims(["time", "class_over_time"])
+    none = part_of(sensitivity_sections(sensitivity=older), "times")
+    assert none["kind"] == "empty"
+    assert "kept no outcome classes over time" in none["reason"]
+
+
+def test_words_of_two_axes_are_one_list() -> None:
+    study = sensitivity(points=(2, 3))
+    both = with_courses(
+        study.rename(drag_coefficient="latching").assign_coords(
+            latching=np.array(["collision", "none"], dtype=object)
+        )
+    )
+    part = part_of(sensitivity_sections(sensitivity=both), "times")
+    count = values(part["over_time"]["count"])[0]
+    assert len(part["settings"]) == len(count) == 6
+    for place, name in enumerate(part["settings"]):
+        row, column = divmod(place, 3)
+        assert name.startswith(f"latching {['collision', 'none'][row]}, stochastic force ")
+        one = both["count_over_time"].isel(latching=row, force_std=column)
+        np.testing.assert_array_equal(count[place], one.transpose("class_over_time", "time"))
+
+
+def test_of_more_than_twelve_parts_the_first_are_shown_and_the_rest_named() -> None:
+    """Lines along numbers have no note of their own, to which that could be added."""
+    study = sensitivity(points=(2, 3)).rename(drag_coefficient="latching")
+    study = study.assign_coords(latching=np.array(["collision", "none"], dtype=object))
+    blocks = np.arange(3, 17)
+    many = with_courses(study).map(
+        lambda one: one.expand_dims(blocks=blocks) if "latching" in one.dims else one
+    )
+    made = sensitivity_sections(sensitivity=many)
+    assert len([part for part in made if part["id"].startswith("l1")]) == 12
+    assert part_of(made, "l1-12")["note"] == "More are in the file."
+    times = [part for part in made if part["kind"] == "setting_times"]
+    assert len(times) == 12
+    assert times[2]["title"] == "Outcome classes over time, blocks 5"
 
 
 def test_a_study_of_before_has_none(study: xr.Dataset) -> None:

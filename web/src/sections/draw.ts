@@ -6,6 +6,7 @@ import { el } from "../dom";
 import { type Kind, type RawSection, SECTIONS, type SectionOf } from "../page";
 import { rich } from "../symbols";
 import { drawBiplot } from "./biplot";
+import { drawChosenTimes } from "./chosen_times";
 import { drawClassTimes } from "./class_times";
 import { drawClasses } from "./classes";
 import { drawEmpty } from "./empty";
@@ -38,6 +39,7 @@ const DRAWERS: Partial<{ [K in Kind]: Draw<K> }> = {
   classes: drawClasses,
   class_times: drawClassTimes,
   l1_map: drawL1Map,
+  setting_times: drawChosenTimes,
   biplot: drawBiplot,
   replay: drawReplay,
   table: drawTable,

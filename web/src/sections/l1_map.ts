@@ -202,8 +202,10 @@ function settingPanel(
     // What is there keeps its room until the new picture stands, so that the page does not jump.
     below.style.setProperty("min-height", `${below.clientHeight}px`);
     below.replaceChildren();
-    if (times !== null && some) drawSettingTimes(below, times, context);
-    else if (some) below.append(el("p", { class: "nothing" }, withoutTimes(map, cell, context)));
+    if (times !== null && some) {
+      below.append(el("h3", {}, "Outcome classes over time"));
+      drawSettingTimes(below, times, context);
+    } else if (some) below.append(el("p", { class: "nothing" }, withoutTimes(map, cell, context)));
     below.style.removeProperty("min-height");
     grid.dataset["shown"] = `${cell.row},${cell.column}`;
   };

@@ -37,7 +37,8 @@ export function timesSource(section: L1MapSection, context: Context): Source {
   };
 }
 
-async function decodeTimes(
+/** Returns what gives the classes of the setting at a row and a column. */
+export async function decodeTimes(
   kept: OverTime,
   context: Context,
 ): Promise<(row: number, column: number) => SettingTimes> {
@@ -83,7 +84,7 @@ export function drawSettingTimes(
       : "Point at a chart to read shares: this setting, reference.",
   );
   const pair = el("div", { class: "pair-grid times" });
-  body.append(el("h3", {}, "Outcome classes over time"), pair);
+  body.append(pair);
   const draw = (title: string, courses: readonly Course[]): void => {
     const column = el("div", {}, el("h4", {}, title));
     pair.append(column);
@@ -124,7 +125,8 @@ function reading(
   const pairs: [string, string][] = [["time", moment(at(time, index))]];
   setting.forEach((one, number) => {
     const beside = reference?.[number];
-    const shares = [one, ...(beside === undefined ? [] : [beside])].map((course) => at(course.share, index));
+    const both = [one, ...(beside === undefined ? [] : [beside])];
+    const shares = both.map((course) => at(course.share, index));
     if (shares.some((share) => share > 0)) pairs.push([one.name, shares.map((share) => percent(share)).join(", ")]);
   });
   return pairs;
@@ -146,7 +148,8 @@ function timesTable(
     moment(now),
     ...setting.flatMap((one, number) => {
       const beside = reference?.[number];
-      return [one, ...(beside === undefined ? [] : [beside])].map((course) => percent(at(course.share, index)));
+      const both = [one, ...(beside === undefined ? [] : [beside])];
+      return both.map((course) => percent(at(course.share, index)));
     }),
   ]);
   return table("Shares of the outcome classes over time", ["time", ...heads], rows, () => true);
