@@ -33,6 +33,9 @@ _LEAST_STD_PX: Final = 0.12
 _CORRELATED: Final = 12.0
 """Neighbouring points of an outline share their pixels, so fewer are independent; measured on
 rendered frames with hidden discs."""
+_SLIVER: Final = 0.35
+"""Share of a disc below which what is seen of it may fit the marker in more than one direction."""
+_SWINGS: Final = np.radians(np.arange(-60.0, 60.1, 0.5))
 
 
 def outlined_centres(
@@ -65,23 +68,26 @@ def outlined_centres(
     pose, normal, rms = _refine(points, side, tried, diameter, spacing)
     half = np.array([math.cos(pose[2]), math.sin(pose[2])]) * spacing / 2
     centres = np.stack([pose[:2] - half, pose[:2] + half])
-    variance = _CORRELATED * max(rms, _LEAST_STD_PX) ** 2 * np.linalg.inv(normal)
+    noise = _CORRELATED * max(rms, _LEAST_STD_PX) ** 2
+    variance = noise * np.linalg.inv(normal)
     turned = np.array([-half[1], half[0]])
     lever = np.zeros((4, 3))
     lever[:2, :2] = lever[2:, :2] = np.eye(2)
     lever[:2, 2], lever[2:, 2] = -turned, turned
-    return Measured(centres, lever @ variance @ lever.T, _shares(weights, centres, diameter))
+    covariance = lever @ variance @ lever.T
+    shares = _shares(weights, centres, diameter)
+    least = int(np.argmin(shares))
+    if shares[least] < _SLIVER:
+        swung = _swing_variance(parts[least], centres[1 - least], centres[least], diameter, noise)
+        sway = 4.0 * np.outer(turned, turned)
+        block = np.s_[2 * least : 2 * least + 2]
+        covariance[block, block] += max(swung - variance[2, 2], 0.0) * sway
+    return Measured(centres, covariance, shares)
 
 
 def _outline(weight: Weights, at: Array, diameter: float) -> Array:
     """Return where a colour's weight crosses half of its height, shape (n, 2)."""
-    reach = 1.2 * diameter
-    left, top = (max(math.floor(place - reach), 0) for place in at.tolist())
-    right, bottom = (math.ceil(place + reach) + 2 for place in at.tolist())
-    weight = weight[top:bottom, left:right]
-    rows, columns = weight.shape
-    across, down = np.arange(left, left + columns) - at[0], np.arange(top, top + rows) - at[1]
-    near = across**2 + (down**2)[:, None] < reach**2
+    weight, near, corner = _around(weight, at, 1.2 * diameter)
     inside = weight[near & (weight > _LEVEL)]
     level = _LEVEL * (float(np.median(inside)) if inside.size else 1.0)
     over = weight > level
@@ -92,7 +98,20 @@ def _outline(weight: Weights, at: Array, diameter: float) -> Array:
     found = np.empty((len(below) + len(beside), 2))
     found[:, 0] = np.concatenate([down_column, along_column + beside])
     found[:, 1] = np.concatenate([down_row + below, along_row])
-    return np.asarray(found + np.array([left, top]))
+    return np.asarray(found + corner)
+
+
+def _around(
+    weight: Weights, at: Array, reach: float
+) -> tuple[Weights, npt.NDArray[np.bool_], Array]:
+    """Return a part of a patch, which of its pixels are near a place, and where it begins."""
+    left, top = (max(math.floor(place - reach), 0) for place in at.tolist())
+    # One more than needed, for outlines between the last pixel that is near and the next.
+    right, bottom = (max(math.ceil(place + reach) + 2, 0) for place in at.tolist())
+    part = weight[top:bottom, left:right]
+    rows, columns = part.shape
+    across, down = np.arange(left, left + columns) - at[0], np.arange(top, top + rows) - at[1]
+    return part, across**2 + (down**2)[:, None] < reach**2, np.array([left, top])
 
 
 def _part(weight: Weights, level: float, row: Whole, column: Whole, step: tuple[int, int]) -> Array:
@@ -127,6 +146,14 @@ def _search(points: Array, side: Array, first: Array, diameter: float, spacing: 
     return np.asarray(first + np.stack([shift[i], shift[j], _TURNS[k]], axis=-1))
 
 
+def _cost(beyond: Array, scale: float) -> tuple[Array, Array]:
+    """Return cost and weight of points at a distance beyond their circle [px]."""
+    square = (beyond / scale) ** 2
+    limit = np.where(beyond > 0.0, _OUTSIDE, 1.0)
+    held = limit / (limit + square)
+    return held * square, held**2
+
+
 def _refine(
     points: Array, side: Array, poses: Array, diameter: float, spacing: float
 ) -> tuple[Array, Array, float]:
@@ -151,10 +178,7 @@ def _refine(
         beyond = radius - diameter / 2
         out[:, :2] /= radius[:, None]
         out[:, 2] = lever * (cos * out[:, 1] - sin * out[:, 0])
-        square = (beyond / scale) ** 2
-        limit = np.where(beyond > 0.0, _OUTSIDE, 1.0)
-        held = limit / (limit + square)
-        weight = held**2
+        cost, weight = _cost(beyond, scale)
         pulled = out * weight[:, None]
         normal = pulled @ out.transpose(0, 2, 1) + steadied
         change = np.linalg.solve(normal, pulled @ beyond[..., None])[..., 0]
@@ -162,7 +186,7 @@ def _refine(
         change *= np.minimum(1.0, 0.1 * diameter / furthest)[:, None]
         change[:, 2] = np.clip(change[:, 2], -0.15, 0.15)
         poses[moving] = pose + change
-        costs[moving], normals[moving] = (held * square).sum(axis=1), normal
+        costs[moving], normals[moving] = cost.sum(axis=1), normal
         residuals[moving] = (weight * beyond**2).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-9)
         if scale == _SCALE_PX:
             moving = moving[np.abs(change).max(axis=1) >= 1e-3]
@@ -172,15 +196,29 @@ def _refine(
     return poses[best], normals[best], math.sqrt(float(residuals[best]))
 
 
+def _swing_variance(
+    points: Array, held: Array, centre: Array, diameter: float, noise: float
+) -> float:
+    """Return the variance of a marker's direction when little is seen of one of its discs [rad²].
+
+    The other disc is held, and this one swung around it: each direction counts as its outline fits
+    there. Between a bar and a patch of glare a sliver may fit as well on another side, of which the
+    slopes at the best direction know nothing.
+    """
+    column, row = centre - held
+    cos, sin = np.cos(_SWINGS)[:, None], np.sin(_SWINGS)[:, None]
+    across = points[:, 0] - held[0] - (cos * column - sin * row)
+    down = points[:, 1] - held[1] - (sin * column + cos * row)
+    beyond = np.sqrt(across**2 + down**2) - diameter / 2
+    cost = _cost(beyond, _SCALE_PX)[0].sum(axis=1) * _SCALE_PX**2 / noise
+    likely = np.exp(-0.5 * (cost - cost.min()))
+    return float(likely @ _SWINGS**2 / likely.sum())
+
+
 def _shares(weights: list[Weights], centres: Array, diameter: float) -> Array:
     """Return how much of each disc is seen."""
-    reach = diameter / 2 + 1.0
     seen = []
-    for weight, (column, row) in zip(weights, centres.tolist(), strict=True):
-        left, top = max(math.floor(column - reach), 0), max(math.floor(row - reach), 0)
-        around = weight[top : math.ceil(row + reach) + 1, left : math.ceil(column + reach) + 1]
-        rows, columns = around.shape
-        across, down = np.arange(left, left + columns) - column, np.arange(top, top + rows) - row
-        disc = across**2 + (down**2)[:, None] < reach**2
-        seen.append(float(np.count_nonzero(disc & (around > _LEVEL))))
+    for weight, centre in zip(weights, centres, strict=True):
+        part, disc, _ = _around(weight, centre, diameter / 2 + 1.0)
+        seen.append(float(np.count_nonzero(disc & (part > _LEVEL))))
     return np.array(seen) / (math.pi * diameter**2 / 4.0)
