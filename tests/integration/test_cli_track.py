@@ -7,11 +7,13 @@ import json
 import socket
 import threading
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 from command_line import end, here, refusal, start
+from matroska import give_times
 
 import driftwalk as dw
 from driftwalk.cli.progress import ProgressReporter
@@ -85,12 +87,13 @@ def test_video_to_recording(folder: Path, truth: xr.Dataset, tmp_path: Path) -> 
 def test_progress_of_a_file_that_holds_more_than_it_states() -> None:
     text = io.StringIO()
     with ProgressReporter("track", stream=text, seconds_between_lines=0) as progress:
-        for done in (5, 11):
-            tell_progress(progress, done, 10)
-        tell_progress(progress, 5, 0)
+        for done, dropped in ((5, 0), (6, 1), (11, 3)):
+            tell_progress(progress, done, 10, dropped)
+        tell_progress(progress, 5, 0, 0)
     assert text.getvalue().splitlines() == [
         "track: 5 of 10 (50 %)",
-        "track: 11 of 11 (100 %): the source stated 10, there are more",
+        "track: 6 of 10 (60 %): 1 frame dropped up to now",
+        "track: 11 of 11 (100 %): the source stated 10, there are more; 3 frames dropped up to now",
     ]
 
 
@@ -143,13 +146,13 @@ def keys(value: object) -> set[str]:
     return {key for inner in value for key in keys(inner)} if isinstance(value, list) else set()
 
 
-def test_live_client_gets_poses_and_joins(folder: Path, tmp_path: Path) -> None:
+def free_port() -> int:
     with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = taken.getsockname()[1]
-        words = ("--bodies", "2", "--live", str(port))
-        assert f"port {port} on 127.0.0.1 is in use" in refusal(
-            tracked(folder, tmp_path / "no.nc", *words)
-        )
+        return int(taken.getsockname()[1])
+
+
+def streamed(port: int, video: Path, folder: Path, out: Path) -> list[dict[str, Any]]:
+    """Track a video of two blocks, and return all that a client was sent."""
     lines: list[str] = []
 
     def read() -> None:
@@ -165,10 +168,53 @@ def test_live_client_gets_poses_and_joins(folder: Path, tmp_path: Path) -> None:
 
     reader = threading.Thread(target=read)
     reader.start()
-    done = tracked(folder, tmp_path / "r.nc", *words)
+    words = ("--markers", folder / "m.toml", *TANK, "--bodies", "2", "--live", str(port))
+    done = here("track", video, *words, "-o", out)
     reader.join(timeout=30)
     assert done.code == 0, done.err
-    hello, *messages, over = [json.loads(line) for line in lines]
+    return [json.loads(line) for line in lines]
+
+
+@pytest.fixture(scope="module")
+def gappy(folder: Path, truth: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the video as if 3 frames were missing before frame 20 and one before frame 30."""
+    video = tmp_path_factory.mktemp("gappy") / "video.mkv"
+    video.write_bytes((folder / "video.mkv").read_bytes())
+    times = truth["time"].values + 0.3 * (np.arange(FRAMES) >= 20) + 0.1 * (np.arange(FRAMES) >= 30)
+    return give_times(video, times.tolist())
+
+
+def test_dropped_frames_of_a_file_are_told_as_they_come(
+    folder: Path, gappy: Path, tmp_path: Path
+) -> None:
+    """In the stream with the first frame after a gap, and in the recording the same at the end."""
+    out = tmp_path / "r.nc"
+    _, *messages, _ = streamed(free_port(), gappy, folder, out)
+    told = {message["frame"]: message["dropped_frames"] for message in messages}
+    assert len(told) > FRAMES / 2
+    assert told == {frame: 3 * (frame >= 20) + (frame >= 30) for frame in told}
+    counts = json.loads(xr.load_dataset(out, engine="h5netcdf").attrs["counts"])
+    assert counts["dropped"] == told[FRAMES - 1] == 4
+
+
+def test_watching_tells_dropped_frames(folder: Path, gappy: Path) -> None:
+    done = here("watch", gappy, "--markers", folder / "m.toml", *TANK, "--bodies", "2")
+    assert done.code == 0, done.err
+    told = [line.split() for line in done.out.splitlines() if "  dropped  " in line]
+    assert [" ".join(words) for words in told] == [
+        "2.30 s dropped 3 (3 up to now)",
+        "3.40 s dropped 1 (4 up to now)",
+    ]
+
+
+def test_live_client_gets_poses_and_joins(folder: Path, tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        words = ("--bodies", "2", "--live", str(port))
+        assert f"port {port} on 127.0.0.1 is in use" in refusal(
+            tracked(folder, tmp_path / "no.nc", *words)
+        )
+    hello, *messages, over = streamed(port, folder / "video.mkv", folder, tmp_path / "r.nc")
     assert over == {"type": "end", "interrupted": None, "frames_lost_by_client": 0}
     last = messages[-1]
     assert last["frame"] == FRAMES - 1

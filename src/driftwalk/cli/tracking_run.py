@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from driftwalk.track import AssemblySeen, Frame, FrameSource, OverlayWriter, TrackState
 
 Pose = tuple[float, float, float]
-Look = Callable[["Frame", "Sequence[TrackState]", "AssemblySeen | None"], None]
+Look = Callable[["Frame", "Sequence[TrackState]", "AssemblySeen | None", int], None]
 
 _SAVE_EVERY_S: Final = 10.0
 # A save may take this share of the time, so that those of a long recording become rarer.
@@ -47,7 +47,8 @@ class TrackingRun:
     out : Path or None
         The recording to write.
     look : callable, optional
-        Is called with each frame, its states and what was observed.
+        Is called with each frame, its states, what was observed, and how many frames were dropped
+        up to now.
     """
 
     def __init__(
@@ -93,7 +94,8 @@ class TrackingRun:
                 for frame in source:
                     self._source_counts = source.counts.to_dict()
                     self._take(frame, source.waited_s, live, overlay)
-                    tell_progress(progress, frame.index + 1, total)
+                    dropped = self._source_counts["dropped"]
+                    tell_progress(progress, frame.index + 1, total, dropped)
                     self._save_now_and_then()
                 self.interrupted = source.interrupted
             except KeyboardInterrupt:
@@ -167,7 +169,7 @@ class TrackingRun:
         if overlay is not None:
             overlay.write(draw_states(frame.image, states, self.parts.camera), frame.time)
         if self._look is not None:
-            self._look(frame, states, observed)
+            self._look(frame, states, observed, dropped)
 
     def _observe(self, time: float, states: Sequence[TrackState]) -> AssemblySeen | None:
         if self.parts.observer is None:
@@ -218,12 +220,13 @@ class TrackingRun:
         self._pause = max(_SAVE_EVERY_S, (self._saved - began) / _SAVING_SHARE)
 
 
-def tell_progress(progress: ProgressReporter, done: int, total: int) -> None:
-    """Say how far it is; a file may hold more frames than it states."""
-    if 0 < total < done:
-        progress.update(done, done, f"the source stated {total}, there are more")
-    elif total:
-        progress.update(done, total)
+def tell_progress(progress: ProgressReporter, done: int, total: int, dropped: int) -> None:
+    """Say how far it is and what was dropped; a file may hold more frames than it states."""
+    remarks = [f"the source stated {total}, there are more"] if total < done else []
+    if dropped:
+        remarks.append(f"{dropped} frame{'' if dropped == 1 else 's'} dropped up to now")
+    if total:
+        progress.update(done, max(done, total), "; ".join(remarks))
 
 
 @contextlib.contextmanager

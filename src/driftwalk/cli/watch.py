@@ -91,15 +91,25 @@ def watch(
 
 
 class _Printer:
-    """Prints what changes, and the poses once a second."""
+    """Prints what changes, and the poses and the frames dropped once a second."""
 
     def __init__(self) -> None:
         self._class: frozenset[str] | None = None
-        self._next = 0.0
+        self._next = self._next_dropped = 0.0
+        self._dropped = 0
 
     def __call__(
-        self, frame: Frame, states: Sequence[TrackState], observed: AssemblySeen | None
+        self,
+        frame: Frame,
+        states: Sequence[TrackState],
+        observed: AssemblySeen | None,
+        dropped: int,
     ) -> None:
+        if dropped > self._dropped and frame.time >= self._next_dropped:
+            # A camera that is too fast drops some at every frame.
+            self._next_dropped = frame.time + 1.0
+            print(f"{frame.time:9.2f} s  dropped  {dropped - self._dropped} ({dropped} up to now)")
+            self._dropped = dropped
         if observed is None:
             return
         for event in observed.events:

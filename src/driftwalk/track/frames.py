@@ -10,7 +10,6 @@ import csv
 import dataclasses
 import math
 import os
-import statistics
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,9 +19,9 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.opencv import require_opencv
+from driftwalk.track.gaps import FrameGaps
 from driftwalk.track.types import Frame, Image
 
-_GAP: Final = 1.5
 _STALE_STRIDE: Final = 16
 _IMAGES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 _TIMES: Final = "times.csv"
@@ -41,7 +40,8 @@ class FrameCounts:
         Frames that were handed on.
     dropped : int
         Frames that are missing between those there are: from gaps in the times, or taken by a
-        camera while the frame before was still being worked on.
+        camera while the frame before was still being worked on. While a file is read it is counted
+        by the usual gap up to then, which the first few frames teach; it is final at the end.
     duplicates : int
         Frames with the time of the one before, or an earlier one; left out.
     stale : int
@@ -92,13 +92,23 @@ class FrameFilter:
     keep_stale : bool
         Whether frames with exactly the image before are handed on, as a drawn video needs it in
         which nothing moves.
+    gaps : FrameGaps, optional
+        What the times between frames are counted by. Left out for a camera, whose frames are
+        counted where they are lost.
     """
 
-    def __init__(self, name: str, counts: FrameCounts, *, keep_stale: bool = False) -> None:
+    def __init__(
+        self,
+        name: str,
+        counts: FrameCounts,
+        *,
+        keep_stale: bool = False,
+        gaps: FrameGaps | None = None,
+    ) -> None:
         self._name, self._counts, self._keep_stale = name, counts, keep_stale
         self._last: Image | None = None
         self._time = -np.inf
-        self._gaps: list[float] = []
+        self._gaps = gaps
 
     def accept(self, index: int, time: float, image: Any) -> Frame | None:
         """Return the frame, None when it is left out."""
@@ -114,8 +124,9 @@ class FrameFilter:
             self._counts.duplicates += 1
             return None
         stale = self._last is not None and _same(picture, self._last)
-        if self._last is not None:
-            self._gaps.append(time - self._time)
+        if self._last is not None and self._gaps is not None:
+            self._gaps.add(time - self._time)
+            self._counts.dropped = self._gaps.missing
         self._last, self._time = picture, time
         if stale:
             self._counts.stale += 1
@@ -124,17 +135,11 @@ class FrameFilter:
         self._counts.frames += 1
         return Frame(index, time, picture)
 
-    @property
-    def usual_gap(self) -> float:
-        """The usual time between two frames [s]; 0 for less than two."""
-        return statistics.median(self._gaps) if self._gaps else 0.0
-
-    def count_gaps(self) -> None:
-        """Count the frames that are missing, by the usual time between two."""
-        if len(self._gaps) > 1:
-            usual = self.usual_gap
-            long = [gap for gap in self._gaps if gap > _GAP * usual]
-            self._counts.dropped += sum(round(gap / usual) - 1 for gap in long)
+    def settle(self) -> None:
+        """Count the frames that are missing by all gaps, when no more will come."""
+        if self._gaps is not None:
+            self._gaps.settle()
+            self._counts.dropped = self._gaps.missing
 
 
 class VideoFile:
@@ -179,7 +184,8 @@ class VideoFile:
         FormatError
             When there is no frame, the size changes, or the stream has no times.
         """
-        keep = FrameFilter(self.name, self.counts, keep_stale=self._keep_stale)
+        gaps = FrameGaps()
+        keep = FrameFilter(self.name, self.counts, keep_stale=self._keep_stale, gaps=gaps)
         index, time = 0, 0.0
         try:
             while self._capture.grab():
@@ -191,7 +197,7 @@ class VideoFile:
                         yield frame
                 index += 1
         finally:
-            keep.count_gaps()
+            keep.settle()
             self.close()
         if index == 0:
             raise FormatError("holds no frame", path=self.name)
@@ -199,7 +205,7 @@ class VideoFile:
             raise FormatError(
                 "has no presentation times: write it again with another program", path=self.name
             )
-        self.interrupted = self._cut_off(index, time + keep.usual_gap)
+        self.interrupted = self._cut_off(index, time + gaps.usual)
 
     def close(self) -> None:
         """Let go of the file."""
@@ -250,7 +256,7 @@ class ImageSequence:
 
     def __iter__(self) -> Iterator[Frame]:
         """Yield the frames."""
-        keep = FrameFilter(self.name, self.counts, keep_stale=self._keep_stale)
+        keep = FrameFilter(self.name, self.counts, keep_stale=self._keep_stale, gaps=FrameGaps())
         try:
             for index, (file, time) in enumerate(self._files):
                 image = self._cv2.imread(str(file), self._cv2.IMREAD_COLOR)
@@ -260,7 +266,7 @@ class ImageSequence:
                 if frame is not None:
                     yield frame
         finally:
-            keep.count_gaps()
+            keep.settle()
 
     def close(self) -> None:
         """Do nothing: no file stays open."""

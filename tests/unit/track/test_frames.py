@@ -18,6 +18,7 @@ from matroska import give_times
 import driftwalk as dw
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.track.frames import FrameFilter
+from driftwalk.track.gaps import FrameGaps
 
 
 def small(level: str = "moderate") -> dw.VideoSettings:
@@ -42,13 +43,13 @@ def test_a_video_gives_its_times_and_pixels(tmp_path: Path) -> None:
 
 def test_dropped_duplicate_and_stale_frames_are_counted() -> None:
     counts = dw.FrameCounts()
-    keep = FrameFilter("list", counts)
+    keep = FrameFilter("list", counts, gaps=FrameGaps())
     times = [0.0, 0.1, 0.1, 0.2, 0.5, 0.6, 0.7]
     values = [1, 2, 2, 3, 4, 4, 5]
     frames = [
         keep.accept(i, t, picture(v)) for i, (t, v) in enumerate(zip(times, values, strict=True))
     ]
-    keep.count_gaps()
+    keep.settle()
     assert [f.time for f in frames if f is not None] == [0.0, 0.1, 0.2, 0.5, 0.7]
     assert counts.to_dict() == {"frames": 5, "dropped": 2, "duplicates": 1, "stale": 1}
 
