@@ -5,14 +5,13 @@ from __future__ import annotations
 import contextlib
 import itertools
 import json
+import shutil
 import signal
-import socket
 import socketserver
 import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from command_line import FLOW, RECORDING, end, here, start
 from finished_run import write_finished_run
 from page_server import PageServer, served
 from playwright.sync_api import expect
+from ports import held_port
 from signals_at_units import after_units, go_on, halted, until_halted
 
 import driftwalk as dw
@@ -71,9 +71,11 @@ A_SECOND = """(name) => new Promise((done) => {
 })"""
 
 
-def free_port() -> int:
-    with closing(socket.create_server(("127.0.0.1", 0))) as found:
-        return int(found.getsockname()[1])
+@pytest.fixture
+def port() -> Iterator[int]:
+    """Return a port for a server that comes later, or comes back."""
+    with held_port() as held:
+        yield held
 
 
 def data(page: Any, name: str) -> str:
@@ -208,9 +210,8 @@ def test_class_proportions_fill_as_runs_end(visit: Callable[..., Visit], tmp_pat
 
 
 def test_the_page_comes_back_when_the_server_does(
-    visit: Callable[..., Visit], finished: Path
+    visit: Callable[..., Visit], finished: Path, port: int
 ) -> None:
-    port = free_port()
     one = visit(f"http://127.0.0.1:{port}/")
     with served("view", finished, port=port) as server:
         page = one.open(server.address)
@@ -221,6 +222,24 @@ def test_the_page_comes_back_when_the_server_does(
     with served("view", finished, port=port):
         wait_for(page, "connection", "open")
         assert page.locator("section[data-kind=map]").is_visible()
+
+
+def test_a_run_that_is_taken_away_is_not_called_running(
+    visit: Callable[..., Visit], finished: Path, tmp_path: Path
+) -> None:
+    run, aside = tmp_path / "run", tmp_path / "aside"
+    shutil.copytree(finished, run)
+    with served("view", run) as server:
+        page = visit(f"http://127.0.0.1:{server.port}/").open(server.address)
+        wait_for(page, "finished", "yes")
+        run.rename(aside)
+        words = page.locator(".head .state")
+        expect(words).to_have_text("the run is no longer there; the page waits for it")
+        # What was there can still be read.
+        assert page.locator("section[data-kind=map]").is_visible()
+        aside.rename(run)
+        wait_for(page, "finished", "yes")
+        expect(words).to_be_hidden()
 
 
 def test_browsers_that_go_away_leave_the_server_well(
@@ -351,10 +370,10 @@ def test_a_tracker_is_watched(
     visit: Callable[..., Visit],
     picture: Callable[..., Path],
     video: Path,
+    port: int,
     request: pytest.FixtureRequest,
 ) -> None:
     """The tracker waits at each frame until it is told to go on: neither side is too fast."""
-    port = free_port()
     with served("view", "--live", f"127.0.0.1:{port}") as server:
         page = visit(f"http://127.0.0.1:{server.port}/").open(server.address)
         readout = page.locator(".live-tank .readout")

@@ -18,7 +18,9 @@ import xarray as xr
 from command_line import here, refusal
 from finished_run import write_finished_run
 from page_server import PageServer, received, say, served
+from ports import held_port
 from websockets.exceptions import ConnectionClosedError, InvalidStatus
+from websockets.sync.client import connect
 
 import driftwalk as dw
 from driftwalk.core.rundir import RunDirectory
@@ -231,9 +233,39 @@ def test_mistakes(
     assert said in refusal(here(*words))
 
 
-@pytest.mark.parametrize("words", [["--host", "no.such.host.invalid"], ["--port", "70000"]])
-def test_no_such_address(finished: Path, words: list[str]) -> None:
-    refusal(here("view", finished, "--no-open", *words))
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--host", "no.such.host.invalid"], "cannot listen on no.such.host.invalid"),
+        (["--host", "[::1]x"], "cannot listen on ::1]x"),
+        (["--port", "70000"], "from 0 to 65535"),
+        # The system takes an empty address for all of the machine's.
+        (["--host", ""], "is empty"),
+    ],
+)
+def test_no_such_address(finished: Path, words: list[str], said: str) -> None:
+    told = refusal(here("view", finished, "--no-open", *words))
+    assert said in told
+    assert "while attempting" not in told
+
+
+@pytest.mark.skipif(not socket.has_ipv6, reason="this machine has no IPv6")
+@pytest.mark.parametrize("host", ["::1", "[::1]"])
+def test_the_other_loopback_address(finished: Path, host: str) -> None:
+    with served("view", finished, "--host", host) as started:
+        assert started.address == f"http://[::1]:{started.port}/"
+        own = f"[::1]:{started.port}"
+        with connect(f"ws://{own}/ws", origin=f"http://{own}") as channel:
+            received(channel, "page")
+
+
+def test_a_run_whose_manifest_is_damaged(finished: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(finished, folder)
+    (folder / "manifest.json").write_text('{"kind": ')
+    words = refusal(here("view", folder, "--no-open"))
+    assert "the manifest of the run is damaged" in words
+    assert "line 1" in words
 
 
 @pytest.mark.parametrize("package", ["fastapi", "uvicorn", "websockets"])
@@ -286,9 +318,7 @@ def test_a_sweep_that_has_not_begun(tmp_path: Path) -> None:
 
 
 def test_play_shows_a_tank_and_speaks_as_a_tracker() -> None:
-    with closing(socket.create_server(("127.0.0.1", 0))) as taken:
-        port = taken.getsockname()[1]
-    with served("play", "--blocks", 3, "--live", port) as started:
+    with held_port() as port, served("play", "--blocks", 3, "--live", port) as started:
         with started.socket() as channel:
             page = received(channel, "page")["page"]
             assert [s["kind"] for s in page["sections"]] == ["tank", "controls", "density"]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import json
-import socket
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager, closing
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager
 from typing import Any
 
 import numpy as np
 import pytest
+from ports import held_port
 
 from driftwalk.core.errors import InputError
 from driftwalk.track import LiveServer
@@ -24,9 +24,11 @@ def frame(number: int, **more: Any) -> dict[str, Any]:
     return {"type": "frame", "frame": number, "time_s": 0.1 * number, "bodies": [], **more}
 
 
-def free_port() -> int:
-    with closing(socket.create_server(("127.0.0.1", 0))) as found:
-        return int(found.getsockname()[1])
+@pytest.fixture
+def port() -> Iterator[int]:
+    """Return a port for a server that comes later, again, or never."""
+    with held_port() as held:
+        yield held
 
 
 class Heard(list[Any]):
@@ -92,9 +94,8 @@ def test_no_event_is_missed_with_a_frame() -> None:
     asyncio.run(run())
 
 
-def test_a_lost_tracker_is_found_again() -> None:
+def test_a_lost_tracker_is_found_again(port: int) -> None:
     async def run() -> None:
-        port = free_port()
         async with listening(port) as (source, heard):
             with LiveServer(port, hello=HELLO) as server:
                 await heard.until(kind("hello"))
@@ -156,6 +157,13 @@ def test_an_odd_body_is_left_out_and_said() -> None:
     asyncio.run(run())
 
 
+async def request_arrived(server: LiveServer) -> None:
+    """Wait until the server's only client has asked for an image."""
+    async with asyncio.timeout(10):
+        while server._clients[0]._width is None:
+            await asyncio.sleep(0.005)
+
+
 def test_images_come_for_as_long_as_a_browser_wants_them() -> None:
     pytest.importorskip("cv2")
 
@@ -166,20 +174,22 @@ def test_images_come_for_as_long_as_a_browser_wants_them() -> None:
                 await heard.until(kind("hello"))
                 reply = heard.append
 
-                async def images(number: int) -> int:
+                async def images(number: int, *, after_request: bool = False) -> int:
                     heard.clear()
                     for index in range(number):
+                        if after_request:
+                            await request_arrived(server)
                         server.publish(frame(index), picture)
                         await heard.until(lambda c, i=index: c.get("frame") == i)
-                        await asyncio.sleep(0.02)
                     return sum("jpeg_base64" in content for content in heard)
 
                 assert await images(5) == 0
                 await source.receive({"type": "video", "width": 32}, reply)
-                await asyncio.sleep(0.1)
-                assert await images(10) >= 8
+                assert await images(10, after_request=True) == 10
+                # The last image was followed by a request, which is answered.
+                await request_arrived(server)
                 await source.leave(reply)
-                await images(2)
+                assert await images(2) == 1
                 assert await images(5) == 0
 
     asyncio.run(run())
@@ -257,17 +267,20 @@ def test_the_same_wish_for_images_is_passed_on_once() -> None:
         server = await asyncio.start_server(answer, "127.0.0.1", 0)
         async with server, listening(server.sockets[0].getsockname()[1]) as (source, heard):
             await heard.until(kind("hello"))
-            for width in (*[64] * 500, 0, 0, 64, 64):
+            for width in (*[64] * 500, 0, 0, 64, 64, 96):
                 await source.receive({"type": "video", "width": width}, heard.append)
-            await asyncio.sleep(0.1)
-            assert len(asked) == 2
+            # They come in order: with the last one all are there.
+            async with asyncio.timeout(10):
+                while not asked or b"96" not in asked[-1]:
+                    await asyncio.sleep(0.01)
+            assert [json.loads(line)["jpeg_width"] for line in asked] == [64, 64, 96]
 
     asyncio.run(run())
 
 
-def test_nobody_there_is_said_once() -> None:
+def test_nobody_there_is_said_once(port: int) -> None:
     async def run() -> None:
-        async with listening(free_port()) as (source, heard):
+        async with listening(port) as (source, heard):
             await asyncio.sleep(0.8)
             # The page says so from the beginning.
             assert heard == []
