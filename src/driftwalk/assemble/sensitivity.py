@@ -72,7 +72,10 @@ def sensitivity_map(
         of runs with one assembly), ``first_contact_median`` and ``completion_median`` [s, NaN when
         not reached], ``l1_distance`` to the reference, ``l1_in_floors`` (see the function of that
         name), both NaN where the number of blocks is another, and ``trial``: with it
-        `assemble` simulates a setting again. On (class) ``reference``. ``attrs``:
+        `assemble` simulates a setting again. On (class) ``reference``. On (axes..., time,
+        class_over_time) ``count_over_time``, the runs in each class at 101 times, and on (time,
+        class_over_time) ``reference_over_time``, the shares of a reference that has the same times;
+        the classes are the 24 that are most frequent somewhere, and "other". ``attrs``:
         ``reference_runs``, ``noise_floor_mean`` and ``noise_floor_95``, the l1 distance that the
         reference itself would have with so many runs; with a reference of this study what it was
         made with, ``reference_drag_coefficient``, ``reference_force_std_N``, ...
@@ -126,7 +129,8 @@ def sensitivity_reference(
     xarray.Dataset
         Kind "outcome_distribution" of all runs, with ``realisation_count`` and
         ``realisation_proportion`` (realisation, class), ``standard_deviation`` (class) over the
-        realisations, and the attributes ``realisations``, ``mean_pairwise_l1`` (the mean l1
+        realisations, ``count_over_time`` (time, class_over_time) as in `sensitivity_map`, of every
+        class that occurs, and the attributes ``realisations``, ``mean_pairwise_l1`` (the mean l1
         distance of two realisations; the paper has 0.065 for 10 realisations of 1000 runs) and
         ``expected_pairwise_l1``: what multinomial sampling predicts for it.
 
