@@ -72,9 +72,8 @@ function showState(now: State | null, words: HTMLElement, bar: HTMLProgressEleme
   bar.hidden = !running || now.progress === null;
   if (running && now.progress !== null) bar.value = now.progress;
   const share = running && now.progress !== null ? `${percent(now.progress)} done` : null;
-  const text = [running ? (share ?? "running") : null, now?.words ?? null]
-    .filter((part) => part !== null)
-    .join(" · ");
+  // Without a share the words say what there is to say: that it runs, or that it is not there.
+  const text = [share, now?.words ?? (running ? "running" : null)].filter((part) => part !== null).join(" · ");
   words.textContent = text;
   words.hidden = text === "";
   const root = document.documentElement.dataset;

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from driftwalk.core.errors import InputError
 from driftwalk.viewer.hub import Source
-from driftwalk.viewer.security import make_gate
+from driftwalk.viewer.security import is_any, make_gate
 
 LAST_PORT: Final = 65535
 LONGEST_MESSAGE: Final = 1 << 16
@@ -55,6 +55,8 @@ def serve(
     uvicorn = require_server()
     from driftwalk.viewer.app import make_app
 
+    # As an address has it, in brackets.
+    host = host.removeprefix("[").removesuffix("]")
     with _listen(host, port) as listener:
         gate = make_gate(host, listener.getsockname()[1])
         errors: list[BaseException] = []
@@ -118,14 +120,18 @@ def require_server() -> Any:
 def _listen(host: str, port: int) -> socket.socket:
     if not 0 <= port <= LAST_PORT:
         raise InputError(f"a port is a number from 0 to {LAST_PORT}, got {port}")
+    if not host:
+        # The system would take it for all addresses of the machine.
+        raise InputError("an address to serve on is empty: leave --host out, or give one (0.0.0.0)")
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    both = family == socket.AF_INET6 and is_any(host) and socket.has_dualstack_ipv6()
     try:
-        return socket.create_server((host, port), family=family)
+        return socket.create_server((host, port), family=family, dualstack_ipv6=both)
     except OSError as error:
         if error.errno == errno.EADDRINUSE:
             raise InputError(
                 f"port {port} on {host} is in use: choose another one (--port), or 0 for any that "
                 "is free"
             ) from error
-        reason = error.strerror or str(error)
+        reason = (error.strerror or str(error)).partition(" (while")[0]
         raise InputError(f"cannot listen on {host}, port {port}: {reason}") from error

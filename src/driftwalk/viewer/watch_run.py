@@ -175,8 +175,24 @@ def quiet_words(duration_s: float) -> str:
 
 
 def running_view(folder: Path) -> Running:
-    """Return the view of a run under way, by what its specification holds."""
+    """Return the view of a run under way, by what its specification holds.
+
+    Raises
+    ------
+    InputError
+        When that is of another version, or no specification that driftwalk writes.
+    """
     specification = unfinished_specification(folder)
+    try:
+        return _view_of(folder, specification)
+    except (AttributeError, LookupError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{folder / RECORD_FILE} does not say what the run is about: it has been changed or "
+            "damaged; run the same command again, or move the directory away"
+        ) from error
+
+
+def _view_of(folder: Path, specification: Mapping[str, Any]) -> Running:
     if "flows_sha256" in specification:
         from driftwalk.viewer.running_sensitivity import RunningSensitivity
 
@@ -209,9 +225,19 @@ def require_run(folder: Path) -> None:
     elif state == "unfinished":
         unfinished_specification(folder)
     else:
+        _require_whole_manifest(folder / MANIFEST_FILE)
         inside = [path.name for path in sorted(folder.iterdir()) if _holds_run(path)]
         hint = f"; there are runs in it: {', '.join(inside[:MOST_NAMED])}" if inside else ""
         raise InputError(f"{folder}: this directory holds no run of driftwalk{hint}")
+
+
+def _require_whole_manifest(path: Path) -> None:
+    """Refuse a manifest that is there and cannot be read: it says more than that none is there."""
+    if path.is_file():
+        try:
+            read_manifest(path)
+        except DriftwalkError as error:
+            raise InputError(f"the manifest of the run is damaged: {error}") from error
 
 
 def unfinished_specification(folder: Path) -> dict[str, Any]:

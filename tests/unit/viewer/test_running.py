@@ -339,6 +339,26 @@ def age(run: RunDirectory, duration_s: float) -> None:
         os.utime(path, (past, past))
 
 
+@pytest.mark.parametrize("study", [5, None, [], "x", {"tank": 5}, {"no such part": {}}])
+def test_a_damaged_record_ends_nothing_and_is_told(run: RunDirectory, study: Any) -> None:
+    source = RunSource(run.path)
+    record = run.path / ".run.json"
+    whole = record.read_text()
+    content = json.loads(whole)
+    content["specification"]["study"] = study
+    record.write_text(json.dumps(content))
+    (told,) = source.look()
+    assert "cannot be read" in told["state"]["words"]
+    assert "changed or damaged" in told["state"]["words"]
+    assert source.look() == []
+    del content["specification"]["study"]
+    record.write_text(json.dumps(content))
+    assert source.look() == []
+    record.write_text(whole)
+    assert [content["type"] for content in source.look()] == ["page"]
+    assert page(source)["state"]["words"] == "map: 0 %"
+
+
 @pytest.mark.parametrize(
     ("duration_s", "ago"),
     [
