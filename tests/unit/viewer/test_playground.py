@@ -237,8 +237,11 @@ def test_messages_and_actions() -> None:
         await source.receive({"type": "set", "name": "nothing", "value": 0}, heard.append)
         for odd in ({}, {"type": "set"}, {"type": "action", "name": ["x"]}, {"type": 5}):
             await source.receive(odd, heard.append)
+        await until(lambda: tanks()[-1]["time_s"] > stopped + 0.1)
+        before = len(tanks())
         await source.receive({"type": "action", "name": "restart"}, heard.append)
-        await until(lambda: tanks()[-1]["time_s"] < stopped + 0.1)
+        # Its first picture is at most one advance old, whenever it is looked at.
+        await until(lambda: min([c["time_s"] for c in tanks()[before:]], default=1) <= 0.1)
         await until(lambda: any(content["type"] == "density" for content in heard))
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
@@ -251,19 +254,29 @@ def test_messages_and_actions() -> None:
     json.dumps(heard, allow_nan=False)
 
 
-def test_a_flood_of_wishes_is_one_wish() -> None:
+def test_a_flood_of_wishes_is_one_wish(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whoever presses a button ten thousand times must not stop the tank for the others."""
+    done: list[str] = []
+
+    def counted(work: Any) -> Any:
+        def call(**values: Any) -> None:
+            done.append(work.__name__)
+            work(**values)
+
+        return call
 
     async def run() -> list[Any]:
         source = PlaySource(Study(), STILL, blocks=12)
         heard: list[Any] = []
+        monkeypatch.setattr(source.tank, "restart", counted(source.tank.restart))
+        monkeypatch.setattr(source.tank, "set", counted(source.tank.set))
         for number in range(10_000):
             await source.receive({"type": "action", "name": "restart"}, heard.append)
             wanted = {"type": "set", "name": "blocks", "value": 1 + number % 12}
             await source.receive(wanted, heard.append)
         source.watched(1)
         task = asyncio.create_task(source.run(heard.append))
-        async with asyncio.timeout(4):
+        async with asyncio.timeout(60):
             while not heard or heard[-1].get("time_s", 0.0) < 0.05:
                 await asyncio.sleep(0.01)
         task.cancel()
@@ -273,6 +286,7 @@ def test_a_flood_of_wishes_is_one_wish() -> None:
     heard = asyncio.run(run())
     # The last of them holds: 10,000 is 4 more than a multiple of 12.
     assert len(heard[-1]["x"]) == 4
+    assert done == ["restart", "set"]
 
 
 def test_the_tank_rests_while_nobody_watches() -> None:
@@ -281,26 +295,41 @@ def test_the_tank_rests_while_nobody_watches() -> None:
         heard: list[Any] = []
         task = asyncio.create_task(source.run(heard.append))
 
-        async def moves() -> bool:
-            await asyncio.sleep(0.4)
-            before = source.tank.time
-            heard.clear()
-            await asyncio.sleep(0.6)
-            pictures = [content for content in heard if content["type"] == "tank"]
-            assert bool(pictures) == (source.tank.time > before)
-            return bool(pictures)
+        def pictures() -> int:
+            return sum(content["type"] == "tank" for content in heard)
 
-        assert not await moves()
+        async def it_moves() -> None:
+            heard.clear()
+            before = source.tank.time
+            async with asyncio.timeout(30):
+                while pictures() < 20 or source.tank.time == before:
+                    await asyncio.sleep(0.01)
+
+        async def it_rests() -> None:
+            # What is on its way to a browser that has just gone still arrives.
+            await asyncio.sleep(0.1)
+            heard.clear()
+            before = source.tank.time
+            await asyncio.sleep(0.9)
+            # One picture may have been under way.
+            assert pictures() <= 1
+            assert source.tank.time - before <= 0.11
+
+        await it_rests()
+        begin = time.perf_counter()
         source.watched(2)
-        assert await moves()
+        await it_moves()
         source.watched(1)
-        assert await moves()
+        await it_moves()
         source.watched(0)
-        assert not await moves()
+        moved = time.perf_counter() - begin
+        await it_rests()
+        begin = time.perf_counter()
         source.watched(1)
-        assert await moves()
+        await it_moves()
+        moved += time.perf_counter() - begin
         # A rest of a second is not caught up with.
-        assert source.tank.time < 4.0
+        assert source.tank.time < moved + 0.4
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
 
@@ -377,22 +406,27 @@ def test_whoever_comes_gets_a_picture_of_one_moment() -> None:
 
 
 def test_real_time_is_kept() -> None:
-    async def run() -> tuple[float, float]:
+    async def run() -> list[float]:
         source = PlaySource(Study(), STILL, blocks=2)
         source.watched(1)
         heard: list[Any] = []
         task = asyncio.create_task(source.run(heard.append))
         await asyncio.sleep(0.5)
-        begin, wall = source.tank.time, time.perf_counter()
-        await asyncio.sleep(1.0)
-        passed = source.tank.time - begin, time.perf_counter() - wall
+        speeds: list[float] = []
+        while len(speeds) < 20 and max(speeds, default=0.0) < 0.5:
+            # The clock is read first and last: a pause between two lines only adds to its time.
+            wall, begin = time.perf_counter(), source.tank.time
+            await asyncio.sleep(1.0)
+            simulated, passed = source.tank.time - begin, time.perf_counter() - wall
+            # It may fall behind on a machine that is busy, never run ahead.
+            assert simulated < 1.1 * passed + 0.05
+            speeds.append(simulated / passed)
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
-        return passed
+        return speeds
 
-    simulated, wall = asyncio.run(run())
-    # It may fall behind on a machine that is busy, never run ahead.
-    assert 0.5 * wall < simulated < 1.1 * wall + 0.05
+    # The best of some seconds: other work only slows it down.
+    assert max(asyncio.run(run())) > 0.5
 
 
 def test_joined_faces_of_a_built_assembly() -> None:
