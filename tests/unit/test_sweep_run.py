@@ -5,8 +5,9 @@ from __future__ import annotations
 import multiprocessing
 import threading
 import time
-from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -83,7 +84,7 @@ def test_order_of_completion_does_not_matter() -> None:
     gates[UNITS[-1].start].set()
 
     def backwards(unit: WorkUnit) -> Arrays:
-        assert gates[unit.start].wait(5)
+        assert gates[unit.start].wait(60)
         order.append(unit.start)
         if unit.start > 0:
             gates[unit.start - 2].set()
@@ -135,25 +136,28 @@ def test_failing_unit_is_named_and_the_rest_kept(kind: str, tmp_path: Path) -> N
 
 
 def test_units_under_way_are_kept_and_waiting_ones_cancelled(tmp_path: Path) -> None:
+    """Whoever computes goes on until the last unit has been cancelled, however late that is."""
     store = ShardStore(tmp_path, fingerprint={})
-    under_way, failed = threading.Event(), threading.Event()
+    under_way, cancelled = threading.Event(), threading.Event()
     started: list[int] = []
+
+    class Pool(ThreadPoolExecutor):
+        def submit(self, function: Any, *words: Any) -> Future[Any]:
+            future = super().submit(function, *words)
+            if words[0] == UNITS[-1]:
+                future.add_done_callback(lambda done: done.cancelled() and cancelled.set())
+            return future
 
     def function(unit: WorkUnit) -> Arrays:
         started.append(unit.start)
-        if unit.start == 0:
-            under_way.set()
-            assert failed.wait(5)
-            time.sleep(0.05)
-        elif unit.start == 2:
-            assert under_way.wait(5)
-            failed.set()
+        if unit.start == 2:
+            assert under_way.wait(60)
             raise ValueError("fault")
-        else:
-            time.sleep(0.2)
+        under_way.set()
+        assert cancelled.wait(60)
         return noisy(unit)
 
-    with ThreadPoolExecutor(2) as executor, pytest.raises(SweepError):
+    with Pool(2) as executor, pytest.raises(SweepError, match="fault"):
         run_sweep(function, UNITS, store=store, executor=executor)
     assert store.has(UNITS[0])
     assert UNITS[-1].start not in started
