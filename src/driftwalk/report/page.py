@@ -22,6 +22,7 @@ from driftwalk.report.page_recording import noise_of, recording_sections
 from driftwalk.report.page_recovery import recovery_sections
 from driftwalk.report.page_run import MAIN_FILES, Run, open_run_folder
 from driftwalk.report.page_sensitivity import sensitivity_sections
+from driftwalk.report.page_tracking import tracking_sections, tracking_warnings
 from driftwalk.schema import body_names
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ def recording_page(
     trajectory : xarray.Dataset
         A `trajectory`, as from `driftwalk.load`.
     described : mapping, optional
-        What `driftwalk.describe` returns: for the noise of the tracking and the warnings.
+        What `driftwalk.describe` returns: for the tracking, its noise and the warnings.
 
     Returns
     -------
@@ -116,11 +117,13 @@ def recording_page(
     """
     facts = {} if described is None else described
     names = body_names(trajectory)
-    noise = noise_of(facts, names[0]) if len(names) == 1 else None
+    tracking = facts.get("tracking")
     remarks = [SIMULATED] if is_simulated(trajectory) else []
+    remarks += [*tracking_warnings(tracking), *(str(text) for text in facts.get("warnings", []))]
     sections = [
-        warnings_section([*remarks, *(str(text) for text in facts.get("warnings", []))]),
-        *recording_sections(trajectory, noise=noise),
+        warnings_section(remarks),
+        *tracking_sections(tracking),
+        *recording_sections(trajectory, noise={name: noise_of(facts, name) for name in names}),
     ]
     source = trajectory.attrs.get("source")
     return _page(

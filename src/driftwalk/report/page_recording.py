@@ -51,7 +51,10 @@ class Noise(NamedTuple):
 
 
 def recording_sections(
-    trajectory: xr.Dataset, *, body: str | None = None, noise: Noise | None = None
+    trajectory: xr.Dataset,
+    *,
+    body: str | None = None,
+    noise: Noise | Mapping[str, Noise | None] | None = None,
 ) -> list[Section]:
     """Return a section for each body of a recording, or for the one that was used.
 
@@ -61,11 +64,12 @@ def recording_sections(
         A `trajectory`.
     body : str, optional
         The body that was used; all, at most 8, without it.
-    noise : Noise, optional
-        The noise of its tracking.
+    noise : Noise or mapping, optional
+        The noise of its tracking where one body is shown, or that of each body by its name.
     """
     names = body_names(check_trajectory(trajectory))
     chosen = names[:MOST_BODIES] if body is None else [body]
+    noises = _by_body(noise, chosen)
     made: list[Section] = []
     for number_of, name in enumerate(chosen, start=1):
         made += attempt(
@@ -74,7 +78,7 @@ def recording_sections(
             lambda name=name, number_of=number_of: trajectory_section(  # type: ignore[misc]
                 trajectory,
                 body=name,
-                noise=noise if len(chosen) == 1 else None,
+                noise=noises.get(name),
                 id=f"recording-{number_of}",
             ),
         )
@@ -149,7 +153,7 @@ def trajectory_section(
         **path,
         gaps=_gaps(track, interval, gap),
         speed=_speed_density(speed),
-        facts=_facts(track, interval, gap, speed, noise),
+        facts=[*_facts(track, interval, gap, speed, noise), *_ambiguity(trajectory, body)],
     )  # fmt: skip
 
 
@@ -168,9 +172,22 @@ def noise_of(described: Mapping[str, Any], body: str) -> Noise | None:
     if value is None:
         return None
     error = number(facts.get("position_noise_standard_error_m"))
-    low, high = (None, None) if error is None else (value - error, value + error)
-    words = "estimated from the recording" + ("" if error is None else ", ± standard error")
-    return Noise(value, low, high, words)
+    if error is None:
+        return Noise(value, None, None, "estimated from the recording")
+    if value == 0.0:
+        words = "standard error of an estimate of zero: too small for the recording to tell"
+        return Noise(error, None, None, words)
+    words = "estimated from the recording, ± standard error"
+    return Noise(value, max(value - error, 0.0), value + error, words)
+
+
+def _by_body(
+    noise: Noise | Mapping[str, Noise | None] | None, chosen: list[str]
+) -> Mapping[str, Noise | None]:
+    if isinstance(noise, Mapping):
+        return noise
+    # Of several bodies nobody knows which one's it is.
+    return {chosen[0]: noise} if len(chosen) == 1 else {}
 
 
 def _shown(track: Track, interval: Floats, gap: npt.NDArray[np.bool_]) -> tuple[Track, int]:
@@ -217,7 +234,7 @@ def _facts(
         figure("duration", duration, "s"),
         figure("rate", 1.0 / usual, "Hz"),
         figure("gaps", int(gap.sum())),
-        figure("time in gaps", float((interval[gap] - usual).sum()) / duration),
+        figure("time in gaps", 100.0 * float((interval[gap] - usual).sum()) / duration, "%"),
         figure("mean speed", speed.mean() if speed.size else None, "m/s"),
         figure(
             "99 % of speeds are below", np.percentile(speed, 99.0) if speed.size else None, "m/s"
@@ -229,3 +246,13 @@ def _facts(
             | {"low": noise.low, "high": noise.high}
         )
     return facts
+
+
+def _ambiguity(trajectory: xr.Dataset, body: str | None) -> list[dict[str, Any]]:
+    """Return the share of a tracked recording in which the body could be another one."""
+    if "ambiguous" not in trajectory:
+        return []
+    scores = trajectory["ambiguous"].transpose("time", "body").values
+    which = 0 if body is None else body_names(trajectory).index(body)
+    share = 100.0 * float((scores[:, which] > 0.0).mean())
+    return [figure("identity ambiguous", share, "%", note="share of the time")]

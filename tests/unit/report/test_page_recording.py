@@ -12,9 +12,10 @@ from page_reading import numbers_of, part_of, values
 from synthetic_calibration import ARENA, bundled_flow, bundled_recording
 
 from driftwalk.core.errors import InputError
+from driftwalk.record import describe
 from driftwalk.report import flow_section, recording_page, trajectory_section
 from driftwalk.report.page_flow import MOST_FRAMES, flow_sections
-from driftwalk.report.page_recording import Noise, recording_sections
+from driftwalk.report.page_recording import Noise, noise_of, recording_sections
 from driftwalk.schema import FLAGS, build_trajectory
 
 
@@ -64,7 +65,8 @@ def test_gaps_break_the_path() -> None:
     np.testing.assert_allclose(shown[~np.isnan(shown)], np.arange(7.0) / 100, atol=1e-5)
     facts = numbers_of(part, "facts")
     assert facts["gaps"]["value"] == 2
-    assert facts["time in gaps"]["value"] == pytest.approx((4.8 + 3.8 - 0.2) / 9.0)
+    assert facts["time in gaps"]["value"] == pytest.approx(100 * (4.8 + 3.8 - 0.2) / 9.0)
+    assert facts["time in gaps"]["unit"] == "%"
 
 
 def test_a_long_recording_is_thinned_but_keeps_its_gaps_and_ends() -> None:
@@ -124,6 +126,75 @@ def test_a_page_of_a_recording_says_what_its_description_says(recording: xr.Data
     ]
     noise = numbers_of(part_of(page, "recording-1"), "facts")["tracking noise"]
     assert noise["low"] == pytest.approx(2.9e-4)
+
+
+def tracked() -> xr.Dataset:
+    """Return two blocks as tracking leaves them: one could be another for 2 of 4 frames."""
+    x = np.array([[0.0, 0.1], [0.01, 0.12], [0.02, 0.14], [0.03, 0.16]])
+    counts = {"frames": 4, "dropped": 1, "duplicates": 0, "stale": 0, "taken_back": 2}
+    moving = build_trajectory(
+        0.1 * np.arange(4),
+        x,
+        -x,
+        attrs={
+            "tracked_from": "film.mp4",
+            "complete": "no",
+            "interrupted": "the disk is full",
+            "tracking_counts": json.dumps({**counts, "rejected": {"too small": 987}}),
+        },
+    )
+    ambiguous = np.array([[0.0, 0.0], [0.0, 0.3], [0.0, 0.2], [0.0, 0.0]])
+    return moving.assign(ambiguous=(("time", "body"), ambiguous))
+
+
+def test_a_page_of_a_tracked_recording_says_how_it_was_tracked() -> None:
+    page = recording_page(tracked(), describe(tracked()))
+    part = part_of(page, "tracking")
+    text = " ".join(part["paragraphs"])
+    assert "film.mp4" in text
+    assert "too small 987" in text
+    told = {label: one["value"] for label, one in numbers_of(part, "numbers").items()}
+    assert told["frames tracked"] == 4
+    assert told["frames dropped"] == 1
+    assert told["positions taken back"] == 2
+    assert part_of(page, "warnings")["items"] == [
+        "the tracking did not come to its end: the disk is full"
+    ]
+
+
+def test_each_body_has_its_own_noise_and_ambiguity() -> None:
+    bodies = {"0": {"position_noise_m": 1e-4}, "1": {"position_noise_m": 2e-4}}
+    page = recording_page(tracked(), {"bodies": bodies})
+    for number, noise, share in ((1, 1e-4, 0.0), (2, 2e-4, 50.0)):
+        facts = numbers_of(part_of(page, f"recording-{number}"), "facts")
+        assert facts["tracking noise"]["value"] == noise
+        assert facts["identity ambiguous"]["value"] == pytest.approx(share)
+        assert facts["identity ambiguous"]["unit"] == "%"
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "told"),
+    [
+        (3e-4, 1e-4, (3e-4, 2e-4, 4e-4)),
+        (3e-5, 4e-5, (3e-5, 0.0, 7e-5)),
+        (0.0, 2e-5, (2e-5, None, None)),
+        (3e-4, None, (3e-4, None, None)),
+    ],
+)
+def test_a_noise_is_never_negative(
+    value: float, error: float | None, told: tuple[float | None, ...]
+) -> None:
+    facts = {"position_noise_m": value, "position_noise_standard_error_m": error}
+    noise = noise_of({"bodies": {"a": facts}}, "a")
+    assert noise is not None
+    assert noise[:3] == pytest.approx(told)
+    assert ("too small" in noise.source) == (value == 0.0)
+
+
+def test_a_recording_that_was_not_tracked_here_says_nothing_of_it(recording: xr.Dataset) -> None:
+    page = recording_page(recording, describe(recording))
+    assert [part["id"] for part in page["sections"]] == ["warnings", "recording-1"]
+    assert "identity ambiguous" not in numbers_of(part_of(page, "recording-1"), "facts")
 
 
 def test_an_arena_that_is_no_json_is_said() -> None:
