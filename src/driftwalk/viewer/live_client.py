@@ -128,8 +128,11 @@ class LiveSource(Source):
         self._note(hello, publish)
         await self._ask()
         frames = SoundFrames()
-        while line := await reader.readline():
+        # A line that the end cut short is no fault of the tracker's.
+        while (line := await reader.readline()).endswith(b"\n"):
             await self._take(line, frames, publish)
+            # Lines that have come already are read without a pause: the browsers take turns.
+            await asyncio.sleep(0)
         self._say_left_out(frames, publish, last=True)
         return None
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import time
+from collections.abc import Container, Iterator
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -76,30 +78,50 @@ class StoreReader:
         return found
 
 
-def store_readers(run: Path, known: dict[str, StoreReader]) -> dict[str, StoreReader]:
-    """Return the sweeps of a run, those that began last at the end.
+class RunReader:
+    """Reads the finished work units of a run, sweep by sweep, as they appear.
 
     Parameters
     ----------
     run : Path
         A run directory.
-    known : dict of str to StoreReader
-        The readers so far; they are kept.
+
+    Attributes
+    ----------
+    sweeps : dict of str to StoreReader
+        The sweeps that have begun, by the name of their folder; those that began last at the end.
     """
-    try:
-        folders = [path for path in (run / SHARD_FOLDER).iterdir() if path.is_dir()]
-        began = {path: (path / SPECIFICATION_FILE).stat().st_mtime_ns for path in folders}
-    except OSError:
-        # Between two steps of the run a folder may have no specification yet, or be gone.
-        return dict(known)
-    readers = dict(known)
-    for path in sorted(began, key=began.__getitem__):
-        if path.name not in readers:
-            try:
-                readers[path.name] = StoreReader(path)
-            except RunDirectoryError:
-                continue
-    return readers
+
+    def __init__(self, run: Path) -> None:
+        self._run = run
+        self.sweeps: dict[str, StoreReader] = {}
+
+    def look(self) -> None:
+        """Find the sweeps that have begun since the last call."""
+        try:
+            folders = [path for path in (self._run / SHARD_FOLDER).iterdir() if path.is_dir()]
+            began = {path: (path / SPECIFICATION_FILE).stat().st_mtime_ns for path in folders}
+        except OSError:
+            # Between two steps of the run a folder may have no specification yet, or be gone.
+            return
+        for path in sorted(began, key=began.__getitem__):
+            if path.name not in self.sweeps:
+                with contextlib.suppress(RunDirectoryError):
+                    self.sweeps[path.name] = StoreReader(path)
+
+    def new_units(self, names: Container[str] | None = None) -> Iterator[tuple[str, FinishedUnit]]:
+        """Look, and yield the units that were finished since the last call, with their sweeps.
+
+        Parameters
+        ----------
+        names : container of str, optional
+            The sweeps that are wanted; default: all.
+        """
+        self.look()
+        for name, reader in self.sweeps.items():
+            if names is None or name in names:
+                for unit in reader.new_units():
+                    yield name, unit
 
 
 def quiet_time(run: Path) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, Protocol
 
-from driftwalk.viewer.run_shards import StoreReader, store_readers
+from driftwalk.viewer.run_shards import RunReader
 
 Section = dict[str, Any]
 
@@ -57,8 +57,7 @@ class RunningOther:
     title = "A run under way"
 
     def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
-        self._folder = folder
-        self._readers: dict[str, StoreReader] = {}
+        self._reader = RunReader(folder)
         self._done = 0
         kind = specification.get("kind")
         if kind in ("fit", "recovery"):
@@ -66,8 +65,7 @@ class RunningOther:
 
     def look(self) -> list[Section]:
         """Count what is finished."""
-        self._readers = store_readers(self._folder, self._readers)
-        self._done += sum(len(reader.new_units()) for reader in self._readers.values())
+        self._done += sum(1 for _ in self._reader.new_units())
         return []
 
     def sections(self) -> list[Section]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from driftwalk.assemble import class_cells, outcome_distribution, world_class
 from driftwalk.assemble.dataset import BROKEN
-from driftwalk.viewer.run_shards import FinishedUnit, StoreReader, store_readers
+from driftwalk.viewer.run_shards import FinishedUnit, RunReader
 from driftwalk.viewer.running import NO_CELL, Section
 
 if TYPE_CHECKING:
@@ -37,24 +37,17 @@ class RunningAssembly:
     def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
         from driftwalk.model import Study
 
-        self._folder = folder
         self._study: Study = Study(**specification["study"])
         both = specification.get("calibration_sha256") is not None
         self._names = dict(NAMES) if both else {"fixed": "all runs"}
-        self._readers: dict[str, StoreReader] = {}
+        self._reader = RunReader(folder)
         self._count: dict[str, Counter[str]] = {name: Counter() for name in self._names}
         self._runs = dict.fromkeys(self._names, 0)
         self._class_of: dict[bytes, str] = {}
 
     def look(self) -> list[Section]:
         """Read the new shards; return the proportions if there are any."""
-        self._readers = store_readers(self._folder, self._readers)
-        units = [
-            (name, unit)
-            for name, reader in self._readers.items()
-            if name in self._names
-            for unit in reader.new_units()
-        ]
+        units = list(self._reader.new_units(self._names))
         for name, unit in units:
             self._take(name, unit)
         return self.sections() if units else []

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import DriftwalkError
 from driftwalk.report import encode_array, map_section
-from driftwalk.viewer.run_shards import FinishedUnit, StoreReader, store_readers
+from driftwalk.viewer.run_shards import FinishedUnit, RunReader
 from driftwalk.viewer.running import NO_CELL, Section
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ class RunningCalibration:
         self._folder = folder
         self._study: Study = Study(**specification["study"])
         self._body: str | None = specification.get("body")
-        self._readers: dict[str, StoreReader] = {}
+        self._reader = RunReader(folder)
         self._maps: dict[str, SettingsMap] = {}
         self._bootstrap: list[FinishedUnit] = []
         self._loaded: xr.Dataset | None = None
@@ -102,9 +102,9 @@ class RunningCalibration:
 
     def look(self) -> list[Section]:
         """Read the new shards, and return the sections that they changed."""
-        self._readers = store_readers(self._folder, self._readers)
+        self._reader.look()
         changed = set()
-        for name, reader in self._readers.items():
+        for name, reader in self._reader.sweeps.items():
             stage = name.partition("-")[0]
             if stage not in STAGES:
                 continue

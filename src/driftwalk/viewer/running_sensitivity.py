@@ -21,7 +21,7 @@ from driftwalk.assemble.sensitivity_times import (
 )
 from driftwalk.report import encode_array
 from driftwalk.report.page_sensitivity_times import over_time_part
-from driftwalk.viewer.run_shards import StoreReader, store_readers
+from driftwalk.viewer.run_shards import RunReader
 from driftwalk.viewer.running import NO_CELL, Section
 
 if TYPE_CHECKING:
@@ -54,29 +54,24 @@ class RunningSensitivity:
     def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
         from driftwalk.model import Study
 
-        self._folder = folder
         self._study: Study = Study(**specification["study"])
         self._axes = dict(self._study.sensitivity.axes)
         self._shape = tuple(len(values) for values in self._axes.values())
-        self._readers: dict[str, StoreReader] = {}
+        self._reader = RunReader(folder)
         self._count: dict[str, dict[int, Counter[str]]] = {"reference": {}, "map": {}}
         # As text: few of the settings are ever asked for.
         self._courses: dict[str, dict[int, bytes]] = {"reference": {}, "map": {}}
 
     def look(self) -> list[Section]:
         """Read the new shards; return the map if it has changed."""
-        self._readers = store_readers(self._folder, self._readers)
         changed = False
-        for name, reader in self._readers.items():
-            if name not in self._count:
-                continue
-            for unit in reader.new_units():
-                changed = True
-                for row, text in enumerate(unit.arrays["count"]):
-                    self._count[name][unit.start + row] = Counter(json.loads(text))
-                # A run that an earlier version began keeps none.
-                for row, text in enumerate(unit.arrays.get("courses", ())):
-                    self._courses[name][unit.start + row] = text
+        for name, unit in self._reader.new_units(self._count):
+            changed = True
+            for row, text in enumerate(unit.arrays["count"]):
+                self._count[name][unit.start + row] = Counter(json.loads(text))
+            # A run that an earlier version began keeps none.
+            for row, text in enumerate(unit.arrays.get("courses", ())):
+                self._courses[name][unit.start + row] = text
         return self.sections() if changed else []
 
     def sections(self) -> list[Section]:
@@ -110,7 +105,7 @@ class RunningSensitivity:
         done = sum(len(counts) for counts in self._count.values())
         wanted = int(np.prod(self._shape)) + self._study.sensitivity.reference_realisations
         words = f"{done} of {wanted} settings"
-        if "sobol" in self._readers:
+        if "sobol" in self._reader.sweeps:
             return None, f"{words}; Sobol' indices under way"
         return 0.95 * done / wanted, words
 

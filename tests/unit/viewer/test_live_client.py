@@ -164,6 +164,46 @@ async def request_arrived(server: LiveServer) -> None:
             await asyncio.sleep(0.005)
 
 
+def test_a_flood_of_frames_lets_the_others_have_their_turn() -> None:
+    number = 5000
+    flood = b"".join(json.dumps(frame(index)).encode() + b"\n" for index in range(number))
+
+    async def run() -> int:
+        async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            writer.write(json.dumps(HELLO).encode() + b"\n" + flood)
+            await reader.read()
+            writer.close()
+
+        server = await asyncio.start_server(answer, "127.0.0.1", 0)
+        async with server, listening(server.sockets[0].getsockname()[1]) as (_, heard):
+            await heard.until(kind("hello"))
+            turns = 0
+            async with asyncio.timeout(20):
+                while heard[-1].get("frame") != number - 1:
+                    turns += 1
+                    await asyncio.sleep(0)
+        return turns
+
+    # One for each frame, but for those that were read before the first look.
+    assert asyncio.run(run()) > 0.5 * number
+
+
+def test_a_line_that_the_end_cuts_short_is_no_fault() -> None:
+    async def run() -> None:
+        async def answer(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            lines = [json.dumps(content).encode() for content in (HELLO, frame(0))]
+            writer.write(b"\n".join(lines) + b'\n{"type": "fra')
+            await writer.drain()
+            writer.close()
+
+        server = await asyncio.start_server(answer, "127.0.0.1", 0)
+        async with server, listening(server.sockets[0].getsockname()[1]) as (_, heard):
+            assert "gone" in (await heard.until(kind("lost")))["words"]
+            assert [content["type"] for content in heard] == ["hello", "frame", "lost"]
+
+    asyncio.run(run())
+
+
 def test_images_come_for_as_long_as_a_browser_wants_them() -> None:
     pytest.importorskip("cv2")
 
