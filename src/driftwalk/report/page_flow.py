@@ -61,7 +61,8 @@ def flow_section(flow: xr.Dataset, *, id: str = "flow", title: str = "The flow")
     Returns
     -------
     dict
-        A section of kind "flow". `standard_error` is the root mean square over both components.
+        A section of kind "flow". `standard_error` is the root mean square over both components,
+        NaN where the flow was not measured.
 
     Raises
     ------
@@ -82,7 +83,8 @@ def flow_section(flow: xr.Dataset, *, id: str = "flow", title: str = "The flow")
     errors = [f"{name}_standard_error" for name in "uv"]
     error = None
     if all(name in flow for name in errors):
-        error = encode_array(np.sqrt(sum(flow[name].values ** 2 for name in errors) / 2.0))
+        both = np.sqrt(sum(flow[name].values ** 2 for name in errors) / 2.0)
+        error = encode_array(np.where(kind == KINDS["measured"], both, np.nan))
     return section(
         id, "flow", title, _note(flow, kind),
         arena=arena_part(flow),
