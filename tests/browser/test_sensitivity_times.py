@@ -26,6 +26,7 @@ pytestmark = pytest.mark.browser
 SIZE = ("--blocks", "3", "--runs", "40", "--realisations", "2", "--duration", "60s")
 MAP = ("--vary", "drag-coefficient=0.2:1:0.4", "--vary", "force-std=0.2mN:1mN:0.4mN")
 SHAPE = (3, 3)
+NAMES = ("I3", "L3", "2+1", "1+1+1")
 
 
 @pytest.fixture(scope="module")
@@ -206,6 +207,7 @@ def test_a_run_of_before_says_that_it_kept_none(
 
 def test_a_running_analysis_shows_the_settings_that_are_there(
     visit: Callable[..., Visit],
+    picture: Callable[..., Path],
     found: xr.Dataset,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -227,8 +229,15 @@ def test_a_running_analysis_shows_the_settings_that_are_there(
                 charts = page.locator(".setting-times svg.plot")
                 assert_areas_are(charts.nth(0), shares_of(found, row, column))
                 assert_areas_are(charts.nth(1), found["reference_over_time"].values.T)
+                bars = page.locator(".map-setting svg.classes").get_attribute("aria-label")
+                ends = 100 * found["proportion"].values[row, column]
+                told = (f"{n} {share:.3g} %" for n, share in zip(NAMES, ends, strict=True))
+                assert bars == f"Outcomes of this setting: {', '.join(told)}"
+            picture(page, "sensitivity-under-way")
             click_cell(page, 2, 2)
-            assert "are not there yet" in page.locator(".setting-times").inner_text()
+            shown = page.locator("[data-part=l1-map]")
+            assert "are not there yet" in shown.inner_text()
+            assert shown.locator("svg.classes, .setting-times svg").count() == 0
 
 
 def test_settings_on_no_map_are_chosen_from_a_list(

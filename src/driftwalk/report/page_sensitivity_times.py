@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 NEEDED: Final = ("count_over_time", "time", "class_over_time", "runs")
-MOST_COUNTS: Final = 2_000_000
-"""Numbers of runs that the maps of a page hold together: some 1.2 MB of it."""
+MOST_COUNTS: Final = 6_000_000
+"""Numbers of runs that the maps of a page hold together: some 2.2 MB of it."""
 
 
 def over_time_part(part: xr.Dataset, x: str, y: str) -> dict[str, Any] | None:

@@ -20,6 +20,8 @@ from driftwalk.assemble.sensitivity_times import (
     kept_times,
 )
 from driftwalk.report import encode_array
+from driftwalk.report.assembly_labels import classes_to_show
+from driftwalk.report.page_classes import cells_of
 from driftwalk.report.page_sensitivity_times import over_time_part
 from driftwalk.viewer.run_shards import RunReader
 from driftwalk.viewer.running import NO_CELL, Section
@@ -94,9 +96,7 @@ class RunningSensitivity:
                 "reference": None,
                 "noise": None,
                 "label": "l1 distance",
-                "classes": [],
-                "cells": [],
-                "shares": None,
+                **self._outcomes(tuple(shape)),
             }
         ]
 
@@ -140,6 +140,22 @@ class RunningSensitivity:
             share = table / table.sum(axis=1, keepdims=True)
             one["reference_over_time"] = (("time", "class_over_time"), share)
         return over_time_part(one, "x", "y")
+
+    def _outcomes(self, shape: tuple[int, ...]) -> dict[str, Any]:
+        """Return the classes of the first settings, as many as a map of a shape has."""
+        found = {k: count for k, count in self._count["map"].items() if k < np.prod(shape)}
+        names = sort_classes(name for count in found.values() for name in count)
+        share = np.full((int(np.prod(shape)), len(names)), np.nan)
+        for setting, count in found.items():
+            if count:
+                share[setting] = [count[name] / count.total() for name in names]
+        largest = np.nan_to_num(share).max(axis=0, initial=0.0)
+        shown = classes_to_show(list(names), largest)
+        return {
+            "classes": [names[index] for index in shown],
+            "cells": [cells_of(names[index]) for index in shown],
+            "shares": encode_array(share[:, shown].reshape(*shape, len(shown))) if shown else None,
+        }
 
     def _distances(self) -> npt.NDArray[np.float64]:
         """Return the l1 distance of every setting to the pooled reference, NaN where unknown."""

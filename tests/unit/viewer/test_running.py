@@ -251,6 +251,13 @@ def test_sensitivity_fills_its_map(tmp_path: Path) -> None:
         np.testing.assert_allclose(
             dw.decode_array(section["value"]), [[0.0, 1.0, 1.0], [0.6, np.nan, np.nan]], rtol=1e-6
         )
+        assert section["classes"] == ["2", "1+1"]
+        gone = [np.nan, np.nan]
+        np.testing.assert_allclose(
+            dw.decode_array(section["shares"]),
+            [[[0.5, 0.5], [1.0, 0.0], [0.0, 1.0]], [[0.8, 0.2], gone, gone]],
+            rtol=1e-6,
+        )
         assert section["x"]["name"] == "force_std"
         assert section["y"]["values"] == [0.2, 0.3]
         assert page(source)["state"]["words"] == "6 of 8 settings"

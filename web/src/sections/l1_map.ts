@@ -179,7 +179,7 @@ function reading(map: L1Data, { row, column }: Cell): [string, string][] {
   return [
     [shortName(y.label), inUnit(at(y.values, row), map.yDisplay, 4)],
     [shortName(x.label), inUnit(at(x.values, column), map.xDisplay, 4)],
-    [label, short(at(map.value, row * map.columns + column))],
+    [label, short(distanceAt(map, { row, column }))],
   ];
 }
 
@@ -198,30 +198,40 @@ function settingPanel(
     const mine = newest;
     const times = await source(cell).catch(() => null);
     if (mine !== newest) return;
-    const some = showSetting(map, panel, grid, cell);
+    const waits = context.fetchCell !== null && !Number.isFinite(distanceAt(map, cell));
+    const nothing = waits
+      ? "The outcomes of this setting are not there yet."
+      : "There are no outcomes of this setting.";
+    const some = showSetting(map, panel, grid, cell, nothing);
     // What is there keeps its room until the new picture stands, so that the page does not jump.
     below.style.setProperty("min-height", `${below.clientHeight}px`);
     below.replaceChildren();
     if (times !== null && some) {
       below.append(el("h3", {}, "Outcome classes over time"));
       drawSettingTimes(below, times, context);
-    } else if (some) below.append(el("p", { class: "nothing" }, withoutTimes(map, cell, context)));
+    } else if (some) {
+      const words = "This run kept no outcome classes over time; a new run keeps them.";
+      below.append(el("p", { class: "nothing" }, waits ? nothing : words));
+    }
     below.style.removeProperty("min-height");
     grid.dataset["shown"] = `${cell.row},${cell.column}`;
   };
 }
 
-function withoutTimes(map: L1Data, { row, column }: Cell, context: Context): string {
-  const waits = context.fetchCell !== null && !Number.isFinite(at(map.value, row * map.columns + column));
-  return waits
-    ? "The outcome classes of this setting are not there yet."
-    : "This run kept no outcome classes over time; a new run keeps them.";
+function distanceAt(map: L1Data, { row, column }: Cell): number {
+  return at(map.value, row * map.columns + column);
 }
 
 /** Shows the outcomes of a setting at the end of its runs; returns false where it is known to have none. */
-function showSetting(map: L1Data, panel: HTMLElement, grid: HTMLElement, cell: Cell): boolean {
+function showSetting(
+  map: L1Data,
+  panel: HTMLElement,
+  grid: HTMLElement,
+  cell: Cell,
+  nothing: string,
+): boolean {
   const { section, shares } = map;
-  const distance = at(map.value, cell.row * map.columns + cell.column);
+  const distance = distanceAt(map, cell);
   Object.assign(grid.dataset, {
     row: String(cell.row),
     column: String(cell.column),
@@ -242,7 +252,7 @@ function showSetting(map: L1Data, panel: HTMLElement, grid: HTMLElement, cell: C
   }));
   const known = rows.filter((row) => Number.isFinite(row.bars[0]?.share));
   if (known.length === 0) {
-    panel.append(el("p", { class: "nothing" }, "There are no outcomes of this setting."));
+    panel.append(el("p", { class: "nothing" }, nothing));
     return false;
   }
   const label = known.map((row) => `${row.name} ${percent(row.bars[0]?.share ?? 0)}`).join(", ");
