@@ -11,10 +11,12 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pytest
 import xarray as xr
 from drawn_blocks import marker_of, moving_blocks
 
 import driftwalk as dw
+from driftwalk.track.live_camera import LiveCamera
 
 SMALL = {"width_px": 240, "height_px": 180, "px_per_m": 560.0}
 TANK = ("--tank-diameter", "30cm")
@@ -36,7 +38,23 @@ def images_of(video: Path) -> list[np.ndarray]:
 
 @contextlib.contextmanager
 def network_camera(video: Path, *, shown: int, rate: float = 30.0) -> Iterator[str]:
-    """Serve the images of a video as a network camera does; each connection ends after `shown`."""
+    """Serve the images of a video as a network camera does; each connection ends after `shown`.
+
+    It takes its time where the tracker does: the next image comes when the last one was taken.
+    """
+    opened: list[LiveCamera] = []
+    open_camera = LiveCamera.open
+
+    def open_and_note(text: str) -> LiveCamera:
+        opened.append(open_camera(text))
+        return opened[-1]
+
+    def one_waits() -> bool:
+        return any(
+            camera._newest is not None and camera._thread.is_alive() and not camera._stop
+            for camera in opened
+        )
+
     files = [cv2.imencode(".jpg", image)[1].tobytes() for image in images_of(video)]
 
     class Handler(BaseHTTPRequestHandler):
@@ -53,8 +71,14 @@ def network_camera(video: Path, *, shown: int, rate: float = 30.0) -> Iterator[s
                     head = f"--next\r\nContent-Type: image/jpeg\r\nContent-Length: {len(file)}\r\n"
                     self.wfile.write(head.encode() + b"\r\n" + file + b"\r\n")
                     time.sleep(1.0 / rate)
+                    while one_waits():
+                        time.sleep(0.002)
 
-    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server,
+    ):
+        patch.setattr(LiveCamera, "open", staticmethod(open_and_note))
         thread = threading.Thread(target=server.serve_forever)
         thread.start()
         yield f"camera:http://127.0.0.1:{server.server_port}/stream.mjpg"
