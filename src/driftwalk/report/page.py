@@ -12,8 +12,10 @@ from driftwalk.report.page_calibration import calibration_sections
 from driftwalk.report.page_fit import fit_sections
 from driftwalk.report.page_manifest import manifest_section
 from driftwalk.report.page_parts import (
+    FOUND_TITLE,
     SIMULATED,
     Section,
+    attempt,
     is_simulated,
     section,
     warnings_section,
@@ -67,7 +69,7 @@ def report_page(folder: str | Path) -> dict[str, Any]:
     ``[part["title"] for part in report_page("run")["sections"]]``
     """
     run = open_run_folder(Path(folder))
-    sections = _SECTIONS[run.kind](run) if run.kind is not None else []
+    sections = _sections_of(run)
     if run.state == "finished" and run.read == 0:
         reason = "; ".join(run.problems) or "none of the results that driftwalk knows is there"
         raise InputError(f"{run.folder} holds a finished run, but {reason}")
@@ -170,6 +172,14 @@ def _words_of_state(run: Run) -> str | None:
         f"This run is not finished.{begun} The same command, run again, continues it; what is "
         "there so far is shown."
     )
+
+
+def _sections_of(run: Run) -> list[Section]:
+    if run.kind is None:
+        return []
+    make = _SECTIONS[run.kind]
+    # What data in another form break outside of any section costs the page, and not the program.
+    return attempt("summary", FOUND_TITLE, lambda: make(run))
 
 
 def _state_section(words: str) -> Section:

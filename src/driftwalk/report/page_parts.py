@@ -24,6 +24,8 @@ _ARENA_KEYS: Final = {
     "rectangle": ("width_m", "height_m"),
     "polygon": ("vertices_m",),
 }
+LONGEST_REASON: Final = 200
+"""Letters of an error that are shown."""
 FOUND_TITLE: Final = "What was found"
 SIMULATED: Final = "The recording was simulated: it is no measurement."
 
@@ -47,12 +49,18 @@ def empty_section(id: str, title: str, reason: str) -> Section:
 def attempt(id: str, title: str, make: Callable[[], Section | list[Section]]) -> list[Section]:
     """Make sections; what the data do not allow becomes an empty section with the reason.
 
-    Errors that no data explain are faults of driftwalk, and pass.
+    Another version of driftwalk, or another program, may have written the data in another form:
+    that costs the section, and not the page. Errors that no data explain are faults of driftwalk,
+    and pass.
     """
     try:
         made = make()
     except DriftwalkError as error:
         return [empty_section(id, title, str(error))]
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+        words = f"{type(error).__name__}: {error}"[:LONGEST_REASON]
+        reason = f"The data are not in the form that this version of driftwalk reads ({words})."
+        return [empty_section(id, title, reason)]
     return made if isinstance(made, list) else [made]
 
 
