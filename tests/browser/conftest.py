@@ -29,6 +29,8 @@ ARGUMENTS = [
     "--disable-sync",
 ]
 DESKTOP = {"width": 1440, "height": 900}
+PATIENCE_MS = 20_000
+"""How long a page may take to show something."""
 PHONE = {"width": 390, "height": 844}
 
 
@@ -41,8 +43,9 @@ def browser() -> Iterator[Browser]:
         if os.environ.get("DRIFTWALK_REQUIRE_BROWSER") == "1":
             pytest.fail(words)
         pytest.skip(words)
-    from playwright.sync_api import sync_playwright
+    from playwright.sync_api import expect, sync_playwright
 
+    expect.set_options(timeout=PATIENCE_MS)
     with sync_playwright() as playwright:
         started = playwright.chromium.launch(executable_path=found, args=ARGUMENTS)
         yield started
@@ -94,7 +97,7 @@ def visit(browser: Browser) -> Iterator[Callable[..., Visit]]:
 
     def start(allowed: str, *, viewport: dict[str, int] = DESKTOP, **options: Any) -> Visit:
         context = browser.new_context(viewport=viewport, **options)
-        context.set_default_timeout(20_000)
+        context.set_default_timeout(PATIENCE_MS)
         visits.append(Visit(context.new_page(), allowed))
         return visits[-1]
 
