@@ -115,9 +115,10 @@ def test_a_calibration(run: Path, tmp_path: Path) -> None:
 
 
 def test_a_report_is_made_quickly_and_always_the_same(run: Path, tmp_path: Path) -> None:
-    begin = time.perf_counter()
+    # Processor time: what else the machine does is not counted.
+    begin = time.process_time()
     report_of(run, tmp_path / "a.html")
-    assert time.perf_counter() - begin < 10.0
+    assert time.process_time() - begin < 10.0
     report_of(run, tmp_path / "b.html")
     assert (tmp_path / "a.html").read_bytes() == (tmp_path / "b.html").read_bytes()
 

@@ -289,8 +289,9 @@ def test_the_report_of_a_default_search_is_quick_and_small(tmp_path: Path) -> No
     recording = build_trajectory(0.1 * np.arange(18_000), x, y, 0 * x)
     parts = {"calibration.nc": found, "flow.nc": bundled_flow(), "recording.nc": recording}
     folder = make_run(tmp_path / "run", parts)
-    begin = time.perf_counter()
+    # Processor time: what else the machine does is not counted.
+    begin = time.process_time()
     path = write_report(report_page(folder), tmp_path / "report.html")
-    assert time.perf_counter() - begin < 10.0
+    assert time.process_time() - begin < 10.0
     assert 1e6 < path.stat().st_size < 5e6
     assert part_of(report_page(folder), "map")["cells"]["excerpt_x"]["shape"] == [*shape, 301]
