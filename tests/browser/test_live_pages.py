@@ -224,6 +224,20 @@ def test_the_page_comes_back_when_the_server_does(
         assert page.locator("section[data-kind=map]").is_visible()
 
 
+def test_a_page_becomes_that_of_another_server_on_its_port(
+    visit: Callable[..., Visit], finished: Path, port: int
+) -> None:
+    """The playground is ended and a run is viewed in its place; the tab was open all the time."""
+    one = visit(f"http://127.0.0.1:{port}/")
+    with served("play", "--blocks", 2, port=port) as server:
+        page = one.open(server.address)
+        until_tank(page, "frames", 2)
+    with served("view", finished, port=port):
+        page.locator("section[data-kind=map]").wait_for()
+        assert page.locator("h1").inner_text() == "Calibration"
+        assert page.locator("canvas.tank-canvas").count() == 0
+
+
 def test_a_run_that_is_taken_away_is_not_called_running(
     visit: Callable[..., Visit], finished: Path, tmp_path: Path
 ) -> None:

@@ -1,6 +1,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import { SECTIONS, checkPage, checkState } from "../src/page";
+import { isAnother } from "../src/views/connection";
 import { checkFrame, checkHello } from "../src/views/live_message";
 import { besides, insertAfter, sameIds } from "../src/views/order";
 import { nextPause, parsed } from "../src/views/socket";
@@ -14,6 +15,13 @@ test("a page needs little, and what is absent is null", () => {
   assert.equal(page.state, null);
   assert.equal(checkPage({ ...PAGE, state: {} }).state?.finished, true);
   assert.equal(checkState({ type: "state", finished: false, progress: 0.5 }).progress, 0.5);
+});
+
+test("a page of another kind or version needs another front end", () => {
+  const first = checkPage({ ...PAGE, view: "play", driftwalk_version: "1.0.0" });
+  assert.equal(isAnother({ ...first, title: "other", subtitle: "other" }, first), false);
+  assert.equal(isAnother({ ...first, view: "run" }, first), true);
+  assert.equal(isAnother({ ...first, driftwalk_version: "1.0.1" }, first), true);
 });
 
 test("what is no page is refused with a reason", () => {

@@ -32,7 +32,7 @@ export function showLive(first: Page): Promise<void> {
   const shell = makeShell(first);
   return new Promise((ready) => {
     const stream = new LiveStream(shell);
-    connected(shell, {
+    connected(shell, first, {
       opened: (link) => stream.opened(link),
       received: (message) => {
         if (message.type === "page") shell.showPage(checkPage(message["page"]));

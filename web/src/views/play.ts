@@ -35,7 +35,7 @@ export function showPlay(first: Page): Promise<void> {
   shell.main.append(el("p", { class: "nothing" }, "Waiting for the server."));
   return new Promise((ready) => {
     let playground: Playground | null = null;
-    connected(shell, {
+    connected(shell, first, {
       received: (message, link) => {
         if (message.type === "page") {
           const page = checkPage(message["page"]);

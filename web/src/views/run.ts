@@ -87,7 +87,7 @@ export function showRun(first: Page): Promise<void> {
   const changed = new Map<string, RawSection>();
 
   return new Promise((ready) => {
-    const link = connected(shell, {
+    const link = connected(shell, first, {
       received: (message) => {
         if (message.type === "page") {
           newest = checkPage(message["page"]);
