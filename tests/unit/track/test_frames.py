@@ -182,7 +182,7 @@ class Camera:
 
     def read(self) -> tuple[bool, Any]:
         if self.ahead == 0:
-            self.gate.wait(5.0)
+            self.gate.wait(60.0)
         self.ahead -= 1
         self.left -= 1
         return (True, picture(self.left)) if self.left >= 0 else (False, None)
@@ -194,7 +194,7 @@ class Camera:
 def test_a_camera_hands_out_the_newest_and_may_disappear() -> None:
     camera = Camera(frames=6)
     # A clock that goes on by a second with each frame that is read.
-    live = dw.LiveCamera(camera, "camera:0", patience=2.0, now=lambda: 100.0 - camera.left)
+    live = dw.LiveCamera(camera, "camera:0", patience=60.0, now=lambda: 100.0 - camera.left)
     frames, waited = [], []
     for frame in live:
         frames.append(frame)
