@@ -19,7 +19,7 @@ from driftwalk.report.page_parts import (
     is_simulated,
     section,
 )
-from driftwalk.report.page_words import count, quantity
+from driftwalk.report.page_words import count, percent, quantity
 from driftwalk.report.plot_trajectory import GAP_INTERVALS
 from driftwalk.schema import Track, body_names, body_track, check_trajectory
 
@@ -33,6 +33,8 @@ MOST_GAPS: Final = 1000
 """Gaps that a page lists, the longest ones."""
 MOST_BODIES: Final = 8
 SPEED_BINS: Final = 40
+FAR_SPEED: Final = 2.0
+"""How many times the 99th percentile a speed may be and still be in the histogram."""
 POSITION_PARTS: Final = 20_000
 """The extent of a path in steps of its resolution, at least."""
 ANGLE_STEP: Final = 1e-3
@@ -143,8 +145,15 @@ def trajectory_section(
     speed = np.hypot(np.diff(track.x), np.diff(track.y))[~gap] / interval[~gap]
     notes = [SIMULATED] if is_simulated(trajectory) else []
     if every > 1:
-        notes.append(f"Every {every}th position is shown.")
+        notes.append(f"One position in {every} is shown.")
     notes.append(f"Positions are shown to {quantity(step, 'm')}.")
+    top = _top_speed(speed)
+    beyond = speed[speed > top]
+    if beyond.size:
+        notes.append(
+            f"{percent(beyond.size / speed.size)} of the speeds are beyond the histogram, up to "
+            f"{quantity(float(beyond.max()), 'm/s', digits=3)}."
+        )
     names = body_names(trajectory)
     title = "The recording" if len(names) == 1 else f"The recording, body {body}"
     return section(
@@ -152,7 +161,7 @@ def trajectory_section(
         arena=arena_part(trajectory),
         **path,
         gaps=_gaps(track, interval, gap),
-        speed=_speed_density(speed),
+        speed=_speed_density(speed, top),
         facts=[*_facts(track, interval, gap, speed, noise), *_ambiguity(trajectory, body)],
     )  # fmt: skip
 
@@ -214,9 +223,17 @@ def _gaps(track: Track, interval: Floats, gap: npt.NDArray[np.bool_]) -> list[li
     return [[float(track.time[i]), float(track.time[i + 1])] for i in longest]
 
 
-def _speed_density(speed: Floats) -> dict[str, Any]:
+def _top_speed(speed: Floats) -> float:
+    """Return where the histogram ends: a few jumps must not squeeze all else into one bin."""
     top = float(speed.max(initial=0.0)) or 1.0
-    density, edges = np.histogram(speed, bins=SPEED_BINS, range=(0.0, top), density=True)
+    usual = FAR_SPEED * float(np.percentile(speed, 99.0)) if speed.size else top
+    return usual if 0.0 < usual < top else top
+
+
+def _speed_density(speed: Floats, top: float) -> dict[str, Any]:
+    """Return the density of all speeds, as far as it is shown."""
+    number_of, edges = np.histogram(speed, bins=SPEED_BINS, range=(0.0, top))
+    density = number_of / (max(speed.size, 1) * np.diff(edges))
     return {"edges": plain_list(edges), "density": plain_list(density)}
 
 

@@ -55,6 +55,18 @@ def test_facts_and_speeds_are_those_of_the_recording(recording: xr.Dataset) -> N
     np.testing.assert_allclose(density * np.diff(edges), share, atol=1e-12)
 
 
+def test_a_jump_does_not_squeeze_the_speeds_into_one_bin() -> None:
+    speed = np.random.default_rng(4).uniform(0.05, 0.1, 1000)
+    speed[500] = 8.0
+    x = np.concatenate([[0.0], np.cumsum(0.1 * speed)])
+    part = trajectory_section(build_trajectory(0.1 * np.arange(1001), x, 0.0 * x))
+    edges, density = (values(part["speed"][key]) for key in ("edges", "density"))
+    assert 0.1 < edges[-1] < 0.21
+    # All that is beyond is missing from the integral, and is told.
+    assert (density * np.diff(edges)).sum() == pytest.approx(0.999)
+    assert "0.1 % of the speeds are beyond the histogram, up to 8 m/s." in part["note"]
+
+
 def test_gaps_break_the_path() -> None:
     time = np.array([0.0, 0.1, 0.2, 5.0, 5.1, 5.2, 9.0])
     moving = build_trajectory(time, np.arange(7.0) / 100, np.zeros(7))
@@ -76,7 +88,7 @@ def test_a_long_recording_is_thinned_but_keeps_its_gaps_and_ends() -> None:
     part = trajectory_section(moving)
     shown, at = values(part["x"]), values(part["time"])
     assert 10_000 < shown.size <= 20_000
-    assert "Every 6th position is shown." in part["note"]
+    assert "One position in 6 is shown." in part["note"]
     assert part["gaps"] == [[59_999.0, 60_050.0]]
     gap = int(np.flatnonzero(np.isnan(shown))[0])
     assert (at[gap - 1], at[gap + 1]) == (59_999.0, 60_050.0)
