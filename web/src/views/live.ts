@@ -8,6 +8,7 @@ import { type Shell, makeShell } from "../shell";
 import { TankCanvas, type Trail, type View } from "../tank/canvas";
 import { assemblies, shapeName } from "../tank/joined";
 import { boxAround } from "../tank/outline";
+import { Trails } from "../tank/trails";
 import { type Camera, drawVideo, imageBox } from "../tank/video";
 import { onThemeChange } from "../theme";
 import { duration, fixed, quantity, whole } from "../units";
@@ -55,7 +56,7 @@ class LiveStream {
   private readonly video = el("input", { type: "checkbox", name: "video" });
   private readonly trails = el("input", { type: "checkbox", name: "trails" });
   private readonly take: (frame: Frame) => void;
-  private readonly past = new Map<string, { time: number; x: number; y: number }[]>();
+  private readonly past = new Trails(TRAIL_S);
   private readonly seenEvents = new Set<string>();
   private link: Link | null = null;
   private hello: Hello | null = null;
@@ -161,12 +162,7 @@ class LiveStream {
   /** Keeps what must not be lost when the page draws more slowly than frames come. */
   private note(frame: Frame): void {
     for (const one of frame.events ?? []) this.addEvent(one);
-    for (const body of frame.bodies) {
-      const trail = this.past.get(body.id) ?? [];
-      trail.push({ time: frame.time_s, x: body.x_m ?? Number.NaN, y: body.y_m ?? Number.NaN });
-      while (frame.time_s - (trail[0]?.time ?? frame.time_s) > TRAIL_S) trail.shift();
-      this.past.set(body.id, trail);
-    }
+    this.past.add(frame.time_s, frame.bodies);
   }
 
   /** Lets a frame be drawn; blocks and the picture under them are always of one frame. */
@@ -220,11 +216,7 @@ class LiveStream {
   }
 
   private trailsNow(shapes: ReadonlyMap<string, string>): Trail[] {
-    return [...this.past].map(([id, points]) => ({
-      x: points.map((point) => point.x),
-      y: points.map((point) => point.y),
-      colour: shapeColour(shapes.get(id) ?? "1"),
-    }));
+    return this.past.all().map(({ id, x, y }) => ({ x, y, colour: shapeColour(shapes.get(id) ?? "1") }));
   }
 
   private showNow(frame: Frame): void {
