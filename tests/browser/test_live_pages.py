@@ -421,7 +421,6 @@ def test_a_tracker_is_watched(
             raise AssertionError("the camera's picture does not come to lie under the blocks")
         assert data(page, "outcome") == "1+1"
         picture(page, "live-desktop")
-        page.uncheck("input[name=video]")
         # From here on the tracker goes as fast as it can.
         assert end(tracker).code == 0
         expect(readout).to_contain_text("has ended")

@@ -217,8 +217,12 @@ def require_run(folder: Path) -> None:
         Says what is there instead.
     """
     if not folder.is_dir():
-        what = "is a file, expected a run directory" if folder.exists() else "there is no such "
-        raise InputError(f"{folder}: {what}{'' if folder.exists() else 'directory'}")
+        if folder.exists():
+            raise InputError(
+                f"{folder}: is a file, expected a run directory; the page of a recording is written "
+                f"by 'driftwalk report {folder.name}'"
+            )
+        raise InputError(f"{folder}: there is no such directory")
     state = state_of(folder)
     if state == "finished":
         refuse_other_version(folder, read_manifest(folder / MANIFEST_FILE))

@@ -475,7 +475,7 @@ def test_what_is_no_run_is_refused(tmp_path: Path, run: RunDirectory) -> None:
     (tmp_path / "file").write_text("x")
     for name, words in (
         ("nowhere", "there is no such directory"),
-        ("file", "is a file, expected a run directory"),
+        ("file", "is a file, expected a run directory; .* by 'driftwalk report file'$"),
         ("empty", "holds no run of driftwalk$"),
         ("", "there are runs in it: run"),
     ):

@@ -55,7 +55,7 @@ export async function drawFlow(section: FlowSection, body: HTMLElement): Promise
             {
               swatch: "hatch" as const,
               colour: "var(--orange)",
-              text: "filled in: the block was never there",
+              text: "filled in, arrows orange: the block was never there",
             },
           ]
         : []),

@@ -14,6 +14,7 @@ import { onThemeChange } from "../theme";
 import { duration, fixed, quantity, whole } from "../units";
 import { checkPage } from "../page";
 import { connected } from "./connection";
+import { HeldFrame } from "./held";
 import { type Frame, type Hello, type LiveEvent, UNKNOWN, checkFrame, checkHello } from "./live_message";
 import { ShapeCounts, shapeColour } from "./shape_counts";
 import { newestWins } from "./newest";
@@ -56,6 +57,7 @@ class LiveStream {
   private readonly video = el("input", { type: "checkbox", name: "video" });
   private readonly trails = el("input", { type: "checkbox", name: "trails" });
   private readonly take: (frame: Frame) => void;
+  private readonly held = new HeldFrame<Frame>((frame) => this.take(frame));
   private readonly past = new Trails(TRAIL_S);
   private readonly seenEvents = new Set<string>();
   private link: Link | null = null;
@@ -110,8 +112,11 @@ class LiveStream {
       this.note(frame);
       void this.schedule(frame);
     } else if (message.type === "note") this.leftOut.textContent = String(message["words"] ?? "");
-    else if (message.type === "lost") this.say(String(message["words"] ?? "the tracker is gone"));
-    else if (message.type === "end") {
+    else if (message.type === "lost") {
+      this.held.flush();
+      this.say(String(message["words"] ?? "the tracker is gone"));
+    } else if (message.type === "end") {
+      this.held.flush();
       const why = message["interrupted"];
       this.say(typeof why === "string" ? `The stream has ended: ${why}` : "The stream has ended.");
     }
@@ -142,6 +147,7 @@ class LiveStream {
             lens: image.lens,
           };
     this.picture = null;
+    this.held.drop();
     this.past.clear();
     this.counts.clear();
     this.list.replaceChildren();
@@ -165,20 +171,29 @@ class LiveStream {
     this.past.add(frame.time_s, frame.bodies);
   }
 
-  /** Lets a frame be drawn; blocks and the picture under them are always of one frame. */
+  /**
+   * Lets a frame be drawn; blocks and the picture under them are of one frame, as long as pictures
+   * come. A frame without one waits for the next picture, not for ever.
+   */
   private async schedule(frame: Frame): Promise<void> {
+    const { hello } = this;
     if (frame.jpeg_base64 !== null && this.video.checked) {
       const image = new Image();
       image.src = `data:image/jpeg;base64,${frame.jpeg_base64}`;
       await image.decode().catch(() => undefined);
-      if (image.naturalWidth > 0 && this.video.checked) {
+      if (image.naturalWidth > 0 && this.video.checked && hello === this.hello) {
         this.picture = image;
         this.pictured = performance.now();
       }
-    } else if (this.picture !== null && performance.now() - this.pictured < PICTURE_MS) {
-      this.link?.send({ type: "ready" });
-      return;
+    } else if (this.picture !== null) {
+      const patience = this.pictured + PICTURE_MS - performance.now();
+      if (patience > 0) {
+        this.held.hold(frame, patience);
+        this.link?.send({ type: "ready" });
+        return;
+      }
     }
+    this.held.drop();
     this.take(frame);
   }
 
