@@ -128,6 +128,9 @@ def test_explained_frame(folder: Path, tmp_path: Path) -> None:
     assert done.out.count("found") == 2
     assert (tmp_path / "r-frame-3.png").stat().st_size > 1000
     assert not (tmp_path / "r.nc").exists()
+    named = tracked(folder, tmp_path / "named.png", "--explain", "3")
+    assert named.code == 0, named.err
+    assert (tmp_path / "named.png").read_bytes() == (tmp_path / "r-frame-3.png").read_bytes()
     assert "there is no frame 400" in refusal(
         tracked(folder, tmp_path / "r.nc", "--explain", "400")
     )

@@ -80,6 +80,32 @@ def test_a_colour_that_never_appears(words: list[object], tmp_path: Path) -> Non
     assert "green (a*" in said
 
 
+def test_a_scale_at_which_the_markers_do_not_fit_the_block(
+    words: list[object], tmp_path: Path
+) -> None:
+    out = tmp_path / "m.toml"
+    teach = ("markers", "teach", words[0], "--side", "3cm", "-o", out, "--overwrite")
+    good = here(*teach, *TANK)
+    assert good.code == 0, good.err
+    assert "warning" not in good.err
+    # A tank twice as wide as it is: discs 28 mm apart, on a block of 30 mm.
+    wrong = here(*teach, "--tank-diameter", "60cm")
+    assert wrong.code == 0, wrong.err
+    assert "and the block's side is 30 mm" in wrong.err
+    assert "check --tank-diameter" in wrong.err
+
+
+def test_a_video_without_colours_teaches_nothing_and_says_what_to_do(tmp_path: Path) -> None:
+    folder = tmp_path / "grey"
+    folder.mkdir()
+    for number in range(3):
+        image = np.full((60, 80, 3), 90 + number, np.uint8)
+        assert cv2.imwrite(str(folder / f"{number}.png"), image)
+    teach = ("markers", "teach", folder, "--image-rate", "10Hz", "--px-per-m", 200)
+    said = refusal(here(*teach, "-o", tmp_path / "m.toml"))
+    assert "what stands out: all is grey; take a video in brighter, even light" in said
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -92,6 +118,7 @@ def test_a_colour_that_never_appears(words: list[object], tmp_path: Path) -> Non
         (("--live", "70000"), "a port is a number from 0 to 65535"),
         (("--markers", "aruco:4X4_50"), "nothing was tracked in 24 frames"),
         (("--markers", "aruco:9X9"), "no dictionary '9X9'"),
+        (("--markers", "aruco"), "name the dictionary too, such as aruco:4X4_50"),
         (("--overlay", "o.gif"), "an overlay is written as .mp4"),
     ],
 )

@@ -11,7 +11,12 @@ from driftwalk.cli import tracking_options as given
 from driftwalk.cli.main import paragraphs
 from driftwalk.cli.output import print_note, print_table
 from driftwalk.cli.tracking_options import TrackingOptions
+from driftwalk.core.errors import InputError
 
+_REMEDY = (
+    "take a video in brighter, even light, with stronger colours on the discs, or a part of it in "
+    "which several blocks are seen whole"
+)
 markers_app = typer.Typer(add_completion=False, help="Describe the markers on the blocks.")
 
 
@@ -43,7 +48,11 @@ def teach(
     options = TrackingOptions(
         source, "", camera=camera, tank_diameter=tank_diameter, px_per_m=px_per_m
     )
-    proposal = propose_markers(images, find_camera(options, images), block_side=side)
+    found = find_camera(options, images)
+    try:
+        proposal = propose_markers(images, found, block_side=side)
+    except InputError as error:
+        raise InputError(f"{source}: {error}; {_REMEDY}") from None
     save_markers(out, proposal.marker)
     save_picture(picture, proposal.picture)
     marker = proposal.marker
@@ -55,6 +64,13 @@ def teach(
     ]
     print_table(rows)
     print_note(f"wrote {out} and {picture}")
+    reach = marker.spacing_m + marker.size_m
+    if side is not None and reach > side:
+        print_note(
+            f"warning: the two discs reach over {1e3 * reach:.3g} mm, and the block's side is "
+            f"{1e3 * side:.3g} mm: unless they lie along its diagonal the scale is wrong; check "
+            "--tank-diameter, --px-per-m or --camera"
+        )
 
 
 markers_app.command("teach", help=paragraphs(teach.__doc__ or ""))(teach)

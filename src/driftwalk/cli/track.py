@@ -13,6 +13,8 @@ from driftwalk.cli.output import print_json, print_note, print_table
 from driftwalk.cli.tracking_options import TrackingOptions
 from driftwalk.core.errors import InputError
 
+_SHOWN = {"duplicates": "doubled"}
+
 
 def track(
     source: given.SourceName,
@@ -113,10 +115,10 @@ def _print(found: dict[str, Any]) -> None:
     print()
     counts = {**found["counts"], **found["counts"]["rejected"]}
     counts.pop("rejected")
-    print_table([[name.replace("_", " "), number] for name, number in counts.items()])
+    print_table([[_SHOWN.get(name, name.replace("_", " ")), n] for name, n in counts.items()])
     if found["frames_per_s"] is not None:
         print()
-        print_table([["frames per second", found["frames_per_s"]]])
+        print_table([["frames tracked per second", found["frames_per_s"]]])
     if found["interrupted"] is not None:
         print_note(f"warning: {found['interrupted']}")
 
@@ -127,9 +129,11 @@ def _explain(options: TrackingOptions, number: int, out: Path | None, existing: 
     from driftwalk.core.atomic import require_target
     from driftwalk.track import explain_frame, open_source, save_picture
 
-    stem = Path(options.source.replace(":", "-")).stem if out is None else out.stem
-    folder = Path() if out is None else out.parent
-    picture = folder / f"{stem}-frame-{number}.png"
+    if out is not None and out.suffix == ".png":
+        picture = out
+    else:
+        stem = Path(options.source.replace(":", "-")).stem if out is None else out.stem
+        picture = (Path() if out is None else out.parent) / f"{stem}-frame-{number}.png"
     require_target(picture, existing=existing, endings=(".png",))
     parts = build_parts(options)
     opened = open_source(options.source, rate=options.image_rate, keep_stale=True)

@@ -34,7 +34,7 @@ Markers = Annotated[
     _option(
         _FINDING,
         "--markers",
-        metavar="FILE.toml|aruco:DICT|blob",
+        metavar="FILE|aruco:DICT|blob",
         help="Two-colour markers, coded tags, or single dark or bright objects.",
     ),
 ]

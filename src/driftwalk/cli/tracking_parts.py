@@ -147,13 +147,15 @@ def _detector(
         if "polarity" not in given:
             given["polarity"] = usual_polarity(list(images), background)
             word = "dark or bright" if given["polarity"] == "both" else given["polarity"]
-            print_note(f"objects that are {word} are followed; --polarity says otherwise")
+            print_note(f"objects that are {word} are followed; to follow others, give --polarity")
         return BlobDetector(background, camera, objects=options.bodies, **given), None
     if given:
         name = next(iter(given)).replace("_", "-")
         raise ConfigurationError(f"--{name} is for --markers blob")
     if options.markers.startswith("aruco:"):
         return TagDetector(options.markers.partition(":")[2], camera), None
+    if options.markers in {"aruco", "aruco:"}:
+        raise ConfigurationError("--markers aruco: name the dictionary too, such as aruco:4X4_50")
     marker = load_markers(options.markers)
     _check_size(marker, camera, options)
     _check_colours(marker, images, options)

@@ -228,8 +228,8 @@ def _how_good(calibration: xr.Dataset) -> list[str]:
     return [
         words,
         f"Calibrated on the first half, it is {second:.4g} from the second (noise floor "
-        f"{second_floor:.4g}). That holds the errors of half a recording's parameters and flow too: "
-        "some floors are no surprise in a short one.",
+        f"{second_floor:.4g}). In that are the errors of the parameters and the flow of half a "
+        "recording too: some floors are no surprise where it is short.",
     ]
 
 

@@ -13,6 +13,7 @@ import json
 import math
 import socket
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from functools import reduce
@@ -29,6 +30,8 @@ MOST_CLIENTS: Final = 32
 _LAST_PORT: Final = 65535
 WAITING_FRAMES: Final = 8
 """Frames that wait for a client; older ones are lost to it."""
+PATIENCE_S: Final = 3.0
+"""How long clients may take for the last lines when all ends [s]."""
 _LONGEST_REQUEST: Final = 4096
 _WIDTHS: Final = range(16, 4097)
 _JPEG_QUALITY: Final = 80
@@ -135,6 +138,10 @@ class LiveServer:
             clients = list(self._clients)
         for client in clients:
             client.finish()
+        # For them all together: one that does not read is not waited for any longer.
+        until = time.monotonic() + PATIENCE_S
+        for client in clients:
+            client.wait(until)
 
     def _welcome(self) -> None:
         while True:
@@ -189,11 +196,14 @@ class _Client:
             self._changed.notify()
 
     def finish(self) -> None:
-        """Send what waits, if the client takes it at once, and close."""
+        """Take no more; what waits is still sent."""
         with self._changed:
             self._over = True
             self._changed.notify()
-        self._sender.join(timeout=0.5)
+
+    def wait(self, until: float) -> None:
+        """Close as soon as all is sent, or at a moment of the monotonic clock."""
+        self._sender.join(timeout=max(until - time.monotonic(), 0.0))
         self._hang_up()
 
     def _send(self) -> None:

@@ -219,8 +219,8 @@ def require_run(folder: Path) -> None:
     if not folder.is_dir():
         if folder.exists():
             raise InputError(
-                f"{folder}: is a file, expected a run directory; the page of a recording is written "
-                f"by 'driftwalk report {folder.name}'"
+                f"{folder}: is a file, expected a run directory; the page of a recording is "
+                f"written by 'driftwalk report {folder.name}'"
             )
         raise InputError(f"{folder}: there is no such directory")
     state = state_of(folder)

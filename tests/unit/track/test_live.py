@@ -6,6 +6,7 @@ import base64
 import contextlib
 import json
 import socket
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -89,6 +90,40 @@ def test_slow_client_loses_frames_and_the_tracker_does_not_wait(connect) -> None
             lost = line["frames_lost_by_client"]
         assert frames == sorted(set(frames))
         assert 0 < lost <= 400 - len(frames)
+
+
+def test_the_last_lines_wait_for_a_client_that_is_busy(connect) -> None:
+    with LiveServer(0) as server:
+        _, reader = connect(server, small=True)
+        assert server.wait_for_clients(1)
+        for frame in range(3):
+            server.publish({"frame": frame, "payload": "x" * 3_000_000})
+        found: list[int] = []
+
+        def read_late() -> None:
+            time.sleep(1.0)
+            found.extend(json.loads(line)["frame"] for line in reader)
+
+        busy = threading.Thread(target=read_late)
+        busy.start()
+    busy.join()
+    assert found == [0, 1, 2]
+
+
+def test_clients_that_never_read_are_left_together(
+    connect, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("driftwalk.track.live.PATIENCE_S", 1.0)
+    server = LiveServer(0)
+    _clients = [connect(server, small=True) for _ in range(8)]
+    assert server.wait_for_clients(8)
+    for frame in range(3):
+        server.publish({"frame": frame, "payload": "x" * 10_000_000})
+    began = time.monotonic()
+    server.close()
+    # One after the other they would take eight seconds.
+    assert time.monotonic() - began < 7.0
+    assert server.clients == 0
 
 
 def test_client_that_leaves_is_forgotten(connect) -> None:
