@@ -111,7 +111,8 @@ def autocorrelation_criterion(white: White, components: tuple[str, ...]) -> Crit
         "the errors of prediction are not independent: Ljung-Box statistic "
         f"{white.portmanteau:.0f}, expected {dof} ± {math.sqrt(2 * dof):.0f}; the autocorrelation "
         f"of {components[component]} at lag {lag} is {value:+.3f}, expected {expected:+.3f} ± "
-        f"{std:.3f}: the force has a memory, or the flow changes faster than the model lets it",
+        f"{std:.3f}: the force has a memory, the flow changes faster than the model lets it, or "
+        "neighbouring samples share their errors (a compressed video, a smoothed track)",
     )
 
 
