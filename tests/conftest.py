@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
+
+# Tests run side by side, one a core: threads of the linear algebra would only wait for each other.
+# This is read when NumPy is loaded, and passed on to the commands that tests start.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
 
 # The same examples in every run, and no bar on their time: whether a test passes tells about the
 # code, not about the machine or the day. `--hypothesis-profile=default` searches anew.
