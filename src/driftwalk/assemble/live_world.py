@@ -70,8 +70,9 @@ class LiveTank:
     goes on when all blocks have become one assembly, and has no end.
 
     Everything may be called from several threads at once. `advance`, `part`, `events` and `restart`
-    wait for each other. `set` and the properties do not wait for them, and `advance` does not hold
-    the interpreter lock: while it runs, other threads see the state before it. No change is lost
+    wait for each other. `set` and the properties do not wait for them, except `set` for a
+    `restart`, and `advance` does not hold the interpreter lock: while it runs, other threads see
+    the state before it. No change is lost
     when several threads call `set` at once. Each property is read on its own, though: when another
     thread advances in between, `x` and `y` are those of two moments.
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from small_sensitivity import FLOW, REALISATIONS, RUNS, by_hand, small
 
 import driftwalk as dw
 from driftwalk.assemble import settings as engine
@@ -19,24 +20,6 @@ from driftwalk.assemble.run import assemble
 from driftwalk.core.errors import InputError
 from driftwalk.core.shards import ShardStore
 from driftwalk.sweep import MemoryStore
-
-RUNS, REALISATIONS = 12, 3
-# A stream towards one side of a narrow tank: within ten seconds most blocks have met.
-FLOW = dw.uniform_flow(0.02, 0.0)
-
-
-def small(**sections: dict[str, Any]) -> dw.Study:
-    """Return a study of two or three blocks and few short runs."""
-    given: dict[str, Any] = {
-        "tank": {"diameter_m": 0.16},
-        "forces": {"drag_coefficient": 0.45, "force_std_N": 1e-3},
-        "assembly": {"blocks": 3, "duration_s": 10.0},
-        "sensitivity": {"runs": RUNS, "reference_realisations": REALISATIONS, "seed": 5},
-    }
-    for name, values in sections.items():
-        given[name] = {**given.get(name, {}), **values}
-    return dw.Study(**given)
-
 
 AXES = {"drag_coefficient": [0.2, 1.0], "force_std": [0.0, 5e-4, 2e-3]}
 
@@ -54,11 +37,6 @@ def reference(study: dw.Study) -> xr.Dataset:
 @pytest.fixture(scope="module")
 def found(study: dw.Study, reference: xr.Dataset) -> xr.Dataset:
     return dw.sensitivity_map(study, FLOW, axes=AXES, reference=reference)
-
-
-def by_hand(study: dw.Study, trial: int, **options: Any) -> xr.Dataset:
-    """Simulate one setting by the public function, with the random numbers of its trial."""
-    return assemble(study, FLOW, runs=RUNS, seed=5, trial=trial, **options)
 
 
 def counts(assembly: xr.Dataset) -> Counter[str]:

@@ -11,29 +11,23 @@ from typing import Any
 
 import numpy as np
 import pytest
+import small_sensitivity
 import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from small_sensitivity import FLOW, REALISATIONS, RUNS, by_hand
 
 import driftwalk as dw
 from driftwalk.assemble import sensitivity_times as times
 from driftwalk.assemble import settings as engine
-from driftwalk.assemble.run import assemble, assembly_path
+from driftwalk.assemble.run import assembly_path
 
-RUNS, REALISATIONS = 12, 3
-# A stream towards one side of a narrow tank: within ten seconds most blocks have met.
-FLOW = dw.uniform_flow(0.02, 0.0)
 AXES = {"drag_coefficient": [0.2, 1.0], "force_std": [5e-4, 2e-3]}
 
 
 def small(**assembly: Any) -> dw.Study:
-    """Return a study of three blocks and few short runs."""
-    return dw.Study(
-        tank={"diameter_m": 0.18},
-        forces={"drag_coefficient": 0.45, "force_std_N": 1e-3},
-        assembly={"blocks": 3, "duration_s": 10.0, **assembly},
-        sensitivity={"runs": RUNS, "reference_realisations": REALISATIONS, "seed": 5},
-    )
+    """Return a study of three blocks and few short runs, in a tank a little wider."""
+    return small_sensitivity.small(tank={"diameter_m": 0.18}, assembly=assembly)
 
 
 @pytest.fixture(scope="module")
@@ -49,11 +43,6 @@ def reference(study: dw.Study) -> xr.Dataset:
 @pytest.fixture(scope="module")
 def found(study: dw.Study, reference: xr.Dataset) -> xr.Dataset:
     return dw.sensitivity_map(study, FLOW, axes=AXES, reference=reference)
-
-
-def by_hand(study: dw.Study, trial: int, **options: Any) -> xr.Dataset:
-    """Simulate one setting by the public function, with the random numbers of its trial."""
-    return assemble(study, FLOW, runs=RUNS, seed=5, trial=trial, **options)
 
 
 def classes_by_loop(runs: xr.Dataset, moment: float) -> Counter[str]:
