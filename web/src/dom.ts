@@ -28,6 +28,14 @@ export function set(element: Element, attributes: Attributes): void {
   }
 }
 
+/** Fills an element anew; it keeps its room until the new content stands, so that the page does not jump. */
+export function refill(element: HTMLElement, fill: () => void): void {
+  element.style.setProperty("min-height", `${element.clientHeight}px`);
+  element.replaceChildren();
+  fill();
+  element.style.removeProperty("min-height");
+}
+
 let serial = 0;
 
 /** Returns an id that no other element of this page has. */

@@ -1,7 +1,7 @@
 /** The outcome classes over time of settings that are on no map: one is chosen by its name. */
 
 import { type Context, remembered } from "../context";
-import { el } from "../dom";
+import { el, refill } from "../dom";
 import type { SettingTimesSection } from "../page";
 import { decodeTimes, drawSettingTimes } from "./setting_times";
 
@@ -17,10 +17,7 @@ export async function drawChosenTimes(
   const shown = el("div", { class: "setting-times" });
   body.append(el("p", {}, select), shown);
   const show = (): void => {
-    shown.style.setProperty("min-height", `${shown.clientHeight}px`);
-    shown.replaceChildren();
-    drawSettingTimes(shown, times(0, choice.setting), context);
-    shown.style.removeProperty("min-height");
+    refill(shown, () => drawSettingTimes(shown, times(0, choice.setting), context));
     shown.dataset["shown"] = String(choice.setting);
   };
   select.selectedIndex = choice.setting;

@@ -10,7 +10,7 @@ import { type Place, onPointer } from "../charts/hover";
 import { figure } from "../charts/responsive";
 import { colourScale } from "../colours";
 import { type Context, remembered } from "../context";
-import { el, svg } from "../dom";
+import { el, refill, svg } from "../dom";
 import type { Cell } from "../keyboard";
 import type { L1MapSection } from "../page";
 import { type Swatch, details, legend, readout, starPath, table } from "../parts";
@@ -203,17 +203,15 @@ function settingPanel(
       ? "The outcomes of this setting are not there yet."
       : "There are no outcomes of this setting.";
     const some = showSetting(map, panel, grid, cell, nothing);
-    // What is there keeps its room until the new picture stands, so that the page does not jump.
-    below.style.setProperty("min-height", `${below.clientHeight}px`);
-    below.replaceChildren();
-    if (times !== null && some) {
-      below.append(el("h3", {}, "Outcome classes over time"));
-      drawSettingTimes(below, times, context);
-    } else if (some) {
-      const words = "This run kept no outcome classes over time; a new run keeps them.";
-      below.append(el("p", { class: "nothing" }, waits ? nothing : words));
-    }
-    below.style.removeProperty("min-height");
+    refill(below, () => {
+      if (times !== null && some) {
+        below.append(el("h3", {}, "Outcome classes over time"));
+        drawSettingTimes(below, times, context);
+      } else if (some) {
+        const words = "This run kept no outcome classes over time; a new run keeps them.";
+        below.append(el("p", { class: "nothing" }, waits ? nothing : words));
+      }
+    });
     grid.dataset["shown"] = `${cell.row},${cell.column}`;
   };
 }

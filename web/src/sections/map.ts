@@ -4,7 +4,7 @@ import { type Grid, at, decode, nearest } from "../arrays";
 import type { Place } from "../charts/hover";
 import { figure } from "../charts/responsive";
 import { type Context, remembered } from "../context";
-import { el } from "../dom";
+import { el, refill } from "../dom";
 import type { Cell } from "../keyboard";
 import type { MapSection } from "../page";
 import { type Swatch, choices, details, legend, readout, table } from "../parts";
@@ -182,11 +182,11 @@ function settingPanel(map: MapData, panel: HTMLElement, context: Context): (cell
     const excerpt = source === null ? null : await source(cell.row, cell.column).catch(() => null);
     const beside = await recorded;
     if (mine !== newest) return;
-    panel.style.setProperty("min-height", `${panel.clientHeight}px`);
-    panel.replaceChildren(settingHead(map, cell));
-    if (excerpt === null) panel.append(el("p", { class: "nothing" }, "No motion of this setting was kept."));
-    else drawSetting(panel, map, beside, excerpt);
-    panel.style.removeProperty("min-height");
+    refill(panel, () => {
+      panel.append(settingHead(map, cell));
+      if (excerpt === null) panel.append(el("p", { class: "nothing" }, "No motion of this setting was kept."));
+      else drawSetting(panel, map, beside, excerpt);
+    });
     panel.dataset["shown"] = `${cell.row},${cell.column}`;
   };
 }
