@@ -71,6 +71,31 @@ def test_a_recording_that_is_not_explained_gets_the_reasons(tmp_path: Path) -> N
     assert "noise floor" in done.out
 
 
+def test_a_check_that_cannot_be_made_says_so_and_the_fit_is_kept(tmp_path: Path) -> None:
+    """Synthetic: a body that rests, but for a jump in every eighth of 110 intervals."""
+    generator = np.random.default_rng(1)
+    spread = np.where(np.arange(110) % 8 == 0, 5e-3, 1e-6)[:, None]
+    places = np.cumsum(spread * generator.normal(size=(110, 2)), axis=0)
+    rows = [f"{0.1 * k:.1f},{x:.7f},{y:.7f}" for k, (x, y) in enumerate(places)]
+    path = tmp_path / "jumps.csv"
+    path.write_text("\n".join(["t_s,x_m,y_m", *rows]), encoding="utf-8")
+    how = ("--spline-spacing", "3cm", "-o", tmp_path / "run")
+    done = here("fit", path, *how)
+    assert done.code == 0, done.err
+    line = next(line for line in done.out.splitlines() if line.startswith("model check"))
+    assert "the model cannot be checked: the fit used" in line
+    assert not (tmp_path / "run" / "check.nc").exists()
+    found = json.loads(here("fit", path, *how, "--overwrite", "--json").out)
+    assert found["explained"] is None
+    assert found["check_left_out"] in line
+    with xr.open_dataset(tmp_path / "run" / "fit.nc", engine="h5netcdf") as stored:
+        assert stored.attrs["check_left_out"] == found["check_left_out"]
+        assert stored.attrs["drag_coefficient"] == found["drag_coefficient"]
+    assert here("report", tmp_path / "run", "-o", tmp_path / "page.html").code == 0
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert found["check_left_out"] in page
+
+
 @pytest.mark.slow
 def test_a_robot_that_drives_itself_is_not_explained(
     shared_data: Callable[[str], Path], tmp_path: Path

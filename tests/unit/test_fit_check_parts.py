@@ -160,6 +160,14 @@ def test_autocorrelation_with_gaps_by_brute_force() -> None:
         assert found.std[:, lag - 1] == pytest.approx(1.0 / np.sqrt(len(pairs)))
 
 
+def test_lags_without_a_pair_take_no_degree_of_freedom() -> None:
+    white = np.random.default_rng(12).normal(size=(400, 2))
+    found = white_of([errors_of_noise(white, np.arange(400) % 2 == 0)], nothing_fitted())
+    # Only even lags join samples that are used.
+    assert found.portmanteau_dof == 2 * 10
+    assert found.p_value == pytest.approx(chi2.sf(found.portmanteau, 20))
+
+
 def test_what_fitting_puts_in_is_taken_out_again() -> None:
     """Residuals of a local mean are anticorrelated; with the leverage known they count as white."""
     generator = np.random.default_rng(9)

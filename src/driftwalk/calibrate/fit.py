@@ -18,6 +18,7 @@ from driftwalk.calibrate.fit_refuse import (
     FEWEST_SAMPLES,
     require_length,
     require_motion,
+    require_own_arena,
     require_size,
     require_usable,
 )
@@ -29,12 +30,13 @@ from driftwalk.calibrate.fit_result import (
     visited_shares,
     whiteness_of,
 )
+from driftwalk.calibrate.fit_solution import require_noise_below_motion, solved
 from driftwalk.calibrate.fit_spline import Spline, lay_spline
 from driftwalk.calibrate.fit_start import first_point, first_weights
 from driftwalk.calibrate.fit_wall import wall_intervals
 from driftwalk.calibrate.fit_warnings import precision_facts, warnings_of
 from driftwalk.core.errors import InputError
-from driftwalk.flow.arena import Outline, outline_of
+from driftwalk.flow.arena import Outline, outline_of, read_arena
 from driftwalk.schema import Track, body_track
 
 if TYPE_CHECKING:
@@ -110,10 +112,12 @@ def fit_motion(
     flows = len(intervals.labels)
     passes = Passes(series, _body(chosen, used_angle), spline, flows)
     mode, restricted = _search(passes, ready, chosen, tell or silent)
-    whiteness = whiteness_of(passes.innovations(restricted.point))
+    with solved():
+        innovations = passes.innovations(restricted.point)
+    whiteness = whiteness_of(innovations)
     facts_given: dict[str, Any] = {}
     if used_angle == "state":
-        given, _ = _series(ready.parts, chosen, outline, "given", ready.places)
+        given = _series(ready.parts, chosen, outline, "given", ready.places)
         facts_given = angle_given_facts(
             Passes(given, _body(chosen, "given"), spline, flows), mode, restricted, chosen
         )
@@ -130,6 +134,7 @@ def fit_motion(
         "restricted": "yes" if restricted.has_minimum else "no",
         "samples": sum(one.time.size for one in series),
         "samples_used": mode.used,
+        "intervals_usable": _usable(series),
         "duration_s": duration,
         "recordings": len(ready.tracks),
         **whiteness._asdict(),
@@ -233,20 +238,36 @@ def _prepare(
         parts += cut
         places += [(flow, index) for flow in intervals.flows]
     used_angle = _use_angle(many, tracks, study.fit.angle if angle is None else angle)
-    series, wall_share = _series(parts, study, outline, used_angle, places)
+    series = _series(parts, study, outline, used_angle, places)
+    count, near_wall = (
+        sum(one.time.size - 1 for one in series),
+        sum(one.near_wall for one in series),
+    )
+    if _is_fitted_arena(many[0], study):
+        require_own_arena(study, intervals=count, near_wall=near_wall, where=_name_of(many[0]))
+    _require_usable(series, study)
     for flow in range(0 if intervals.steady else len(intervals.labels)):
         _require_usable(
             [one for one in series if one.flow == flow],
             study,
             where=f"{intervals.describe_flow(flow)}: ",
         )
-    return _Ready(tracks, parts, places, intervals, series, used_angle, wall_share)
+    return _Ready(tracks, parts, places, intervals, series, used_angle, near_wall / count)
 
 
 def _name_of(recording: xr.Dataset) -> str:
     """Return what a message on a recording begins with."""
     name = recording.attrs.get("source", "")
     return f"{name}: " if name else ""
+
+
+def _is_fitted_arena(recording: xr.Dataset, study: Study) -> bool:
+    """Whether the tank is the circle that was fitted to the positions (``arena="fit"``)."""
+    arena, found = (
+        read_arena(str(recording.attrs.get(key, "{}"))) for key in ("arena", "arena_found")
+    )
+    # Where the size is given and only the centre is fitted, no radius is found.
+    return "radius_is" in found and arena.get("diameter_m") == study.tank.diameter_m
 
 
 def _simulated(recording: xr.Dataset) -> bool:
@@ -284,8 +305,8 @@ def _series(
     outline: Outline,
     used_angle: str,
     places: Sequence[tuple[int, int]] | None = None,
-) -> tuple[list[Series], float]:
-    """Return the tracks as the filter takes them, and the share of intervals at the wall.
+) -> list[Series]:
+    """Return the tracks as the filter takes them.
 
     `places` are the flow and the recording of each, by default one flow and recording after
     recording. Times begin with the recording's first sample.
@@ -324,22 +345,25 @@ def _series(
                 int(wall.sum()),
             )
         )
-    _require_usable(found, study)
-    return found, sum(one.near_wall for one in found) / sum(one.time.size - 1 for one in found)
+    return found
 
 
 def _require_usable(series: Sequence[Series], study: Study, *, where: str = "") -> None:
-    usable = sum(
-        int(np.count_nonzero((one.excluded[1:] == 0) & (np.diff(one.time) <= LONGEST_GAP_S)))
-        for one in series
-    )
     require_usable(
-        usable,
+        _usable(series),
         intervals=sum(one.time.size - 1 for one in series),
         near_wall=sum(one.near_wall for one in series),
         tank=study.tank.describe(),
         longest_gap=LONGEST_GAP_S,
         where=where,
+    )
+
+
+def _usable(series: Sequence[Series]) -> int:
+    """Return the number of intervals that are not left out and not longer than a gap."""
+    return sum(
+        int(np.count_nonzero((one.excluded[1:] == 0) & (np.diff(one.time) <= LONGEST_GAP_S)))
+        for one in series
     )
 
 
@@ -381,12 +405,10 @@ def _search(passes: Passes, ready: _Ready, study: Study, tell: Tell) -> tuple[Mo
         in_flows=[_longest_in(ready, flow) for flow in range(passes.flows)],
     )
     weights = first_weights(ready.tracks, passes.spline)
-    try:
+    with solved():
         mode = find_mode(passes, start, weights, prior, iterations=study.fit.iterations, tell=tell)
         tell(mode.iterations, mode.iterations, "drag")
-        return mode, restricted_drag(passes, mode, prior)
-    except np.linalg.LinAlgError as error:
-        raise InputError(
-            "the fit has no solution for this recording: its motion does not follow the model at "
-            f"all, or tank, block or units are wrong ({error})"
-        ) from error
+        restricted = restricted_drag(passes, mode, prior)
+        noise = math.exp(restricted.point.log_noise)
+    require_noise_below_motion(noise, ready.tracks)
+    return mode, restricted

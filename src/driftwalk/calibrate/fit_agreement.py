@@ -11,12 +11,11 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
 from driftwalk.calibrate.fit_newton import Mode, Prior, find_mode
 from driftwalk.calibrate.fit_pass import Passes
 from driftwalk.calibrate.fit_reml import Restricted, restricted_drag
 from driftwalk.calibrate.fit_result import parameter_attrs, parameter_covariance
+from driftwalk.calibrate.fit_solution import BREAKDOWN
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -53,7 +52,7 @@ def angle_given_facts(
             passes, start, mode.weights, prior, iterations=study.fit.iterations, hold_first=False
         )
         found = restricted_drag(passes, other, prior, intensity=False)
-    except np.linalg.LinAlgError:
+    except BREAKDOWN:
         return {"angle_disagreement_std": math.nan}
     covariance = parameter_covariance(other, found)
     own = parameter_covariance(mode, restricted)

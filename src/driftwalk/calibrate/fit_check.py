@@ -10,7 +10,7 @@ import numpy as np
 
 from driftwalk.calibrate.fit import _as_list
 from driftwalk.calibrate.fit_check_motion import compare_motion
-from driftwalk.calibrate.fit_check_pass import errors_of, estimate_of
+from driftwalk.calibrate.fit_check_pass import Errors, errors_of, estimate_of
 from driftwalk.calibrate.fit_check_residuals import residuals_of
 from driftwalk.calibrate.fit_check_result import (
     criterion_variables,
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 SCHEMA_VERSION: Final = 1
 FEWEST_REPLICATES: Final = 4
+FEWEST_USED: Final = 100
+"""Intervals; fewer make no flow either, and the autocorrelation has 20 lags."""
 
 
 def check_model(
@@ -76,8 +78,8 @@ def check_model(
     Raises
     ------
     InputError
-        When the first dataset is no fit, or was made of other recordings, or there are fewer than
-        four replicates.
+        When the first dataset is no fit, or was made of other recordings, there are fewer than
+        four replicates, or the fit used too few intervals to tell anything from their errors.
 
     Examples
     --------
@@ -94,7 +96,14 @@ def check_model(
     many = _as_list(recordings)
     estimate = estimate_of(fit, many, body=body)
     errors = errors_of(estimate)
-    found = residuals_of(estimate, errors)
+    _require_used(errors)
+    try:
+        found = residuals_of(estimate, errors)
+    except np.linalg.LinAlgError as error:
+        raise InputError(
+            "the model cannot be checked: what is left open by the fit has no finite size; the "
+            "motion tells next to nothing of the flow"
+        ) from error
     attrs: dict[str, Any] = {
         "kind": "model_check",
         "schema_version": SCHEMA_VERSION,
@@ -143,3 +152,14 @@ def check_model(
     attrs["explained"] = "no" if findings else "yes"
     attrs["findings"] = json.dumps(findings, ensure_ascii=False)
     return xr.Dataset(data, coords=coords, attrs=attrs)
+
+
+def _require_used(errors: Sequence[Errors]) -> None:
+    """Refuse a check of so few errors that the tests of them mean nothing."""
+    used = sum(int(one.used.sum()) for one in errors)
+    if used < FEWEST_USED:
+        intervals = sum(one.used.size - 1 for one in errors)
+        raise InputError(
+            f"the model cannot be checked: the fit used {used} of {intervals} intervals between "
+            f"samples, and the check needs {FEWEST_USED} at least"
+        )

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 Integers = npt.NDArray[np.int64]
+Flags = npt.NDArray[np.bool_]
 
 SAMPLES_AT_ONCE = 2048
 """Rows of derivatives that are held at a time: some 20 MB."""
@@ -97,8 +98,8 @@ class Errors:
     series: Series
     white: Floats
     """Shape (n, D); zero where not used."""
-    used: npt.NDArray[np.bool_]
-    outlier: npt.NDArray[np.bool_]
+    used: Flags
+    outlier: Flags
     """Samples that the filter did not take, so far were they from where it had predicted them."""
     speed: Floats
     """Speed of the water past the block at the sample before [m/s], NaN where unknown; (n,)."""
@@ -295,6 +296,25 @@ def _parts(estimate: Estimate, errors: Sequence[Errors]) -> Iterator[_Part]:
             yield _Part(index, flow, start, np.asarray(found["jacobian"]), white, places)
 
 
+def used_pairs(used: Flags, lags: int) -> Iterator[tuple[int, Flags]]:
+    """Yield the lags that the samples reach, each with where a sample and the one so far on count.
+
+    Parameters
+    ----------
+    used : ndarray of bool, shape (n,)
+        Samples that count; there may be fewer of them than lags.
+    lags : int
+        Longest lag.
+
+    Yields
+    ------
+    tuple of int and ndarray of bool, shape (n - lag,)
+        The lag, and by the earlier sample whether both count.
+    """
+    for lag in range(min(lags, used.size - 1) + 1):
+        yield lag, used[lag:] & used[: used.size - lag]
+
+
 def _autocovariance(
     spread: Floats, errors: Sequence[Errors], kept: Sequence[_Part], lags: int
 ) -> Floats:
@@ -307,8 +327,7 @@ def _autocovariance(
         own = np.concatenate([draws[columns] for _, columns in part.places])
         moved = (part.jacobian @ own).reshape(-1, components, DRAWS)
         used = errors[part.series].used[part.start : part.start + len(moved)]
-        for lag in range(lags + 1):
-            both = used[lag:] & used[: used.size - lag]
+        for lag, both in used_pairs(used, lags):
             products = moved[lag:][both] * moved[: used.size - lag][both]
             total[:, lag] += products.sum(axis=(0, 2)) / DRAWS
             pairs[lag] += both.sum()

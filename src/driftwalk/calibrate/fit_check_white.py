@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from driftwalk.calibrate.fit_check_pass import Errors, Leverage
+from driftwalk.calibrate.fit_check_pass import Errors, Leverage, used_pairs
 from driftwalk.calibrate.fit_spline import Floats
 
 LAGS = 20
@@ -54,21 +55,23 @@ def white_of(errors: Sequence[Errors], leverage: Leverage, *, lags: int = LAGS) 
     components = errors[0].components
     products, pairs = np.zeros((components, lags + 1)), np.zeros(lags + 1)
     for one in errors:
-        for lag in range(min(lags, one.used.size - 1) + 1):
-            until = one.used.size - lag
-            both = one.used[lag:] & one.used[:until]
-            products[:, lag] += (one.white[lag:][both] * one.white[:until][both]).sum(axis=0)
+        for lag, both in used_pairs(one.used, lags):
+            earlier = one.white[: one.used.size - lag]
+            products[:, lag] += (one.white[lag:][both] * earlier[both]).sum(axis=0)
             pairs[lag] += np.count_nonzero(both)
+    # Where gaps leave no pair at a lag, that lag says nothing and takes no degree of freedom.
+    known = np.broadcast_to(pairs[1:] > 0.0, (components, lags))
     pairs = np.maximum(pairs, 1.0)
     mean = products / pairs
     variance = np.maximum(mean[:, :1], 1e-300)
     found = mean[:, 1:] / variance
     expected = -leverage.autocovariance[:, 1 : lags + 1]
     std = np.broadcast_to(1.0 / np.sqrt(pairs[1:]), found.shape)
-    off = (found - expected) / std
+    off = np.where(known, (found - expected) / std, 0.0)
     samples = pairs[0]
     # Each term is divided by its own number of pairs, which allows for gaps too.
     portmanteau = float((1.0 + 2.0 / samples) * (off**2).sum())
+    dof = int(np.count_nonzero(known))
     values = np.concatenate([one.white[one.used] for one in errors])
     unit = values / np.sqrt(variance[:, 0])
     component, lag = divmod(int(np.abs(off).argmax()), lags)
@@ -77,8 +80,8 @@ def white_of(errors: Sequence[Errors], leverage: Leverage, *, lags: int = LAGS) 
         expected,
         np.array(std),
         portmanteau,
-        found.size,
-        float(chi2.sf(portmanteau, found.size)),
+        dof,
+        float(chi2.sf(portmanteau, dof)) if dof else math.nan,
         variance[:, 0],
         1.0 - leverage.autocovariance[:, 0],
         (unit**4).mean(axis=0) - 3.0,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -18,6 +19,7 @@ from driftwalk.calibrate.fit_result import fitted_flow
 from driftwalk.calibrate.fit_spline import Floats
 from driftwalk.calibrate.problem import Problem, prepare_problem
 from driftwalk.compare import apply_steps, plan_steps
+from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.schema import Track
 from driftwalk.simulate import recorded_camera
@@ -35,6 +37,8 @@ FLOWS = 8
 ESTIMATE, DRAWN = 0, 1
 """Numbers of the two sets in the addresses of their random numbers."""
 DRAW_STREAM = 2
+MOST_LOG_STD = math.log(10.0)
+"""Standard deviation of the logarithm of a parameter, beyond which draws of it mean nothing."""
 
 Path = tuple[Floats, Floats, Floats]
 
@@ -175,6 +179,11 @@ def _draws(
     generator = np.random.default_rng([seed, DRAW_STREAM])
     size = estimate.point.coefficients.size
     found = fit["covariance"].values[:3, :3]
+    widest = float(np.sqrt(np.diag(found).max()))
+    if not widest < MOST_LOG_STD:
+        raise InputError(
+            "the fit leaves C_d, the force or the tracking noise open by more than a factor of ten"
+        )
     logs = generator.multivariate_normal(np.zeros(3), found, size=count)
     free = generator.normal(size=(count, len(spread))) @ spread.T
     along = spread[:size] @ spread[size] / (spread[size] @ spread[size])

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from driftwalk.calibrate.fit_pass import Passes, Point, Sums
+from driftwalk.calibrate.fit_solution import cholesky
 from driftwalk.calibrate.fit_spline import Floats, penalties
 
 PRIOR_DRAG = 0.5
@@ -229,7 +230,6 @@ def limited(step: Floats, drag: int) -> Floats:
 
 def inverse(information: Floats) -> Floats:
     """Return the inverse of a symmetric positive definite matrix."""
-    from scipy.linalg import cho_factor, cho_solve
+    from scipy.linalg import cho_solve
 
-    factor = cho_factor(information)
-    return np.asarray(cho_solve(factor, np.eye(len(information))))
+    return np.asarray(cho_solve(cholesky(information), np.eye(len(information))))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from driftwalk.calibrate.fit_length import length_advice
+from driftwalk.calibrate.fit_start import typical_speed
 from driftwalk.core.errors import InputError
 from driftwalk.simulate import recorded_camera
 
@@ -22,6 +23,8 @@ LEAST_MOTION_IN_NOISES: Final = 3.0
 """Standard deviation of the positions of a moving body, in tracking noises."""
 KEPT: Final = 0.99
 """Share of the positions that tells how far a body goes: single jumps of the tracker do not."""
+MOST_AT_OWN_WALL: Final = 0.9
+"""Share of the intervals at the wall of a tank that was fitted to the positions themselves."""
 MOST_COEFFICIENTS: Final = 4400
 """Of all flows together where there are several: about six flows in the paper's tank."""
 
@@ -51,6 +54,12 @@ def require_motion(track: Track, study: Study, *, where: str) -> None:
     """
     from driftwalk.model import apply_overrides
 
+    if typical_speed([track]) == 0.0:
+        raise InputError(
+            f"{where}the body rests in 99 % of the recording, at the same position to the last "
+            "digit, and there is no motion to fit; check the body (--body) and the time that is "
+            "kept (--from, --to)"
+        )
     tail = 0.5 * (1.0 - KEPT)
     width = max(float(np.ptp(np.quantile(axis, (tail, 1.0 - tail)))) for axis in (track.x, track.y))
     scatter = max(float(track.x.std()), float(track.y.std()))
@@ -70,6 +79,33 @@ def require_motion(track: Track, study: Study, *, where: str) -> None:
             f"{why}, and there is nothing to fit; check the units, the body (--body) and the time "
             "that is kept (--from, --to)"
         )
+
+
+def require_own_arena(study: Study, *, intervals: int, near_wall: int, where: str) -> None:
+    """Refuse a tank that was fitted to the positions and then excludes nearly all of them.
+
+    Parameters
+    ----------
+    study : Study
+        The block and the tank, a fitted circle.
+    intervals, near_wall : int
+        Intervals between samples: all, and those at the wall.
+    where : str
+        Beginning of the message.
+
+    Raises
+    ------
+    InputError
+        With the sizes of both, and what to state instead.
+    """
+    if near_wall <= MOST_AT_OWN_WALL * intervals:
+        return
+    raise InputError(
+        f"{where}--arena fit found a tank {1e3 * max(study.tank.extent_m):.3g} mm across, in "
+        f"which a block of {1e3 * study.block.side_m:.3g} mm is at the wall in {near_wall} of "
+        f"{intervals} intervals: the body stays in a region too small to find the tank from. State "
+        "the tank with --arena circle:D, and check the scale and the side of the block"
+    )
 
 
 def require_usable(

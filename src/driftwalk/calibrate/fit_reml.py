@@ -20,6 +20,7 @@ import numpy as np
 
 from driftwalk.calibrate.fit_newton import Mode, Prior
 from driftwalk.calibrate.fit_pass import Passes, Point
+from driftwalk.calibrate.fit_solution import cholesky
 from driftwalk.calibrate.fit_spline import Floats
 
 SPAN = 2.0
@@ -64,7 +65,7 @@ def profile_at(
     passes: Passes, mode: Mode, prior: Prior, log_drag: float, coefficients: Floats
 ) -> Profile:
     """Return the profile at a C_d, from one pass at coefficients that are nearly the best."""
-    from scipy.linalg import cho_factor, cho_solve
+    from scipy.linalg import cho_solve
 
     point = replace(
         mode.point,
@@ -72,7 +73,7 @@ def profile_at(
         coefficients=coefficients.reshape(mode.point.coefficients.shape),
     )
     sums = prior.add(passes.sums(point, noise="without"), point, mode.weights)
-    factor = cho_factor(sums.information[:-1, :-1])
+    factor = cholesky(sums.information[:-1, :-1])
     step = cho_solve(factor, sums.score[:-1])
     return Profile(
         log_drag,

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 SCHEMA_VERSION: Final = 1
+MOST_LOG_WIDTH: Final = 300.0
+"""Beyond this an interval has no upper end: exp would not fit a double for long."""
 LEAST_COUNT: Final = 3
 """Samples with the block over a node that make the node a measured one."""
 PARAMETERS: Final = (
@@ -114,8 +116,13 @@ def parameter_attrs(point: Any, covariance: Floats, study: Study) -> dict[str, A
     attrs: dict[str, Any] = {"force_interval_s": interval, "confidence": confidence}
     for name, (value, width) in values.items():
         attrs[name] = value
-        attrs[f"{name}_interval"] = [value * math.exp(-width), value * math.exp(width)]
+        attrs[f"{name}_interval"] = [value * math.exp(-width), _upper(value, width)]
     return attrs
+
+
+def _upper(value: float, log_width: float) -> float:
+    """Return the upper end of an interval; infinity where the data leave it open."""
+    return value * math.exp(log_width) if log_width < MOST_LOG_WIDTH else math.inf
 
 
 def build_fit(

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 MOST_WALL_SHARE: Final = 0.3
 """Share of intervals at the wall above which C_d means little."""
+LEAST_USED: Final = 0.9
+"""Share of the usable intervals below which what the filter takes is not the whole motion."""
 LEAST_VISITED: Final = 0.3
 """Share of the tank's nodes below which a fitted flow is mostly made of its prior."""
 NOTABLE_LEVER: Final = 0.005
@@ -84,6 +86,13 @@ def _on_the_data(
         found.append(
             f"{facts['wall_share']:.0%} of the intervals are at the wall and were left out: C_d is "
             "not to be trusted above 30 %; record where the block keeps away from the wall"
+        )
+    used, usable = facts["samples_used"], facts["intervals_usable"]
+    if used < LEAST_USED * usable:
+        found.append(
+            f"the fit used {used} of {usable} intervals only: at the end of the others the body "
+            "was more than 6 standard deviations from where the model predicted it; what was "
+            "fitted is only a part of the motion"
         )
     std = facts["drag_coefficient_relative_std"]
     wanted = facts.get("drag_coefficient_precision")

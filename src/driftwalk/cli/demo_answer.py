@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.cli.calibrate import summary as calibration_summary
-from driftwalk.cli.fit import summary as fit_summary
-from driftwalk.cli.fit import verdict
+from driftwalk.cli.fit import answer
 from driftwalk.cli.output import print_note
 
 if TYPE_CHECKING:
@@ -76,14 +75,14 @@ def in_json(found: Found) -> dict[str, Any]:
     """Return what ``--json`` prints: the two answers and the truth."""
     return {
         "truth": demo_truth(),
-        "fit": fit_summary(found.fit) | verdict(found.check) | {"flow_error": found.flow_error},
+        "fit": answer(found.fit, found.check) | {"flow_error": found.flow_error},
         "calibration": calibration_summary(found.calibration),
     }
 
 
 def print_beside_truth(found: Found, folder: Path) -> None:
     """Print a table of both answers and the truth, what speaks against them, and the figures."""
-    fit = fit_summary(found.fit) | verdict(found.check)
+    fit = answer(found.fit, found.check)
     search, truth = calibration_summary(found.calibration), demo_truth()
     near = search["distance_to_floor_ratio"] < found.calibration.attrs["far_above_floor"]
     print("This recording was simulated by another engine (ODE): the truth is known.")

@@ -43,6 +43,8 @@ FIT_KEYS: Final[dict[str, str]] = {
 MOST_FINDINGS: Final = 2
 """Findings that are printed; all are in the file."""
 FAR_ABOVE_FLOOR: Final = 2.0
+SMALLEST_FIXED: Final = 1e-3
+"""Smaller numbers are printed with an exponent."""
 RecordingFiles = Annotated[
     list[Path],
     typer.Argument(metavar="RECORDING...", help="Recordings of one block in one tank, read alike."),
@@ -152,10 +154,10 @@ def fit(
     work = FitWork(trajectories, chosen, how.body, inputs, remark, check=not no_check)
     found = run_fit(work, out, overwrite=overwrite)
     if json:
-        print_json(summary(found.fit) | verdict(found.check))
+        print_json(answer(found.fit, found.check))
     else:
         print_answer(found.fit, out)
-        print_verdict(found.check)
+        print_verdict(found.check, found.fit)
         print(f"all in one page        {report_command(out)}")
 
 
@@ -198,12 +200,17 @@ _KEYS = (
 
 
 def summary(found: xr.Dataset) -> dict[str, Any]:
-    """Return what ``--json`` prints: the answer with units in its keys."""
+    """Return the fit with units in its keys."""
     return {
         **{key: found.attrs[key] for key in _KEYS if key in found.attrs},
         "recording": found.attrs["source"],
         "warnings": json_module.loads(found.attrs["warnings"]),
     }
+
+
+def answer(fit: xr.Dataset, check: xr.Dataset | None) -> dict[str, Any]:
+    """Return all that ``--json`` prints: the fit, and the check where one was asked for."""
+    return summary(fit) | verdict(check, fit)
 
 
 def print_answer(found: xr.Dataset, folder: Path) -> None:
@@ -219,10 +226,8 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
     )
     for name, key, scale, unit, more in rows:
         low, high = (scale * end for end in facts[f"{key}_interval"])
-        print(
-            f"{name}{scale * facts[key]:.4f}{unit}{more}   "
-            f"{facts['confidence']:.0%} interval {low:.4f} to {high:.4f}"
-        )
+        value, low, high = (_number(one) for one in (scale * facts[key], low, high))
+        print(f"{name}{value}{unit}{more}   {facts['confidence']:.0%} interval {low} to {high}")
     print(f"noise intensity σ_F²·τ {facts['force_noise_intensity_N2_s']:.4g} N² s")
     print(f"intervals at the wall  {facts['wall_share']:.1%}, left out")
     if "flow" in found.dims:
@@ -234,10 +239,16 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
     print(f"flow                   {folder / 'flow.nc'}")
 
 
-def verdict(check: xr.Dataset | None) -> dict[str, Any]:
-    """Return what ``--json`` prints of the check of the model; nothing where there was none."""
+def _number(value: float) -> str:
+    """Return a number with four decimals, or with three digits where these would all be zeros."""
+    return f"{value:.4f}" if value >= SMALLEST_FIXED else f"{value:.3g}"
+
+
+def verdict(check: xr.Dataset | None, fit: xr.Dataset) -> dict[str, Any]:
+    """Return the check of the model with units in its keys; nothing where none was asked for."""
     if check is None:
-        return {}
+        reason = fit.attrs.get("check_left_out")
+        return {} if reason is None else {"explained": None, "check_left_out": reason}
     facts = check.attrs
     distances = {key: float(facts[key]) for key in ("ks_distance", "ks_noise_floor")}
     return {
@@ -247,11 +258,13 @@ def verdict(check: xr.Dataset | None) -> dict[str, Any]:
     }
 
 
-def print_verdict(check: xr.Dataset | None) -> None:
+def print_verdict(check: xr.Dataset | None, fit: xr.Dataset) -> None:
     """Print whether the model explains the recording, and the worst of what speaks against it."""
+    found = verdict(check, fit)
     if check is None:
+        if found:
+            print(f"model check            {found['check_left_out']}")
         return
-    found = verdict(check)
     if found["explained"]:
         print("model check            the model explains this recording")
     else:

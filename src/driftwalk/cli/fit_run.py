@@ -11,6 +11,7 @@ from driftwalk.cli.calibration_run import dataset_hash, netcdf_bytes
 from driftwalk.cli.output import print_note
 from driftwalk.cli.progress import ProgressReporter
 from driftwalk.cli.run_folder import open_run
+from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,7 +52,7 @@ class Fitted(NamedTuple):
 
     fit: xr.Dataset
     check: xr.Dataset | None
-    """Whether the model explains the recordings; None where it was not asked for."""
+    """Whether the model explains the recordings; None without a check."""
 
 
 def run_fit(work: FitWork, folder: Path, *, overwrite: bool) -> Fitted:
@@ -108,9 +109,15 @@ def run_fit(work: FitWork, folder: Path, *, overwrite: bool) -> Fitted:
             check = None
             if work.check:
                 progress.update(found.attrs["iterations"], found.attrs["iterations"], "check")
-                check = check_model(found, work.recordings, body=work.body)
-                run.write("check.nc", netcdf_bytes(check))
-                write_check_figures(run.folder("figures"), check=check)
+                try:
+                    check = check_model(found, work.recordings, body=work.body)
+                except InputError as error:
+                    # The fit is kept, and says why nothing stands beside it.
+                    found.attrs["check_left_out"] = str(error)
+                    run.write("fit.nc", netcdf_bytes(found))
+                else:
+                    run.write("check.nc", netcdf_bytes(check))
+                    write_check_figures(run.folder("figures"), check=check)
     return Fitted(found, check)
 
 

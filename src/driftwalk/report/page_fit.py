@@ -75,7 +75,8 @@ def fit_sections(
     if fit is not None:
         made += flow_sections(fit)
         if check is None:
-            reason = "The model was not checked against the recording."
+            why = fit.attrs.get("check_left_out")
+            reason = f"{why}." if why else "The model was not checked against the recording."
             made.append(empty_section("check", "Does the model explain it?", reason))
     if check is not None:
         made += check_sections(check)
