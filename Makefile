@@ -19,8 +19,6 @@ CPP := $(shell find cpp -name '*.cpp' -o -name '*.hpp')
 
 demo: $(PACKAGE)
 	$(BIN)/driftwalk demo
-	@echo "The figures:"
-	@find demo -name '*.png' -not -path '*/previous/*' | sort | sed 's/^/  /'
 
 test: $(TEST_TOOLS)
 	$(BIN)/python -m pytest -n 2

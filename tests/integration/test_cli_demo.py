@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from command_line import Done, apart, contents, here, refusal
+from command_line import Done, apart, contents, here, refusal, start
 from page_reading import page_in
 
 TRUTH = {
@@ -30,16 +30,39 @@ def test_both_answers_stand_beside_the_truth(finished: tuple[Path, Done]) -> Non
     folder, done = finished
     assert done.code == 0, done.err
     assert "simulated by another engine (ODE)" in done.out
-    rows = {line[:27].strip(): line[27:].split() for line in done.out.splitlines()}
-    assert rows["drag coefficient C_d"][0] == "0.3867"
-    assert rows["stochastic force σ_F [mN]"][0] == "0.6123"
-    assert rows["tracking noise [mm]"][0] == "0.3"
-    assert rows["model explains it"] == ["yes", "yes"]
-    for run in ("fit", "calibrate"):
-        document = (folder / run / "report.html").read_text(encoding="utf-8")
-        assert page_in(document)["subtitle"] == run
+    lines = done.out.splitlines()
+    for method in ("likelihood fit", "KS map in the fitted flow"):
+        first = next(k for k, line in enumerate(lines) if line.split()[:1] == ["truth"])
+        assert lines[first].endswith(method)
+        lines = lines[first + 1 :]
+        rows = {line[:27].strip(): line[27:].split() for line in reversed(lines)}
+        assert rows["drag coefficient C_d"][0] == "0.3867"
+        assert rows["stochastic force σ_F [mN]"][0] == "0.6123"
+        assert rows["tracking noise [mm]"][0] == "0.3"
+        assert rows["model explains it"] == ["yes"]
+    assert lines[-1] == f"open in a browser: {folder / 'report.html'}"
+    page = page_in((folder / "report.html").read_text(encoding="utf-8"))
+    assert page["title"] == "Demo"
+    names = [part["id"].split("-")[0] for part in page["sections"]]
+    assert names == sorted(names, key=["fit", "calibrate"].index)
+    assert {"fit", "calibrate"} == set(names)
     for figure in ("fit/figures/check_steps.png", "calibrate/figures/ks_map.png"):
         assert (folder / figure).stat().st_size > 1000
+
+
+@pytest.mark.slow
+def test_the_fit_is_told_before_the_map_is_begun(tmp_path: Path) -> None:
+    """Through a pipe too: what is printed does not wait in a buffer for the end."""
+    folder = tmp_path / "demo"
+    process = start("demo", "--quick", "--out", folder)
+    with process:
+        assert process.stdout is not None
+        line = next(line for line in process.stdout if line.startswith("Its page: "))
+        # The map takes far longer than the reading of this line.
+        assert not (folder / "calibrate" / "manifest.json").exists()
+        page = page_in(Path(line.removeprefix("Its page: ").strip()).read_text(encoding="utf-8"))
+        assert page["subtitle"] == "fit"
+        process.kill()
 
 
 @pytest.mark.slow

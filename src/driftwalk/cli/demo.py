@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from driftwalk.cli.calibrate import Overwrite, Threads
-from driftwalk.cli.demo_answer import Found, in_json, print_beside_truth
+from driftwalk.cli.demo_answer import (
+    Fitted,
+    in_json,
+    print_calibration,
+    print_fit,
+    print_next,
+    print_places,
+)
 from driftwalk.cli.options import Json
 from driftwalk.cli.output import print_json, print_note
 
@@ -31,8 +38,8 @@ QUICK = {
 }
 FIT, CALIBRATION = "fit", "calibrate"
 """The run directories inside that of the demo, one for each command."""
-REPORT = "report.html"
-"""The report of each, in its run directory."""
+PAGE = "report.html"
+"""The page of both runs, beside them."""
 
 
 def demo(
@@ -50,25 +57,27 @@ def demo(
 
     The recording was simulated by another engine (ODE), so that the truth is known. First comes
     the likelihood fit of flow, drag, force and tracking noise (DIR/fit), then the paper's map of KS
-    distances in the fitted flow (DIR/calibrate). Both are printed beside the truth.
+    distances in the fitted flow (DIR/calibrate). Each is printed beside the truth as soon as it is
+    there; DIR/report.html shows both.
     """
     from driftwalk.datasets import tank30_recording
-    from driftwalk.report import report_page, write_report
 
     _require_own(out)
     recording, study = tank30_recording(), demo_study(quick=quick)
     folder = files("driftwalk.datasets") / "tank30_ode_a"
     with as_file(folder / "recording.csv") as path:
-        fit, check = _fit(recording, study, path, out / FIT, overwrite=overwrite)
+        fitted = Fitted(*_fit(recording, study, path, out / FIT, overwrite=overwrite), recording)
+        _write_page(out, FIT)
+        if not json:
+            print_fit(fitted)
+            print_next(out / PAGE)
         calibration = _calibrate(recording, study, path, out, overwrite=overwrite, threads=threads)
-    for run in (out / FIT, out / CALIBRATION):
-        if not (run / REPORT).exists():  # A finished run that is only read stays as it is.
-            write_report(report_page(run), run / REPORT)
-    found = Found(fit, check, calibration, recording)
+    _write_page(out, FIT, CALIBRATION)
     if json:
-        print_json(in_json(found))
+        print_json(in_json(fitted, calibration))
     else:
-        print_beside_truth(found, out)
+        print_calibration(calibration)
+        print_places(out, out / PAGE)
 
 
 def demo_study(*, quick: bool) -> Study:
@@ -117,6 +126,14 @@ def _calibrate(
     return run_calibration(work, folder, overwrite=overwrite)
 
 
+def _write_page(out: Path, *runs: str) -> None:
+    """Write the page of the runs that are there, in place of the one before."""
+    from driftwalk.report import joined_page, report_page, write_report
+
+    pages = [report_page(out / run) for run in runs]
+    write_report(joined_page(pages, title="Demo"), out / PAGE, existing="replace")
+
+
 def _require_own(out: Path) -> None:
     """Refuse a directory with anything in it that no demo made, before any work."""
     from driftwalk.core.errors import RunDirectoryError
@@ -124,7 +141,7 @@ def _require_own(out: Path) -> None:
     from driftwalk.core.shards import make_folder
 
     make_folder(out)
-    foreign = [entry for entry in visible(out) if entry.name not in (FIT, CALIBRATION)]
+    foreign = [entry for entry in visible(out) if entry.name not in (FIT, CALIBRATION, PAGE)]
     if foreign:
         raise RunDirectoryError(
             f"{out} holds files but no run of this demo ({foreign[0].name}, ...); choose an empty "

@@ -1,4 +1,4 @@
-"""What the demo prints: the fit and the calibration beside the truth."""
+"""What the demo prints: the fit, then the calibration, each beside the truth."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ STEP_REMARK: Final = (
 
 
 @dataclass(frozen=True)
-class Found:
-    """What both commands found.
+class Fitted:
+    """What the first half of the demo found.
 
     Attributes
     ----------
@@ -34,15 +34,12 @@ class Found:
         A `fit`.
     check : xarray.Dataset
         Its `model_check`.
-    calibration : xarray.Dataset
-        A `calibration` in the fitted flow.
     recording : xarray.Dataset
-        The `trajectory` of both.
+        The `trajectory`.
     """
 
     fit: xr.Dataset
     check: xr.Dataset
-    calibration: xr.Dataset
     recording: xr.Dataset
 
     @property
@@ -71,42 +68,68 @@ def demo_truth() -> dict[str, float]:
     return {key: truth[key] for key in KNOWN}
 
 
-def in_json(found: Found) -> dict[str, Any]:
+def in_json(fitted: Fitted, calibration: xr.Dataset) -> dict[str, Any]:
     """Return what ``--json`` prints: the two answers and the truth."""
     return {
         "truth": demo_truth(),
-        "fit": answer(found.fit, found.check) | {"flow_error": found.flow_error},
-        "calibration": calibration_summary(found.calibration),
+        "fit": answer(fitted.fit, fitted.check) | {"flow_error": fitted.flow_error},
+        "calibration": calibration_summary(calibration),
     }
 
 
-def print_beside_truth(found: Found, folder: Path) -> None:
-    """Print a table of both answers and the truth, what speaks against them, and the figures."""
-    fit = answer(found.fit, found.check)
-    search, truth = calibration_summary(found.calibration), demo_truth()
-    near = search["distance_to_floor_ratio"] < found.calibration.attrs["far_above_floor"]
-    print("This recording was simulated by another engine (ODE): the truth is known.")
-    print_row("", "truth", "likelihood fit", "KS map in the fitted flow")
-    for name, key, scale in ROWS:
-        known = f"{scale * truth[key]:.4g}"
-        print_row(name, known, _estimate(fit, key, scale), _estimate(search, key, scale))
-    print_row("flow past the block", "", f"{found.flow_error:.1%} off", "the same")
-    print_row("KS distance, floor", "", _distance(fit, "ks_noise_floor"), _distance(search))
-    print_row("model explains it", "", _word(fit["explained"]), _word(near))
+def print_fit(fitted: Fitted) -> None:
+    """Print the fit beside the truth, and what speaks against it."""
+    fit, truth = answer(fitted.fit, fitted.check), demo_truth()
     every = 1e3 * truth["force_interval_s"]
+    print("This recording was simulated by another engine (ODE): the truth is known.")
+    _print_estimates("likelihood fit", fit)
+    print_row("flow past the block", "", f"{fitted.flow_error:.1%} off")
+    print_row("KS distance, floor", "", _distance(fit, "ks_noise_floor"))
+    print_row("model explains it", "", _word(fit["explained"]))
     print(f"Intervals of 90 %; σ_F drawn anew every {every:g} ms. {STEP_REMARK}")
     for finding in fit["findings"]:
         print_note(f"model check: {finding}")
-    for name, warnings in (("fit", fit["warnings"]), ("KS map", search["warnings"])):
-        for warning in warnings:
-            print_note(f"warning: {name}: {warning}")
-    print(f"figures: {folder}/fit/figures, {folder}/calibrate/figures")
-    print(f"open in a browser: {folder}/fit/report.html, {folder}/calibrate/report.html")
+    for warning in fit["warnings"]:
+        print_note(f"warning: fit: {warning}")
+
+
+def print_next(page: Path) -> None:
+    """Say what comes next; whoever waits may open the page of the fit meanwhile."""
+    print(f"Its page: {page}")
+    # Through a pipe the answer would wait in the buffer for the map.
+    print(
+        "Next, the paper's method: a map of KS distances in the fitted flow, a minute or two.\n",
+        flush=True,
+    )
+
+
+def print_calibration(calibration: xr.Dataset) -> None:
+    """Print the minimum of the map beside the truth, and what speaks against it."""
+    search = calibration_summary(calibration)
+    near = search["distance_to_floor_ratio"] < calibration.attrs["far_above_floor"]
+    _print_estimates("KS map in the fitted flow", search)
+    print_row("KS distance, floor", "", _distance(search))
+    print_row("model explains it", "", _word(near))
+    for warning in search["warnings"]:
+        print_note(f"warning: KS map: {warning}")
+
+
+def print_places(folder: Path, page: Path) -> None:
+    """Print where the figures are and, last, the page to open."""
+    print(f"\nfigures: {folder}/fit/figures, {folder}/calibrate/figures")
+    print(f"open in a browser: {page}")
+
+
+def _print_estimates(method: str, facts: dict[str, Any]) -> None:
+    truth = demo_truth()
+    print_row("", "truth", method)
+    for name, key, scale in ROWS:
+        print_row(name, f"{scale * truth[key]:.4g}", _estimate(facts, key, scale))
 
 
 def print_row(name: str, *cells: str) -> None:
     """Print a row of the table."""
-    widths = (9, 28, 0)
+    widths = (9, 0)
     line = "".join(f"{cell:{width}}" for cell, width in zip(cells, widths, strict=True))
     print(f"{name:27}{line}".rstrip())
 

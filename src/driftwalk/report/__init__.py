@@ -7,7 +7,7 @@ from driftwalk.report.assembly_figures import write_assembly_figures, write_sens
 from driftwalk.report.check_figures import write_check_figures
 from driftwalk.report.figures import write_figures
 from driftwalk.report.fit_figures import plot_flow_error, write_fit_figures
-from driftwalk.report.page import recording_page, report_page
+from driftwalk.report.page import joined_page, recording_page, report_page
 from driftwalk.report.page_arrays import decode_array, encode_array
 from driftwalk.report.page_assembly import assembly_sections
 from driftwalk.report.page_calibration import calibration_sections
@@ -54,6 +54,7 @@ __all__ = [
     "encode_array",
     "fit_sections",
     "flow_section",
+    "joined_page",
     "manifest_section",
     "map_section",
     "plot_biplot",

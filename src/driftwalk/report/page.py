@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -40,6 +40,10 @@ TITLES: Final = {
     "recovery": "Recovery study",
     None: "Run",
 }
+
+
+_BESIDE_CONTENT: Final = ("id", "note", "facts")
+"""What two pages may say differently of one thing, such as the noise of a recording."""
 
 
 def report_page(folder: str | Path) -> dict[str, Any]:
@@ -134,6 +138,57 @@ def recording_page(
         finished=True,
         words=None,
         created=None,
+        sections=sections,
+    )
+
+
+def joined_page(pages: Sequence[Mapping[str, Any]], *, title: str) -> dict[str, Any]:
+    """Return one page with the sections of several, such as the runs that belong together.
+
+    A section that an earlier page shows too, the recording for one, is not repeated.
+
+    Parameters
+    ----------
+    pages : sequence of mapping
+        What `report_page` returns, at least one; their subtitles differ.
+    title : str
+        Of the page.
+
+    Returns
+    -------
+    dict
+        Plain JSON, as of `report_page`. The identifier of a section begins with the subtitle of its
+        page; with several pages its title names that page.
+
+    Raises
+    ------
+    InputError
+        When no page is given, or two have the same subtitle.
+
+    Examples
+    --------
+    ``joined_page([report_page("fit"), report_page("run")], title="Tank")``
+    """
+    names = [str(page["subtitle"]) for page in pages]
+    if not names or len(set(names)) < len(names):
+        raise InputError(f"pages to join need names of their own, got {', '.join(names) or 'none'}")
+    shown: list[Section] = []
+    sections: list[Section] = []
+    for name, page in zip(names, pages, strict=True):
+        for part in page["sections"]:
+            content = {key: value for key, value in part.items() if key not in _BESIDE_CONTENT}
+            if content in shown:
+                continue
+            shown.append(content)
+            heading = part["title"] if len(names) == 1 else f"{page['title']}: {part['title']}"
+            sections.append({**part, "id": f"{name}-{part['id']}", "title": heading})
+    words = [str(page["state"]["words"]) for page in pages if page["state"]["words"]]
+    return _page(
+        title=title,
+        subtitle=", ".join(names),
+        finished=all(page["state"]["finished"] for page in pages),
+        words=" ".join(words) or None,
+        created=max((page["created_utc"] for page in pages if page["created_utc"]), default=None),
         sections=sections,
     )
 

@@ -22,7 +22,13 @@ from driftwalk.core.errors import InputError, RunDirectoryError
 from driftwalk.core.provenance import manifest
 from driftwalk.core.rundir import RunDirectory
 from driftwalk.model import Study
-from driftwalk.report import manifest_section, report_html, report_page, write_report
+from driftwalk.report import (
+    joined_page,
+    manifest_section,
+    report_html,
+    report_page,
+    write_report,
+)
 from driftwalk.report.page_manifest import (
     PAPER_AUTHORS,
     PAPER_TITLE,
@@ -236,6 +242,32 @@ def test_several_recordings_of_a_fit(tmp_path: Path) -> None:
     files = {"fit.nc": made_up_fit(), "recording.nc": recording, "recording-2.nc": recording}
     page = report_page(make_run(tmp_path / "run", files, specification={"kind": "fit"}))
     assert part_of(page, "recording-1-of-2")["kind"] == "trajectory"
+
+
+def test_pages_of_runs_that_belong_together_are_joined(
+    tmp_path: Path, datasets: dict[str, xr.Dataset]
+) -> None:
+    recording = datasets["recording.nc"]
+    fit = {"fit.nc": made_up_fit(), "recording.nc": recording}
+    first = report_page(make_run(tmp_path / "fit", fit, specification={"kind": "fit"}))
+    second = report_page(make_run(tmp_path / "map", datasets, finished=False))
+    page = joined_page([first, second], title="Both")
+    assert (page["title"], page["subtitle"]) == ("Both", "fit, map")
+    assert page["state"]["finished"] is False
+    assert "This run is not finished" in page["state"]["words"]
+    ids = [part["id"] for part in page["sections"]]
+    assert len(set(ids)) == len(ids)
+    # Each run shows the recording, the joined page does it once.
+    of_recording = [
+        [part["id"] for part in one["sections"] if part["kind"] == "trajectory"]
+        for one in (first, second, page)
+    ]
+    assert [len(found) for found in of_recording] == [1, 1, 1]
+    fold = [part["title"] for part in page["sections"] if part["id"] == "map-state"]
+    assert fold == ["Calibration: Not finished"]
+    for wrong in ([], [first, first]):
+        with pytest.raises(InputError, match="names of their own"):
+            joined_page(wrong, title="None")
 
 
 def test_self_assembly_from_its_files(tmp_path: Path) -> None:
