@@ -3,15 +3,15 @@
 
 DRIFTWALK_LANES_BEGIN
 
+namespace {
 #if defined(__AVX512F__)
-inline constexpr int assembly_lanes = 16;
+constexpr int assembly_lanes = 16;
 #elif defined(__AVX2__)
-inline constexpr int assembly_lanes = 8;
+constexpr int assembly_lanes = 8;
 #else
-inline constexpr int assembly_lanes = 4;
+constexpr int assembly_lanes = 4;
 #endif
 
-namespace {
 using Real = FloatPack<assembly_lanes>;
 
 std::int64_t assemble(const Prepared<float>& run, const AssemblyRules& rules,
@@ -20,9 +20,9 @@ std::int64_t assemble(const Prepared<float>& run, const AssemblyRules& rules,
   return AssemblyPack<Real, float>(run, rules, worlds, out, queue, scratch, scratch.blended_flow)
       .run();
 }
-} // namespace
 
-inline constexpr AssemblyKernel kernel{assemble, assembly_lanes, PackMemory<Real>::bytes};
+constexpr AssemblyKernel kernel{assemble, assembly_lanes, PackMemory<Real>::bytes};
+} // namespace
 
 DRIFTWALK_LANES_END
 

@@ -29,9 +29,9 @@ DragResponse<D> drag_alone(const FilterProblem& problem, double theta, double om
   }
   return drag;
 }
-} // namespace
 
-inline constexpr InferKernel kernel{{run_filter<2>, drag_alone<2>}, {run_filter<3>, drag_alone<3>}};
+constexpr InferKernel kernel{{run_filter<2>, drag_alone<2>}, {run_filter<3>, drag_alone<3>}};
+} // namespace
 
 DRIFTWALK_LANES_END
 

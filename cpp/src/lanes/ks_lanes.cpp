@@ -19,7 +19,8 @@ void sweep_with(const KsSweep& sweep, KsBest best[2]) {
 
 void sweep_any(const KsSweep& sweep, KsBest best[2]) {
   // A quadrant is a sum of at most four terms, none beyond the total.
-  if (sweep.total <= std::numeric_limits<std::int32_t>::max() / 4) {
+  constexpr std::int64_t narrow = std::numeric_limits<std::int32_t>::max() / 4;
+  if (sweep.total <= narrow) {
     sweep_with<std::int32_t>(sweep, best);
   } else {
     sweep_with<std::int64_t>(sweep, best);

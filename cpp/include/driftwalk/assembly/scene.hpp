@@ -1,9 +1,11 @@
 // One world with several blocks in plain numbers: what contacts and latching work on.
 //
-// Plain data only: this header is read by code of every instruction set (see config.hpp).
+// Read by code of every instruction set (see config.hpp): plain data, and no function but those
+// that each set has of its own.
 #pragma once
 
 #include "driftwalk/assembly/rules.hpp"
+#include "driftwalk/config.hpp"
 
 #include <cstdint>
 
@@ -48,10 +50,6 @@ struct PairList {
   int count;
 };
 
-inline constexpr int pair_capacity(int blocks) {
-  return blocks * (blocks - 1) / 2;
-}
-
 struct Scene {
   int blocks;
   int assemblies;
@@ -94,3 +92,12 @@ void part_blocks(const AssemblyRules& rules, Scene& scene);
 void find_pairs(const AssemblyRules& rules, Scene& scene);
 
 } // namespace driftwalk
+
+DRIFTWALK_LANES_BEGIN
+
+// Room for all pairs that there are.
+inline constexpr int pair_capacity(int blocks) {
+  return blocks * (blocks - 1) / 2;
+}
+
+DRIFTWALK_LANES_END

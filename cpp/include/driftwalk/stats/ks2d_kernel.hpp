@@ -77,8 +77,9 @@ inline void ks_finish_order(const KsOrder<Key>& order, std::int64_t n,
   const std::int64_t vectors = (n + lanes - 1) / lanes;
   order.before[0][vectors] = counts[0];
   order.before[1][vectors] = counts[1];
+  constexpr Key below_all = std::numeric_limits<Key>::min();
   for (int lane = 0; lane < lanes; ++lane) {
-    order.query[n + lane] = std::numeric_limits<Key>::min(); // a query that nothing stands below
+    order.query[n + lane] = below_all; // a query that nothing stands below
   }
 }
 
@@ -240,7 +241,8 @@ private:
 
   // Key of a position: shifted so that the whole range of a signed number is used.
   static Key key_of(std::int64_t position) {
-    return Key(position + std::int64_t(std::numeric_limits<Key>::min()));
+    constexpr std::int64_t lowest = std::numeric_limits<Key>::min();
+    return Key(position + lowest);
   }
 
   void lay_out_x() {
