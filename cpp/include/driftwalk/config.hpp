@@ -4,6 +4,9 @@
 // DRIFTWALK_LANES_BEGIN and closes it with DRIFTWALK_LANES_END. Each instruction set then has an
 // inline namespace of its own, so the linker can never take an AVX-512 copy of an inline function
 // for a processor without it. For the same reason these headers use no std:: containers.
+//
+// A .cpp file keeps its own names in an anonymous namespace: of an `inline` one that two files
+// define the linker keeps either. .ci/one-definition finds both mistakes.
 #pragma once
 
 #ifndef DRIFTWALK_ISA
