@@ -22,10 +22,11 @@ def body(time: Any, x: Any, y: Any = None) -> RawBody:
 
 
 def test_of_duplicate_times_the_last_row_is_kept() -> None:
-    cleaned, counts = clean_body(body([0, 1, 1, 1, 2], [0, 1, 2, 3, 4]))
+    cleaned, counts = clean_body(body([0, 1, 1, 1, 2], [0, 1, 2, 3, 4]), separate=True)
     np.testing.assert_array_equal(cleaned.clock, [0, 1, 2])
     np.testing.assert_array_equal(cleaned.x, [0, 3, 4])
     assert (counts.rows, counts.duplicates_dropped, counts.samples) == (5, 2, 3)
+    assert counts.times_in_two_places == 1
 
 
 def test_unsorted_times_are_an_error_unless_sorting_is_asked_for() -> None:
@@ -39,7 +40,7 @@ def test_unsorted_times_are_an_error_unless_sorting_is_asked_for() -> None:
 
 
 def test_sorting_keeps_the_last_of_duplicate_times_in_the_file() -> None:
-    cleaned, _ = clean_body(body([1, 0, 1], [10, 0, 11]), sort="sort")
+    cleaned, _ = clean_body(body([1, 0, 1], [10, 0, 11]), sort="sort", separate=True)
     np.testing.assert_array_equal(cleaned.x, [0, 11])
 
 
@@ -102,7 +103,7 @@ def test_missing_samples_lie_between_and_are_not_compared() -> None:
 
 def test_everything_is_counted_in_the_dataset(tmp_path: Path) -> None:
     path = tmp_path / "synthetic.csv"
-    path.write_text("t,x,y\n0,0,0\n2,2,0\n1,1,0\n1,1.5,0\n3,,\n4,90,0\n5,5,0\n6,6,0\n")
+    path.write_text("t,x,y\n0,0,0\n2,2,0\n1,1.5,0\n1,1.5,0\n3,,\n4,90,0\n5,5,0\n6,6,0\n")
     dataset = load(path, sort="sort", max_speed=3.0, stop=5.0)
     counts = json.loads(dataset.attrs["counts"])
     expected = {
@@ -111,6 +112,7 @@ def test_everything_is_counted_in_the_dataset(tmp_path: Path) -> None:
         "without_time": 0,
         "unsorted": 1,
         "duplicates_dropped": 1,
+        "times_in_two_places": 0,
         "outside_window": 1,
         "missing": 1,
         "jumps_removed": 1,

@@ -63,6 +63,7 @@ _COUNTS = {
     "missing": "without a position",
     "without_time": "without a time, dropped",
     "duplicates_dropped": "same time again, earlier dropped",
+    "times_in_two_places": "  of these, times in two places",
     "unsorted": "times out of order, sorted",
     "outside_window": "outside --from and --to",
     "jumps_removed": "jumps made gaps",

@@ -9,6 +9,12 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
 from driftwalk.record.raw import RawBody
+from driftwalk.record.several_bodies import (
+    BodyColumns,
+    name_the_body,
+    refuse_several_bodies,
+    times_in_two_places,
+)
 
 
 @dataclass
@@ -23,6 +29,8 @@ class Counts:
     """Times that went backwards, sorted because that was asked for."""
     duplicates_dropped: int = 0
     """Rows whose time a later row repeats, dropped: the last is kept."""
+    times_in_two_places: int = 0
+    """Times whose rows lie in different places; the last is kept."""
     outside_window: int = 0
     """Rows before ``--from`` or after ``--to``, dropped."""
     jumps_removed: int = 0
@@ -44,6 +52,9 @@ def clean_body(
     start: float | None = None,
     stop: float | None = None,
     max_speed: float | None = None,
+    quantum: float = 0.0,
+    separate: bool = False,
+    columns: BodyColumns | None = None,
 ) -> tuple[RawBody, Counts]:
     """Return the body with strictly increasing times, and what was done to it.
 
@@ -58,11 +69,19 @@ def clean_body(
     max_speed : float, optional
         A sample that could be reached from the last good one only faster than this [m/s] becomes
         a gap.
+    quantum : float
+        Resolution of the positions [m]: rows within it are in the same place.
+    separate : bool
+        Whether the rows are known to be of one body, so that two places at one time are counted
+        however many they are.
+    columns : callable, optional
+        Finds the columns of the file that could name the body, for the errors.
 
     Raises
     ------
     InputError
-        When times go backwards and `sort` is ``"error"``.
+        When times go backwards and `sort` is ``"error"``, or when at more than 1 % of the times
+        rows are in different places, unless `separate`.
     """
     if sort not in ("error", "sort"):
         raise InputError(f"sort is 'error' or 'sort', got '{sort}'")
@@ -71,17 +90,21 @@ def clean_body(
     if not known.all():
         counts.without_time = int((~known).sum())
         body = _take(body, known)
-    body = _in_order(body, counts, sort=sort)
-    repeated = body.clock[1:] == body.clock[:-1]
-    if repeated.any():
-        counts.duplicates_dropped = int(repeated.sum())
-        body = _take(body, np.append(~repeated, True))
+    body = _in_order(body, counts, sort=sort, columns=columns)
     if start is not None or stop is not None:
         inside = np.ones(body.clock.size, dtype=bool)
         inside &= body.clock >= (-np.inf if start is None else start)
         inside &= body.clock <= (np.inf if stop is None else stop)
         counts.outside_window = int((~inside).sum())
         body = _take(body, inside)
+    repeated = body.clock[1:] == body.clock[:-1]
+    if repeated.any():
+        apart = times_in_two_places(body.clock, body.x, body.y, quantum=quantum)
+        if not separate:
+            refuse_several_bodies(body, apart, columns)
+        counts.times_in_two_places = int(apart.size)
+        counts.duplicates_dropped = int(repeated.sum())
+        body = _take(body, np.append(~repeated, True))
     counts.missing = _blank_missing(body)
     if max_speed is not None:
         if not max_speed > 0:
@@ -99,16 +122,21 @@ def _take(body: RawBody, rows: npt.NDArray[np.bool_] | npt.NDArray[np.int64]) ->
     return RawBody(body.name, body.clock[rows], body.x[rows], body.y[rows], theta, extra=extra)
 
 
-def _in_order(body: RawBody, counts: Counts, *, sort: str) -> RawBody:
+def _in_order(body: RawBody, counts: Counts, *, sort: str, columns: BodyColumns | None) -> RawBody:
     backwards = np.flatnonzero(body.clock[1:] < body.clock[:-1])
     if not backwards.size:
         return body
     if sort == "error":
         at = int(backwards[0])
+        found = [] if columns is None else columns(True)
+        remedy = (
+            f"{name_the_body(found)}, or --sort if it is one body"
+            if found
+            else "add --sort to sort them"
+        )
         raise InputError(
             f"time goes backwards in row {at + 2} of body '{body.name}': {body.clock[at]:.6g} s is "
-            f"followed by {body.clock[at + 1]:.6g} s ({backwards.size} such rows); add --sort to "
-            "sort them"
+            f"followed by {body.clock[at + 1]:.6g} s ({backwards.size} such rows); {remedy}"
         )
     counts.unsorted = int(backwards.size)
     return _take(body, np.argsort(body.clock, kind="stable"))

@@ -19,7 +19,12 @@ _ROOTS: dict[str, str] = {
         ("body", "id", "track", "trackid", "robot", "robotid", "individual", "animal", "name"),
         "body",
     ),
+    **dict.fromkeys(("particle", "agent", "subject", "fish", "mouse", "rat", "bot"), "body"),
+    **dict.fromkeys(("particleid", "agentid", "objectid", "tagid", "uid", "tracklet"), "body"),
 }
+# These count as names of bodies beside "id" alone: an object or a tag by itself may be a class or a
+# state, which changes while the body stays the same.
+_WITH_ID = frozenset({"object", "obj", "cell", "marker", "tag", "target", "blob", "instance"})
 _UNITS: dict[str, str] = {
     **{unit: unit for unit in ("m", "cm", "mm", "um", "km", "s", "ms", "us", "ns", "min", "px")},
     **{"µm": "um", "μm": "um", "µs": "us", "μs": "us", "metres": "m", "meters": "m"},
@@ -40,6 +45,11 @@ _ALLOWED: dict[str, frozenset[str]] = {
 # Words that stand beside x or y without naming a body. They hint at an image, so a length beside
 # them is not taken for metres.
 _IMAGE_WORDS = frozenset({"pos", "position", "center", "centre", "centroid", "image", "coord"})
+# Words beside x or y that make it no position at all.
+_NO_POSITION = frozenset(
+    {"velocity", "vel", "speed", "acceleration", "acc", "accel", "force", "err", "error"}
+    | {"std", "sigma", "var", "variance", "min", "max", "confidence", "likelihood", "score"}
+)
 _FRAME_WORDS = frozenset({"number", "no", "index", "stamp", "col", "num"})
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
 
@@ -80,20 +90,24 @@ def column_meaning(name: str) -> ColumnMeaning | None:
         found = found[1:]  # "robot x", "id_1_x": the body's own name, then the quantity
     elif len(found) == 2 and found[0][1] == found[1][1] == "body":
         found = found[:1]  # "track id"
+    elif len(found) == 2 and found[0][1] in ("x", "y", "theta") and found[1][1] == "body":
+        found = found[:1]  # "x_fish"
     elif len(found) == 2 and found[0][1] == "frame" and found[1][1] == "body":
         found = found[:1]  # "frame id"
     if len(found) != 1:
         return None
     index, quantity, number = found[0]
     rest = [token for position, token in enumerate(tokens) if position != index]
+    lower = {token.lower() for token in rest}
     words = _IMAGE_WORDS | _FRAME_WORDS
-    if quantity in ("t", "frame", "body") and any(
-        token.lower() not in words | {"id"} for token in rest
-    ):
+    allowed = words | {"id"} | (_WITH_ID if tokens[index].lower() == "id" else frozenset())
+    if quantity in ("t", "frame", "body") and lower - allowed:
+        return None
+    if quantity in ("x", "y", "theta") and lower & _NO_POSITION:
         return None
     if unit and unit not in _ALLOWED[quantity]:
         return None
-    image = {token.lower() for token in rest} & _IMAGE_WORDS
+    image = lower & _IMAGE_WORDS
     names = [token for token in rest if token.lower() not in words]
     return ColumnMeaning(
         quantity=quantity,
@@ -130,6 +144,8 @@ class ColumnMap:
     clock: int | None = None
     """Times or frame numbers; None: the row number is the frame number."""
     clock_unit: str = "frame"
+    bare_clock: bool = False
+    """Whether the clock is one of times whose unit nobody named."""
     bodies: dict[str, dict[str, int]] = field(default_factory=dict)
     """Body to quantity (x, y, theta) to column."""
     body_column: int | None = None
@@ -220,6 +236,7 @@ def _collect(
     elif "t" in single:
         result.clock = single["t"]
         result.clock_unit = meanings[result.clock].unit or "s"
+        result.bare_clock = not meanings[result.clock].unit
     return result
 
 

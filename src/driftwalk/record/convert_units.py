@@ -142,10 +142,11 @@ def _convert_clocks(raw: RawRecording, ticks: float, attrs: dict[str, object]) -
     arrays = {id(body.clock): body.clock for body in raw.bodies}
     starts = [float(np.nanmin(c)) for c in arrays.values() if np.isfinite(c).any()]
     origin = min(starts, default=0.0)
-    if raw.clock_unit == "frame" or origin / ticks < EPOCH_S:
-        origin = 0.0
+    begin = (raw.clock_origin + origin) / ticks
+    if raw.clock_unit == "frame" or begin < EPOCH_S:
+        origin = -float(raw.clock_origin)
     else:
-        attrs["time_origin_unix_s"] = origin / ticks
+        attrs["time_origin_unix_s"] = begin
     converted = {key: _writable(clock) for key, clock in arrays.items()}
     for clock in converted.values():
         np.subtract(clock, origin, out=clock)

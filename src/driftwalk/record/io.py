@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,12 +13,13 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.arena import PlacedArena, arena_attributes, place_arena
+from driftwalk.record.bare_clock import check_bare_clock
 from driftwalk.record.clean import Counts, clean_body
 from driftwalk.record.convert_units import convert_units
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.registry import find_loader
 from driftwalk.record.text import DAMAGED_GZIP
-from driftwalk.record.warn import plausibility_warnings
+from driftwalk.record.warn import angle_warnings, plausibility_warnings
 from driftwalk.schema import build_trajectory
 
 if TYPE_CHECKING:
@@ -123,15 +125,29 @@ def load(
     loader = find_loader(source, format=format or ("matrices" if options.y is not None else None))
     try:
         raw = loader.read(source, options)
-    except DAMAGED_GZIP as error:
-        raise FormatError(f"is a damaged gzip file: {error}", path=source) from error
-    raw.bodies = _select(raw.bodies, body)
-    try:
+        raw.bodies = _select(raw.bodies, body)
+        raw.notes += [*check_bare_clock(raw), *angle_warnings(raw)]
         bodies, attrs = convert_units(raw, options, y_axis=y_axis)
-        cleaned, counts = _clean(bodies, sort=sort, start=start, stop=stop, max_speed=max_speed)
+        clean = partial(
+            clean_body,
+            sort=sort,
+            start=start,
+            stop=stop,
+            max_speed=max_speed,
+            quantum=float(str(attrs["position_quantum_m"])),
+            separate=raw.separate,
+            columns=raw.body_columns,
+        )
+        cleaned, counts = _clean(bodies, clean)
         del bodies
+        if not any(body.clock.size for body in cleaned):
+            if start is not None or stop is not None:
+                raise InputError("no sample lies between --from and --to")
+            raise InputError("the recording has no row with a time")
         attrs |= {"source": source.name, "format": loader.name}
         return _assemble(cleaned, counts, attrs, raw, arena=arena, block_side=block_side)
+    except DAMAGED_GZIP as error:
+        raise FormatError(f"is a damaged gzip file: {error}", path=source) from error
     except FormatError:
         raise
     except InputError as error:
@@ -163,26 +179,15 @@ def _select(bodies: list[RawBody], wanted: str | None) -> list[RawBody]:
 
 
 def _clean(
-    bodies: list[RawBody],
-    *,
-    sort: str,
-    start: float | None,
-    stop: float | None,
-    max_speed: float | None,
+    bodies: list[RawBody], clean: Callable[[RawBody], tuple[RawBody, Counts]]
 ) -> tuple[list[RawBody], dict[str, Counts]]:
     """Clean each body; the uncleaned one is let go as soon as its successor is there."""
     cleaned: list[RawBody] = []
     counts: dict[str, Counts] = {}
     while bodies:
-        body, found = clean_body(
-            bodies.pop(0), sort=sort, start=start, stop=stop, max_speed=max_speed
-        )
+        body, found = clean(bodies.pop(0))
         cleaned.append(body)
         counts[body.name] = found
-    if not any(body.clock.size for body in cleaned):
-        if start is not None or stop is not None:
-            raise InputError("no sample lies between --from and --to")
-        raise InputError("the recording has no row with a time")
     return cleaned, counts
 
 
@@ -209,6 +214,8 @@ def _assemble(
     time, x, y, theta = _one_clock(bodies)
     if "sample_rate_Hz" not in attrs and time.size > 1:
         attrs["sample_rate_Hz"] = _usual_rate(bodies)
+    if twice := totals["times_in_two_places"]:
+        notes.append(f"times with rows in different places, of which the last is kept: {twice}")
     notes += plausibility_warnings(bodies)
     attrs["counts"] = json.dumps(
         {

@@ -6,6 +6,7 @@ a loader only says what the file holds.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -85,6 +86,18 @@ class RawRecording:
     """Attributes to carry over into the dataset."""
     extra: dict[str, Extra] = field(default_factory=dict)
     """Further variables, which each body has in its `extra`."""
+    clock_origin: int = 0
+    """What is to be added to every clock: taken off where whole numbers are beyond float64."""
+    bare_clock: str | None = None
+    """Column of a clock that is taken as seconds though nothing says so, ``""`` where the format
+    has no columns to name; None for any other clock."""
+    bare_angle: bool = False
+    """Whether angles are taken as radians though nothing says so."""
+    separate: bool = False
+    """Whether the format itself keeps bodies apart: rows at one time come of a coarse clock."""
+    body_columns: Callable[[bool], list[str]] | None = None
+    """Finds the columns that could name the body, see `record.several_bodies`; None: there are no
+    columns to choose from."""
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import gzip
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import IO, Any
 
@@ -28,6 +29,7 @@ DAMAGED_GZIP = (gzip.BadGzipFile, EOFError, zlib.error)
 """What reading a gzip file that is cut off or damaged raises."""
 BOM = b"\xef\xbb\xbf"
 HEAD_BYTES = 1 << 16
+_EXACT = 1 << 53
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,8 @@ class TableLayout:
     """Columns (from 0) to read as numbers."""
     texts: tuple[int, ...] = ()
     """Columns (from 0) to read as text."""
+    clock: int | None = None
+    """The one of the numbers whose whole values may be beyond those that float64 holds exactly."""
 
 
 @dataclass
@@ -53,6 +57,8 @@ class Table:
     rows: int
     numbers: dict[int, Array]
     """Column (from 0) to its values."""
+    clock_origin: int = 0
+    """What was taken off the clock, so that nanoseconds since 1970 keep every one."""
     codes: dict[int, npt.NDArray[np.int32]] = field(default_factory=dict)
     """Text column to the index of each row's value in `labels`."""
     labels: dict[int, list[str]] = field(default_factory=dict)
@@ -80,7 +86,7 @@ def read_head(path: Path) -> bytes:
     return head.removeprefix(BOM)
 
 
-def read_table(path: Path, layout: TableLayout) -> Table:
+def read_table(path: Path, layout: TableLayout, *, blocks: int | None = None) -> Table:
     """Read the numbered and the text columns of a table.
 
     Parameters
@@ -89,6 +95,8 @@ def read_table(path: Path, layout: TableLayout) -> Table:
         Text file, may be gzip-compressed.
     layout : TableLayout
         Columns to read.
+    blocks : int, optional
+        Read no more than so many blocks of 4 MiB; None: the whole file.
 
     Returns
     -------
@@ -111,14 +119,20 @@ def read_table(path: Path, layout: TableLayout) -> Table:
     codes: dict[int, list[npt.NDArray[np.int32]]] = {column: [] for column in layout.texts}
     labels: dict[int, dict[str, int]] = {column: {} for column in layout.texts}
     rows = 0
-    for line, block in _blocks(path, layout.skip_lines):
+    origin = 0
+    for line, block in islice(_blocks(path, layout.skip_lines), blocks):
         # pandas fails on a table of blank lines alone.
         if not block.strip(b" \r\n"):
             continue
         frame = _parse(block, layout, path=path, line=line)
+        if layout.clock is not None and not rows:
+            origin = _far_origin(frame[layout.clock].to_numpy())
         rows += len(frame)
         for column, parts in chunks.items():
-            parts.append(frame[column].to_numpy(dtype=np.float64))
+            values = frame[column].to_numpy()
+            if origin and column == layout.clock:
+                values = values - (origin if values.dtype.kind == "i" else float(origin))
+            parts.append(values.astype(np.float64, copy=False))
         for column, seen in labels.items():
             codes[column].append(_encode(frame[column], seen))
     if not rows:
@@ -129,7 +143,15 @@ def read_table(path: Path, layout: TableLayout) -> Table:
         numbers={column: _join(chunks.pop(column)) for column in layout.numbers},
         codes={column: np.concatenate(codes.pop(column)) for column in layout.texts},
         labels={column: list(seen) for column, seen in labels.items()},
+        clock_origin=origin,
     )
+
+
+def _far_origin(values: npt.NDArray[Any]) -> int:
+    """Return the first of whole numbers that float64 would round, 0 when it need not."""
+    if not values.size or values.dtype.kind != "i" or np.abs(values).max() <= _EXACT:
+        return 0
+    return int(values[0])
 
 
 def _join(parts: list[Array]) -> Array:

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from driftwalk.record.raw import RawBody
+from driftwalk.record.raw import RawBody, RawRecording
 
 LARGEST_EXTENT_M = 20.0
 SMALLEST_EXTENT_M = 1e-3
 LARGEST_SPEED_M_S = 10.0
+LONGEST_RECORDING_S = 1e9
+SHORTEST_INTERVAL_S = 1e-5
+FULL_TURN = 6.2832
+LEAP = 90.0
+"""No body turns by so many radians between two samples; degrees that wrap around do."""
 
 
 def plausibility_warnings(bodies: list[RawBody]) -> list[str]:
@@ -37,10 +42,47 @@ def plausibility_warnings(bodies: list[RawBody]) -> list[str]:
         warnings.append(
             f"the positions span only {extent:.3g} m: is the unit, or the scale, right?"
         )
+    warnings += _clock_warnings(bodies)
     speeds = [_usual_speed(body) for body in bodies]
     if speeds and max(speeds) > LARGEST_SPEED_M_S and extent <= LARGEST_EXTENT_M:
         warnings.append(f"the usual speed is {max(speeds):.3g} m/s: is the clock's unit right?")
     return warnings
+
+
+def _clock_warnings(bodies: list[RawBody]) -> list[str]:
+    clocks = [body.clock for body in bodies if body.clock.size > 1]
+    if not clocks:
+        return []
+    last = max(float(clock[-1] - clock[0]) for clock in clocks)
+    shortest = min(float(np.median(np.diff(clock))) for clock in clocks)
+    if last > LONGEST_RECORDING_S:
+        return [f"the recording lasts {last:.3g} s: is the unit of its clock right?"]
+    if shortest < SHORTEST_INTERVAL_S:
+        return [f"the usual interval is {shortest:.3g} s: is the unit of the clock right?"]
+    return []
+
+
+def angle_warnings(raw: RawRecording) -> list[str]:
+    """Return what speaks against radians where angles are taken as such though nothing says so.
+
+    An orientation in radians is wrapped, or is followed from its first, wrapped, value on.
+
+    Parameters
+    ----------
+    raw : RawRecording
+        In the units of the file.
+    """
+    if not raw.bare_angle or raw.angle_unit != "rad":
+        return []
+    known = [body.theta[np.isfinite(body.theta)] for body in raw.bodies if body.theta is not None]
+    for theta in known:
+        if theta.size and (abs(theta[0]) > FULL_TURN or (np.abs(np.diff(theta)) > LEAP).any()):
+            low, high = float(theta.min()), float(theta.max())
+            return [
+                f"angles from {low:.4g} to {high:.4g} are read as radians: if they are degrees, "
+                "name the unit, as in --columns theta=NAME:deg"
+            ]
+    return []
 
 
 def _usual_speed(body: RawBody) -> float:

@@ -48,7 +48,9 @@ class JsonPointsLoader:
         timed = bool(np.isfinite(t).any())
         clock: Array = t if timed else np.arange(x.size, dtype=np.float64)
         body = RawBody("0", clock, x, y, theta if np.isfinite(theta).any() else None)
-        return RawRecording([body], clock_unit="s" if timed else "frame", rows=x.size)
+        return RawRecording(
+            [body], clock_unit="s" if timed else "frame", bare_clock="", rows=x.size
+        )
 
 
 def _point(point: Any, index: int, path: Path) -> list[float]:

@@ -7,11 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.record.body_columns import body_columns
 from driftwalk.record.column_names import ColumnMap, map_columns
 from driftwalk.record.head import first_lines, read_header
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.stacked import split_bodies
 from driftwalk.record.text import Table, TableLayout, read_table
+
+NO_CLOCK = "the table has no column of times or frames: every row counts as a frame"
 
 
 class PlainLoader:
@@ -49,15 +52,42 @@ class PlainLoader:
             if columns.clock is None
             else table.numbers[columns.clock]
         )
+        notes = [] if columns.clock is not None else [NO_CLOCK]
+        if "body" not in options.columns and _numbers_the_rows(table, columns.body_column, clock):
+            notes.append(f"column '{labels[columns.body_column or 0]}' numbers the rows: one body")
+            columns.body_column = None
         return RawRecording(
             bodies=_bodies(table, columns, clock, path=path),
             clock_unit=columns.clock_unit,
+            clock_origin=table.clock_origin,
             length_unit=columns.length_unit,
             angle_unit=columns.angle_unit or "rad",
+            bare_clock=_bare_clock(columns, labels),
+            bare_angle=not columns.angle_unit,
+            body_columns=lambda in_order: body_columns(
+                path, columns, labels, delimiter=delimiter, skip=skip, in_order=in_order
+            ),
             # Bare `x, y` beside a time in seconds is SI; beside frame numbers it may be pixels.
             bare_length_is_si=columns.bare and columns.clock_unit != "frame",
             rows=table.rows,
+            notes=notes,
         )
+
+
+def _bare_clock(columns: ColumnMap, labels: list[str]) -> str | None:
+    if columns.clock is None or not columns.bare_clock:
+        return None
+    return labels[columns.clock]
+
+
+def _numbers_the_rows(table: Table, column: int | None, clock: Array) -> bool:
+    """Whether what seems to name the body counts up row by row, over more than one moment."""
+    if column is None or table.rows < 3 or len(table.labels[column]) != table.rows:
+        return False
+    first, *rest = table.labels[column]
+    if not first.isdecimal() or (clock == clock[0]).all():
+        return False
+    return all(label == str(int(first) + at) for at, label in enumerate(rest, start=1))
 
 
 def _layout(columns: ColumnMap, names: list[str], *, delimiter: str, skip: int) -> TableLayout:
@@ -71,6 +101,7 @@ def _layout(columns: ColumnMap, names: list[str], *, delimiter: str, skip: int) 
         skip_lines=skip,
         numbers=tuple(sorted(used - set(texts))),
         texts=texts,
+        clock=columns.clock,
     )
 
 

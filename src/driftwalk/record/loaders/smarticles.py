@@ -47,7 +47,9 @@ class SmarticlesLoader:
             )
             for robot in range(ROBOTS)
         ]
-        return RawRecording(bodies, clock_unit="s", length_unit="px", rows=table.rows)
+        return RawRecording(
+            bodies, clock_unit="s", bare_clock="", separate=True, length_unit="px", rows=table.rows
+        )
 
 
 LOADER = SmarticlesLoader()

@@ -48,7 +48,10 @@ class UbiTrailLoader:
             x=table.numbers[2] * scale,
             y=table.numbers[3] * scale,
         )
-        return RawRecording(bodies, clock_unit="ms", length_unit="px", rows=table.rows)
+        # An area is a body. The clock, of a video's file, often says the same of two frames.
+        return RawRecording(
+            bodies, clock_unit="ms", length_unit="px", separate=True, rows=table.rows
+        )
 
 
 def _area_widths(path: Path) -> dict[str, float]:
