@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -22,7 +23,8 @@ TRUTH = {
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Done]:
     """Return a whole demo, with the short search."""
     folder = tmp_path_factory.mktemp("demo") / "demo"
-    return folder, apart("demo", "--quick", "--out", folder)
+    strict = os.environ | {"PYTHONWARNINGS": "error"}  # no warning of a library reaches a user
+    return folder, apart("demo", "--quick", "--out", folder, env=strict)
 
 
 @pytest.mark.slow

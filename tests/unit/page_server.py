@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import http.client
 import json
+import os
 import signal
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -26,7 +27,9 @@ class PageServer:
     """A command that serves a page."""
 
     def __init__(self, *words: object, port: int = 0) -> None:
-        self.process = start(*words, "--port", port, "--no-open")
+        # No warning of a library reaches a user.
+        strict = os.environ | {"PYTHONWARNINGS": "error"}
+        self.process = start(*words, "--port", port, "--no-open", env=strict)
         assert self.process.stdout is not None
         self.address = self.process.stdout.readline().strip()
         if not self.address:
@@ -73,7 +76,8 @@ def served(*words: object, port: int = 0) -> Iterator[PageServer]:
         yield server
     finally:
         if server.process.poll() is None:
-            server.stop()
+            _, said = server.stop()
+            assert "Warning" not in said, said
 
 
 def received(socket: Any, kind: str, *, within: int = 200) -> dict[str, Any]:

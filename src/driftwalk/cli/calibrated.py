@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.run_layout import state_of
+from driftwalk.schema.hdf5 import UNREADABLE, open_hdf5
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -104,12 +105,10 @@ def _require_finished(folder: Path, files: dict[str, Path]) -> None:
 
 
 def _read(path: Path) -> xr.Dataset:
-    import xarray as xr
-
     try:
-        with xr.open_dataset(path, engine="h5netcdf") as dataset:
+        with open_hdf5(path) as dataset:
             found = dataset.load()
-    except (OSError, ValueError, KeyError) as error:
+    except UNREADABLE as error:
         raise InputError(f"{path} cannot be read as NetCDF: {error}") from error
     if found.attrs.get("kind") != "calibration":
         raise InputError(f"{path} is no calibration: its kind is {found.attrs.get('kind')!r}")

@@ -12,6 +12,7 @@ from driftwalk.cli.output import print_json, print_note, print_table
 from driftwalk.cli.recording_options import RecordingOptions, with_recording_options
 from driftwalk.cli.study_recording import load_with_study
 from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.schema.hdf5 import UNREADABLE, open_hdf5, stored_kind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -177,15 +178,13 @@ def _load(
 
 def _simulated_path(path: Path) -> xr.Dataset | None:
     """Return the dataset of a file that `driftwalk assemble` wrote; None for a recording."""
-    import xarray as xr
-
-    if path.suffix != ".nc" or not path.is_file():
+    if path.suffix != ".nc" or stored_kind(path) != "assembly_path":
         return None
     try:
-        with xr.open_dataset(path, engine="h5netcdf") as stored:
-            return stored.load() if stored.attrs.get("kind") == "assembly_path" else None
-    except (OSError, ValueError):
-        # Whatever else it is, the loaders say what is wrong with it.
+        with open_hdf5(path) as stored:
+            return stored.load()
+    except UNREADABLE:
+        # Damaged: the loaders say what is wrong with it.
         return None
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from driftwalk.cli.recording_options import RecordingOptions
 from driftwalk.cli.require_motion import require_motion
 from driftwalk.core.errors import InputError
+from driftwalk.schema.hdf5 import UNREADABLE, open_hdf5, stored_kind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -69,16 +70,11 @@ def load_simulation(path: Path, *, replicate: int = 0) -> xr.Dataset | None:
 
 def _open_simulation(path: Path) -> xr.Dataset | None:
     """Return the simulation that the file holds, None when it is anything else."""
-    if not path.is_file():
+    if stored_kind(path) != "simulation":
         return None
-    with path.open("rb") as file:
-        if file.read(len(_HDF5)) != _HDF5:
-            return None
-    import xarray as xr
-
     try:
-        with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as dataset:
-            return dataset.load() if dataset.attrs.get("kind") == "simulation" else None
-    except (ValueError, KeyError, OSError):
-        # Damaged, or no NetCDF: the loaders of recordings say what is wrong.
+        with open_hdf5(path, decode_times=False) as dataset:
+            return dataset.load()
+    except UNREADABLE:
+        # Damaged: the loaders of recordings say what is wrong.
         return None

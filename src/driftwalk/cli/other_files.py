@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
+from driftwalk.schema.hdf5 import stored_kind
+
 VIDEOS: Final = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpeg", ".mpg", ".webm", ".wmv")
 KINDS: Final = {
     "simulation": "a simulation: driftwalk report and driftwalk compare take it",
@@ -32,20 +34,5 @@ def what_else(path: Path) -> str | None:
         return None
     if path.suffix.lower() in VIDEOS:
         return "is a video: driftwalk track makes a recording of it"
-    kind = _netcdf_kind(path)
-    return None if kind is None else f"holds {KINDS.get(kind, _OTHER.format(kind))}"
-
-
-def _netcdf_kind(path: Path) -> str | None:
-    """Return which kind of driftwalk's own datasets a file holds, None for any other file."""
-    import xarray as xr
-
-    if path.suffix.lower() != ".nc":
-        return None
-    try:
-        with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as stored:
-            kind = stored.attrs.get("kind")
-    except (OSError, ValueError, KeyError):
-        # Damaged, or no NetCDF of version 4.
-        return None
-    return None if kind in (None, "trajectory") else str(kind)
+    kind = stored_kind(path) if path.suffix.lower() == ".nc" else None
+    return None if kind in (None, "trajectory") else f"holds {KINDS.get(kind, _OTHER.format(kind))}"

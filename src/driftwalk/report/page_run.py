@@ -11,6 +11,7 @@ from driftwalk.core.errors import DriftwalkError, InputError
 from driftwalk.core.provenance import read_manifest, refuse_other_version
 from driftwalk.core.run_layout import MANIFEST_FILE, RECORD_FILE, State, state_of, visible
 from driftwalk.core.shards import read_specification
+from driftwalk.schema.hdf5 import UNREADABLE, open_hdf5
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -139,12 +140,10 @@ def read_dataset(path: Path) -> xr.Dataset:
     InputError
         When it cannot be read.
     """
-    import xarray as xr
-
     try:
-        with xr.open_dataset(path, engine="h5netcdf") as dataset:
+        with open_hdf5(path) as dataset:
             return dataset.load()
-    except (OSError, ValueError, KeyError, RuntimeError) as error:
+    except UNREADABLE as error:
         raise InputError(f"{path.name} cannot be read: {error}") from error
 
 

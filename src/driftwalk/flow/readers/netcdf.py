@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import ConfigurationError, FormatError
 from driftwalk.core.units import parse_quantity
+from driftwalk.schema.hdf5 import UNREADABLE, open_hdf5
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,7 +21,6 @@ Array = npt.NDArray[np.float64]
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _CLASSIC = (b"CDF\x01", b"CDF\x02")
 MAGIC = (_HDF5, *_CLASSIC)
-_FAILURES = (OSError, ValueError, KeyError, TypeError, RuntimeError, IndexError, AttributeError)
 _LONG_WORDS = {"meters": "m", "metres": "m", "meter": "m", "metre": "m", "seconds": "s"}
 
 
@@ -34,12 +35,13 @@ def open_netcdf(path: Path) -> xr.Dataset:
     import xarray as xr
 
     with path.open("rb") as file:
-        engine = "h5netcdf" if file.read(8).startswith(_HDF5) else "scipy"
+        hdf5 = file.read(8).startswith(_HDF5)
+    opened = open_hdf5 if hdf5 else partial(xr.open_dataset, engine="scipy")
     try:
         # Plain numbers: a time coordinate in "s" is not to become dates.
-        with xr.open_dataset(path, engine=engine, decode_times=False) as dataset:
+        with opened(path, decode_times=False) as dataset:
             return dataset.load()
-    except _FAILURES as error:
+    except UNREADABLE as error:
         raise FormatError(f"cannot be read as NetCDF: {error}", path=path) from error
 
 
