@@ -106,6 +106,8 @@ def clean_body(
         counts.duplicates_dropped = int(repeated.sum())
         body = _take(body, np.append(~repeated, True))
     counts.missing = _blank_missing(body)
+    if body.theta is not None and not np.isfinite(body.theta).all():
+        body.theta = np.where(np.isfinite(body.theta), body.theta, np.nan)
     if max_speed is not None:
         if not max_speed > 0:
             raise InputError(f"--max-speed must be above zero, got {max_speed} m/s")

@@ -13,8 +13,8 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.arena import PlacedArena, arena_attributes, place_arena
-from driftwalk.record.bare_clock import check_bare_clock
 from driftwalk.record.clean import Counts, clean_body
+from driftwalk.record.clock import check_clock
 from driftwalk.record.convert_units import convert_units
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.registry import find_loader
@@ -126,7 +126,7 @@ def load(
     try:
         raw = loader.read(source, options)
         raw.bodies = _select(raw.bodies, body)
-        raw.notes += [*check_bare_clock(raw), *angle_warnings(raw)]
+        raw.notes += [*check_clock(raw), *angle_warnings(raw)]
         bodies, attrs = convert_units(raw, options, y_axis=y_axis)
         clean = partial(
             clean_body,

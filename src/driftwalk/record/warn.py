@@ -76,7 +76,9 @@ def angle_warnings(raw: RawRecording) -> list[str]:
         return []
     known = [body.theta[np.isfinite(body.theta)] for body in raw.bodies if body.theta is not None]
     for theta in known:
-        if theta.size and (abs(theta[0]) > FULL_TURN or (np.abs(np.diff(theta)) > LEAP).any()):
+        with np.errstate(over="ignore"):  # a leap may be infinite
+            leaps = np.abs(np.diff(theta)) > LEAP
+        if theta.size and (abs(theta[0]) > FULL_TURN or leaps.any()):
             low, high = float(theta.min()), float(theta.max())
             return [
                 f"angles from {low:.4g} to {high:.4g} are read as radians: if they are degrees, "

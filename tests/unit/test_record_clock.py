@@ -157,3 +157,16 @@ def test_angles_that_are_hardly_radians(angles: list[float], said: bool, tmp_pat
     assert any("--columns theta=NAME:deg" in warning for warning in warnings) == said
     named = load(path, columns={"theta": "theta:deg"})
     assert json.loads(named.attrs["counts"])["warnings"] == []
+
+
+@pytest.mark.parametrize("header", ["time,x_m,y_m", "t_s,x_m,y_m", "t_ns,x_m,y_m"])
+def test_times_that_no_recording_has(header: str, tmp_path: Path) -> None:
+    path = write(tmp_path, "", [0.1 * i for i in range(49)] + [1.7e308], header)
+    with pytest.raises(InputError, match=r"the times are .* apart: one"):
+        load(path)
+
+
+def test_an_angle_that_is_not_finite_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "synthetic.csv"
+    path.write_text("t,x,y,theta\n0,1,2,inf\n1,2,3,0.5\n2,3,4,-inf\n")
+    np.testing.assert_array_equal(load(path)["theta"].values[:, 0], [np.nan, 0.5, np.nan])

@@ -1,4 +1,4 @@
-"""Whether the numbers of a clock can be seconds, where the file does not say its unit."""
+"""Whether the times of a file can be true: above all those whose unit it does not say."""
 
 from __future__ import annotations
 
@@ -17,13 +17,16 @@ USUAL_INTERVAL_S = 10.0
 """Beyond this, milliseconds of a video are likelier than a camera that waits so long."""
 LAST_DAY_S = 1e10
 """Seconds since 1970 until the year 2286."""
+LONGEST_RECORDING_S = 1e12
+"""30 000 years; powers of much longer times are beyond float64."""
 _FIRST_DAY_S = 1e8
 _FASTEST_S, _SLOWEST_S = 1e-4, 2.0
 _HOUR_S = 3600.0
+_ENOUGH = 100_000
 
 
-def check_bare_clock(raw: RawRecording) -> list[str]:
-    """Refuse numbers that cannot be seconds, and return what to say about those that may not be.
+def check_clock(raw: RawRecording) -> list[str]:
+    """Refuse times that cannot be, and return what to say about those that may not be seconds.
 
     Parameters
     ----------
@@ -39,10 +42,10 @@ def check_bare_clock(raw: RawRecording) -> list[str]:
     ------
     InputError
         When the clock names no unit and in seconds would begin after the year 2286, or have
-        intervals beyond `LONGEST_INTERVAL_S` or below `SHORTEST_INTERVAL_S`.
+        intervals beyond `LONGEST_INTERVAL_S` or below `SHORTEST_INTERVAL_S`; when a clock of any
+        unit lasts longer than `LONGEST_RECORDING_S`.
     """
-    column = raw.bare_clock
-    if column is None or raw.clock_unit != "s":
+    if raw.clock_unit == "frame":
         return []
     clocks = list({id(body.clock): body.clock for body in raw.bodies}.values())
     known = [clock[np.isfinite(clock)] for clock in clocks]
@@ -50,7 +53,17 @@ def check_bare_clock(raw: RawRecording) -> list[str]:
         return []
     first = min(float(clock.min()) for clock in known if clock.size) + raw.clock_origin
     last = max(float(clock.max()) for clock in known if clock.size) + raw.clock_origin
-    steps = _steps(known)
+    notes = []
+    if raw.bare_clock is not None and raw.clock_unit == "s":
+        notes = _check_bare(raw.bare_clock, _steps(known), first, last)
+    lasts = (last - first) / CLOCK_UNITS[raw.clock_unit]
+    if lasts > LONGEST_RECORDING_S:
+        raise InputError(f"the times are {lasts:.3g} s apart: one of them, or their unit, is wrong")
+    return notes
+
+
+def _check_bare(column: str, steps: Array, first: float, last: float) -> list[str]:
+    """Refuse what cannot be seconds, and say what may be milliseconds."""
     interval = float(np.median(steps)) if steps.size else 0.0
     long = interval > LONGEST_INTERVAL_S and not _whole_hours(steps)
     short = 0.0 < interval < SHORTEST_INTERVAL_S
@@ -67,9 +80,11 @@ def check_bare_clock(raw: RawRecording) -> list[str]:
 
 
 def _steps(clocks: list[Array]) -> Array:
-    """Return the sizes of the steps of all clocks; rows at one time make none."""
-    steps = np.concatenate([np.abs(np.diff(clock)) for clock in clocks])
-    return steps[steps > 0]
+    """Return the sizes of the first steps of all clocks; rows at one time make none."""
+    with np.errstate(over="ignore"):  # beyond float64 is as long as a step can be
+        steps = np.concatenate([np.abs(np.diff(clock[:_ENOUGH])) for clock in clocks])
+    bounded: Array = np.minimum(steps[steps > 0], np.finfo(np.float64).max)
+    return bounded
 
 
 def _whole_hours(steps: Array) -> bool:
