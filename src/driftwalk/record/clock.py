@@ -45,17 +45,18 @@ def check_clock(raw: RawRecording) -> list[str]:
         intervals beyond `LONGEST_INTERVAL_S` or below `SHORTEST_INTERVAL_S`; when a clock of any
         unit lasts longer than `LONGEST_RECORDING_S`.
     """
-    if raw.clock_unit == "frame":
+    if raw.clock_unit == "frame" or not raw.bodies:
         return []
     clocks = list({id(body.clock): body.clock for body in raw.bodies}.values())
-    known = [clock[np.isfinite(clock)] for clock in clocks]
-    if not any(clock.size for clock in known):
+    # One mask at a time, and no copies: a clock may have millions of times.
+    first = min(float(clock.min(where=np.isfinite(clock), initial=np.inf)) for clock in clocks)
+    last = max(float(clock.max(where=np.isfinite(clock), initial=-np.inf)) for clock in clocks)
+    if last < first:
         return []
-    first = min(float(clock.min()) for clock in known if clock.size) + raw.clock_origin
-    last = max(float(clock.max()) for clock in known if clock.size) + raw.clock_origin
+    first, last = first + raw.clock_origin, last + raw.clock_origin
     notes = []
     if raw.bare_clock is not None and raw.clock_unit == "s":
-        notes = _check_bare(raw.bare_clock, _steps(known), first, last)
+        notes = _check_bare(raw.bare_clock, _steps(clocks), first, last)
     lasts = (last - first) / CLOCK_UNITS[raw.clock_unit]
     if lasts > LONGEST_RECORDING_S:
         raise InputError(f"the times are {lasts:.3g} s apart: one of them, or their unit, is wrong")
@@ -81,8 +82,9 @@ def _check_bare(column: str, steps: Array, first: float, last: float) -> list[st
 
 def _steps(clocks: list[Array]) -> Array:
     """Return the sizes of the first steps of all clocks; rows at one time make none."""
+    known = [start[np.isfinite(start)] for start in (clock[:_ENOUGH] for clock in clocks)]
     with np.errstate(over="ignore"):  # beyond float64 is as long as a step can be
-        steps = np.concatenate([np.abs(np.diff(clock[:_ENOUGH])) for clock in clocks])
+        steps = np.concatenate([np.abs(np.diff(start)) for start in known])
     bounded: Array = np.minimum(steps[steps > 0], np.finfo(np.float64).max)
     return bounded
 
