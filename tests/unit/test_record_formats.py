@@ -278,7 +278,7 @@ def test_json_points(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[[1, 2], [3, 4", "line 2, column 1: is not JSON"),
+        ("[[1, 2], [3, 4", "line 2, column 1: expected JSON"),
         ("[[1, 2], [3]]", "entry 2"),
         ('[[1, 2], ["a", "b"]]', "entry 2"),
         ("[[1, 2], [true, 1]]", "entry 2"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,6 +16,7 @@ from driftwalk.assemble.sensitivity_axes import Axes
 from driftwalk.assemble.sensitivity_times import map_courses, reference_courses
 from driftwalk.assemble.settings import Outcomes, Settings
 from driftwalk.core.errors import InputError
+from driftwalk.core.json_text import parse_json
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -206,7 +206,7 @@ def _reference_attrs(reference: xr.Dataset) -> dict[str, Any]:
         "realisations", "mean_pairwise_l1", "expected_pairwise_l1",
     )  # fmt: skip
     facts |= {f"reference_{key}": reference.attrs[key] for key in keys if key in reference.attrs}
-    arena = json.loads(reference.attrs.get("arena", "{}"))
+    arena = parse_json(reference.attrs.get("arena", "{}"))
     if "diameter_m" in arena:
         facts["reference_tank_diameter_m"] = arena["diameter_m"]
     return facts

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
@@ -185,7 +184,7 @@ def _visited_cells(
     if recordings is None:
         return _surrounded(flow, radius=0.5 * _side(fit))
     many = [recordings] if isinstance(recordings, xr.Dataset) else list(recordings)
-    outline = outline_of(json.loads(fit.attrs["arena"]))
+    outline = outline_of(fit.attrs["arena"])
     reach = _side(fit) / math.sqrt(2.0) + MARGIN
     intervals = fitted_intervals(fit)
     flows = np.array(intervals.flows)

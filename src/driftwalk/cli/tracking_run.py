@@ -20,6 +20,7 @@ from driftwalk.cli.tracking_live import LiveOutputs
 from driftwalk.cli.tracking_options import TrackingOptions
 from driftwalk.cli.tracking_parts import TrackingParts
 from driftwalk.core.errors import InputError
+from driftwalk.core.json_text import parse_json
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -260,7 +261,7 @@ def summary(run: TrackingRun) -> dict[str, Any]:
             }
             for at, name in enumerate(names)
         },
-        "counts": json.loads(recording.attrs["counts"]),
+        "counts": parse_json(recording.attrs["counts"]),
         "frames_per_s": run.frames / run.working_s if run.working_s > 0 else None,
         "interrupted": run.interrupted,
     }

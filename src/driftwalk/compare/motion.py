@@ -13,6 +13,7 @@ from driftwalk.compare.plan import usual_interval
 from driftwalk.compare.significance import PermutationTest, block_permutation_test
 from driftwalk.compare.walk import steps
 from driftwalk.core.errors import InputError
+from driftwalk.core.json_text import parse_json
 from driftwalk.schema import body_track
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ def compare(
     sentences = [
         f"motion {name}: {sentence}"
         for name, walk in zip("ab", walks, strict=True)
-        for sentence in json.loads(walk.attrs["warnings"])
+        for sentence in parse_json(walk.attrs["warnings"])
     ]
     test = None
     if permutations > 0:

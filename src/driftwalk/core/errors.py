@@ -43,6 +43,8 @@ class FormatError(InputError):
         line: int | None = None,
         column: int | None = None,
     ) -> None:
+        self.reason = message
+        """The message without the place."""
         self.path = path
         self.line = line
         self.column = column

@@ -14,6 +14,7 @@ import numpy as np
 
 from driftwalk.core.atomic import write_atomic
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.json_text import read_json
 
 MANIFEST_VERSION: Final = 1
 MANIFEST_KIND: Final = "driftwalk manifest"
@@ -130,20 +131,13 @@ def read_manifest(path: str | Path) -> dict[str, Any]:
     InputError
         When the file cannot be read.
     FormatError
-        When it is not JSON or holds something else than an object; names line and column.
+        When it is not JSON, is too large, or holds something else than an object; names line and
+        column.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        values = read_json(path)
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise FormatError("expected JSON, got bytes that are no text", path=path) from error
-    try:
-        values = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise FormatError(
-            f"expected JSON: {error.msg}", path=path, line=error.lineno, column=error.colno
-        ) from error
     if not isinstance(values, dict):
         raise FormatError(f"expected an object, got {type(values).__name__}", path=path)
     return values

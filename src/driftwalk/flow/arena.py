@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,7 +10,8 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.json_text import parse_json
 
 Array = npt.NDArray[np.float64]
 
@@ -159,8 +159,8 @@ def read_arena(arena: Mapping[str, Any] | str) -> dict[str, Any]:
     if not isinstance(arena, str):
         return dict(arena)
     try:
-        facts = json.loads(arena)
-    except ValueError as error:
+        facts = parse_json(arena)
+    except FormatError as error:
         raise InputError(f"the arena is not JSON text ({error}): got {arena!r}") from error
     if not isinstance(facts, dict):
         raise InputError(f"the arena must be an object of keys, got {arena!r}")

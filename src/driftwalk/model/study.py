@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Self
 
 from pydantic import Field, model_validator
 
-from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.errors import ConfigurationError, FormatError
+from driftwalk.core.toml_text import parse_toml, read_toml
 from driftwalk.model.assembly import Assembly
 from driftwalk.model.block import Block
 from driftwalk.model.calibration import Calibration
@@ -185,12 +185,7 @@ def load_study(path: str | Path) -> Study:
     >>> load_study("study.toml").tank.diameter_m  # doctest: +SKIP
     0.3
     """
-    try:
-        # A byte order mark, as some editors write, is not part of TOML.
-        text = Path(path).read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise ConfigurationError(f"{path}: not a text file in UTF-8 ({error.reason})") from error
-    return parse_study(text, source=str(path))
+    return _study(lambda: read_toml(path), source=str(path))
 
 
 def parse_study(text: str, *, source: str = "study") -> Study:
@@ -213,10 +208,14 @@ def parse_study(text: str, *, source: str = "study") -> Study:
     >>> parse_study('forces.force_std_N = "0.6mN"').forces.force_std_N
     0.0006
     """
+    return _study(lambda: parse_toml(text), source=source)
+
+
+def _study(read: Callable[[], dict[str, Any]], *, source: str) -> Study:
     try:
-        return Study(**tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigurationError(f"{source}: not a TOML file: {error}") from error
+        return Study(**read())
+    except FormatError as error:
+        raise ConfigurationError(f"{source}: {error.reason}") from error
     except ConfigurationError as error:
         raise ConfigurationError(f"{source}: {error}") from error
 

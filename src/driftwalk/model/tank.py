@@ -8,7 +8,8 @@ from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.errors import ConfigurationError, FormatError
+from driftwalk.core.json_text import parse_json
 from driftwalk.model.section import Quantity, Section
 
 Vertices = tuple[tuple[float, float], ...]
@@ -211,8 +212,8 @@ class Tank(Outline):
             When it is not an arena.
         """
         try:
-            facts = json.loads(arena) if isinstance(arena, str) else dict(arena)
-        except json.JSONDecodeError as error:
+            facts = parse_json(arena) if isinstance(arena, str) else dict(arena)
+        except FormatError as error:
             raise ConfigurationError(f"the arena is not JSON text: {error}") from error
         if not isinstance(facts, dict):
             raise ConfigurationError(f"the arena must be an object of keys, got {facts!r}")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.json_text import parse_json
 from driftwalk.record.circle import fit_circle
 from driftwalk.record.noise import estimate_tracking_noise
 from driftwalk.record.raw import Array
@@ -84,8 +84,8 @@ def _json_attribute(attrs: dict[Any, Any], name: str, default: Any) -> Any:
     if text is None:
         return default
     try:
-        return json.loads(text)
-    except (TypeError, ValueError) as error:
+        return parse_json(str(text))
+    except FormatError as error:
         raise InputError(f"the attribute '{name}' of the dataset is not JSON: {error}") from error
 
 

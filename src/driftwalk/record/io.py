@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.json_text import parse_json
 from driftwalk.record.arena import PlacedArena, arena_attributes, place_arena
 from driftwalk.record.clean import Counts, clean_body
 from driftwalk.record.clock import check_clock
@@ -205,7 +206,7 @@ def _assemble(
     if arena is not None:
         placed = _place(arena, bodies, block_side=block_side)
         _shift(bodies, placed)
-        before = json.loads(attrs.get("origin_shift_m", "[0.0, 0.0]"))
+        before = parse_json(attrs.get("origin_shift_m", "[0.0, 0.0]"))
         attrs |= arena_attributes(placed, shifted_before=before)
         notes += placed.notes
     totals = {

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.json_text import parse_json
 from driftwalk.report.labels import FACTORS
 from driftwalk.report.style import INK
 
@@ -42,9 +42,12 @@ def arena_of(dataset: xr.Dataset, arena: Mapping[str, Any] | str | None = None) 
     if not isinstance(described, str):
         return dict(described)
     try:
-        return dict(json.loads(described))
-    except ValueError as error:
+        facts = parse_json(described)
+    except FormatError as error:
         raise InputError(f"the arena is not JSON ({error}): got {described!r}") from error
+    if not isinstance(facts, dict):
+        raise InputError(f"the arena must be an object of keys, got {described!r}")
+    return facts
 
 
 def arena_patch(arena: Mapping[str, Any]) -> Patch:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
+from driftwalk.core.json_text import parse_json
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -91,7 +91,7 @@ def interval_of(calibration: xr.Dataset, name: str) -> tuple[float, float] | Non
     stored = calibration.attrs.get(name)
     if stored is None:
         return None
-    ends = np.asarray(json.loads(stored) if isinstance(stored, str) else stored, dtype=np.float64)
+    ends = np.asarray(parse_json(stored) if isinstance(stored, str) else stored, dtype=np.float64)
     if ends.shape != (2,) or not np.isfinite(ends).all():
         return None
     return float(ends[0]), float(ends[1])

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.core.errors import DriftwalkError, InputError
+from driftwalk.core.errors import DriftwalkError, FormatError, InputError
+from driftwalk.core.json_text import parse_json
 from driftwalk.report.arena import arena_of
 from driftwalk.report.labels import interval_of
 from driftwalk.report.page_arrays import number
@@ -103,8 +103,8 @@ def value_of(dataset: xr.Dataset, name: str) -> float | None:
 def texts_of(dataset: xr.Dataset, name: str) -> list[str]:
     """Return a list of sentences that an attribute holds as JSON; empty when it is absent."""
     try:
-        found = json.loads(dataset.attrs.get(name, "[]"))
-    except (TypeError, ValueError) as error:
+        found = parse_json(str(dataset.attrs.get(name, "[]")))
+    except FormatError as error:
         raise InputError(f"the attribute '{name}' is no JSON: {error}") from error
     return [str(item) for item in found] if isinstance(found, list) else [str(found)]
 

@@ -353,15 +353,16 @@ def images_in(folder: Path) -> list[Path]:
 
 def _listed_images(folder: Path) -> list[tuple[Path, float]]:
     path = folder / _TIMES
-    found = []
     with path.open(newline="", encoding="utf-8-sig") as stream:
-        for number, row in enumerate(csv.DictReader(stream), start=2):
-            try:
-                found.append((folder / row["file"], float(row["time_s"])))
-            except (KeyError, TypeError, ValueError):
-                raise FormatError(
-                    "needs the columns file and time_s, a time in each row", path=path, line=number
-                ) from None
+        rows = csv.DictReader(stream)
+        try:
+            found = [(folder / row["file"], float(row["time_s"])) for row in rows]
+        except (KeyError, TypeError, ValueError, csv.Error):
+            raise FormatError(
+                "needs the columns file and time_s, a time in each row",
+                path=path,
+                line=rows.line_num,
+            ) from None
     if not found:
         raise FormatError("lists no image", path=path)
     return found

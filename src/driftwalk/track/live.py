@@ -20,7 +20,8 @@ from functools import reduce
 from types import TracebackType
 from typing import Any, Final, NamedTuple, Self
 
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.json_text import parse_json
 from driftwalk.core.opencv import require_opencv
 from driftwalk.core.provenance import finite_or_none
 from driftwalk.track.types import Image
@@ -264,8 +265,8 @@ def requested_width(line: bytes) -> int | None:
     (320, None)
     """
     try:
-        request = json.loads(line)
-    except ValueError:
+        request = parse_json(line)
+    except FormatError:
         return None
     width = request.get("jpeg_width") if isinstance(request, dict) else None
     return width if isinstance(width, int) and width in _WIDTHS else None

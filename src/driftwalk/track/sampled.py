@@ -89,7 +89,8 @@ def frame_count(source: str | Path) -> int | None:
     if path.is_dir():
         listed = path / "times.csv"
         if listed.exists():
-            return sum(1 for _ in listed.open(encoding="utf-8-sig")) - 1
+            with listed.open("rb") as file:
+                return sum(1 for _ in file) - 1
         return len(images_in(path))
     if not path.is_file():
         return None

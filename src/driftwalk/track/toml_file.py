@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from pathlib import Path
 from typing import Any, TypeVar
 
 from driftwalk.core.atomic import atomic_path
 from driftwalk.core.errors import ConfigurationError, FormatError
+from driftwalk.core.toml_text import read_toml
 from driftwalk.model.section import Section
 
 Kind = TypeVar("Kind", bound=Section)
@@ -24,14 +24,13 @@ def load_sections(path: str | Path, kind: type[Kind], *, what: str) -> Kind:
     """
     file = Path(path)
     try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
-        return kind(**data)
+        return kind(**read_toml(file))
     except FileNotFoundError:
         raise FormatError(f"no such {what} file", path=file) from None
     except IsADirectoryError:
         raise FormatError(f"is a folder, not a {what} file", path=file) from None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise FormatError(f"is not a {what} file: {error}", path=file) from None
+    except FormatError as error:
+        raise FormatError(f"is not a {what} file: {error.reason}", path=file) from None
     except ConfigurationError as error:
         raise FormatError(str(error), path=file) from None
 

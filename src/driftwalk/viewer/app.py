@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 from collections.abc import AsyncIterator, Callable
 from typing import Any, Final
 
@@ -18,6 +17,8 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.types import Message as AsgiMessage
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from driftwalk.core.errors import FormatError
+from driftwalk.core.json_text import parse_json
 from driftwalk.viewer.hub import Content, Hub, Source
 from driftwalk.viewer.messages import Outbox, make_message
 from driftwalk.viewer.security import HEADERS, Gate
@@ -152,8 +153,8 @@ def parsed(text: str) -> dict[str, Any] | None:
     ({'type': 'ready'}, None, None)
     """
     try:
-        content = json.loads(text)
-    except (ValueError, RecursionError):
+        content = parse_json(text)
+    except FormatError:
         return None
     return content if isinstance(content, dict) else None
 

@@ -9,7 +9,8 @@ import time as clock
 from collections.abc import Sequence
 from typing import Any, Final
 
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.json_text import parse_json
 from driftwalk.viewer.hub import Content, Publish, Source
 from driftwalk.viewer.shell import page_frame
 from driftwalk.viewer.sound_frame import SoundFrames
@@ -199,7 +200,7 @@ def stream_line(line: bytes) -> dict[str, Any] | None:
     ({'type': 'end'}, None)
     """
     try:
-        content = json.loads(line)
-    except (ValueError, RecursionError):
+        content = parse_json(line)
+    except FormatError:
         return None
     return content if isinstance(content, dict) and isinstance(content.get("type"), str) else None

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from driftwalk.core.bounded import MIB
 from driftwalk.core.errors import FormatError
+from driftwalk.core.json_text import MOST_BYTES, parse_json
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.text import open_binary
 
@@ -29,19 +30,19 @@ class JsonPointsLoader:
     def read(self, path: Path, _options: ReadOptions) -> RawRecording:
         """Read the points. Objects may have ``t`` [s] and ``theta`` [rad]."""
         with open_binary(path) as file:
-            try:
-                points = json.loads(file.read().decode("utf-8-sig"))
-            except json.JSONDecodeError as error:
-                raise FormatError(
-                    f"is not JSON: {error.msg}", path=path, line=error.lineno, column=error.colno
-                ) from error
-            except (UnicodeDecodeError, RecursionError) as error:
-                raise FormatError(f"is not JSON: {error}", path=path) from error
+            text = file.read(MOST_BYTES + 1)
+        if len(text) > MOST_BYTES:
+            raise FormatError(
+                f"holds more than {MOST_BYTES / MIB:g} MiB of JSON: store it as CSV, which is read "
+                "piece by piece",
+                path=path,
+            )
+        points = parse_json(text, path=path)
         if not isinstance(points, list) or not points:
             raise FormatError("expected a list with one point per frame", path=path)
-        rows = np.array(
-            [_point(point, index, path) for index, point in enumerate(points)], dtype=np.float64
-        )
+        rows = np.empty((len(points), len(KEYS)))
+        for index, point in enumerate(points):
+            rows[index] = _point(point, index, path)
         x, y, theta, t = (np.ascontiguousarray(rows[:, column]) for column in range(4))
         undetected = (x == -1.0) & (y == -1.0)
         x[undetected] = y[undetected] = np.nan

@@ -1,0 +1,80 @@
+"""JSON of a file or an attribute: read whole, or refused with the place of what is wrong.
+
+Python's own reader lets three things pass that are no mistake of its caller: it ends with
+`RecursionError` on brackets that are nested too deeply, with `ValueError` on integers of more than
+4300 digits, and it returns integers that no float and no array holds.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Final
+
+from driftwalk.core.bounded import MIB, read_bounded
+from driftwalk.core.errors import FormatError
+from driftwalk.core.nesting import refuse_deep
+
+MOST_BYTES: Final = 64 * MIB
+"""What a JSON file may hold: some 3 million points, or any manifest."""
+_INTEGER_DIGITS: Final = 18
+"""Digits that fit into 64 bits whatever they are."""
+
+
+def read_json(path: str | Path) -> Any:
+    """Return what a JSON file holds.
+
+    Raises
+    ------
+    FormatError
+        When the file is too large or no JSON; with line and column where there is one.
+    OSError
+        When it cannot be read.
+    """
+    return parse_json(read_bounded(path, most=MOST_BYTES), path=path)
+
+
+def parse_json(text: str | bytes, *, path: str | Path | None = None) -> Any:
+    """Return what a JSON text holds.
+
+    Parameters
+    ----------
+    text : str or bytes
+        JSON in UTF-8; a byte order mark is left aside. An integer beyond 64 bits is read as a
+        float, as by readers that know floats alone.
+    path : path-like, optional
+        Where it is from, for the message.
+
+    Raises
+    ------
+    FormatError
+        When it is no JSON, with line and column where there is one; when it is nested too deeply.
+
+    Examples
+    --------
+    >>> parse_json('{"x": [1, 1000000000000000000000]}')
+    {'x': [1, 1e+21]}
+    """
+    try:
+        decoded = text if isinstance(text, str) else text.decode("utf-8-sig")
+        values = json.loads(decoded, parse_int=_integer)
+    except UnicodeDecodeError as error:
+        raise FormatError("expected JSON, got bytes that are no text", path=path) from error
+    except json.JSONDecodeError as error:
+        raise FormatError(
+            f"expected JSON: {error.msg}", path=path, line=error.lineno, column=error.colno
+        ) from error
+    except RecursionError:
+        raise FormatError("expected JSON, got brackets nested too deeply", path=path) from None
+    refuse_deep(values, path=path)
+    return values
+
+
+def _integer(digits: str) -> int | float:
+    return int(digits) if len(digits) <= _INTEGER_DIGITS else _long_integer(digits)
+
+
+def _long_integer(digits: str) -> int | float:
+    as_float = float(digits)
+    # Below 2**63 the integer is exact; a float of these digits need not be.
+    return int(digits) if abs(as_float) < 2.0**63 else as_float

@@ -1,0 +1,76 @@
+"""TOML of the files that people write by hand: study, markers, camera."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+from driftwalk.core.bounded import MIB, read_bounded
+from driftwalk.core.errors import FormatError
+from driftwalk.core.nesting import refuse_deep
+
+MOST_BYTES: Final = MIB
+"""What such a file may hold, comments too: its reader takes time that grows with the square of
+some of what it holds."""
+_LARGE: Final = "an integer has more than 64 bits"
+
+
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """Return what a TOML file holds.
+
+    Raises
+    ------
+    FormatError
+        See `parse_toml`; also when the file is too large.
+    OSError
+        When it cannot be read.
+    """
+    return parse_toml(read_bounded(path, most=MOST_BYTES), path=path)
+
+
+def parse_toml(text: str | bytes, *, path: str | Path | None = None) -> dict[str, Any]:
+    """Return what a TOML text holds.
+
+    Parameters
+    ----------
+    text : str or bytes
+        TOML in UTF-8; a byte order mark, as some editors write, is left aside.
+    path : path-like, optional
+        Where it is from, for the message.
+
+    Raises
+    ------
+    FormatError
+        When it is no TOML, values are nested too deeply, or an integer has more than 64 bits.
+
+    Examples
+    --------
+    >>> parse_toml('side_m = 0.03')
+    {'side_m': 0.03}
+    """
+    try:
+        values = tomllib.loads(text if isinstance(text, str) else text.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise FormatError(f"not a text file in UTF-8 ({error.reason})", path=path) from error
+    except RecursionError:
+        raise FormatError("not a TOML file: values nested too deeply", path=path) from None
+    except ValueError as error:
+        # The syntax; a date that no calendar has; an integer of more digits than Python converts.
+        reason = _LARGE if "Exceeds the limit" in str(error) else str(error)
+        raise FormatError(f"not a TOML file: {reason}", path=path) from error
+    refuse_deep(values, path=path)
+    if any(isinstance(value, int) and not -(2**63) <= value < 2**63 for value in _leaves(values)):
+        raise FormatError(f"not a TOML file: {_LARGE}", path=path)
+    return values
+
+
+def _leaves(value: Any) -> Iterator[Any]:
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list):
+        for item in value:
+            yield from _leaves(item)
+    else:
+        yield value
