@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.cli.calibration_run import dataset_hash, netcdf_bytes
 from driftwalk.cli.progress import ProgressReporter
 from driftwalk.cli.run_folder import open_run
+from driftwalk.schema.netcdf import open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -187,13 +188,10 @@ def _simulate(work: AssemblyWork, run: RunDirectory, progress: ProgressReporter)
 
 def _write_film(run: RunDirectory, film: str, progress: ProgressReporter) -> None:
     """Film the first run from what is stored of it."""
-    import xarray as xr
-
     from driftwalk.report import write_animation
 
     progress.update(1, 1, "film")
-    with xr.open_dataset(run.path / "path.nc", engine="h5netcdf") as path:
-        write_animation(path, run.folder("figures") / f"run.{film}")
+    write_animation(open_netcdf(run.path / "path.nc"), run.folder("figures") / f"run.{film}")
 
 
 def _specification(work: AssemblyWork) -> dict[str, Any]:

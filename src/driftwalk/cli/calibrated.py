@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from driftwalk.core.errors import InputError
+from driftwalk.core.json_text import parse_json
 from driftwalk.core.run_layout import state_of
-from driftwalk.schema.hdf5 import UNREADABLE, open_hdf5
+from driftwalk.schema.netcdf import open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -74,7 +74,7 @@ def read_calibrated(folder: Path) -> Calibrated:
     )
     flow = load_flow(files["flow"], arena=study.tank.to_arena(), own_flags="keep")
     region = found if "region_level" in facts else None
-    return Calibrated(study, flow, found, region, files, json.loads(facts["warnings"]))
+    return Calibrated(study, flow, found, region, files, parse_json(facts["warnings"]))
 
 
 def _require_finished(folder: Path, files: dict[str, Path]) -> None:
@@ -105,11 +105,7 @@ def _require_finished(folder: Path, files: dict[str, Path]) -> None:
 
 
 def _read(path: Path) -> xr.Dataset:
-    try:
-        with open_hdf5(path) as dataset:
-            found = dataset.load()
-    except UNREADABLE as error:
-        raise InputError(f"{path} cannot be read as NetCDF: {error}") from error
+    found = open_netcdf(path)
     if found.attrs.get("kind") != "calibration":
         raise InputError(f"{path} is no calibration: its kind is {found.attrs.get('kind')!r}")
     return found

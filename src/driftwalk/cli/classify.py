@@ -12,7 +12,7 @@ from driftwalk.cli.output import print_json, print_note, print_table
 from driftwalk.cli.recording_options import RecordingOptions, with_recording_options
 from driftwalk.cli.study_recording import load_with_study
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.schema.hdf5 import UNREADABLE, open_hdf5, stored_kind
+from driftwalk.schema.netcdf import kind_of, open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -178,14 +178,10 @@ def _load(
 
 def _simulated_path(path: Path) -> xr.Dataset | None:
     """Return the dataset of a file that `driftwalk assemble` wrote; None for a recording."""
-    if path.suffix != ".nc" or stored_kind(path) != "assembly_path":
+    if path.suffix != ".nc" or not path.is_file():
         return None
-    try:
-        with open_hdf5(path) as stored:
-            return stored.load()
-    except UNREADABLE:
-        # Damaged: the loaders say what is wrong with it.
-        return None
+    # Whatever else it is, the loaders say what is wrong with it.
+    return open_netcdf(path) if kind_of(path) == "assembly_path" else None
 
 
 def _name(names: list[str], index: int) -> str:

@@ -19,6 +19,7 @@ from driftwalk.cli.demo_answer import (
 )
 from driftwalk.cli.options import Json
 from driftwalk.cli.output import print_json, print_note
+from driftwalk.schema.netcdf import open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -102,7 +103,7 @@ def _fit(
 
     if not _finished(folder, overwrite):
         run_fit(FitWork([recording], study, None, {"recording": path}), folder, overwrite=overwrite)
-    return _read(folder / "fit.nc"), _read(folder / "check.nc")
+    return open_netcdf(folder / "fit.nc"), open_netcdf(folder / "check.nc")
 
 
 def _calibrate(
@@ -120,7 +121,7 @@ def _calibrate(
 
     folder, flow = out / CALIBRATION, out / FIT / "flow.nc"
     if _finished(folder, overwrite):
-        return _read(folder / "calibration.nc")
+        return open_netcdf(folder / "calibration.nc")
     given = load_flow(flow, arena=study.tank.to_arena(), own_flags="keep")
     work = Work(recording, study, given, None, {"recording": path, "flow": flow}, threads)
     return run_calibration(work, folder, overwrite=overwrite)
@@ -156,10 +157,3 @@ def _finished(folder: Path, overwrite: bool) -> bool:
         return False
     print_note(f"{folder} holds a finished run (--overwrite starts anew); this is what it found")
     return True
-
-
-def _read(path: Path) -> xr.Dataset:
-    import xarray as xr
-
-    with xr.open_dataset(path, engine="h5netcdf") as dataset:
-        return dataset.load()

@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING
 from driftwalk.cli.recording_options import RecordingOptions
 from driftwalk.cli.require_motion import require_motion
 from driftwalk.core.errors import InputError
-from driftwalk.schema.hdf5 import UNREADABLE, open_hdf5, stored_kind
+from driftwalk.schema.netcdf import kind_of, open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
-
-_HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 def load_motion(path: Path, how: RecordingOptions, *, replicate: int = 0) -> xr.Dataset:
@@ -70,11 +68,7 @@ def load_simulation(path: Path, *, replicate: int = 0) -> xr.Dataset | None:
 
 def _open_simulation(path: Path) -> xr.Dataset | None:
     """Return the simulation that the file holds, None when it is anything else."""
-    if stored_kind(path) != "simulation":
+    if not path.is_file():
         return None
-    try:
-        with open_hdf5(path, decode_times=False) as dataset:
-            return dataset.load()
-    except UNREADABLE:
-        # Damaged: the loaders of recordings say what is wrong.
-        return None
+    # Damaged, or no NetCDF: the loaders of recordings say what is wrong.
+    return open_netcdf(path) if kind_of(path) == "simulation" else None

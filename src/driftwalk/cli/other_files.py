@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from driftwalk.schema.hdf5 import stored_kind
+from driftwalk.schema.netcdf import kind_of
 
 VIDEOS: Final = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpeg", ".mpg", ".webm", ".wmv")
 KINDS: Final = {
@@ -34,5 +34,13 @@ def what_else(path: Path) -> str | None:
         return None
     if path.suffix.lower() in VIDEOS:
         return "is a video: driftwalk track makes a recording of it"
-    kind = stored_kind(path) if path.suffix.lower() == ".nc" else None
-    return None if kind in (None, "trajectory") else f"holds {KINDS.get(kind, _OTHER.format(kind))}"
+    kind = _netcdf_kind(path)
+    return None if kind is None else f"holds {KINDS.get(kind, _OTHER.format(kind))}"
+
+
+def _netcdf_kind(path: Path) -> str | None:
+    """Return which kind of driftwalk's own datasets a file holds, None for any other file."""
+    if path.suffix.lower() != ".nc":
+        return None
+    kind = kind_of(path)
+    return None if kind == "trajectory" else kind

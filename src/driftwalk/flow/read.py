@@ -15,10 +15,11 @@ from driftwalk.core.errors import FormatError, InputError
 from driftwalk.flow.arena import Outline, outline_of, read_arena
 from driftwalk.flow.fill import fill_velocity
 from driftwalk.flow.grid import Grid
-from driftwalk.flow.readers.netcdf import MAGIC, open_netcdf, to_si
+from driftwalk.flow.readers.netcdf import to_si
 from driftwalk.flow.readers.table import read_csv
 from driftwalk.flow.rows import grid_rows
 from driftwalk.schema import FLAGS, build_flow_field, check_flow_field
+from driftwalk.schema.netcdf import is_netcdf, open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -68,15 +69,13 @@ def load_flow(
     source = Path(path)
     if not source.is_file():
         raise FormatError("there is no such file", path=source)
-    with source.open("rb") as file:
-        head = file.read(8)
-    if not head.startswith(MAGIC):
+    if not is_netcdf(source):
         field = grid_rows(read_csv(source), source)
         return _new_field(
             field.x, field.y, field.velocity, arena=arena, attrs={"source": source.name}
         )
     dataset = open_netcdf(source)
-    if dataset.attrs.get("kind") == "flow_field" and "flag" in dataset:
+    if str(dataset.attrs.get("kind")) == "flow_field" and "flag" in dataset:
         if arena is not None and own_flags == "refuse":
             raise InputError(f"{source} has flags of its own: leave the arena out")
         return _checked(dataset, source)

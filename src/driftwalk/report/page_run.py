@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from driftwalk.core.errors import DriftwalkError, InputError
+from driftwalk.core.errors import DriftwalkError, FormatError, InputError
 from driftwalk.core.provenance import read_manifest, refuse_other_version
 from driftwalk.core.run_layout import MANIFEST_FILE, RECORD_FILE, State, state_of, visible
 from driftwalk.core.shards import read_specification
-from driftwalk.schema.hdf5 import UNREADABLE, open_hdf5
+from driftwalk.schema.netcdf import open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,9 +83,9 @@ class Run:
         if not path.is_file():
             return None
         try:
-            found = read_dataset(path)
-        except InputError as error:
-            self.problems.append(str(error))
+            found = open_netcdf(path)
+        except FormatError as error:
+            self.problems.append(f"{path.name} {error.reason}")
             return None
         self.read += 1
         return found
@@ -130,21 +130,6 @@ def open_run_folder(folder: Path) -> Run:
     if run.kind is None:
         run.kind = _kind_of(run.specification)
     return run
-
-
-def read_dataset(path: Path) -> xr.Dataset:
-    """Read a NetCDF file whole.
-
-    Raises
-    ------
-    InputError
-        When it cannot be read.
-    """
-    try:
-        with open_hdf5(path) as dataset:
-            return dataset.load()
-    except UNREADABLE as error:
-        raise InputError(f"{path.name} cannot be read: {error}") from error
 
 
 def _kind_of(specification: Mapping[str, Any]) -> str | None:

@@ -1,8 +1,7 @@
-"""Flow fields in NetCDF: driftwalk's own, or any with u, v, x, y and their units."""
+"""Flow fields in NetCDF of any program: u, v, x, y and their units."""
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,38 +10,13 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import ConfigurationError, FormatError
 from driftwalk.core.units import parse_quantity
-from driftwalk.schema.hdf5 import UNREADABLE, open_hdf5
 
 if TYPE_CHECKING:
     import xarray as xr
 
 Array = npt.NDArray[np.float64]
 
-_HDF5 = b"\x89HDF\r\n\x1a\n"
-_CLASSIC = (b"CDF\x01", b"CDF\x02")
-MAGIC = (_HDF5, *_CLASSIC)
 _LONG_WORDS = {"meters": "m", "metres": "m", "meter": "m", "metre": "m", "seconds": "s"}
-
-
-def open_netcdf(path: Path) -> xr.Dataset:
-    """Read a NetCDF file into memory and close it.
-
-    Raises
-    ------
-    FormatError
-        When it is damaged.
-    """
-    import xarray as xr
-
-    with path.open("rb") as file:
-        hdf5 = file.read(8).startswith(_HDF5)
-    opened = open_hdf5 if hdf5 else partial(xr.open_dataset, engine="scipy")
-    try:
-        # Plain numbers: a time coordinate in "s" is not to become dates.
-        with opened(path, decode_times=False) as dataset:
-            return dataset.load()
-    except UNREADABLE as error:
-        raise FormatError(f"cannot be read as NetCDF: {error}", path=path) from error
 
 
 def to_si(dataset: xr.Dataset, path: Path) -> xr.Dataset:

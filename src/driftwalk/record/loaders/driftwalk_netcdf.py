@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.netcdf import open_netcdf, read_attributes
 from driftwalk.record.raw import Extra, RawBody, RawRecording, ReadOptions
 from driftwalk.schema import body_names, check_trajectory
+from driftwalk.schema.netcdf import MAGIC, kind_of, open_netcdf
 from driftwalk.schema.trajectory import VARIABLES
 
 if TYPE_CHECKING:
@@ -25,7 +25,8 @@ class DriftwalkLoader:
 
     def sniff(self, head: bytes, path: Path) -> float:
         """Recognise the attribute ``kind``."""
-        return 1.0 if read_attributes(head, path).get("kind") == "trajectory" else 0.0
+        known = head.startswith(MAGIC) and kind_of(path) == "trajectory"
+        return 1.0 if known else 0.0
 
     def read(self, path: Path, _options: ReadOptions) -> RawRecording:
         """Read every body and carry the attributes over."""

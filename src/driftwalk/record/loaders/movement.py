@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.record.netcdf import open_netcdf, read_attributes
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
+from driftwalk.schema.netcdf import MAGIC, open_netcdf, read_attributes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,7 +23,7 @@ class MovementLoader:
 
     def sniff(self, head: bytes, path: Path) -> float:
         """Recognise the attributes that `movement` writes."""
-        attributes = read_attributes(head, path)
+        attributes = read_attributes(path) if head.startswith(MAGIC) else {}
         return 0.9 if {"time_unit", "ds_type"} & set(attributes) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:

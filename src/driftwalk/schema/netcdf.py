@@ -1,0 +1,149 @@
+"""The door for NetCDF files: their declared size first, then whole into memory, then their kind.
+
+A header may declare any size. HDF5 stores a chunk that was never written as nothing at all, and
+reads it as its fill value: a file of a few kilobytes holds terabytes so. What a header declares is
+therefore compared with the size of the file, before anything of that size is made.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from driftwalk.core.bounded import MIB
+from driftwalk.core.errors import FormatError
+from driftwalk.schema.contents import check_contents
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+HDF5: Final = b"\x89HDF\r\n\x1a\n"
+MAGIC: Final = (HDF5, b"CDF\x01", b"CDF\x02")
+
+ALLOWANCE_BYTES: Final = 128 * MIB
+"""What any file may hold in memory, however small it is."""
+LARGEST_RATIO: Final = 500
+"""How much more a file may hold in memory than on the disk, beyond that.
+
+Deflate, the filter that NetCDF uses, shrinks nothing by more than 1032, and that only where every
+byte is the same. Positions with digits of their own shrink by 10 at most, by 100 where nearly all
+of them are missing."""
+_WIDTH: Final = 8
+"""Bytes of a number in memory at least: packed ones are unpacked to doubles."""
+
+
+def open_netcdf(path: Path) -> xr.Dataset:
+    """Read a NetCDF file into memory and close it.
+
+    Numbers stay as they are stored: a time in "s" does not become a date. Of driftwalk's own
+    datasets the contents are checked, see `check_contents`.
+
+    Raises
+    ------
+    FormatError
+        When it is no NetCDF file, declares more than it can hold, is damaged, or one of
+        driftwalk's own without what its kind needs.
+    """
+    if not is_netcdf(path):
+        raise FormatError("is not a NetCDF file", path=path)
+    with _opened(path) as dataset:
+        found = dataset.load()
+    return check_contents(found, path)
+
+
+def read_attributes(path: Path) -> dict[str, Any]:
+    """Return the global attributes of a NetCDF file, {} when it is none or damaged."""
+    try:
+        if not is_netcdf(path):
+            return {}
+        with _opened(path) as dataset:
+            return {str(key): value for key, value in dataset.attrs.items()}
+    except FormatError:
+        return {}
+
+
+def kind_of(path: Path) -> str | None:
+    """Return which kind of driftwalk's own datasets a file holds, None for any other file."""
+    kind = read_attributes(path).get("kind")
+    return kind if isinstance(kind, str) else None
+
+
+def is_netcdf(path: Path) -> bool:
+    """Return whether a file begins as NetCDF files do.
+
+    Raises
+    ------
+    FormatError
+        When it cannot be opened.
+    """
+    return _start(path).startswith(MAGIC)
+
+
+def _start(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(len(HDF5))
+    except OSError as error:
+        raise FormatError(f"cannot be opened: {error.strerror or error}", path=path) from error
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[xr.Dataset]:
+    """Open a file that begins as NetCDF; what goes wrong with it inside becomes a `FormatError`."""
+    import xarray as xr
+
+    is_hdf5 = _start(path).startswith(HDF5)
+    options: dict[str, Any] = {"engine": "h5netcdf" if is_hdf5 else "scipy"}
+    if is_hdf5:
+        # HDF5 of other programs has dimensions without names.
+        options["phony_dims"] = "access"
+    try:
+        with warnings.catch_warnings():
+            # What the libraries remark about a file of the user's is no line of ours.
+            warnings.simplefilter("ignore")
+            _refuse_huge(_declared_hdf5(path) if is_hdf5 else _declared_classic(path), path)
+            with xr.open_dataset(path, decode_times=False, **options) as dataset:
+                yield dataset
+    except FormatError:
+        raise
+    except Exception as error:
+        # On a damaged file the libraries fail with whatever the damage leads them to.
+        reason = str(error) or type(error).__name__
+        raise FormatError(f"cannot be read as NetCDF: {reason}", path=path) from error
+
+
+def _refuse_huge(declared: int, path: Path) -> None:
+    size = path.stat().st_size
+    if declared > ALLOWANCE_BYTES + LARGEST_RATIO * size:
+        raise FormatError(
+            f"is damaged: its header declares {declared / 1e9:.3g} GB, which a file of "
+            f"{size / 1e6:.2g} MB does not hold",
+            path=path,
+        )
+
+
+def _declared_hdf5(path: Path) -> int:
+    """Return how many bytes the variables of a file have in memory by its header."""
+    import h5py
+
+    total = 0
+    with h5py.File(path, "r") as file:
+        for name in file:
+            entry = file[name]
+            if isinstance(entry, h5py.Dataset) and entry.shape is not None:
+                total += entry.size * max(entry.dtype.itemsize, _WIDTH)
+    return total
+
+
+def _declared_classic(path: Path) -> int:
+    """Return the same of NetCDF 3, whose reader refuses what lies beyond the end of the file."""
+    from scipy.io import netcdf_file
+
+    with netcdf_file(path, "r", mmap=True) as file:
+        return sum(
+            variable.data.size * max(variable.data.itemsize, _WIDTH)
+            for variable in file.variables.values()
+        )
