@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from driftwalk.core.errors import InputError
 from driftwalk.core.json_text import parse_json
 from driftwalk.core.run_layout import state_of
+from driftwalk.schema.contents import check_contents
 from driftwalk.schema.netcdf import open_netcdf
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ def _require_finished(folder: Path, files: dict[str, Path]) -> None:
 
 
 def _read(path: Path) -> xr.Dataset:
-    found = open_netcdf(path)
+    found = check_contents(open_netcdf(path), path)
     if found.attrs.get("kind") != "calibration":
         raise InputError(f"{path} is no calibration: its kind is {found.attrs.get('kind')!r}")
     return found

@@ -103,15 +103,11 @@ def _squares(text: str) -> tuple[int, int]:
 
 
 def _read(path: Path) -> Any:
-    from driftwalk.core.opencv import require_opencv
+    from driftwalk.core.opencv import read_image
 
-    cv2 = require_opencv()
     if not path.is_file():
         raise FormatError("no such image", path=path)
-    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
-    if image is None:
-        raise FormatError("is not an image that OpenCV can read", path=path)
-    return image
+    return read_image(path)
 
 
 camera_app.command("calibrate", help=paragraphs(calibrate.__doc__ or ""))(calibrate)

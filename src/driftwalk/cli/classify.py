@@ -12,6 +12,7 @@ from driftwalk.cli.output import print_json, print_note, print_table
 from driftwalk.cli.recording_options import RecordingOptions, with_recording_options
 from driftwalk.cli.study_recording import load_with_study
 from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.schema.contents import check_contents
 from driftwalk.schema.netcdf import kind_of, open_netcdf
 
 if TYPE_CHECKING:
@@ -181,7 +182,7 @@ def _simulated_path(path: Path) -> xr.Dataset | None:
     if path.suffix != ".nc" or not path.is_file():
         return None
     # Whatever else it is, the loaders say what is wrong with it.
-    return open_netcdf(path) if kind_of(path) == "assembly_path" else None
+    return check_contents(open_netcdf(path), path) if kind_of(path) == "assembly_path" else None
 
 
 def _name(names: list[str], index: int) -> str:

@@ -18,6 +18,8 @@ from driftwalk.core.errors import DriftwalkError
 EXIT_USER_ERROR = 2
 EXIT_INTERRUPTED = 130
 EXIT_BROKEN_PIPE = 141
+_LONGEST = 1500
+"""Characters of a message; it may quote what a file holds."""
 
 
 class PastTyper(Exception):
@@ -66,6 +68,8 @@ def one_line(error: BaseException) -> str | None:
         return _joined(str(error))
     if hasattr(error, "format_message"):  # what typer raises for a mistake in the options
         return _usage_message(error)
+    if isinstance(error, MemoryError):
+        return _joined(f"there is not enough memory for this: {error}".rstrip(": "))
     if isinstance(error, OSError):
         return _joined(_operating_system_message(error))
     return None
@@ -89,7 +93,12 @@ def _operating_system_message(error: OSError) -> str:
 
 
 def _joined(text: str) -> str:
-    return " ".join(text.split())
+    """Return a text on one line that is not endless and leaves the terminal as it is."""
+    line = " ".join(text.split())
+    if len(line) > _LONGEST:
+        half = _LONGEST // 2
+        line = f"{line[:half]} … {line[-half:]}"
+    return "".join(character if character.isprintable() else "\ufffd" for character in line)
 
 
 def _silence_stdout() -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from driftwalk.cli.recording_options import RecordingOptions
 from driftwalk.cli.require_motion import require_motion
 from driftwalk.core.errors import InputError
+from driftwalk.schema.contents import check_contents
 from driftwalk.schema.netcdf import kind_of, open_netcdf
 
 if TYPE_CHECKING:
@@ -71,4 +72,4 @@ def _open_simulation(path: Path) -> xr.Dataset | None:
     if not path.is_file():
         return None
     # Damaged, or no NetCDF: the loaders of recordings say what is wrong.
-    return open_netcdf(path) if kind_of(path) == "simulation" else None
+    return check_contents(open_netcdf(path), path) if kind_of(path) == "simulation" else None

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+import contextlib
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
 
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import FormatError, InputError
+
+_STDERR: Final = 2
 
 
 def require_opencv(purpose: str = "tracking") -> Any:
@@ -29,4 +36,45 @@ def require_opencv(purpose: str = "tracking") -> Any:
         import cv2
     except ImportError as error:
         raise InputError(f"{purpose} needs OpenCV: pip install 'driftwalk[track]'") from error
+    # What it cannot read is said in one line of ours; these would come before it.
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     return cv2
+
+
+def read_image(path: str | Path) -> Any:
+    """Return an image in colour, shape (rows, columns, 3).
+
+    Raises
+    ------
+    FormatError
+        When the file is no image that OpenCV can read, or one of more than 2^30 pixels.
+
+    Examples
+    --------
+    >>> read_image("no/such.png")
+    Traceback (most recent call last):
+    driftwalk.core.errors.FormatError: no/such.png: is not an image that OpenCV can read
+    """
+    cv2 = require_opencv()
+    try:
+        with _without_stderr():
+            image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    except cv2.error as error:
+        raise FormatError("is not an image that OpenCV can read", path=path) from error
+    if image is None:
+        raise FormatError("is not an image that OpenCV can read", path=path)
+    return image
+
+
+@contextlib.contextmanager
+def _without_stderr() -> Iterator[None]:
+    """Keep the libraries under OpenCV, which ask for no level, from printing about an image."""
+    sys.stderr.flush()
+    kept, nowhere = os.dup(_STDERR), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, _STDERR)
+        yield
+    finally:
+        os.dup2(kept, _STDERR)
+        os.close(kept)
+        os.close(nowhere)

@@ -19,6 +19,7 @@ from driftwalk.flow.readers.netcdf import to_si
 from driftwalk.flow.readers.table import read_csv
 from driftwalk.flow.rows import grid_rows
 from driftwalk.schema import FLAGS, build_flow_field, check_flow_field
+from driftwalk.schema.contents import check_contents
 from driftwalk.schema.netcdf import is_netcdf, open_netcdf
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ def load_flow(
     if str(dataset.attrs.get("kind")) == "flow_field" and "flag" in dataset:
         if arena is not None and own_flags == "refuse":
             raise InputError(f"{source} has flags of its own: leave the arena out")
-        return _checked(dataset, source)
+        return _checked(check_contents(dataset, source), source)
     si = to_si(dataset, source)
     time = si["time"].values if "time" in si.dims else None
     velocity = np.stack([si["u"].values, si["v"].values], axis=-1)

@@ -17,6 +17,7 @@ from driftwalk.record.arena import PlacedArena, arena_attributes, place_arena
 from driftwalk.record.clean import Counts, clean_body
 from driftwalk.record.clock import check_clock
 from driftwalk.record.convert_units import convert_units
+from driftwalk.record.extent import refuse_many_bodies, refuse_sparse
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.registry import find_loader
 from driftwalk.record.text import DAMAGED_GZIP
@@ -128,6 +129,7 @@ def load(
         raw = loader.read(source, options)
         raw.bodies = _select(raw.bodies, body)
         raw.notes += [*check_clock(raw), *angle_warnings(raw)]
+        refuse_many_bodies([one.name for one in raw.bodies])
         bodies, attrs = convert_units(raw, options, y_axis=y_axis)
         clean = partial(
             clean_body,
@@ -149,10 +151,15 @@ def load(
         return _assemble(cleaned, counts, attrs, raw, arena=arena, block_side=block_side)
     except DAMAGED_GZIP as error:
         raise FormatError(f"is a damaged gzip file: {error}", path=source) from error
-    except FormatError:
-        raise
+    except FormatError as error:
+        raise _of_file(error, source) from error
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
+
+
+def _of_file(error: FormatError, path: Path) -> FormatError:
+    """Return the error with the file that it is about, which not all that raise it know."""
+    return error if error.path is not None else FormatError(error.reason, path=path)
 
 
 def readable_formats() -> dict[str, str]:
@@ -257,6 +264,7 @@ def _one_clock(bodies: list[RawBody]) -> tuple[Array, Array, Array, Array | None
         return body.clock, body.x, body.y, body.theta
     clocks = {id(body.clock): body.clock for body in bodies}
     time = np.unique(np.concatenate(list(clocks.values())))
+    refuse_sparse(time, bodies)
     x = _on_clock(time, bodies, [body.x for body in bodies])
     y = _on_clock(time, bodies, [body.y for body in bodies])
     theta = _on_clock(time, bodies, [body.theta for body in bodies]) if has_theta else None

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.record.extent import refuse_many_bodies
 from driftwalk.record.raw import Array, RawBody
 
 
@@ -29,7 +30,13 @@ def split_bodies(
         Names of the bodies.
     clock, x, y, theta : array, shape (n,)
         The rows.
+
+    Raises
+    ------
+    FormatError
+        When there are more labels than bodies are read.
     """
+    refuse_many_bodies(labels)
     if len(labels) == 1:
         return [RawBody(labels[0], clock, x, y, theta)]
     order = np.argsort(codes, kind="stable")

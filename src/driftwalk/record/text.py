@@ -9,6 +9,7 @@ column is wrong.
 from __future__ import annotations
 
 import gzip
+import io
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -30,6 +31,11 @@ DAMAGED_GZIP = (gzip.BadGzipFile, EOFError, zlib.error)
 BOM = b"\xef\xbb\xbf"
 HEAD_BYTES = 1 << 16
 _EXACT = 1 << 53
+LONGEST_LINE = 16 << 20
+GZIP_ALLOWANCE = 16 << 20
+GZIP_RATIO = 50
+"""A gzip file may unpack to this many times its size, and 16 MiB more. Tables of numbers shrink to
+a third, of mostly missing ones to a twentieth."""
 
 
 @dataclass(frozen=True)
@@ -70,10 +76,70 @@ def open_binary(path: Path) -> IO[bytes]:
     try:
         with path.open("rb") as file:
             compressed = file.read(2) == GZIP_MAGIC
-        return gzip.open(path, "rb") if compressed else path.open("rb")  # type: ignore[return-value]
+        return io.BufferedReader(_BoundedGzip(path), 1 << 20) if compressed else path.open("rb")
     except (OSError, ValueError) as error:  # ValueError: a name that no file can have
         reason = getattr(error, "strerror", None) or error
         raise FormatError(f"cannot be opened: {reason}", path=path) from error
+
+
+class _BoundedGzip(io.RawIOBase):
+    """What a gzip file holds, as far as text can be packed: zeros shrink by a thousand."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._file = gzip.open(path, "rb")  # noqa: SIM115
+        self._left = GZIP_ALLOWANCE + GZIP_RATIO * path.stat().st_size
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        content = self._file.read(len(buffer))
+        self._left -= len(content)
+        if self._left < 0:
+            raise FormatError(
+                f"unpacks to more than {GZIP_RATIO} times its size, which no recording does: "
+                "unpack it (gzip -d) if it is one",
+                path=self._path,
+            )
+        buffer[: len(content)] = content
+        return len(content)
+
+    def close(self) -> None:
+        if not self.closed:
+            self._file.close()
+        super().close()
+
+
+def lines_of(file: IO[bytes], path: Path) -> Iterator[tuple[int, bytes]]:
+    """Yield the lines of a text file that hold anything, with their numbers from 1.
+
+    Raises
+    ------
+    FormatError
+        When one is longer than any line of a text file.
+    """
+    number, rest = 1, b""
+    while block := file.read(BLOCK_BYTES):
+        if not rest and not block.strip():
+            number += block.count(b"\n")
+            continue
+        *lines, rest = (rest + block).split(b"\n")
+        refuse_long_line(rest, path, number + len(lines))
+        yield from ((at, line) for at, line in enumerate(lines, start=number) if line)
+        number += len(lines)
+    if rest:
+        yield number, rest
+
+
+def refuse_long_line(line: bytes, path: Path, number: int) -> None:
+    """Refuse a line that is longer than any line of a text file."""
+    if len(line) > LONGEST_LINE:
+        raise FormatError(
+            f"has a line of more than {LONGEST_LINE >> 20} MiB: is it a text file?",
+            path=path,
+            line=number,
+        )
 
 
 def read_head(path: Path) -> bytes:
@@ -166,7 +232,7 @@ def _blocks(path: Path, skip_lines: int) -> Iterator[tuple[int, bytes]]:
     with open_binary(path) as file:
         try:
             for _ in range(skip_lines):
-                file.readline()
+                file.readline(LONGEST_LINE)
             if not skip_lines:
                 start = file.read(len(BOM))
                 rest = b"" if start == BOM else start
@@ -175,6 +241,7 @@ def _blocks(path: Path, skip_lines: int) -> Iterator[tuple[int, bytes]]:
             while block := file.read(BLOCK_BYTES):
                 whole, newline, tail = (rest + block).rpartition(b"\n")
                 rest = tail
+                refuse_long_line(rest, path, line + whole.count(b"\n"))
                 if newline:
                     yield line, whole + newline
                     line += whole.count(b"\n") + 1
@@ -186,8 +253,6 @@ def _blocks(path: Path, skip_lines: int) -> Iterator[tuple[int, bytes]]:
 
 def _parse(block: bytes, layout: TableLayout, *, path: Path, line: int) -> Any:
     """Return the block as a data frame, or raise a `FormatError` that says where it is wrong."""
-    import io
-
     import pandas as pd
 
     fields = _field_counts(block, layout.delimiter)

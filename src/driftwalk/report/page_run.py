@@ -85,7 +85,7 @@ class Run:
         try:
             found = open_netcdf(path)
         except FormatError as error:
-            self.problems.append(f"{path.name} {error.reason}")
+            self.problems.append(f"{path.name} cannot be read: it {error.reason}")
             return None
         self.read += 1
         return found

@@ -1,4 +1,4 @@
-"""The door for NetCDF files: their declared size first, then whole into memory, then their kind.
+"""The door for NetCDF files: their declared size first, then whole into memory.
 
 A header may declare any size. HDF5 stores a chunk that was never written as nothing at all, and
 reads it as its fill value: a file of a few kilobytes holds terabytes so. What a header declares is
@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.bounded import MIB
 from driftwalk.core.errors import FormatError
-from driftwalk.schema.contents import check_contents
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,20 +37,18 @@ _WIDTH: Final = 8
 def open_netcdf(path: Path) -> xr.Dataset:
     """Read a NetCDF file into memory and close it.
 
-    Numbers stay as they are stored: a time in "s" does not become a date. Of driftwalk's own
-    datasets the contents are checked, see `check_contents`.
+    Numbers stay as they are stored: a time in "s" does not become a date. What it has to hold is
+    its reader's to check, by `driftwalk.schema.contents.check_contents` where work goes on with it.
 
     Raises
     ------
     FormatError
-        When it is no NetCDF file, declares more than it can hold, is damaged, or one of
-        driftwalk's own without what its kind needs.
+        When it is no NetCDF file, declares more than it can hold, or is damaged.
     """
     if not is_netcdf(path):
         raise FormatError("is not a NetCDF file", path=path)
     with _opened(path) as dataset:
-        found = dataset.load()
-    return check_contents(found, path)
+        return dataset.load()
 
 
 def read_attributes(path: Path) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.opencv import require_opencv
+from driftwalk.core.opencv import read_image, require_opencv
 from driftwalk.track.gaps import FrameGaps
 from driftwalk.track.types import Frame, Image
 
@@ -246,7 +246,7 @@ class ImageSequence:
     def __init__(
         self, folder: str | Path, *, rate: float | None = None, keep_stale: bool = False
     ) -> None:
-        self._cv2 = require_opencv()
+        require_opencv()
         self.name = str(folder)
         self.counts = FrameCounts()
         self.interrupted: str | None = None
@@ -259,9 +259,7 @@ class ImageSequence:
         keep = FrameFilter(self.name, self.counts, keep_stale=self._keep_stale, gaps=FrameGaps())
         try:
             for index, (file, time) in enumerate(self._files):
-                image = self._cv2.imread(str(file), self._cv2.IMREAD_COLOR)
-                if image is None:
-                    raise FormatError("is not an image that OpenCV can read", path=file)
+                image = read_image(file)
                 frame = keep.accept(index, time, image)
                 if frame is not None:
                     yield frame

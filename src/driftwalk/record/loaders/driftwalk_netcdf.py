@@ -10,6 +10,7 @@ import numpy as np
 from driftwalk.core.errors import FormatError
 from driftwalk.record.raw import Extra, RawBody, RawRecording, ReadOptions
 from driftwalk.schema import body_names, check_trajectory
+from driftwalk.schema.contents import check_contents
 from driftwalk.schema.netcdf import MAGIC, kind_of, open_netcdf
 from driftwalk.schema.trajectory import VARIABLES
 
@@ -30,7 +31,7 @@ class DriftwalkLoader:
 
     def read(self, path: Path, _options: ReadOptions) -> RawRecording:
         """Read every body and carry the attributes over."""
-        dataset = open_netcdf(path)
+        dataset = check_contents(open_netcdf(path), path)
         try:
             check_trajectory(dataset)
         except ValueError as error:

@@ -18,7 +18,7 @@ from driftwalk.core.errors import FormatError
 from driftwalk.record.head import first_lines
 from driftwalk.record.raw import Array, RawRecording, ReadOptions
 from driftwalk.record.stacked import order_in_frame, split_bodies
-from driftwalk.record.text import open_binary
+from driftwalk.record.text import lines_of, open_binary
 
 # Number of arguments of $PARTICLE to the places of image x, y, world x, y, orientation.
 _PLACES = {6: (1, 2, 4, 5, 3), 8: (1, 2, 3, 4, 6)}
@@ -73,7 +73,7 @@ def _particles(path: Path) -> tuple[Array, npt.NDArray[np.int64]]:
     ids = array("q")
     frame = float("nan")
     with open_binary(path) as file:
-        for line, raw in enumerate(file, start=1):
+        for line, raw in lines_of(file, path):
             text = raw.strip()
             if text.startswith((b"$FRAMENUMBER,", b"$PARTICLE,")):
                 command, *arguments = _verified(text, path, line).split(",")

@@ -1,0 +1,60 @@
+"""How many bodies and times a recording may have: a `trajectory` has a place for each of both.
+
+A column that counts its rows, taken for the names of the bodies, makes a body of every row: a file
+of one megabyte then asks for a hundred gigabytes of NaN.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from driftwalk.core.errors import FormatError
+from driftwalk.record.raw import Array, RawBody
+
+MOST_BODIES: Final = 5000
+EMPTY_PLACES: Final = 20_000_000
+"""Places, times by bodies, that a recording of any size may have: 0.5 GB."""
+PLACES_PER_SAMPLE: Final = 50
+"""Places beyond that for each sample: bodies may come and go, as fragments of tracks do."""
+
+
+def refuse_many_bodies(names: Sequence[str]) -> None:
+    """Refuse more bodies than any recording has.
+
+    Raises
+    ------
+    FormatError
+        Names the first ones.
+    """
+    if len(names) > MOST_BODIES:
+        first = ", ".join(f"'{name:.20}'" for name in names[:3])
+        raise FormatError(
+            f"has {len(names)} bodies ({first}, …), more than the {MOST_BODIES} that are read: "
+            "does the column that names the body count rows?"
+        )
+
+
+def refuse_sparse(time: Array, bodies: list[RawBody]) -> None:
+    """Refuse bodies that have almost none of their times in common.
+
+    Parameters
+    ----------
+    time : array, shape (n,)
+        The times of all bodies.
+    bodies : list of RawBody
+        The bodies.
+
+    Raises
+    ------
+    FormatError
+        Says how many places there would be, and for how many samples.
+    """
+    samples = sum(body.clock.size for body in bodies)
+    places = time.size * len(bodies)
+    if places > EMPTY_PLACES + PLACES_PER_SAMPLE * samples:
+        raise FormatError(
+            f"has {len(bodies)} bodies at {time.size} different times, which is a table of "
+            f"{3 * 8 * places / 1e9:.3g} GB for {samples} samples: choose bodies (--body) or a "
+            "part of the time (--from, --to)"
+        )
