@@ -15,7 +15,7 @@ TEST_TOOLS := $(VENV)/.test-tools
 DEV_TOOLS := $(VENV)/.dev-tools
 CPP := $(shell find cpp -name '*.cpp' -o -name '*.hpp')
 
-.PHONY: demo test test-slow test-browser doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs web wheel clean
+.PHONY: demo test test-slow test-browser fuzz doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs web wheel clean
 
 demo: $(PACKAGE)
 	$(BIN)/driftwalk demo
@@ -29,6 +29,15 @@ test-slow: $(TEST_TOOLS)
 # In Chromium, which has to be installed; without it the tests are skipped.
 test-browser: $(TEST_TOOLS)
 	$(BIN)/python -m pytest tests/browser -m browser
+
+# Damaged files against the command line, some 2 a second; the same seed gives the same cases. What
+# it finds lies in run/fuzz/findings. The first round makes the valid files, for a minute or two.
+FUZZ := run/fuzz
+FUZZ_SEED := 1
+FUZZ_CASES := 2000
+
+fuzz: $(TEST_TOOLS)
+	$(BIN)/python tests/fuzz/run.py $(FUZZ) --seed $(FUZZ_SEED) --cases $(FUZZ_CASES)
 
 doctest: $(TEST_TOOLS)
 	$(BIN)/python -m pytest -n 2 --doctest-modules src/driftwalk

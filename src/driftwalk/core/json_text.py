@@ -17,8 +17,8 @@ from driftwalk.core.nesting import refuse_deep
 
 MOST_BYTES: Final = 64 * MIB
 """What a JSON file may hold: some 3 million points, or any manifest."""
-_INTEGER_DIGITS: Final = 18
-"""Digits that fit into 64 bits whatever they are."""
+_INTEGER_DIGITS: Final = 20
+"""Characters of the longest integer of 64 bits."""
 
 
 def read_json(path: str | Path) -> Any:
@@ -71,10 +71,7 @@ def parse_json(text: str | bytes, *, path: str | Path | None = None) -> Any:
 
 
 def _integer(digits: str) -> int | float:
-    return int(digits) if len(digits) <= _INTEGER_DIGITS else _long_integer(digits)
-
-
-def _long_integer(digits: str) -> int | float:
-    as_float = float(digits)
-    # Below 2**63 the integer is exact; a float of these digits need not be.
-    return int(digits) if abs(as_float) < 2.0**63 else as_float
+    if len(digits) > _INTEGER_DIGITS:
+        return float(digits)
+    value = int(digits)
+    return value if -(2**63) <= value < 2**63 else float(value)
