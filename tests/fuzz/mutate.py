@@ -31,7 +31,8 @@ WORD = re.compile(rb"[A-Za-z_]\w*")
 LINE_LIMIT = 40_000
 MOST_BYTES = 4 << 20
 """What damage makes of a file at most, but for bombs: finding it is not to take long."""
-BOMB_MEMBER = 10 << 20
+BOMB_MEMBER, BOMB_BYTES = 10 << 20, 2 << 20
+"""Bytes of a part of a bomb, unpacked; of the whole, packed."""
 
 Mutator = Callable[[bytes, random.Random], bytes]
 
@@ -154,7 +155,7 @@ def bomb(content: bytes, rng: random.Random) -> bytes:
     last = content.rstrip(b"\n").rpartition(b"\n")[2] + b"\n"
     filling = rng.choice([b"\n", b"\x00", b"7", last, b"[1,2],"])
     member = gzip.compress(filling * (BOMB_MEMBER // len(filling)), compresslevel=1, mtime=0)
-    return gzip.compress(content, mtime=0) + member * 400
+    return gzip.compress(content, mtime=0) + member * min(400, BOMB_BYTES // len(member))
 
 
 BYTES: list[Mutator] = [flip, set_bytes, truncate, duplicate, splice]

@@ -59,8 +59,8 @@ def seeds(place: Path, *, runs: bool = True) -> list[Seed]:
     runs : bool
         Whether those of run directories are wanted, which are slow.
     """
-    made = [*_recordings(place), *_settings(place), *_images(place), *_calibration(place)]
-    return [*made, *_runs(place)] if runs else made
+    made = [*_recordings(place), *_settings(place), *_images(place)]
+    return [*made, *_calibration(place), *_runs(place)] if runs else made
 
 
 def _kept(folder: Path, make: Callable[[Path], None]) -> Path:
@@ -281,7 +281,9 @@ def _runs(place: Path) -> Iterator[Seed]:
     def recovery(folder: Path) -> None:
         truth = folder.with_name("truth.toml")
         truth.write_text(small_study().to_toml())
-        _run("study", "recover", "--truth", truth, "--out", folder)
+        _run(
+            "study", "recover", "--truth", truth, "--flow", DATA / "flow_true.csv", "--out", folder
+        )
 
     yield from _of_folder(_kept(place / "fit", fit), (_report(),))
     classify = (("classify", "@/path.nc"), ("classify", "@/path.nc", "--run", "1"))

@@ -51,7 +51,8 @@ def encode_array(
     Returns
     -------
     dict
-        JSON-ready; `decode_array` reads it. An infinite value becomes NaN.
+        JSON-ready; `decode_array` reads it. A value that is infinite, also as a float of that size,
+        becomes NaN.
 
     Raises
     ------
@@ -67,7 +68,8 @@ def encode_array(
     if dtype not in DTYPES:
         raise InputError(f"dtype is one of {', '.join(DTYPES)}, got {dtype!r}")
     array = np.asarray(values, dtype=np.float64)
-    array = np.where(np.isfinite(array), array, np.nan)
+    largest = np.finfo(np.float32 if dtype == "f4" else np.float64).max
+    array = np.where(np.abs(array) <= largest, array, np.nan)
     if dtype in ("f4", "f8"):
         return _packed(array.astype(f"<{dtype}"), dtype)
     if dtype == "u1":

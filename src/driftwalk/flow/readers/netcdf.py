@@ -31,6 +31,13 @@ def to_si(dataset: xr.Dataset, path: Path) -> xr.Dataset:
         if required not in dataset.variables:
             has = ", ".join(str(name) for name in dataset.variables)
             raise FormatError(f"there is no variable '{required}'; it has {has}", path=path)
+    for name in ("u", "v", "x", "y", *({"time"} & set(map(str, dataset.variables)))):
+        if dataset[name].dtype.kind not in "fiu":
+            raise FormatError(f"'{name}' holds no numbers", path=path)
+        if name in ("x", "y") and dataset[name].dims != (name,):
+            raise FormatError(
+                f"'{name}' needs the dimension {name} alone, got {dataset[name].dims}", path=path
+            )
     chosen = dataset[["u", "v"]]
     extra = [name for name in chosen.dims if name not in ("time", "y", "x")]
     long = [name for name in extra if chosen.sizes[name] > 1]

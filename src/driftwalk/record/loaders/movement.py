@@ -31,6 +31,9 @@ class MovementLoader:
         dataset = open_netcdf(path)
         if "position" not in dataset or not {"time", "space"} <= set(dataset["position"].dims):
             raise FormatError("has no variable 'position' over time and space", path=path)
+        for name in ("position", *({"time"} & set(map(str, dataset.coords)))):
+            if dataset[name].dtype.kind not in "fiu":
+                raise FormatError(f"'{name}' holds no numbers", path=path)
         position = _choose_keypoint(dataset["position"], options.keypoint)
         individual = _dimension(position, "individual")
         if individual is None:
