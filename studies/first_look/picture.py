@@ -1,4 +1,4 @@
-"""The picture of README.md: a recording, the flow that `driftwalk fit` finds in it, what blocks build.
+"""The picture of README.md: a recording, the flow that `driftwalk fit` finds, what blocks build.
 
 $ driftwalk fit recording.csv --tank-diameter 30cm --force-interval 16ms -o fit/
 $ driftwalk assemble --flow fit/flow.nc --drag-coefficient 0.3928 --force-std 0.6154mN \

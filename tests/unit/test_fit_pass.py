@@ -22,7 +22,7 @@ def passes(request: pytest.FixtureRequest) -> Passes:
     study = coarse_study()
     outline = outline_of(study.tank.to_arena())
     tracks = [body_track(recording(60.0, name)) for name in ("first", "second")]
-    series, _ = _series(tracks, study, outline, request.param)
+    series = _series(tracks, study, outline, request.param)
     spline = lay_spline(outline, side=0.03, spacing=0.03)
     return Passes(series, _body(study, request.param), spline)
 

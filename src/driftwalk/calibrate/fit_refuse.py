@@ -54,12 +54,6 @@ def require_motion(track: Track, study: Study, *, where: str) -> None:
     """
     from driftwalk.model import apply_overrides
 
-    if typical_speed([track]) == 0.0:
-        raise InputError(
-            f"{where}the body rests in 99 % of the recording, at the same position to the last "
-            "digit, and there is no motion to fit; check the body (--body) and the time that is "
-            "kept (--from, --to)"
-        )
     tail = 0.5 * (1.0 - KEPT)
     width = max(float(np.ptp(np.quantile(axis, (tail, 1.0 - tail)))) for axis in (track.x, track.y))
     scatter = max(float(track.x.std()), float(track.y.std()))
@@ -78,6 +72,12 @@ def require_motion(track: Track, study: Study, *, where: str) -> None:
             f"{where}the body never moves: it stays within {1e3 * width:.2g} mm around {place}, "
             f"{why}, and there is nothing to fit; check the units, the body (--body) and the time "
             "that is kept (--from, --to)"
+        )
+    if typical_speed([track]) == 0.0:
+        raise InputError(
+            f"{where}the body rests in 99 % of the recording, at the same position to the last "
+            "digit, and there is no motion to fit; check the body (--body) and the time that is "
+            "kept (--from, --to)"
         )
 
 

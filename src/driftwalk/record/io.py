@@ -128,8 +128,8 @@ def load(
     try:
         raw = loader.read(source, options)
         raw.bodies = _select(raw.bodies, body)
-        raw.notes += [*check_clock(raw), *angle_warnings(raw)]
         refuse_many_bodies([one.name for one in raw.bodies])
+        raw.notes += [*check_clock(raw), *angle_warnings(raw)]
         bodies, attrs = convert_units(raw, options, y_axis=y_axis)
         clean = partial(
             clean_body,

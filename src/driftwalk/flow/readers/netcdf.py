@@ -50,9 +50,9 @@ def to_si(dataset: xr.Dataset, path: Path) -> xr.Dataset:
         nodes = chosen[axis].values
         if nodes.size < 2 or not np.isfinite(nodes).all():
             raise FormatError(f"'{axis}' needs at least 2 finite positions", path=path)
-    for name in chosen.variables:
-        unit = {"u": "m/s", "v": "m/s", "time": "s"}.get(str(name), "m")
-        factor = _factor(dataset[name].attrs.get("units"), unit, str(name), path)
+    for name in map(str, chosen.variables):
+        unit = {"u": "m/s", "v": "m/s", "time": "s"}.get(name, "m")
+        factor = _factor(dataset[name].attrs.get("units"), unit, name, path)
         chosen[name] = (chosen[name].dims, factor * chosen[name].values.astype(np.float64))
     return chosen.sortby([name for name in ("x", "y") if name in chosen.dims]).transpose(
         *[name for name in ("time", "y", "x") if name in chosen.dims]
