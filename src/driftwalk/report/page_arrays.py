@@ -22,6 +22,8 @@ DType = Literal["f4", "f8", "i2", "i4", "u1"]
 DTYPES: Final = ("f4", "f8", "i2", "i4", "u1")
 SHORT: Final = 64
 """Arrays with fewer numbers than this stand as a plain list where their reader allows it."""
+MOST_LISTED: Final = 100_000
+"""Numbers of a plain list; no axis of a study has so many."""
 _LIMIT: Final = {"i2": 32767, "i4": 2147483647}
 _DEFLATE_LEVEL: Final = 9
 
@@ -136,11 +138,18 @@ def numbers(values: npt.ArrayLike, *, dtype: DType = "f4", **options: Any) -> An
 def plain_list(values: npt.ArrayLike) -> Any:
     """Return an array as nested lists, null where a number is not finite.
 
+    Raises
+    ------
+    InputError
+        With more than 100,000 numbers: lists of Python take thirty times their memory.
+
     Examples
     --------
     >>> plain_list([[1.0], [float("inf")]])
     [[1.0], [None]]
     """
+    if np.size(values) > MOST_LISTED:
+        raise InputError(f"{np.size(values)} numbers in one list are more than a page shows")
     return _plain(np.asarray(values, dtype=np.float64).tolist())
 
 

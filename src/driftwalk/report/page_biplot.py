@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -11,7 +10,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.report.assembly_labels import class_names
 from driftwalk.report.page_arrays import number, numbers
 from driftwalk.report.page_axes import MAP_AXES, axis_words, require_axes, value_words
-from driftwalk.report.page_parts import Section, require, section
+from driftwalk.report.page_parts import Section, require, section, settings_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,4 +60,4 @@ def biplot_section(components: xr.Dataset, sensitivity: xr.Dataset) -> Section:
 
 def _setting_names(sensitivity: xr.Dataset, dims: list[str]) -> list[str]:
     every = [[f"{axis_words(n)} {value_words(n, v)}" for v in sensitivity[n].values] for n in dims]
-    return [", ".join(words) for words in product(*every)]
+    return [", ".join(words) for words in settings_of(*every)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -28,6 +29,8 @@ LONGEST_REASON: Final = 200
 """Letters of an error that are shown."""
 FOUND_TITLE: Final = "What was found"
 SIMULATED: Final = "The recording was simulated: it is no measurement."
+MOST_SETTINGS: Final = 50_000
+"""Combinations of parameters that a page names; a cube of 31 values a side has 29,791."""
 
 
 def section(id: str, kind: str, title: str, note: str | None = None, **content: Any) -> Section:
@@ -156,6 +159,30 @@ def figure(
         "label": label, "symbol": symbol, "value": number(value), "unit": unit, "low": None,
         "high": None, "confidence": None, "note": note,
     }  # fmt: skip
+
+
+def settings_of(*values: Sequence[Any]) -> list[tuple[Any, ...]]:
+    """Return every combination of values, the last one fastest.
+
+    Parameters
+    ----------
+    *values : sequence
+        The values of each parameter.
+
+    Raises
+    ------
+    InputError
+        When there are more: a damaged file may declare an axis of any length.
+
+    Examples
+    --------
+    >>> settings_of("ab", [1, 2])
+    [('a', 1), ('a', 2), ('b', 1), ('b', 2)]
+    """
+    total = math.prod(len(each) for each in values)
+    if total > MOST_SETTINGS:
+        raise InputError(f"{total} settings are more than the {MOST_SETTINGS} that a page shows")
+    return list(product(*values))
 
 
 def warnings_section(items: Sequence[str], *, title: str = "Warnings") -> Section:

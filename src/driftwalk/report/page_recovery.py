@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
@@ -40,6 +41,8 @@ SUMMARY: Final = {
     "coverage_high": "at most",
 }
 COORDINATES: Final = ("duration", "angle", "parameter")
+MOST_WAYS: Final = 1000
+"""Combinations of these, a row of the table each."""
 
 
 def recovery_sections(recovery: xr.Dataset | None) -> list[Section]:
@@ -65,6 +68,9 @@ def recovery_sections(recovery: xr.Dataset | None) -> list[Section]:
     missing = [name for name in COORDINATES if name not in recovery.variables]
     if missing:
         return empty_head(f"the recovery holds no {', '.join(missing)}")
+    ways = math.prod(recovery[name].size for name in COORDINATES)
+    if ways > MOST_WAYS:
+        return empty_head(f"{ways} rows of estimates are more than the {MOST_WAYS} of a page")
     made = head_sections(lambda: recovery_summary(recovery), lambda: _warnings(recovery))
     made += attempt("errors", "Errors and intervals", lambda: errors_section(recovery))
     made += attempt("by-length", "Error by length", lambda: by_length_section(recovery))

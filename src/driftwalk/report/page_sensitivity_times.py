@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -12,7 +11,7 @@ from driftwalk.report.assembly_labels import OTHER, classes_to_show
 from driftwalk.report.page_arrays import encode_array, numbers
 from driftwalk.report.page_axes import axis_words, value_words
 from driftwalk.report.page_classes import cells_of
-from driftwalk.report.page_parts import Section, empty_section, section
+from driftwalk.report.page_parts import Section, empty_section, section, settings_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,7 +84,7 @@ def setting_times_section(part: xr.Dataset, id: str, where: str) -> Section:
         return empty_section(id, title, reason)
     settings = [
         ", ".join(f"{axis_words(n)} {value_words(n, v)}" for n, v in zip(dims, place, strict=True))
-        for place in product(*(part[name].values.tolist() for name in dims))
+        for place in settings_of(*(part[name].values.tolist() for name in dims))
     ]
     return section(id, "setting_times", title, None, settings=settings, over_time=found)
 

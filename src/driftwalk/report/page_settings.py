@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -22,7 +21,7 @@ from driftwalk.report.page_axes import (
 )
 from driftwalk.report.page_chart import chart, label, mark, series
 from driftwalk.report.page_classes import cells_of
-from driftwalk.report.page_parts import Section, section, value_of
+from driftwalk.report.page_parts import Section, section, settings_of, value_of
 from driftwalk.report.page_sensitivity_times import (
     over_time_part,
     setting_times_section,
@@ -194,7 +193,7 @@ def _slices(sensitivity: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
     dims = [str(dim) for dim in sensitivity["l1_distance"].dims]
     fixed = dims[: max(len(dims) - MAP_AXES, 0)]
     parts = []
-    for values in product(*(sensitivity[name].values.tolist() for name in fixed)):
+    for values in settings_of(*(sensitivity[name].values.tolist() for name in fixed)):
         chosen = dict(zip(fixed, values, strict=True))
         words = "".join(f", {axis_words(n)} {value_words(n, v)}" for n, v in chosen.items())
         parts.append((words, sensitivity.sel(chosen)))

@@ -15,6 +15,7 @@ from page_reading import values
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.report import decode_array, encode_array
 from driftwalk.report.page_arrays import SHORT, nice_step, number, numbers, plain_list
+from driftwalk.report.page_parts import settings_of
 
 SHAPES = array_shapes(min_dims=1, max_dims=3, min_side=0, max_side=9)
 FLOATS = st.floats(-1e9, 1e9) | st.just(np.nan)
@@ -124,3 +125,17 @@ def test_a_nice_step_is_round_and_fine_enough(extent: float, parts: float) -> No
     assert step > 0.3 * extent / parts
     assert f"{step:e}"[0] in "125"
     assert float(f"{step:.0e}") == step
+
+
+def test_a_list_longer_than_any_axis_is_refused_before_it_is_made() -> None:
+    """A damaged file may declare an axis of any length; a list takes thirty times its memory."""
+    assert len(plain_list(np.zeros(100_000))) == 100_000
+    with pytest.raises(InputError, match="100001 numbers in one list"):
+        plain_list(np.zeros(100_001))
+
+
+def test_combinations_of_settings_are_those_of_nested_loops() -> None:
+    assert settings_of("ab", [1, 2], (True,)) == [(a, b, True) for a in "ab" for b in (1, 2)]
+    # Four axes of a million values each: what makes them all would never come back.
+    with pytest.raises(InputError, match="settings are more than the 50000 that a page shows"):
+        settings_of(*[range(10**6)] * 4)

@@ -15,6 +15,7 @@ from driftwalk.report import (
     plot_flow_recovery,
     plot_recovery,
     plot_recovery_error,
+    recovery_sections,
     write_recovery_figures,
 )
 
@@ -106,3 +107,11 @@ def test_refusals(recovery: xr.Dataset) -> None:
     for plot in (plot_recovery, plot_flow_recovery, plot_recovery_error):
         with pytest.raises(InputError, match="not a recovery study"):
             plot(xr.Dataset())
+
+
+def test_a_page_of_far_too_many_durations_is_one_sentence(recovery: xr.Dataset) -> None:
+    """Found by damaging files: an axis of 100,000 took the page over half a minute."""
+    long = recovery.isel(duration=np.zeros(100_000, dtype=int))
+    (part,) = recovery_sections(long)
+    assert part["kind"] == "empty"
+    assert "rows of estimates are more than the 1000 of a page" in part["reason"]
