@@ -37,7 +37,7 @@ FUZZ_SEED := 1
 FUZZ_CASES := 2000
 
 fuzz: $(TEST_TOOLS)
-	$(BIN)/python tests/fuzz/run.py $(FUZZ) --seed $(FUZZ_SEED) --cases $(FUZZ_CASES)
+	$(BIN)/python tests/fuzz/fuzz_run.py $(FUZZ) --seed $(FUZZ_SEED) --cases $(FUZZ_CASES)
 
 doctest: $(TEST_TOOLS)
 	$(BIN)/python -m pytest -n 2 --doctest-modules src/driftwalk

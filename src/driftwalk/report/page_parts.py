@@ -53,14 +53,14 @@ def attempt(id: str, title: str, make: Callable[[], Section | list[Section]]) ->
     """Make sections; what the data do not allow becomes an empty section with the reason.
 
     Another version of driftwalk, or another program, may have written the data in another form:
-    that costs the section, and not the page. A missing value shows itself as an attribute that
-    None lacks. Errors that no data explain are faults of driftwalk, and pass.
+    that costs the section, and not the page. Errors that no data explain are faults of driftwalk,
+    and pass.
     """
     try:
         made = make()
     except DriftwalkError as error:
         return [empty_section(id, title, str(error))]
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
         words = f"{type(error).__name__}: {error}"[:LONGEST_REASON]
         reason = f"The data are not in the form that this version of driftwalk reads ({words})."
         return [empty_section(id, title, reason)]

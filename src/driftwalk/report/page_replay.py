@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from driftwalk.core.errors import InputError
 from driftwalk.report.page_arrays import encode_array, nice_step
 from driftwalk.report.page_parts import Section, arena_part, require, required, section
 from driftwalk.report.page_words import count, quantity
@@ -111,5 +112,8 @@ def _classes(
     return [start, *({"time": event["time"], "class": event["class"]} for event in events)]
 
 
-def _class(assembly: xr.Dataset, index: int) -> str | None:
-    return str(assembly["class"].values[index]) if index >= 0 else None
+def _class(assembly: xr.Dataset, index: int) -> str:
+    names = assembly["class"].values
+    if not 0 <= index < names.size:
+        raise InputError(f"an event of the assembly has class {index}, of {names.size} there are")
+    return str(names[index])

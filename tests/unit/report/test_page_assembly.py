@@ -185,6 +185,16 @@ def test_a_run_has_the_number_by_which_it_is_asked_for() -> None:
     assert run["name"] == "run 7"
 
 
+@pytest.mark.parametrize("wrong", [-1, 3])
+def test_an_event_without_a_class_costs_the_replay(wrong: int) -> None:
+    """In a damaged file; a class of -1 is what stands where there is no event."""
+    path = assembly_path()
+    assembly = made_up_assembly(path)
+    assembly["event_class"].values[0, 0] = wrong
+    made = assembly_sections(path=path, assembly=assembly)
+    assert f"an event of the assembly has class {wrong}, of 3" in part_of(made, "replay")["reason"]
+
+
 def test_a_long_path_of_many_blocks_is_thinned() -> None:
     path = assembly_path(runs=4, samples=3001, blocks=64)
     part = part_of(assembly_sections(path=path), "replay")

@@ -1,6 +1,6 @@
 """Damage valid files and hand them to the command line: it must read them, or refuse in one line.
 
-    python tests/fuzz/run.py FOLDER [--seed N] [--cases N] [--only N] [--quick]
+    python tests/fuzz/fuzz_run.py FOLDER [--seed N] [--cases N] [--only N] [--quick]
 
 A case is fine when the command ends with 0, or with 2 and one line on stderr that begins
 "driftwalk: error:". Anything else is a finding: a traceback, a line of a library's, a command that
