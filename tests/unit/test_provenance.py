@@ -158,3 +158,9 @@ def test_import_loads_numpy_at_most() -> None:
         check=True,
     )
     assert done.stdout.strip() == "[]"
+
+
+def test_half_a_surrogate_survives_a_manifest(tmp_path: Path) -> None:
+    path = tmp_path / "manifest.json"
+    write_manifest(path, {"study": {"recording": "K\udce4fer.csv"}})
+    assert read_manifest(path) == {"study": {"recording": "K\udce4fer.csv"}}

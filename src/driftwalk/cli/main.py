@@ -7,6 +7,7 @@ mistake answer at once.
 from __future__ import annotations
 
 import inspect
+import io
 import sys
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any, Final, NamedTuple
@@ -172,4 +173,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def run() -> None:
     """Run the command line and leave the process; the entry point of the installed script."""
+    _spell_what_cannot_be_encoded()
     sys.exit(main())
+
+
+def _spell_what_cannot_be_encoded() -> None:
+    """Let stdout escape what its encoding lacks, such as σ in ASCII, as stderr does already."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from driftwalk.cli.recording_options import RecordingOptions
 from driftwalk.cli.require_motion import require_motion
 from driftwalk.core.errors import InputError
+from driftwalk.core.file_names import text_of_name
 from driftwalk.schema.contents import check_contents
 from driftwalk.schema.netcdf import kind_of, open_netcdf
 
@@ -64,7 +65,7 @@ def load_simulation(path: Path, *, replicate: int = 0) -> xr.Dataset | None:
             f"{path}: no replicate {replicate}; it has {count}, counted from 0 (--replicate)"
         )
     chosen = simulation[["x", "y", "theta"]].isel(replicate=replicate, drop=True)
-    return chosen.assign_attrs(kind="trajectory", source=path.name, simulated="yes")
+    return chosen.assign_attrs(kind="trajectory", source=text_of_name(path.name), simulated="yes")
 
 
 def _open_simulation(path: Path) -> xr.Dataset | None:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.cli.output import print_note
 from driftwalk.cli.tracking_options import TrackingOptions
 from driftwalk.cli.tracking_parts import TrackingParts
+from driftwalk.core.file_names import text_of_name
 
 if TYPE_CHECKING:
     from driftwalk.track import AssemblySeen, Camera, Frame, LiveServer, SeenEvent, TrackState
@@ -120,7 +121,7 @@ def hello(options: TrackingOptions, parts: TrackingParts, source: str) -> dict[s
         "format": "driftwalk live",
         "version": VERSION,
         "source": source,
-        "markers": Path(options.markers).name,
+        "markers": text_of_name(Path(options.markers).name),
         "tank": tank,
         "block_side_m": parts.block_side,
         "body_count": options.bodies,

@@ -20,6 +20,7 @@ from driftwalk.cli.tracking_live import LiveOutputs
 from driftwalk.cli.tracking_options import TrackingOptions
 from driftwalk.cli.tracking_parts import TrackingParts
 from driftwalk.core.errors import InputError
+from driftwalk.core.file_names import text_of_name
 from driftwalk.core.json_text import parse_json
 
 if TYPE_CHECKING:
@@ -84,7 +85,8 @@ class TrackingRun:
 
         total = frame_count(self.options.source) or 0
         source = open_source(self.options.source, rate=self.options.image_rate)
-        self.source_name = source.name if self.options.is_camera else Path(source.name).name
+        name = source.name if self.options.is_camera else Path(source.name).name
+        self.source_name = text_of_name(name)
         with contextlib.ExitStack() as open_things:
             open_things.callback(source.close)
             open_things.enter_context(_termination_as_interrupt())
@@ -132,7 +134,7 @@ class TrackingRun:
             "source": self.source_name,
             # `source` is the recording's own name once it is read from a file.
             "tracked_from": self.source_name,
-            "markers": Path(self.options.markers).name,
+            "markers": text_of_name(Path(self.options.markers).name),
             "complete": "yes" if complete else "no",
         }
         if self.interrupted is not None:

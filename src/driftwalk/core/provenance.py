@@ -14,6 +14,7 @@ import numpy as np
 
 from driftwalk.core.atomic import write_atomic
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.file_names import text_of_name
 from driftwalk.core.json_text import read_json
 
 MANIFEST_VERSION: Final = 1
@@ -94,7 +95,7 @@ def manifest(
         "kind": MANIFEST_KIND,
         "manifest_version": MANIFEST_VERSION,
         "created_utc": utc_now(),
-        "command": command if isinstance(command, str) else _joined(command),
+        "command": text_of_name(command if isinstance(command, str) else _joined(command)),
         "study": plain(study),
         "seeds": plain(seeds),
         "inputs": {role: describe_file(path) for role, path in inputs.items()},
@@ -106,7 +107,8 @@ def manifest(
 def describe_file(path: str | Path) -> dict[str, Any]:
     """Return path, SHA-256 and size [byte] of a file."""
     sha256 = file_sha256(path)
-    return {"path": str(path), "sha256": sha256, "size_bytes": Path(path).stat().st_size}
+    size = Path(path).stat().st_size
+    return {"path": text_of_name(path), "sha256": sha256, "size_bytes": size}
 
 
 def write_manifest(path: str | Path, values: Mapping[str, Any]) -> None:
@@ -120,7 +122,8 @@ def write_manifest(path: str | Path, values: Mapping[str, Any]) -> None:
         When the file cannot be written.
     """
     text = json.dumps(plain(values), indent=2, ensure_ascii=False, allow_nan=False)
-    write_atomic(path, f"{text}\n".encode())
+    # Half a surrogate, which UTF-8 lacks, becomes JSON's own spelling of it.
+    write_atomic(path, f"{text}\n".encode(errors="backslashreplace"))
 
 
 def read_manifest(path: str | Path) -> dict[str, Any]:

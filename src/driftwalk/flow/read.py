@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.file_names import text_of_name
 from driftwalk.flow.arena import Outline, outline_of, read_arena
 from driftwalk.flow.fill import fill_velocity
 from driftwalk.flow.grid import Grid
@@ -73,7 +74,11 @@ def load_flow(
     if not is_netcdf(source):
         field = grid_rows(read_csv(source), source)
         return _new_field(
-            field.x, field.y, field.velocity, arena=arena, attrs={"source": source.name}
+            field.x,
+            field.y,
+            field.velocity,
+            arena=arena,
+            attrs={"source": text_of_name(source.name)},
         )
     dataset = open_netcdf(source)
     if str(dataset.attrs.get("kind")) == "flow_field" and "flag" in dataset:
@@ -90,7 +95,7 @@ def load_flow(
             velocity,
             time=time,
             arena=arena,
-            attrs={"source": source.name},
+            attrs={"source": text_of_name(source.name)},
         )
     except InputError as error:
         raise FormatError(str(error), path=source) from error

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.file_names import text_of_name
 from driftwalk.core.json_text import parse_json
 from driftwalk.record.arena import PlacedArena, arena_attributes, place_arena
 from driftwalk.record.clean import Counts, clean_body
@@ -147,7 +148,7 @@ def load(
             if start is not None or stop is not None:
                 raise InputError("no sample lies between --from and --to")
             raise InputError("the recording has no row with a time")
-        attrs |= {"source": source.name, "format": loader.name}
+        attrs |= {"source": text_of_name(source.name), "format": loader.name}
         return _assemble(cleaned, counts, attrs, raw, arena=arena, block_side=block_side)
     except DAMAGED_GZIP as error:
         raise FormatError(f"is a damaged gzip file: {error}", path=source) from error

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import DriftwalkError, FormatError, InputError
+from driftwalk.core.file_names import text_of_name
 from driftwalk.core.provenance import read_manifest, refuse_other_version
 from driftwalk.core.run_layout import MANIFEST_FILE, RECORD_FILE, State, state_of, visible
 from driftwalk.core.shards import read_specification
@@ -55,7 +56,7 @@ class Run:
     @property
     def name(self) -> str:
         """Name of the folder."""
-        return self.folder.resolve().name
+        return text_of_name(self.folder.resolve().name)
 
     @property
     def body(self) -> str | None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import DriftwalkError, InputError, RunDirectoryError
+from driftwalk.core.file_names import text_of_name
 from driftwalk.core.provenance import read_manifest, refuse_other_version
 from driftwalk.core.run_layout import MANIFEST_FILE, RECORD_FILE, state_of
 from driftwalk.core.shards import read_specification
@@ -53,7 +54,7 @@ class RunSource(Source):
     def __init__(self, folder: str | Path) -> None:
         self._folder = Path(folder)
         require_run(self._folder)
-        self.title = self._folder.resolve().name
+        self.title = text_of_name(self._folder.resolve().name)
         self._page = page_frame(self.view, self.title)
         self._running: Running | None = None
         self._shown: tuple[Any, ...] = ()
