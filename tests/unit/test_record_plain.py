@@ -274,3 +274,56 @@ def test_resolution_of_few_or_many_digits(tmp_path: Path) -> None:
     values = np.random.default_rng(4).normal(size=(300, 2))
     rows = "\n".join(f"{index},{x!r},{y!r}" for index, (x, y) in enumerate(values.tolist()))
     assert load(write(tmp_path, "t,x,y\n" + rows)).attrs["position_quantum_m"] == 0.0
+
+
+# As a lab's program may write it: 25 Hz, the rows of frames 3 and 4 missing, in degrees.
+FOREIGN = (
+    "Bild;x [mm];y [mm];Winkel [°]\n0;1;2;350\n1;2;3;355\n2;3;4;0\n5;4;5;5\n6;5;6;10\n7;6;7;15\n"
+)
+
+
+def test_a_clock_of_unknown_name_that_skips_rows_is_named(tmp_path: Path) -> None:
+    """Counting its rows as frames would close the gaps."""
+    path = write(tmp_path, FOREIGN)
+    with pytest.raises(FormatError, match=r"'Bild' counts up .*--columns frame=Bild"):
+        load(path, frame_rate=25.0)
+    track = body_track(load(path, frame_rate=25.0, columns={"frame": "Bild"}))
+    np.testing.assert_allclose(track.time, np.array([0, 1, 2, 5, 6, 7]) / 25.0)
+
+
+@pytest.mark.parametrize(
+    "last",
+    [
+        pytest.param("0 1 2 3 4 5", id="every row has its frame"),
+        pytest.param("0 1.3 1.9 5 5.1 7", id="a distance gone so far"),
+        pytest.param("4 3 9 1 2 8", id="a measurement"),
+        pytest.param("1 1 1 2 2 4", id="a trial"),
+        pytest.param("a b c d e f", id="words"),
+    ],
+)
+def test_what_is_no_clock_with_missing_rows_is_passed_over(tmp_path: Path, last: str) -> None:
+    rows = "".join(f"{k},{k},{value}\n" for k, value in enumerate(last.split()))
+    dataset = load(write(tmp_path, f"x_mm,y_mm,what\n{rows}"), frame_rate=10.0)
+    np.testing.assert_allclose(dataset["time"], np.arange(6) / 10.0)
+
+
+def test_a_table_without_a_clock_says_how_to_name_one(tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match=r"--columns t=NAME:s or frame=NAME.*--frame-rate"):
+        load(write(tmp_path, "x_mm,y_mm\n1,2\n3,4\n"))
+
+
+def test_a_chosen_column_keeps_the_unit_in_its_name(tmp_path: Path) -> None:
+    path = write(tmp_path, FOREIGN)
+    columns = {"frame": "Bild", "theta": "Winkel [°]"}
+    track = body_track(load(path, frame_rate=25.0, columns=columns))
+    np.testing.assert_allclose(track.theta, np.radians([-10, -5, 0, 5, 10, 15]), atol=1e-12)
+    path = write(tmp_path, "Zeit [ms],x_m,y_m\n0,1,2\n40,1,3\n")
+    np.testing.assert_allclose(load(path, columns={"t": "Zeit [ms]"})["time"], [0.0, 0.04])
+
+
+def test_an_angle_of_unknown_name_is_pointed_out(tmp_path: Path) -> None:
+    dataset = load(write(tmp_path, FOREIGN), frame_rate=25.0, columns={"frame": "Bild"})
+    (warning,) = json.loads(dataset.attrs["counts"])["warnings"]
+    assert warning == (
+        "no orientation is read: add --columns 'theta=Winkel [°]' if that column holds it"
+    )

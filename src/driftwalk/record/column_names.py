@@ -119,6 +119,19 @@ def column_meaning(name: str) -> ColumnMeaning | None:
     )
 
 
+def unit_of_name(name: str) -> str:
+    """Return the unit that the name of any column ends in, ``""`` where there is none.
+
+    Examples
+    --------
+    >>> unit_of_name("Winkel [°]")
+    'deg'
+    """
+    text, unit = _split_brackets(name.strip().strip("\"'").strip())
+    last = re.split(r"[\s_.\-/]+", text)[-1].lower()
+    return unit or (_UNITS.get(last, "") if last != text.lower() else "")
+
+
 def _split_brackets(name: str) -> tuple[str, str | None]:
     """Split ``"x (mm)"`` into name and unit; the unit is None when it is not one that is known."""
     match = _BRACKETS.match(name)
@@ -186,7 +199,8 @@ def map_columns(names: list[str], chosen: dict[str, str], *, use_frames: bool) -
             for other, meaning in meanings.items()
             if meaning.quantity != quantity and other != index
         }
-        inferred = known.unit if known and known.quantity == quantity else ""
+        stated = unit_of_name(names[index])
+        inferred = stated if stated in _ALLOWED[quantity] else ""
         meanings[index] = ColumnMeaning(quantity, unit or inferred, "", bool(known and known.bare))
     return _collect(meanings, names, use_frames=use_frames)
 

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.body_columns import body_columns
-from driftwalk.record.column_names import ColumnMap, map_columns
+from driftwalk.record.clock_columns import uneven_clock
+from driftwalk.record.column_names import ColumnMap, map_columns, unit_of_name
 from driftwalk.record.head import first_lines, read_header
-from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
+from driftwalk.record.raw import ANGLE_UNITS, Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.stacked import split_bodies
 from driftwalk.record.text import Table, TableLayout, read_table
 
 NO_CLOCK = "the table has no column of times or frames: every row counts as a frame"
+NAME_THE_CLOCK = (
+    "no column is known to hold times or frames: name it with --columns t=NAME:s or frame=NAME; "
+    "if there is none, give --frame-rate, and every row counts as a frame"
+)
 
 
 class PlainLoader:
@@ -46,6 +52,8 @@ class PlainLoader:
         except InputError as error:
             raise FormatError(str(error), path=path, line=skip if has_header else None) from error
         labels = [name or str(index) for index, name in enumerate(names, start=1)]
+        if columns.clock is None:
+            _require_rows_are_frames(path, columns, labels, options, delimiter, skip)
         table = read_table(path, _layout(columns, labels, delimiter=delimiter, skip=skip))
         clock: Array = (
             np.arange(table.rows, dtype=np.float64)
@@ -53,6 +61,7 @@ class PlainLoader:
             else table.numbers[columns.clock]
         )
         notes = [] if columns.clock is not None else [NO_CLOCK]
+        notes += _unread_angles(columns, labels)
         if "body" not in options.columns and _numbers_the_rows(table, columns.body_column, clock):
             notes.append(f"column '{labels[columns.body_column or 0]}' numbers the rows: one body")
             columns.body_column = None
@@ -72,6 +81,38 @@ class PlainLoader:
             rows=table.rows,
             notes=notes,
         )
+
+
+def _require_rows_are_frames(
+    path: Path,
+    columns: ColumnMap,
+    labels: list[str],
+    options: ReadOptions,
+    delimiter: str,
+    skip: int,
+) -> None:
+    """Refuse a table without a known clock whose rows cannot, or need not, be frames."""
+    found = uneven_clock(path, columns, labels, delimiter=delimiter, skip=skip)
+    if found is not None:
+        frame, time = (shlex.quote(f"{what}={found}") for what in ("frame", "t"))
+        raise FormatError(
+            f"no column is known to hold times or frames, but '{found}' counts up and skips some: "
+            f"add --columns {frame} if it counts frames, --columns {time} if it holds times",
+            path=path,
+        )
+    if options.frame_rate_hz is None:
+        raise FormatError(NAME_THE_CLOCK, path=path)
+
+
+def _unread_angles(columns: ColumnMap, labels: list[str]) -> list[str]:
+    """Say which columns look like the orientation by their unit alone, where none was found."""
+    if any("theta" in places for places in columns.bodies.values()):
+        return []
+    angles = [name for name in labels if unit_of_name(name) in ANGLE_UNITS]
+    if len(angles) != 1:
+        return []
+    option = shlex.quote(f"theta={angles[0]}")
+    return [f"no orientation is read: add --columns {option} if that column holds it"]
 
 
 def _bare_clock(columns: ColumnMap, labels: list[str]) -> str | None:
