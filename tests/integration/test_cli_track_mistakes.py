@@ -95,6 +95,16 @@ def test_a_scale_at_which_the_markers_do_not_fit_the_block(
     assert "check --tank-diameter" in wrong.err
 
 
+def test_a_picture_that_does_not_fit_on_the_disk_leaves_no_markers_either(
+    words: list[object], tmp_path: Path
+) -> None:
+    out = tmp_path / "m.toml"
+    teach = ("markers", "teach", words[0], "--side", "3cm", *TANK, "-o", out)
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192))"
+    assert "m.png: files of this size are not allowed" in refusal(apart(*teach, before=limit))
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_video_without_colours_teaches_nothing_and_says_what_to_do(tmp_path: Path) -> None:
     folder = tmp_path / "grey"
     folder.mkdir()

@@ -11,7 +11,7 @@ from driftwalk.cli import tracking_options as given
 from driftwalk.cli.main import paragraphs
 from driftwalk.cli.output import print_note, print_table
 from driftwalk.cli.tracking_options import TrackingOptions
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import DriftwalkError, InputError
 
 _REMEDY = (
     "take a video in brighter, even light, with stronger colours on the discs, or a part of it in "
@@ -54,7 +54,12 @@ def teach(
     except InputError as error:
         raise InputError(f"{source}: {error}; {_REMEDY}") from None
     save_markers(out, proposal.marker)
-    save_picture(picture, proposal.picture)
+    try:
+        save_picture(picture, proposal.picture)
+    except DriftwalkError:
+        if not overwrite:  # it would stand in the way of the next try
+            out.unlink(missing_ok=True)
+        raise
     marker = proposal.marker
     rows: list[list[Any]] = [
         ["distance of the discs [mm]", 1e3 * marker.spacing_m],
