@@ -49,3 +49,14 @@ def test_nothing_is_said_of_other_files(tmp_path: Path, capsys: pytest.CaptureFi
         assert what_else(path) is None
     assert main(["info", str(tmp_path / "absent.mp4")]) == 2
     assert "no such file" in capsys.readouterr().err
+
+
+def test_a_run_directory_points_to_the_recording_in_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / ".run.json").write_text("{}")
+    (tmp_path / "recording.nc").write_bytes(b"")
+    assert main(["info", str(tmp_path)]) == 2
+    line = capsys.readouterr().err
+    assert "run directory: driftwalk report" in line
+    assert str(tmp_path / "recording.nc") in line

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
+from driftwalk.core.run_layout import state_of
 from driftwalk.schema.netcdf import kind_of
 
 VIDEOS: Final = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpeg", ".mpg", ".webm", ".wmv")
@@ -30,6 +31,10 @@ def what_else(path: Path) -> str | None:
     >>> from importlib.resources import files
     >>> what_else(Path(str(files("driftwalk.datasets") / "tank30_ode_a" / "recording.csv")))
     """
+    if path.is_dir() and state_of(path) in ("unfinished", "finished"):
+        recording = path / "recording.nc"
+        inside = f", and its recording is {recording}" if recording.is_file() else ""
+        return f"is a run directory: driftwalk report takes it{inside}"
     if not path.is_file():
         return None
     if path.suffix.lower() in VIDEOS:
