@@ -6,6 +6,7 @@ import errno
 import io
 import json
 import os
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable
@@ -351,3 +352,27 @@ def test_progress_on_a_terminal_is_a_bar() -> None:
 )
 def test_duration_text(seconds: float, text: str) -> None:
     assert duration_text(seconds) == text
+
+
+@pytest.mark.skipif(os.name != "posix", reason="closes streams as a POSIX shell does")
+def test_closed_streams_are_no_error() -> None:
+    code = "from driftwalk.cli.main import run; run()"
+    words = f"{shlex.quote(sys.executable)} -c {shlex.quote(code)}"
+    done = subprocess.run(f"{words} study new - >&-", shell=True, capture_output=True)
+    assert (done.returncode, done.stderr) == (0, b"")
+    done = subprocess.run(f"{words} info /nowhere.csv 2>&-", shell=True, capture_output=True)
+    assert (done.returncode, done.stdout) == (2, b"")
+
+
+def test_a_backend_that_does_not_exist_is_no_concern_of_figures() -> None:
+    code = (
+        "import sys; from driftwalk.cli import main; main.main = lambda: __import__('matplotlib')\n"
+        "sys.exit = lambda _: None\nmain.run()\nimport matplotlib; print(matplotlib.get_backend())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "MPLBACKEND": "nonsense", "HOME": "/nowhere", "MPLCONFIGDIR": ""},
+        capture_output=True,
+        text=True,
+    )
+    assert (done.stdout.strip().lower(), done.stderr) == ("agg", "")

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import inspect
 import io
+import logging
+import os
 import sys
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any, Final, NamedTuple
@@ -173,8 +175,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def run() -> None:
     """Run the command line and leave the process; the entry point of the installed script."""
+    _open_closed_streams()
     _spell_what_cannot_be_encoded()
+    _quieten_matplotlib()
     sys.exit(main())
+
+
+def _open_closed_streams() -> None:
+    """Let what a shell closed (``>&-``), which Python makes None, lead nowhere."""
+    if sys.stdout is None:
+        sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w")  # noqa: PTH123, SIM115
+
+
+def _quieten_matplotlib() -> None:
+    """Draw into files whatever MPLBACKEND says, and without remarks on the cache of fonts."""
+    os.environ["MPLBACKEND"] = "agg"
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
 
 
 def _spell_what_cannot_be_encoded() -> None:

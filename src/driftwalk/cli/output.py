@@ -105,8 +105,13 @@ def report_command(folder: Path) -> str:
     --------
     >>> report_command(Path("my run"))
     "driftwalk report 'my run' -o report.html"
+    >>> report_command(Path("-run"))
+    'driftwalk report ./-run -o report.html'
     """
-    return f"driftwalk report {shlex.quote(str(folder))} -o report.html"
+    name = str(folder)
+    # A name that begins with a dash would be taken for an option.
+    name = f"./{name}" if name.startswith("-") else name
+    return f"driftwalk report {shlex.quote(name)} -o report.html"
 
 
 def require_place(path: Path, *, existing: str) -> None:
