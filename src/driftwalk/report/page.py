@@ -42,6 +42,8 @@ TITLES: Final = {
 }
 
 
+_SHOWN_ONCE: Final = ("trajectory", "flow")
+"""Kinds of sections that several runs have in common: what they were made of."""
 _BESIDE_CONTENT: Final = ("id", "note", "facts")
 """What two pages may say differently of one thing, such as the noise of a recording."""
 
@@ -145,7 +147,7 @@ def recording_page(
 def joined_page(pages: Sequence[Mapping[str, Any]], *, title: str) -> dict[str, Any]:
     """Return one page with the sections of several, such as the runs that belong together.
 
-    A section that an earlier page shows too, the recording for one, is not repeated.
+    A recording or a flow that an earlier page shows too is not repeated.
 
     Parameters
     ----------
@@ -177,7 +179,7 @@ def joined_page(pages: Sequence[Mapping[str, Any]], *, title: str) -> dict[str, 
     for name, page in zip(names, pages, strict=True):
         for part in page["sections"]:
             content = {key: value for key, value in part.items() if key not in _BESIDE_CONTENT}
-            if content in shown:
+            if part["kind"] in _SHOWN_ONCE and content in shown:
                 continue
             shown.append(content)
             heading = part["title"] if len(names) == 1 else f"{page['title']}: {part['title']}"
