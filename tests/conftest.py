@@ -14,6 +14,10 @@ from hypothesis import HealthCheck, settings
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
+# FFmpeg keeps the level that it finds when a process opens its first video. Here that may be a
+# test's own; later ones look at what a command prints.
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+
 # The same examples in every run, and no bar on their time: whether a test passes tells about the
 # code, not about the machine or the day. `--hypothesis-profile=default` searches anew.
 settings.register_profile(

@@ -130,6 +130,21 @@ def test_swistrack_particles(tmp_path: Path) -> None:
     assert "no identities" in json.loads(dataset.attrs["counts"])["warnings"][0]
 
 
+@pytest.mark.parametrize(
+    ("zone", "unix_s"), [("", 1651406400.0), ("Z", 1651406400.0), ("+02:00", 1651399200.0)]
+)
+def test_time_stamps_of_swistrack_with_a_zone(tmp_path: Path, zone: str, unix_s: float) -> None:
+    """Found by damaging files: NumPy warned of the zone, and left it to a version to come."""
+    rows = [
+        f"{k}\t2022-05-01T12:00:0{k}.500{zone}\t{k}\t2\t0.{k}\t0.2\t9\t0.5\t0.1" for k in range(4)
+    ]
+    names = "X (image), Y (image), X (world), Y (world), Area, Orientation, Compactness\t"
+    path = write(tmp_path, "particles.csv", f"% Frame number, Time, {names}", *rows)
+    dataset = load(path)
+    np.testing.assert_allclose(dataset["time"].values, np.arange(4.0), atol=1e-6)
+    assert dataset.attrs["time_origin_unix_s"] == unix_s + 0.5
+
+
 def checksummed(content: str) -> str:
     return f"${content}*{reduce(lambda total, c: total ^ ord(c), content, 0):02X}\r"
 

@@ -12,8 +12,6 @@ from typing import Any, Final
 from driftwalk.core.errors import FormatError, InputError
 
 _STDERR: Final = 2
-_QUIET: Final = "-8"
-"""Level of FFmpeg at which it prints nothing, also of a file that is no video."""
 
 
 def require_opencv(purpose: str = "tracking") -> Any:
@@ -34,14 +32,10 @@ def require_opencv(purpose: str = "tracking") -> Any:
     >>> require_opencv().__name__
     'cv2'
     """
-    # Read when the first video is opened. A user's own setting stands.
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", _QUIET)
     try:
         import cv2
     except ImportError as error:
         raise InputError(f"{purpose} needs OpenCV: pip install 'driftwalk[track]'") from error
-    # What it cannot read is said in one line of ours; these would come before it.
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     return cv2
 
 

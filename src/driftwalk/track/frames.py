@@ -25,6 +25,8 @@ from driftwalk.track.types import Frame, Image
 _STALE_STRIDE: Final = 16
 _IMAGES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 _TIMES: Final = "times.csv"
+_LATEST_S: Final = 1e12
+"""30 000 years: beyond any clock, and its gaps can still be counted in frames."""
 # A file whose pictures end so long before its stated end was cut off; sound may go on a little.
 _CUT_OFF_S: Final = 0.5
 _FFMPEG_LOG: Final = "OPENCV_FFMPEG_LOGLEVEL"
@@ -363,6 +365,11 @@ def _listed_images(folder: Path) -> list[tuple[Path, float]]:
             ) from None
     if not found:
         raise FormatError("lists no image", path=path)
+    for number, (_, time) in enumerate(found, start=2):
+        if not abs(time) <= _LATEST_S:
+            raise FormatError(
+                f"has a time of {time:g} s, which no clock shows", path=path, line=number
+            )
     return found
 
 

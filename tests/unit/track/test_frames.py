@@ -85,6 +85,10 @@ def test_images_need_times_or_a_rate(tmp_path: Path) -> None:
     (tmp_path / "times.csv").write_text("file,time_s\n0.png,soon\n")
     with pytest.raises(FormatError, match="line 2"):
         dw.open_source(tmp_path)
+    for beyond in ("1e308", "inf", "nan"):
+        (tmp_path / "times.csv").write_text(f"file,time_s\n0.png,1.0\n2.png,{beyond}\n")
+        with pytest.raises(FormatError, match=r"line 3: has a time of .* which no clock shows"):
+            dw.open_source(tmp_path)
 
 
 @pytest.mark.parametrize(

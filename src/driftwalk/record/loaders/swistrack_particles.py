@@ -6,6 +6,7 @@ compactness; the header has commas and starts with ``%``.
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -65,14 +66,20 @@ class SwisTrackParticlesLoader:
 def _times(table: Table, path: Path) -> Array:
     """Return seconds since 1970 of the ISO time stamps."""
     try:
-        stamps = np.array(table.labels[1], dtype="datetime64[ms]").astype(np.int64)
-    except ValueError as error:
+        stamps = np.array([_since_1970(label) for label in table.labels[1]], dtype=np.float64)
+    except (ValueError, OverflowError) as error:
         raise FormatError(
             f"a time stamp is not an ISO date ({error}); give --frame-rate to use frame numbers",
             path=path,
         ) from error
-    seconds: Array = stamps[table.codes[1]] / 1e3
+    seconds: Array = stamps[table.codes[1]]
     return seconds
+
+
+def _since_1970(stamp: str) -> float:
+    """Return the seconds of an ISO time stamp; one that names no zone is taken as UTC."""
+    time = datetime.fromisoformat(stamp)
+    return (time if time.tzinfo is not None else time.replace(tzinfo=UTC)).timestamp()
 
 
 LOADER = SwisTrackParticlesLoader()
