@@ -24,7 +24,7 @@ FRAMES = ("--frame-rate", "10", "--metres-per-pixel", "0.001")
 DEEP, DIGITS = "[" * 5000, "9" * 5000
 
 
-@pytest.mark.parametrize("count", [20, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [20, pytest.param(60, marks=pytest.mark.slow)])
 def test_a_short_round_finds_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, count: int
 ) -> None:
