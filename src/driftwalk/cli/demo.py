@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,6 +14,7 @@ from driftwalk.cli.demo_answer import (
     Fitted,
     in_json,
     print_calibration,
+    print_check,
     print_fit,
     print_next,
     print_places,
@@ -67,10 +69,13 @@ def demo(
     recording, study = tank30_recording(), demo_study(quick=quick)
     folder = files("driftwalk.datasets") / "tank30_ode_a"
     with as_file(folder / "recording.csv") as path:
-        fitted = Fitted(*_fit(recording, study, path, out / FIT, overwrite=overwrite), recording)
+        tell = _tell_nothing if json else print_fit
+        fitted = Fitted(
+            *_fit(recording, study, path, out / FIT, overwrite=overwrite, tell=tell), recording
+        )
         _write_page(out, FIT)
         if not json:
-            print_fit(fitted)
+            print_check(fitted)
             print_next(out / PAGE)
         calibration = _calibrate(recording, study, path, out, overwrite=overwrite, threads=threads)
     _write_page(out, FIT, CALIBRATION)
@@ -95,14 +100,27 @@ def demo_study(*, quick: bool) -> Study:
     return apply_overrides(Study(), {**known, **(QUICK if quick else {})})
 
 
+def _tell_nothing(fit: xr.Dataset) -> None:
+    """Leave the printing to the end."""
+
+
 def _fit(
-    recording: xr.Dataset, study: Study, path: Path, folder: Path, *, overwrite: bool
+    recording: xr.Dataset,
+    study: Study,
+    path: Path,
+    folder: Path,
+    *,
+    overwrite: bool,
+    tell: Callable[[xr.Dataset], None],
 ) -> tuple[xr.Dataset, xr.Dataset]:
-    """Fit and check, or read what a finished run found."""
+    """Fit and check, or read what a finished run found; the fit is told before it is checked."""
     from driftwalk.cli.fit_run import FitWork, run_fit
 
-    if not _finished(folder, overwrite):
-        run_fit(FitWork([recording], study, None, {"recording": path}), folder, overwrite=overwrite)
+    if _finished(folder, overwrite):
+        tell(open_netcdf(folder / "fit.nc"))
+    else:
+        work = FitWork([recording], study, None, {"recording": path})
+        run_fit(work, folder, overwrite=overwrite, fitted=tell)
     return open_netcdf(folder / "fit.nc"), open_netcdf(folder / "check.nc")
 
 

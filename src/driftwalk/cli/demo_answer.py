@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.cli.calibrate import summary as calibration_summary
 from driftwalk.cli.fit import answer
+from driftwalk.cli.fit import summary as fit_summary
 from driftwalk.cli.output import print_note
 
 if TYPE_CHECKING:
@@ -77,16 +78,24 @@ def in_json(fitted: Fitted, calibration: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def print_fit(fitted: Fitted) -> None:
-    """Print the fit beside the truth, and what speaks against it."""
-    fit, truth = answer(fitted.fit, fitted.check), demo_truth()
-    every = 1e3 * truth["force_interval_s"]
+def print_fit(fit: xr.Dataset) -> None:
+    """Print the estimates of the fit beside the truth, as soon as they are there."""
+    every = 1e3 * demo_truth()["force_interval_s"]
     print("This recording was simulated by another engine (ODE): the truth is known.")
-    _print_estimates("likelihood fit", fit)
+    _print_estimates("likelihood fit", fit_summary(fit))
+    # Through a pipe the answer would wait in the buffer for the check and the map.
+    print(
+        f"Intervals of 90 %; σ_F drawn anew every {every:g} ms. {STEP_REMARK}",
+        flush=True,
+    )
+
+
+def print_check(fitted: Fitted) -> None:
+    """Print how far the flow is off, whether the model explains the recording, and what warns."""
+    fit = answer(fitted.fit, fitted.check)
     print_row("flow past the block", "", f"{fitted.flow_error:.1%} off")
     print_row("KS distance, floor", "", _distance(fit, "ks_noise_floor"))
     print_row("model explains it", "", _word(fit["explained"]))
-    print(f"Intervals of 90 %; σ_F drawn anew every {every:g} ms. {STEP_REMARK}")
     for finding in fit["findings"]:
         print_note(f"model check: {finding}")
     for warning in fit["warnings"]:
@@ -96,7 +105,6 @@ def print_fit(fitted: Fitted) -> None:
 def print_next(page: Path) -> None:
     """Say what comes next; whoever waits may open the page of the fit meanwhile."""
     print(f"Its page: {page}")
-    # Through a pipe the answer would wait in the buffer for the map.
     print(
         "Next, the paper's method: a map of KS distances in the fitted flow, a minute or two.\n",
         flush=True,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -55,7 +55,13 @@ class Fitted(NamedTuple):
     """Whether the model explains the recordings; None without a check."""
 
 
-def run_fit(work: FitWork, folder: Path, *, overwrite: bool) -> Fitted:
+def run_fit(
+    work: FitWork,
+    folder: Path,
+    *,
+    overwrite: bool,
+    fitted: Callable[[xr.Dataset], None] | None = None,
+) -> Fitted:
     """Fit in a run directory, check the model, and return both.
 
     Writes ``fit.nc``, ``flow.nc``, ``recording.nc`` (``recording-2.nc``, ...), ``check.nc``,
@@ -69,6 +75,8 @@ def run_fit(work: FitWork, folder: Path, *, overwrite: bool) -> Fitted:
         The run directory.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
+    fitted : callable, optional
+        Told the fit as soon as it is stored, before the figures and the check.
 
     Raises
     ------
@@ -99,6 +107,8 @@ def run_fit(work: FitWork, folder: Path, *, overwrite: bool) -> Fitted:
             for number, recording in enumerate(work.recordings, start=1):
                 name = "recording.nc" if number == 1 else f"recording-{number}.nc"
                 run.write(name, netcdf_bytes(recording))
+            if fitted is not None:
+                fitted(found)
             write_fit_figures(
                 run.folder("figures"),
                 flow=steady_flows(found),
