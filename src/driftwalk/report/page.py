@@ -178,10 +178,11 @@ def joined_page(pages: Sequence[Mapping[str, Any]], *, title: str) -> dict[str, 
     sections: list[Section] = []
     for name, page in zip(names, pages, strict=True):
         for part in page["sections"]:
-            content = {key: value for key, value in part.items() if key not in _BESIDE_CONTENT}
-            if part["kind"] in _SHOWN_ONCE and content in shown:
-                continue
-            shown.append(content)
+            if part["kind"] in _SHOWN_ONCE:
+                content = {key: value for key, value in part.items() if key not in _BESIDE_CONTENT}
+                if content in shown:
+                    continue
+                shown.append(content)
             heading = part["title"] if len(names) == 1 else f"{page['title']}: {part['title']}"
             sections.append({**part, "id": f"{name}-{part['id']}", "title": heading})
     words = [str(page["state"]["words"]) for page in pages if page["state"]["words"]]
