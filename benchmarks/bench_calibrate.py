@@ -24,8 +24,8 @@ import numpy as np
 from timing import machine
 
 from driftwalk import _core
-from driftwalk.calibrate import calibrate
-from driftwalk.calibrate.problem import prepare_problem, worlds_of
+from driftwalk.calibration import calibrate
+from driftwalk.calibration.problem import prepare_problem, worlds_of
 from driftwalk.cli.demo import demo_study
 from driftwalk.datasets import tank30_flow, tank30_recording, tank30_truth
 from driftwalk.report import write_figures

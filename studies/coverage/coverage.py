@@ -21,16 +21,16 @@ import numpy as np
 
 import driftwalk as dw
 from driftwalk import _core
-from driftwalk.calibrate.interval import (
+from driftwalk.calibration.problem import prepare_problem
+from driftwalk.calibration.quality import noise_floor_at, quality_of_fit
+from driftwalk.calibration.region import (
     build_surface,
     confidence_region,
     region_contains,
     run_bootstrap,
     simulated_steps,
 )
-from driftwalk.calibrate.problem import prepare_problem
-from driftwalk.calibrate.quality import noise_floor_at, quality_of_fit
-from driftwalk.calibrate.search import Map, Window, window_smoother
+from driftwalk.calibration.search import Map, Window, window_smoother
 from driftwalk.schema import body_track
 from driftwalk.simulate import recorded_camera
 

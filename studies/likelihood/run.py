@@ -24,9 +24,9 @@ from typing import Any, Final, get_args
 from study_sets import WORLDS, Case, cases_of, keep_motion, load_motion, record
 
 import driftwalk as dw
-from driftwalk.calibrate.fit import AngleUse
 from driftwalk.core.errors import DriftwalkError
 from driftwalk.core.provenance import plain
+from driftwalk.likelihood.fit import AngleUse
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 INFER: Final = "cpp/include/driftwalk/infer"

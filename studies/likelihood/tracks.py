@@ -8,9 +8,9 @@ import numpy as np
 from worlds import RADIUS_M, Floats, World
 
 import driftwalk as dw
-from driftwalk.calibrate.fit_pass import LONGEST_GAP_S
-from driftwalk.calibrate.fit_wall import wall_intervals
 from driftwalk.flow.arena import outline_of
+from driftwalk.likelihood.filter_pass import LONGEST_GAP_S
+from driftwalk.likelihood.wall import wall_intervals
 from driftwalk.model import Tank
 from driftwalk.schema import build_trajectory
 

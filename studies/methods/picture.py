@@ -12,7 +12,7 @@ from recordings import Known, bundled
 from run import read_lines
 
 import driftwalk as dw
-from driftwalk.calibrate.score import block_flow
+from driftwalk.likelihood.recover.score import block_flow
 from driftwalk.report.arena import draw_arena, label_position
 from driftwalk.report.style import (
     DOUBLE_COLUMN_MM,

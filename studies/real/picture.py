@@ -16,12 +16,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from driftwalk.calibrate.problem import (
-    Problem,
-    prepare_problem,
-    score_worlds,
-    worlds_of,
-)
+from driftwalk.calibration.problem import Problem, prepare_problem, score_worlds, worlds_of
 from driftwalk.model import parse_study
 from driftwalk.report.plot_steps import DENSITY_LABEL, density_mesh, density_of
 from driftwalk.report.style import (

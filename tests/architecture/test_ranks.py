@@ -23,7 +23,9 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "sweep": GROUND,
     # `record` for the tracking noise of a recording, which is what "estimate" stands for.
     "simulate": GROUND | {"model", "record"},
-    "calibrate": GROUND | {"simulate", "compare", "flow", "model", "sweep"},
+    "calibration": GROUND | {"simulate", "compare", "flow", "model", "sweep"},
+    # `calibration` for the check of a fit: how far simulated steps are from the recording's.
+    "likelihood": GROUND | {"simulate", "compare", "flow", "model", "sweep", "calibration"},
     "assemble": GROUND | {"simulate", "compare", "flow", "model", "sweep"},
     # `assemble` for the observer: what is seen is classified by the rules of simulated runs.
     "track": GROUND | {"record", "model", "assemble"},
@@ -33,8 +35,8 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "viewer": GROUND
     | {"record", "flow", "model", "compare", "simulate", "assemble", "track", "report"},
     "cli": GROUND
-    | {"record", "flow", "model", "compare", "sweep", "simulate", "calibrate", "assemble"}
-    | {"track", "datasets", "report", "viewer"},
+    | {"record", "flow", "model", "compare", "sweep", "simulate", "assemble"}
+    | {"calibration", "likelihood", "track", "datasets", "report", "viewer"},
 }
 HEAVY = frozenset(
     {"xarray", "scipy", "pandas", "cv2", "matplotlib", "dask", "optuna", "h5netcdf", "SALib"}

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from driftwalk.calibrate.recover_one import FACTS, FLOW_PARTS, PARTS
-from driftwalk.calibrate.recover_summary import PARAMETERS, add_summary
+from driftwalk.likelihood.recover.one import FACTS, FLOW_PARTS, PARTS
+from driftwalk.likelihood.recover.summary import PARAMETERS, add_summary
 from driftwalk.model import Study
 
 TRUTH = {"drag_coefficient": 0.4, "force_std_N": 6e-4, "tracking_noise_m": 3e-4}

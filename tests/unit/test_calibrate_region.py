@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from driftwalk.calibrate.interval import Bootstrap, confidence_region, region_contains
-from driftwalk.calibrate.surface import make_smoother
+from driftwalk.calibration.region import Bootstrap, confidence_region, region_contains
+from driftwalk.calibration.surface import make_smoother
 
 DRAG = np.linspace(0.3, 0.5, 21)
 FORCE = np.linspace(4e-4, 8e-4, 21)

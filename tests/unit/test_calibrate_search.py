@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import driftwalk as dw
-from driftwalk.calibrate.problem import prepare_problem
-from driftwalk.calibrate.search import (
+from driftwalk.calibration.problem import prepare_problem
+from driftwalk.calibration.search import (
     MOST_REFINED_WORLDS,
     WINDOW_STEPS,
     Map,
@@ -19,7 +19,7 @@ from driftwalk.calibrate.search import (
     refined_window,
     run_map,
 )
-from driftwalk.calibrate.surface import Optimum
+from driftwalk.calibration.surface import Optimum
 from driftwalk.compare import apply_steps
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from driftwalk.calibrate.surface import FINENESS, make_smoother
+from driftwalk.calibration.surface import FINENESS, make_smoother
 
 DRAG = np.linspace(0.3, 0.5, 21)
 FORCE = np.linspace(4e-4, 8e-4, 21)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from driftwalk.calibrate.fit_angle import smooth_angle
+from driftwalk.likelihood.angle import smooth_angle
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from driftwalk.calibrate.fit_check_motion import compare_motion
-from driftwalk.calibrate.fit_check_pass import Contrast, Errors, Leverage, velocity_at
-from driftwalk.calibrate.fit_check_place import (
+from driftwalk.compare import ks_distance
+from driftwalk.core.errors import InputError
+from driftwalk.likelihood.check.errors import Contrast, Errors, Leverage, velocity_at
+from driftwalk.likelihood.check.motion import compare_motion
+from driftwalk.likelihood.check.place import (
     Layout,
     cell_of,
     groups_of,
@@ -17,14 +19,12 @@ from driftwalk.calibrate.fit_check_place import (
     spread_of,
     trend_of,
 )
-from driftwalk.calibrate.fit_check_scan import scan_of
-from driftwalk.calibrate.fit_check_verdict import motion_criterion
-from driftwalk.calibrate.fit_check_white import white_of
-from driftwalk.calibrate.fit_check_worlds import Replicates
-from driftwalk.calibrate.fit_pass import Series
-from driftwalk.calibrate.fit_spline import Spline
-from driftwalk.compare import ks_distance
-from driftwalk.core.errors import InputError
+from driftwalk.likelihood.check.scan import scan_of
+from driftwalk.likelihood.check.verdict import motion_criterion
+from driftwalk.likelihood.check.white import white_of
+from driftwalk.likelihood.check.worlds import Replicates
+from driftwalk.likelihood.filter_pass import Series
+from driftwalk.likelihood.spline import Spline
 
 ROWS, PARAMETERS, COMPONENTS = 400, 12, 2
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from fit_worlds import coarse_study, recording
 
-from driftwalk.calibrate.fit import _body, _series
-from driftwalk.calibrate.fit_newton import Prior, Weights, inverse, limited, newton_step
-from driftwalk.calibrate.fit_pass import Passes, Point, Sums
-from driftwalk.calibrate.fit_spline import lay_spline
 from driftwalk.flow.arena import outline_of
+from driftwalk.likelihood.filter_pass import Passes, Point, Sums
+from driftwalk.likelihood.fit import _body, _series
+from driftwalk.likelihood.newton import Prior, Weights, inverse, limited, newton_step
+from driftwalk.likelihood.spline import lay_spline
 from driftwalk.schema import body_track
 
 

@@ -10,10 +10,10 @@ import xarray as xr
 from fit_worlds import coarse_study, recording
 
 import driftwalk as dw
-from driftwalk.calibrate.fit_check_pass import used_pairs
-from driftwalk.calibrate.fit_result import parameter_attrs
-from driftwalk.calibrate.fit_solution import cholesky, require_noise_below_motion, solved
 from driftwalk.core.errors import InputError
+from driftwalk.likelihood.check.errors import used_pairs
+from driftwalk.likelihood.result import parameter_attrs
+from driftwalk.likelihood.solution import cholesky, require_noise_below_motion, solved
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema import Track, build_trajectory
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from driftwalk.calibrate.fit_spline import Spline, lay_spline, penalties
 from driftwalk.flow.arena import outline_of
+from driftwalk.likelihood.spline import Spline, lay_spline, penalties
 
 SPLINE = Spline(origin_x=-0.05, origin_y=0.02, spacing=0.02, columns=8, rows=6)
 

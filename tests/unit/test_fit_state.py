@@ -10,7 +10,7 @@ import xarray as xr
 from fit_worlds import DRAG, FORCE_N, NOISE_M, coarse_study
 
 import driftwalk as dw
-from driftwalk.calibrate.fit import _use_angle
+from driftwalk.likelihood.fit import _use_angle
 from driftwalk.model import apply_overrides
 from driftwalk.schema import body_track, build_trajectory
 

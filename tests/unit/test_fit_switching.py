@@ -22,16 +22,16 @@ from switching_worlds import (
 )
 
 import driftwalk as dw
-from driftwalk.calibrate.fit import _body, _prepare, _spline
-from driftwalk.calibrate.fit_intervals import Intervals, cut_track, intervals_of, switched_frames
-from driftwalk.calibrate.fit_length import in_words, length_advice, needed_duration
-from driftwalk.calibrate.fit_newton import Prior, Weights
-from driftwalk.calibrate.fit_pass import Passes, Point
-from driftwalk.calibrate.fit_result import Whiteness
-from driftwalk.calibrate.fit_warnings import precision_facts, warnings_of
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.flow import bilinear
 from driftwalk.flow.arena import outline_of
+from driftwalk.likelihood.filter_pass import Passes, Point
+from driftwalk.likelihood.fit import _body, _prepare, _spline
+from driftwalk.likelihood.intervals import Intervals, cut_track, intervals_of, switched_frames
+from driftwalk.likelihood.length import in_words, length_advice, needed_duration
+from driftwalk.likelihood.newton import Prior, Weights
+from driftwalk.likelihood.result import Whiteness
+from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema import Track, body_track, build_trajectory
 
 SWITCHED = {"switching_times_s": [START_S + SWITCH_S]}

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from driftwalk.calibrate.fit_wall import wall_intervals
 from driftwalk.flow.arena import Circle, outline_of
+from driftwalk.likelihood.wall import wall_intervals
 
 TANK = Circle(0.15)
 SIDE = 0.03

@@ -8,9 +8,9 @@ import xarray as xr
 from recovery_worlds import small_study
 
 import driftwalk as dw
-from driftwalk.calibrate import recover_one
-from driftwalk.calibrate.recover_one import Truth, simulated_recordings
 from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.likelihood.recover import one as recover_one
+from driftwalk.likelihood.recover.one import Truth, simulated_recordings
 from driftwalk.model import apply_overrides
 from driftwalk.model.recover import true_time_step_s
 

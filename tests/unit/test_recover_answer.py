@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from recovery_worlds import synthetic_recovery
 
-from driftwalk.calibrate.recover_summary import add_summary
 from driftwalk.cli.recover_answer import length_text, summary, warnings
+from driftwalk.likelihood.recover.summary import add_summary
 
 
 def test_counts_and_warnings_of_what_is_left_out() -> None:

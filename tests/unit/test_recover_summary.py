@@ -7,7 +7,7 @@ import pytest
 from recovery_worlds import synthetic_recovery
 from scipy import stats
 
-from driftwalk.calibrate.recover_summary import coverage_interval, error_scale, summarise
+from driftwalk.likelihood.recover.summary import coverage_interval, error_scale, summarise
 
 
 def test_summary_of_four_recordings_by_hand() -> None:

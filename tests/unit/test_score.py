@@ -10,8 +10,8 @@ import xarray as xr
 from fit_worlds import DRAG, FORCE_N, NOISE_M, coarse_study, recording
 
 import driftwalk as dw
-from driftwalk.calibrate.score import block_flow
 from driftwalk.core.errors import InputError
+from driftwalk.likelihood.recover.score import block_flow
 
 R, SIDE = 0.15, 0.03
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import driftwalk as dw
-from driftwalk.calibrate.problem import prepare_problem, score_worlds, worlds_of
+from driftwalk.calibration.problem import prepare_problem, score_worlds, worlds_of
 from driftwalk.core.errors import InputError
 from driftwalk.model import apply_overrides
 from driftwalk.schema import body_track

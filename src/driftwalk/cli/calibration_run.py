@@ -82,7 +82,7 @@ def run_calibration(work: Work, folder: Path, *, overwrite: bool) -> xr.Dataset:
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
     """
-    from driftwalk.calibrate import calibrate
+    from driftwalk.calibration import calibrate
     from driftwalk.report import write_figures
 
     flow = _checked_flow(work)
@@ -124,7 +124,7 @@ def run_calibration(work: Work, folder: Path, *, overwrite: bool) -> xr.Dataset:
 
 def _checked_flow(work: Work) -> xr.Dataset:
     """Return the flow field of a run; refuse a recording before anything is written for it."""
-    from driftwalk.calibrate import check_recording, recording_flow
+    from driftwalk.calibration import check_recording, recording_flow
 
     try:
         flow = work.flow

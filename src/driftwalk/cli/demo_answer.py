@@ -46,8 +46,8 @@ class Fitted:
     @property
     def flow_error(self) -> float:
         """Relative error of the fitted flow, averaged over the block; see `score_fit`."""
-        from driftwalk.calibrate import score_fit
         from driftwalk.datasets import tank30_flow
+        from driftwalk.likelihood import score_fit
 
         truth = demo_truth()
         score = score_fit(

@@ -85,7 +85,7 @@ def run_fit(
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
     """
-    from driftwalk.calibrate import check_fit, check_model, fit_motion, fitted_flow
+    from driftwalk.likelihood import check_fit, check_model, fit_motion, fitted_flow
     from driftwalk.report import write_check_figures, write_fit_figures
 
     check_fit(work.recordings, work.study, body=work.body)
@@ -133,7 +133,7 @@ def run_fit(
 
 def steady_flows(fit: xr.Dataset) -> list[xr.Dataset]:
     """Return the flows of a fit, one for all of it or one for each name."""
-    from driftwalk.calibrate import fitted_flow
+    from driftwalk.likelihood import fitted_flow
 
     if "flow" not in fit.dims:
         return [fitted_flow(fit)]

@@ -62,7 +62,7 @@ def run_recovery(work: RecoverWork, folder: Path, *, overwrite: bool) -> xr.Data
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
     """
-    from driftwalk.calibrate import check_recovery, recovery_study
+    from driftwalk.likelihood import check_recovery, recovery_study
     from driftwalk.report import write_recovery_figures
 
     check_recovery(work.study, work.flow)

@@ -56,7 +56,7 @@ def write_figures(
     Parameters
     ----------
     calibration : xarray.Dataset
-        What `driftwalk.calibrate.calibrate` returns.
+        What `driftwalk.calibration.calibrate` returns.
     flow : xarray.Dataset
         The `flow_field` that was used.
     trajectory : xarray.Dataset

@@ -1,0 +1,45 @@
+"""Whether a recording can be calibrated on, before anything is computed or written."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from driftwalk.calibration.problem import prepare_problem
+from driftwalk.schema import body_track
+from driftwalk.simulate import recorded_camera
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+
+def check_recording(
+    recording: xr.Dataset, study: Study, *, flow: xr.Dataset, body: str | None = None
+) -> None:
+    """Refuse a recording that `calibrate` would refuse; takes no time worth speaking of.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        A `trajectory`.
+    study : Study
+        Model and step interval.
+    flow : xarray.Dataset
+        A `flow_field`.
+    body : str, optional
+        The body, where there are several.
+
+    Raises
+    ------
+    InputError
+        When the recording is too short, does not move, or several bodies are there and none named.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> dw.check_recording(dw.tank30_recording(), dw.Study(), flow=dw.tank30_flow())
+    """
+    track = body_track(recording, body)
+    camera = recorded_camera(track, study, position_quantum=0.0)
+    prepare_problem(track, study, flow, camera=camera).model()

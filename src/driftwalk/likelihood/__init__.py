@@ -1,0 +1,18 @@
+"""The likelihood fit: flow, drag, stochastic force and tracking noise of one recording."""
+
+from driftwalk.likelihood.check.run import check_model
+from driftwalk.likelihood.fit import check_fit, fit_motion
+from driftwalk.likelihood.recover.check import check_recovery
+from driftwalk.likelihood.recover.run import recovery_study
+from driftwalk.likelihood.recover.score import score_fit
+from driftwalk.likelihood.result import fitted_flow
+
+__all__ = [
+    "check_fit",
+    "check_model",
+    "check_recovery",
+    "fit_motion",
+    "fitted_flow",
+    "recovery_study",
+    "score_fit",
+]

@@ -1,0 +1,1 @@
+"""Does the model explain the recording? The check of a likelihood fit."""

@@ -1,0 +1,334 @@
+"""The errors of prediction at the estimate of a fit, and what fitting has taken out of them.
+
+With J the whitened derivatives of the predictions and Lambda the precision of the prior, the
+whitened innovations at the estimate have the covariance ``I - J C J'``, ``C = (J'J + Lambda)^-1``,
+if the model is right: what was fitted is missing in them. So for any sum ``s = W' w`` of whitened
+innovations the variance is ``W'W - A C A'`` with ``A = W'J``, exactly. The rows A of all sums
+that the check needs are collected in one pass; J itself is never held.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+from driftwalk.likelihood.filter_pass import Passes, Place, Point, Series, Sums
+from driftwalk.likelihood.fit import _body, _prepare
+from driftwalk.likelihood.newton import Prior, Weights
+from driftwalk.likelihood.spline import DEGREE, Floats, Spline, basis
+from driftwalk.schema import Track
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+Integers = npt.NDArray[np.int64]
+Flags = npt.NDArray[np.bool_]
+
+SAMPLES_AT_ONCE = 2048
+"""Rows of derivatives that are held at a time: some 20 MB."""
+MOST_KEPT_PARTS = 4
+"""Parts of the recording whose derivatives are kept for the correction of the autocorrelation."""
+DRAWS = 16
+"""Draws of the parameters from which that correction is computed."""
+WHOLE: tuple[Place, ...] = ((slice(None), slice(None)),)
+"""All columns, where they are."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """A fit, ready to run its filter at what it found."""
+
+    study: Study
+    passes: Passes
+    point: Point
+    weights: Weights
+    tracks: Sequence[Track]
+    """What the series of the passes were made of: the recordings, cut at the switching times."""
+
+
+def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str | None) -> Estimate:
+    """Return what a fit found, with the recordings it was fitted to."""
+    from driftwalk.model import parse_study
+
+    if fit.attrs.get("kind") != "fit":
+        raise InputError(f"not a fit: its kind is {fit.attrs.get('kind')!r}; fit_motion makes one")
+    study = parse_study(fit.attrs["study"])
+    ready = _prepare(recordings, study, fit.attrs["angle"], body)
+    samples = sum(one.time.size for one in ready.series)
+    if samples != int(fit.attrs["samples"]):
+        raise InputError(
+            f"the recordings have {samples} positions, the fit was made of {fit.attrs['samples']}: "
+            "check it with the recordings that it was fitted to"
+        )
+    coefficients = np.asarray(fit["coefficient"].values, dtype=np.float64)
+    x, y = fit.attrs["spline_origin_m"]
+    spline = Spline(
+        float(x), float(y), float(fit.attrs["spline_spacing_m"]), *coefficients.shape[:-3:-1]
+    )
+    intensity = fit.attrs["force_noise_intensity_N2_s"] / study.block.mass_kg**2
+    point = Point(
+        coefficients,
+        math.log(fit.attrs["drag_coefficient"]),
+        math.log(intensity),
+        math.log(fit.attrs["tracking_noise_m"]),
+    )
+    if ready.angle == "state":
+        point = replace(
+            point,
+            log_lever=math.log(fit.attrs["force_lever_m"]),
+            log_angle_noise=math.log(fit.attrs["orientation_noise_rad"]),
+        )
+    weights = Weights(float(fit.attrs["roughness_weight"]), float(fit.attrs["size_weight"]))
+    passes = Passes(ready.series, _body(study, ready.angle), spline, len(ready.intervals.labels))
+    return Estimate(study, passes, point, weights, ready.parts)
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """The errors of prediction of one series, whitened, and where they were made."""
+
+    series: Series
+    white: Floats
+    """Shape (n, D); zero where not used."""
+    used: Flags
+    outlier: Flags
+    """Samples that the filter did not take, so far were they from where it had predicted them."""
+    speed: Floats
+    """Speed of the water past the block at the sample before [m/s], NaN where unknown; (n,)."""
+
+    @property
+    def components(self) -> int:
+        """Number of numbers that are predicted at each sample."""
+        return int(self.white.shape[1])
+
+
+def errors_of(estimate: Estimate) -> list[Errors]:
+    """Run the filter over every series at the estimate."""
+    found = []
+    whitened = estimate.passes.innovations(estimate.point)
+    for series, (white, used) in zip(estimate.passes.series, whitened, strict=True):
+        point = estimate.point.in_flow(series.flow)
+        states = estimate.passes._filter(series, point).run(series.time.size)["state"]
+        speed = np.full(series.time.size, np.nan)
+        # The state before the sample: to sort errors by what they caused would bias them.
+        speed[1:] = _relative_speed(states[:-1], estimate.passes.spline, point)
+        outlier = np.isfinite(white).all(axis=1) & ~used & (series.excluded == 0)
+        found.append(Errors(series, np.where(used[:, None], white, 0.0), used, outlier, speed))
+    return found
+
+
+def _relative_speed(states: Floats, spline: Spline, point: Point) -> Floats:
+    flow = velocity_at(spline, point.coefficients, states[:, 0], states[:, 1])
+    # Coordinates come first, as many as velocities.
+    velocity = states[:, states.shape[1] // 2 :]
+    return np.asarray(np.hypot(flow[0] - velocity[:, 0], flow[1] - velocity[:, 1]))
+
+
+def velocity_at(spline: Spline, coefficients: Floats, x: Floats, y: Floats) -> Floats:
+    """Return the flow [m/s] at points, shape (2, n); NaN where a coordinate is."""
+    total = np.zeros((2, x.size))
+    along = []
+    for position, origin, count in (
+        (x, spline.origin_x, spline.columns),
+        (y, spline.origin_y, spline.rows),
+    ):
+        share = np.nan_to_num((position - origin) / spline.spacing)
+        cell = np.clip(np.floor(share).astype(np.intp), 0, count - DEGREE - 1)
+        along.append((cell, basis(share - cell)))
+    (column, weight_x), (row, weight_y) = along
+    for j in range(DEGREE + 1):
+        for i in range(DEGREE + 1):
+            total += coefficients[:, row + j, column + i] * weight_y[:, j] * weight_x[:, i]
+    total[:, ~(np.isfinite(x) & np.isfinite(y))] = np.nan
+    return total
+
+
+@dataclass(eq=False)
+class Contrast:
+    """Weighted sums of whitened innovations, one for each group of rows.
+
+    Attributes
+    ----------
+    groups : sequence of ndarray, shapes (n, D)
+        Of each series: the group of each innovation, -1 for none.
+    size : int
+        Number of groups.
+    by : {"one", "flow", "drag"}
+        Weight of an innovation: one; its derivative by a factor of the flow; by ln C_d.
+    """
+
+    groups: Sequence[Integers]
+    size: int
+    by: str = "one"
+    score: Floats = field(init=False)
+    """The sums, (size,)."""
+    power: Floats = field(init=False)
+    """Sums of the squared weights, (size,)."""
+    slope: Floats = field(init=False)
+    """Their derivatives by the parameters, with the sign turned, (size, parameters)."""
+
+    def begin(self, parameters: int) -> None:
+        """Make room for the sums."""
+        self.score, self.power = np.zeros(self.size), np.zeros(self.size)
+        self.slope = np.zeros((self.size, parameters))
+
+    def add(
+        self,
+        group: Integers,
+        weight: Floats,
+        white: Floats,
+        jacobian: Floats,
+        places: Sequence[Place] = WHOLE,
+    ) -> None:
+        """Add the rows of one part; `places` says where its columns stand among all parameters."""
+        from scipy.sparse import csr_matrix
+
+        kept = np.flatnonzero(group >= 0)
+        if not kept.size:
+            return
+        present, local = np.unique(group[kept], return_inverse=True)
+        matrix = csr_matrix((weight[kept], (local, kept)), shape=(present.size, group.size))
+        self.score[present] += np.asarray(matrix @ white)
+        self.power[present] += np.bincount(local, weight[kept] ** 2)
+        slope = np.asarray(matrix @ jacobian)
+        for own, columns in places:
+            self.slope[present, columns] += slope[:, own]
+
+
+@dataclass(frozen=True, eq=False)
+class Leverage:
+    """What fitting took out of the errors."""
+
+    spread: Floats
+    """A matrix whose product with standard normals has the covariance C: its root."""
+    parameters: float
+    """Effective number of parameters: the trace of J C J'."""
+    autocovariance: Floats
+    """Mean of J C J' at lags 0, 1, ..., shape (D, lags + 1)."""
+
+    @property
+    def covariance(self) -> Floats:
+        """C, of the flow's coefficients and ln C_d."""
+        return np.asarray(self.spread @ self.spread.T)
+
+
+class _Part(NamedTuple):
+    """Some samples of one series."""
+
+    series: int
+    flow: int
+    start: int
+    jacobian: Floats
+    """By the coefficients of the part's flow and ln C_d, shape (rows, columns): the components of
+    a sample one after the other."""
+    white: Floats
+    places: tuple[Place, Place]
+    """Where its columns stand among the parameters of all flows."""
+
+
+def collect(
+    estimate: Estimate, errors: Sequence[Errors], contrasts: Sequence[Contrast], *, lags: int
+) -> Leverage:
+    """Fill the contrasts in one pass with derivatives, and return what fitting took out."""
+    from scipy.linalg import solve_triangular
+    from scipy.linalg.blas import dsyrk
+
+    size = estimate.point.coefficients.size + 1
+    count = sum(math.ceil(one.used.size / SAMPLES_AT_ONCE) for one in errors)
+    chosen = set(np.linspace(0, count - 1, MOST_KEPT_PARTS).astype(int).tolist())
+    kept = []
+    for contrast in contrasts:
+        contrast.begin(size)
+    lower: dict[int, Any] = {}
+    for number, part in enumerate(_parts(estimate, errors)):
+        jacobian = part.jacobian
+        if part.flow not in lower:
+            lower[part.flow] = np.zeros((jacobian.shape[1],) * 2, order="F")
+        lower[part.flow] = dsyrk(
+            1.0, jacobian.T, beta=1.0, c=lower[part.flow], overwrite_c=1, lower=1
+        )
+        weights = {
+            "one": np.ones(part.white.size),
+            "flow": jacobian[:, :-1] @ estimate.point.in_flow(part.flow).coefficients.ravel(),
+            "drag": jacobian[:, -1],
+        }
+        for contrast in contrasts:
+            group = contrast.groups[part.series][part.start : part.start + SAMPLES_AT_ONCE]
+            contrast.add(group.ravel(), weights[contrast.by], part.white, jacobian, part.places)
+        if number in chosen:
+            kept.append(part)
+    data = np.zeros((size, size))
+    for flow, part_of in lower.items():
+        whole = np.tril(part_of) + np.tril(part_of, -1).T
+        places = estimate.passes.columns_of(flow, 1)
+        for own, row in places:
+            for own_column, column in places:
+                data[row, column] += whole[own, own_column]
+    prior = Prior(estimate.passes)
+    sums = Sums(0.0, np.zeros(len(data)), data, 0)
+    full = prior.add(sums, estimate.point, estimate.weights).information
+    spread = solve_triangular(np.linalg.cholesky(full), np.eye(len(full)), lower=True).T
+    return Leverage(
+        spread,
+        float(((data @ spread) * spread).sum()),
+        _autocovariance(spread, errors, kept, lags),
+    )
+
+
+def _parts(estimate: Estimate, errors: Sequence[Errors]) -> Iterator[_Part]:
+    """Run the filter with derivatives over every series, some samples at a time."""
+    for index, one in enumerate(errors):
+        flow = one.series.flow
+        places = estimate.passes.columns_of(flow, 1)
+        point = estimate.point.in_flow(flow)
+        running = estimate.passes._filter(one.series, point, sensitivities=True)
+        for start in range(0, one.used.size, SAMPLES_AT_ONCE):
+            found = running.run(SAMPLES_AT_ONCE)
+            white = np.asarray(found["whitened"]).ravel()
+            yield _Part(index, flow, start, np.asarray(found["jacobian"]), white, places)
+
+
+def used_pairs(used: Flags, lags: int) -> Iterator[tuple[int, Flags]]:
+    """Yield the lags that the samples reach, each with where a sample and the one so far on count.
+
+    Parameters
+    ----------
+    used : ndarray of bool, shape (n,)
+        Samples that count; there may be fewer of them than lags.
+    lags : int
+        Longest lag.
+
+    Yields
+    ------
+    tuple of int and ndarray of bool, shape (n - lag,)
+        The lag, and by the earlier sample whether both count.
+    """
+    for lag in range(min(lags, used.size - 1) + 1):
+        yield lag, used[lag:] & used[: used.size - lag]
+
+
+def _autocovariance(
+    spread: Floats, errors: Sequence[Errors], kept: Sequence[_Part], lags: int
+) -> Floats:
+    """Return the mean of J C J' by component and lag, from draws of the parameters."""
+    components = errors[0].components
+    generator = np.random.default_rng(0)
+    draws = spread @ generator.normal(size=(len(spread), DRAWS))
+    total, pairs = np.zeros((components, lags + 1)), np.zeros(lags + 1)
+    for part in kept:
+        own = np.concatenate([draws[columns] for _, columns in part.places])
+        moved = (part.jacobian @ own).reshape(-1, components, DRAWS)
+        used = errors[part.series].used[part.start : part.start + len(moved)]
+        for lag, both in used_pairs(used, lags):
+            products = moved[lag:][both] * moved[: used.size - lag][both]
+            total[:, lag] += products.sum(axis=(0, 2)) / DRAWS
+            pairs[lag] += both.sum()
+    return np.asarray(total / np.maximum(pairs, 1.0))

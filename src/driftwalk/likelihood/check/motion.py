@@ -1,0 +1,149 @@
+"""Does the fitted model move like the recording? The recording's steps against simulated ones.
+
+Steps are formed by the same function for all. Replicates at the estimate give the distance and its
+noise floor. Replicates with flow and parameters drawn from what the fit leaves open give the
+judgement: if the model is right, the recording is to them as they are to each other, for each
+differs from the fitted values as the truth does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from driftwalk import _core
+from driftwalk.core.errors import InputError
+from driftwalk.likelihood.check.worlds import Replicates
+from driftwalk.likelihood.spline import Floats
+
+BINS = 40
+BAND = 0.9
+"""Share of the replicates within the bands of the densities."""
+SHOWN_FRACTION = 0.9995
+FEWEST_REPLICATES = 4
+
+
+class Density(NamedTuple):
+    """Density of steps by bin: the recording's, and what the model makes likely."""
+
+    edge: Floats
+    """Edges of the bins, [m] or [rad], (bins + 1,)."""
+    recording: Floats
+    """[1/m] or [1/rad], (bins,)."""
+    median: Floats
+    low: Floats
+    high: Floats
+
+
+class Motion(NamedTuple):
+    """The recording against simulated ones."""
+
+    distance: Floats
+    """KS distance of the recording to each replicate at the estimate."""
+    floor: Floats
+    """KS distances between replicates at the estimate."""
+    drawn_distance: Floats
+    """KS distance of the recording to each replicate with drawn parameters."""
+    drawn_between: Floats
+    """Mean distance of each of those to the others that are in another flow."""
+    flows: int
+    """Number of drawn flows."""
+    step_length: Density
+    turning_angle: Density
+
+    @property
+    def rank_p_value(self) -> float:
+        """Share of drawn replicates that are as far from the others as the recording is from all.
+
+        The recording counts as one of them, so that 1 / (1 + replicates) is the least.
+        """
+        further = np.count_nonzero(self.drawn_between >= self.drawn_distance.mean())
+        return float((1 + further) / (1 + self.drawn_between.size))
+
+    @property
+    def p_value(self) -> float:
+        """The same from a normal distribution of the logarithms, which goes beyond the ranks.
+
+        Replicates in one flow are alike, so the degrees of freedom are those of the flows.
+        """
+        from scipy.stats import t
+
+        logs = np.log(self.drawn_between)
+        spread = max(float(logs.std(ddof=1)), 1e-12) * np.sqrt(1.0 + 1.0 / logs.size)
+        off = (np.log(self.drawn_distance.mean()) - logs.mean()) / spread
+        return float(t.sf(off, self.flows - 1))
+
+
+def compare_motion(
+    real: Floats, at_estimate: Replicates, drawn: Replicates, *, threads: int
+) -> Motion:
+    """Compare a recording's steps with simulated ones.
+
+    Parameters
+    ----------
+    real : ndarray, shape (pairs, 2)
+        Step lengths [m] and turning angles [rad].
+    at_estimate, drawn : Replicates
+        Simulated recordings.
+    threads : int
+        Of the native core.
+
+    Raises
+    ------
+    InputError
+        When fewer than four replicates of either set are sound.
+    """
+    for replicates in (at_estimate, drawn):
+        alone = replicates is drawn and np.unique(drawn.flow).size < 2
+        if len(replicates.steps) < FEWEST_REPLICATES or alone:
+            raise InputError(
+                f"{replicates.broken} of {replicates.broken + len(replicates.steps)} simulated "
+                "recordings broke down: the fitted model cannot be simulated"
+            )
+    half = len(at_estimate.steps) // 2
+    floor = _distances(at_estimate.steps[:half], at_estimate.steps[half:], threads)
+    among = _distances(drawn.steps, drawn.steps, threads)
+    among[drawn.flow[:, None] == drawn.flow[None, :]] = np.nan
+    limits = [
+        float(
+            np.quantile(np.abs(np.concatenate([real[:, k], *(s[:, k] for s in drawn.steps)])), part)
+        )
+        for k, part in ((0, SHOWN_FRACTION), (1, 1.0))
+    ]
+    return Motion(
+        _distances([real], at_estimate.steps, threads)[0],
+        floor.ravel(),
+        _distances([real], drawn.steps, threads)[0],
+        np.nanmean(among, axis=1),
+        int(np.unique(drawn.flow).size),
+        _density(real, drawn, 0, np.linspace(0.0, limits[0] or 1.0, BINS + 1)),
+        _density(real, drawn, 1, np.linspace(-limits[1], limits[1], BINS + 1)),
+    )
+
+
+def _distances(first: Sequence[Floats], second: Sequence[Floats], threads: int) -> Floats:
+    """Return the KS distances of every recording to every other, (first, second)."""
+    return np.asarray(_core.ks_matrix(*_padded(first), *_padded(second), threads=threads))
+
+
+def _padded(steps: Sequence[Floats]) -> tuple[Floats, Floats, np.ndarray]:
+    pairs = np.array([len(one) for one in steps], dtype=np.int64)
+    length, angle = np.zeros((2, pairs.size, int(pairs.max())))
+    for k, one in enumerate(steps):
+        length[k, : len(one)], angle[k, : len(one)] = one.T
+    return length, angle, pairs
+
+
+def _density(real: Floats, drawn: Replicates, column: int, edge: Floats) -> Density:
+    rows = np.array([_histogram(one[:, column], edge) for one in drawn.steps])
+    tail = 0.5 * (1.0 - BAND)
+    low, median, high = np.quantile(rows, [tail, 0.5, 1.0 - tail], axis=0)
+    return Density(edge, _histogram(real[:, column], edge), median, low, high)
+
+
+def _histogram(values: Floats, edge: Floats) -> Floats:
+    """Return the density in each bin, as a share of all values and not of those shown."""
+    count, _ = np.histogram(values, bins=edge)
+    return np.asarray(count / values.size / np.diff(edge))

@@ -1,0 +1,287 @@
+"""Where and when the errors of prediction are not what the model says.
+
+All statistics here are sums of whitened innovations over groups (a cell of the tank, a part of the
+recording, a range of speeds) with their exact variance after fitting, see
+`driftwalk.likelihood.check.errors`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.likelihood.check.errors import Contrast, Errors, Integers
+from driftwalk.likelihood.spline import Floats
+
+Flags = npt.NDArray[np.bool_]
+
+CELLS_PER_SIDE = 1.5
+MOST_CELLS = 24
+"""Most cells across the tank."""
+TIME_BINS = 10
+FEWEST_IN_BIN = 300
+"""Samples of a part of the recording."""
+SPEED_BINS = 6
+FEWEST_IN_CELL = 10
+FEWEST_FOR_SPREAD = 50
+"""Samples that make the mean of their squares about normal."""
+LEAST_FREEDOM = 0.1
+"""A direction in which fitting has left less than this share of the variance says nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Cells of the tank, parts of the recordings, ranges of speed."""
+
+    x: Floats
+    """Centres of the cells [m]."""
+    y: Floats
+    size: float
+    """Side of a cell [m]."""
+    series: Integers
+    """Which series each part belongs to: a recording, or what is between two switching times."""
+    start: Floats
+    """When each part begins, from the first sample of its recording [s]."""
+    end: Floats
+    speed: Floats
+    """Edges of the ranges of the speed of the water past the block [m/s]."""
+    sources: tuple[tuple[int, int], ...] = ()
+    """Recording and flow of each series; without them every series is a recording in one flow."""
+
+    def recording(self, part: int) -> int:
+        """Return the recording that a part belongs to."""
+        series = int(self.series[part])
+        return self.sources[series][0] if self.sources else series
+
+    def flow(self, part: int) -> int:
+        """Return the flow that a part is in."""
+        return self.sources[int(self.series[part])][1] if self.sources else 0
+
+    @property
+    def recordings(self) -> int:
+        """Number of recordings."""
+        return len({self.recording(part) for part in range(self.parts)})
+
+    @property
+    def cells(self) -> int:
+        """Number of cells."""
+        return int(self.x.size * self.y.size)
+
+    @property
+    def parts(self) -> int:
+        """Number of parts of the recordings."""
+        return int(self.start.size)
+
+
+def lay_out(
+    errors: Sequence[Errors], bounds: tuple[float, float, float, float], *, side: float
+) -> Layout:
+    """Lay cells over the tank, and cut the recordings and the speeds into parts."""
+    x_min, y_min, x_max, y_max = bounds
+    widest = max(x_max - x_min, y_max - y_min)
+    size = max(side / CELLS_PER_SIDE, widest / MOST_CELLS)
+    axes = []
+    for low, high in ((x_min, x_max), (y_min, y_max)):
+        count = max(1, int(np.ceil((high - low) / size - 1e-9)))
+        middle = size * (np.arange(count, dtype=np.float64) - 0.5 * (count - 1))
+        axes.append(0.5 * (low + high) + middle)
+    samples = sum(int(one.used.sum()) for one in errors)
+    parts = int(np.clip(samples // FEWEST_IN_BIN, 1, TIME_BINS))
+    numbers, start, end = [], [], []
+    duration = sum(float(one.series.time[-1] - one.series.time[0]) for one in errors)
+    for index, one in enumerate(errors):
+        first, last = float(one.series.time[0]), float(one.series.time[-1])
+        count = max(1, round(parts * (last - first) / duration))
+        edges = np.linspace(first, last, count + 1)
+        numbers += [index] * count
+        start += edges[:-1].tolist()
+        end += edges[1:].tolist()
+    speeds = np.concatenate([one.speed[one.used] for one in errors])
+    speeds = speeds[np.isfinite(speeds)]
+    edges = (
+        np.quantile(speeds, np.linspace(0.0, 1.0, SPEED_BINS + 1)) if speeds.size else np.zeros(0)
+    )
+    return Layout(
+        axes[0],
+        axes[1],
+        size,
+        np.array(numbers),
+        np.array(start),
+        np.array(end),
+        np.unique(edges),
+        tuple((one.series.recording, one.series.flow) for one in errors),
+    )
+
+
+class Groups(NamedTuple):
+    """The groups of every sample of one series, -1 for none."""
+
+    cell: Integers
+    part: Integers
+    speed: Integers
+
+
+def groups_of(layout: Layout, errors: Sequence[Errors]) -> list[Groups]:
+    """Return the groups of the samples of every series."""
+    found = []
+    for index, one in enumerate(errors):
+        # Where the body was at the sample before: known when the prediction was made.
+        x, y = (np.concatenate([axis[:1], axis[:-1]]) for axis in (one.series.x, one.series.y))
+        parts = np.flatnonzero(layout.series == index)
+        part = parts[0] + np.searchsorted(layout.start[parts][1:], one.series.time, side="right")
+        speed = np.searchsorted(layout.speed[1:-1], np.nan_to_num(one.speed), side="right")
+        known = one.used & np.isfinite(one.speed) & (layout.speed.size > 1)
+        found.append(
+            Groups(
+                np.where(one.used, cell_of(layout, x, y), -1),
+                np.where(one.used, part, -1),
+                np.where(known, speed, -1),
+            )
+        )
+    return found
+
+
+def cell_of(layout: Layout, x: Floats, y: Floats) -> Integers:
+    """Return the cells that points are in, those at the rim for points outside."""
+    found = []
+    for values, axis in ((x, layout.x), (y, layout.y)):
+        share = np.floor((values - axis[0]) / layout.size + 0.5)
+        found.append(np.clip(share.astype(np.int64), 0, axis.size - 1))
+    return np.asarray(found[1] * layout.x.size + found[0])
+
+
+class Contrasts(NamedTuple):
+    """What is summed up in the pass with derivatives."""
+
+    place: Contrast
+    """By part of the recording, cell and component, in that order."""
+    strength: Contrast
+    """By part of the recording, weighted with what a stronger flow would do."""
+    drag: Contrast
+    """By range of speed, weighted with what a stronger drag would do."""
+
+
+def contrasts_of(layout: Layout, groups: Sequence[Groups], components: int) -> Contrasts:
+    """Return the empty sums."""
+    place, part, speed = [], [], []
+    for one in groups:
+        both = np.where(one.cell >= 0, one.part * layout.cells + one.cell, -1)[:, None]
+        place.append(np.where(both >= 0, both * components + np.arange(components), -1))
+        part.append(np.repeat(one.part[:, None], components, axis=1))
+        speed.append(np.repeat(one.speed[:, None], components, axis=1))
+    return Contrasts(
+        Contrast(place, layout.parts * layout.cells * components),
+        Contrast(part, layout.parts, by="flow"),
+        Contrast(speed, max(layout.speed.size - 1, 1), by="drag"),
+    )
+
+
+class Local(NamedTuple):
+    """Sums over cells, with their distance from zero; the first axis is that of the groups."""
+
+    samples: Floats
+    mean: Floats
+    """Mean whitened innovation, (groups, D)."""
+    chi_squared: Floats
+    """Squared distance of the mean from zero in its own standard deviations; NaN where there are
+    too few samples."""
+
+
+def local_scores(score: Floats, count: Floats, slope: Floats, covariance: Floats) -> Local:
+    """Return the sums of groups with their chi squared of D degrees of freedom.
+
+    Parameters
+    ----------
+    score : ndarray, shape (groups, D)
+        Sums of whitened innovations.
+    count : ndarray, shape (groups,)
+        Samples.
+    slope : ndarray, shape (groups, D, parameters)
+        Derivatives of the sums.
+    covariance : ndarray, shape (parameters, parameters)
+        C.
+    """
+    chi_squared = np.full(count.size, np.nan)
+    enough = np.flatnonzero(count >= FEWEST_IN_CELL)
+    if enough.size:
+        rows = slope[enough]
+        taken = np.einsum("gdp,gep->gde", (rows @ covariance), rows)
+        left = np.eye(score.shape[1]) - taken / count[enough][:, None, None]
+        value, vector = np.linalg.eigh(left)
+        along = np.einsum("gde,gd->ge", vector, score[enough]) / np.sqrt(count[enough])[:, None]
+        chi_squared[enough] = (along**2 / np.maximum(value, LEAST_FREEDOM)).sum(axis=1)
+    return Local(count, score / np.maximum(count, 1.0)[:, None], chi_squared)
+
+
+class Trend(NamedTuple):
+    """A factor (of the flow, of C_d) that should be one everywhere."""
+
+    change: Floats
+    """By how much the factor seems to be off in each group, relative."""
+    std: Floats
+    """Its standard deviation."""
+    chi_squared: float
+    dof: int
+
+
+def trend_of(contrast: Contrast, covariance: Floats) -> Trend:
+    """Return the estimated changes of a factor, about their common mean, and their chi squared.
+
+    The sums have covariance V = diag(power) - A C A', and a change d of the factor in the groups
+    moves them by V d. What the fit has taken out (the mean of the factor, mostly) cannot be seen.
+    """
+    variance = np.diag(contrast.power) - contrast.slope @ covariance @ contrast.slope.T
+    value, vector = np.linalg.eigh(variance)
+    typical = float(contrast.power.max(initial=0.0))
+    seen = value > LEAST_FREEDOM * typical
+    if not typical > 0.0 or not seen.any():
+        nothing = np.full(contrast.size, np.nan)
+        return Trend(nothing, nothing, 0.0, 0)
+    inverse = (vector[:, seen] / value[seen]) @ vector[:, seen].T
+    change = inverse @ contrast.score
+    return Trend(
+        change,
+        np.sqrt(np.diag(inverse)),
+        float(contrast.score @ change),
+        int(seen.sum()),
+    )
+
+
+class Spread(NamedTuple):
+    """Mean square of the errors in each group, relative to that of all."""
+
+    ratio: Floats
+    """NaN where there are too few samples."""
+    std: Floats
+    """Standard deviation of the ratio if it is one."""
+
+
+def spread_of(errors: Sequence[Errors], groups: Sequence[Integers], size: int) -> Spread:
+    """Return whether the errors are larger in some groups: the noise is to be the same everywhere.
+
+    Parameters
+    ----------
+    errors : sequence of Errors
+        The errors of every recording.
+    groups : sequence of ndarray, shapes (n,)
+        The group of each sample, -1 for none.
+    size : int
+        Number of groups.
+    """
+    group = np.concatenate(list(groups))
+    square = np.concatenate([(one.white**2).mean(axis=1) for one in errors])[group >= 0]
+    group = group[group >= 0]
+    count = np.bincount(group, minlength=size).astype(np.float64)
+    mean = max(float(square.mean()), 1e-300) if square.size else 1.0
+    enough = count >= FEWEST_FOR_SPREAD
+    ratio, std = np.full(size, np.nan), np.full(size, np.nan)
+    total = np.bincount(group, square, minlength=size)
+    ratio[enough] = total[enough] / count[enough] / mean
+    # The mean of all is made of the groups as well.
+    share = 1.0 - count[enough] / max(square.size, 1)
+    std[enough] = float(square.std()) / mean * np.sqrt(share / count[enough])
+    return Spread(ratio, std)

@@ -1,0 +1,138 @@
+"""Did the flow change during the recording? Velocities in the same cell at different times.
+
+The errors of prediction see a change of the flow badly: a wrong flow makes the fit lower C_d until
+one sample tells little of the next. So the body's own velocity is looked at. For every stretch of
+the recording (one part, or several that follow each other) its mean in each cell is compared with
+the mean in the same cell during the rest; how far apart chance alone brings them is known from
+simulated recordings, whose flow is steady.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from driftwalk.likelihood.check.place import Layout, cell_of
+from driftwalk.likelihood.check.worlds import Path
+from driftwalk.likelihood.spline import Floats
+
+FEWEST_IN_CELL = 5
+"""Velocities in a cell, on either side of the comparison."""
+LONGEST_INTERVALS = 1.5
+"""A velocity is taken between samples at most this many usual intervals apart."""
+LEAST_SPREAD = 0.02
+"""Of the logarithm of a difference among replicates: less is chance, with a dozen of them."""
+
+
+class Scan(NamedTuple):
+    """The stretch of the recording that differs most from the rest."""
+
+    first: int
+    """First part of the stretch."""
+    last: int
+    """Its last part."""
+    difference: float
+    """Root mean square difference of the velocities in the same cells [m/s]."""
+    expected: float
+    """Its median among simulated recordings [m/s]."""
+    expected_std: float
+    p_value: float
+
+
+def scan_of(
+    real: Sequence[Path], simulated: Sequence[Sequence[Path]], layout: Layout
+) -> Scan | None:
+    """Return the stretch that differs most from the rest; None where there is only one part.
+
+    Parameters
+    ----------
+    real : sequence of tuple
+        The recordings.
+    simulated : sequence of sequence of tuple
+        Replicates of the recordings.
+    layout : Layout
+        Cells, and parts of the recordings.
+    """
+    from scipy.stats import gumbel_r
+
+    stretches = _stretches(layout)
+    if not stretches:
+        return None
+    table = np.array([_differences(one, stretches, layout) for one in (real, *simulated)])
+    known = (table > 0.0).all(axis=0)
+    if not known.any():
+        return None
+    logs = np.log(table[:, known])
+    mine, theirs = logs[0], logs[1:]
+    spread = max(float(np.sqrt(theirs.var(axis=0, ddof=1).mean())), LEAST_SPREAD)
+    off = (mine - theirs.mean(axis=0)) / spread
+    # Each replicate against the others, as the recording is against all.
+    others = (theirs.sum(axis=0) - theirs) / (len(theirs) - 1)
+    largest = ((theirs - others) / spread).max(axis=1)
+    best = int(off.argmax())
+    # The largest of many has a tail like Gumbel's: two numbers, from mean and standard deviation.
+    scale = largest.std(ddof=1) * np.sqrt(6.0) / np.pi
+    p_value = float(gumbel_r.sf(off[best], largest.mean() - np.euler_gamma * scale, scale))
+    first, last = stretches[int(np.flatnonzero(known)[best])]
+    chosen = np.exp(theirs[:, best])
+    return Scan(
+        first,
+        last,
+        float(np.exp(mine[best])),
+        float(np.median(chosen)),
+        float(chosen.std(ddof=1)),
+        p_value,
+    )
+
+
+def _stretches(layout: Layout) -> list[tuple[int, int]]:
+    """Return the first and last part of every stretch of one series, but not of a whole flow."""
+    found = []
+    in_flow = np.bincount([layout.flow(part) for part in range(layout.parts)])
+    for first in range(layout.parts):
+        for last in range(first, layout.parts):
+            same = layout.series[first] == layout.series[last]
+            if same and last - first + 1 < in_flow[layout.flow(first)]:
+                found.append((first, last))
+    return found
+
+
+def _differences(
+    paths: Sequence[Path], stretches: Sequence[tuple[int, int]], layout: Layout
+) -> Floats:
+    """Return the root mean square difference of each stretch to the rest [m/s], 0 for none.
+
+    The rest is that in the same flow.
+    """
+    sums = np.concatenate([_sums(path, index, layout) for index, path in enumerate(paths)])
+    flows = np.array([layout.flow(part) for part in range(layout.parts)])
+    whole = {int(flow): sums[flows == flow].sum(axis=0) for flow in np.unique(flows)}
+    running = np.concatenate([np.zeros((1, *sums.shape[1:])), np.cumsum(sums, axis=0)])
+    found = np.zeros(len(stretches))
+    for k, (first, last) in enumerate(stretches):
+        inside = running[last + 1] - running[first]
+        rest = whole[int(flows[first])] - inside
+        both = (inside[0] >= FEWEST_IN_CELL) & (rest[0] >= FEWEST_IN_CELL)
+        if both.any():
+            inside, rest = inside[:, both], rest[:, both]
+            apart = inside[1:] / inside[0] - rest[1:] / rest[0]
+            weight = 1.0 / (1.0 / inside[0] + 1.0 / rest[0])
+            found[k] = np.sqrt((weight * (apart**2).sum(axis=0)).sum() / weight.sum())
+    return found
+
+
+def _sums(path: Path, series: int, layout: Layout) -> Floats:
+    """Return number and sums of the velocities by part and cell, (parts, 3, cells)."""
+    time, x, y = path
+    step = np.diff(time)
+    parts = np.flatnonzero(layout.series == series)
+    part = np.searchsorted(layout.start[parts][1:], time[:-1], side="right")
+    cell = cell_of(layout, 0.5 * (x[:-1] + x[1:]), 0.5 * (y[:-1] + y[1:]))
+    kept = step <= LONGEST_INTERVALS * np.median(step)
+    group = (part * layout.cells + cell)[kept]
+    size = parts.size * layout.cells
+    weights = (None, (np.diff(x) / step)[kept], (np.diff(y) / step)[kept])
+    found = [np.bincount(group, one, minlength=size) for one in weights]
+    return np.asarray(np.stack(found).reshape(3, parts.size, -1).transpose(1, 0, 2), np.float64)

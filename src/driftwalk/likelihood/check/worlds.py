@@ -1,0 +1,237 @@
+"""Recordings simulated from a fit: at the estimate, or with what the fit leaves open drawn anew."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk import _core
+from driftwalk.calibration.problem import Problem, prepare_problem
+from driftwalk.compare import apply_steps, plan_steps
+from driftwalk.core.errors import InputError
+from driftwalk.core.seeds import world_keys
+from driftwalk.likelihood.check.errors import Estimate
+from driftwalk.likelihood.filter_pass import Series
+from driftwalk.likelihood.intervals import fitted_intervals
+from driftwalk.likelihood.result import fitted_flow
+from driftwalk.likelihood.spline import Floats
+from driftwalk.schema import Track
+from driftwalk.simulate import recorded_camera
+from driftwalk.simulate.backend import world_table
+from driftwalk.simulate.initial import world_orientations
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+Keys = npt.NDArray[np.uint64]
+FLOWS = 8
+"""Flow fields that are drawn; a world on its own takes as long as eight together."""
+ESTIMATE, DRAWN = 0, 1
+"""Numbers of the two sets in the addresses of their random numbers."""
+DRAW_STREAM = 2
+MOST_LOG_STD = math.log(10.0)
+"""Standard deviation of the logarithm of a parameter, beyond which draws of it mean nothing."""
+
+Path = tuple[Floats, Floats, Floats]
+
+
+class Replicates(NamedTuple):
+    """Simulated recordings, those that broke down left out."""
+
+    steps: list[Floats]
+    """Step lengths [m] and turning angles [rad] of each, (pairs, 2)."""
+    paths: list[list[Path]]
+    """Each one's recordings: times [s], x and y [m]."""
+    flow: npt.NDArray[np.int64]
+    """Which drawn flow each was in."""
+    broken: int
+    """How many were left out."""
+
+
+def ready_problems(
+    fit: xr.Dataset, estimate: Estimate, recordings: Sequence[xr.Dataset]
+) -> list[Problem]:
+    """Return the series ready for comparison, each in its fitted flow, with one step interval.
+
+    Raises
+    ------
+    InputError
+        When a recording forms too few steps.
+    """
+    from driftwalk.model import apply_overrides
+
+    study, tracks, series = estimate.study, estimate.tracks, estimate.passes.series
+    intervals = fitted_intervals(fit)
+    flows = [
+        fitted_flow(fit, interval=intervals.of_flow(flow)[0])
+        for flow in range(len(intervals.labels))
+    ]
+    if study.steps.step_interval_s == "auto":
+        interval = max(plan_steps(track.time).step_interval for track in tracks)
+        study = apply_overrides(study, {"steps.step_interval_s": interval})
+    return [
+        _problem(
+            track,
+            study,
+            flows[one.flow],
+            noise=fit.attrs["tracking_noise_m"],
+            recording=recordings[one.recording],
+        )
+        for track, one in zip(tracks, series, strict=True)
+    ]
+
+
+def _problem(
+    track: Track, study: Study, flow: xr.Dataset, *, noise: float, recording: xr.Dataset
+) -> Problem:
+    from driftwalk.model import apply_overrides
+
+    quantum = float(recording.attrs.get("position_quantum_m", 0.0))
+    # The rounding of the file is part of the noise that the fit finds, and is simulated apart.
+    plain = float(np.sqrt(max(noise**2 - quantum**2 / 12.0, 0.0)))
+    seen = apply_overrides(
+        study,
+        {"observation.position_noise_m": plain, "observation.orientation_noise_rad": 0.0},
+    )
+    camera = recorded_camera(track, seen, position_quantum=quantum)
+    return prepare_problem(track, seen, flow, camera=camera)
+
+
+def replicates_at_estimate(
+    fit: xr.Dataset, problems: Sequence[Problem], *, count: int, seed: int
+) -> Replicates:
+    """Simulate the recordings with what the fit found."""
+    drag, force = fit.attrs["drag_coefficient"], fit.attrs["force_std_N"]
+    parts = []
+    for index, problem in enumerate(problems):
+        keys = _keys(seed, ESTIMATE, index, count)
+        parts.append(_simulated(problem, keys, drag, force))
+    return _joined(parts, np.zeros(count, dtype=np.int64))
+
+
+def replicates_drawn(
+    fit: xr.Dataset,
+    estimate: Estimate,
+    problems: Sequence[Problem],
+    spread: Floats,
+    *,
+    count: int,
+    seed: int,
+) -> Replicates:
+    """Simulate the recordings with flow and parameters drawn from what the fit leaves open.
+
+    Parameters
+    ----------
+    fit, estimate : xarray.Dataset, Estimate
+        The fit.
+    problems : sequence of Problem
+        The recordings, cut at the switching times.
+    spread : ndarray
+        Root of the covariance of the flow's coefficients and ln C_d.
+    count, seed : int
+        How many, and the seed.
+    """
+    flows = min(FLOWS, count)
+    flow_of = np.arange(count) % flows
+    coefficients, factors = _draws(fit, estimate, spread, flows, seed)
+    drag = fit.attrs["drag_coefficient"] * factors[:, 0]
+    force = fit.attrs["force_std_N"] * factors[:, 1]
+    parts: list[list[_World]] = []
+    for index, problem in enumerate(problems):
+        keys = _keys(seed, DRAWN, index, count)
+        series = estimate.passes.series[index]
+
+        def simulated(
+            k: int, problem: Problem = problem, keys: Keys = keys, series: Series = series
+        ) -> list[_World]:
+            x, y = problem.flow["x"].values, problem.flow["y"].values
+            point = replace(estimate.point, coefficients=coefficients[k]).in_flow(series.flow)
+            u, v = estimate.passes.spline.values(point.coefficients, x, y)
+            flow = problem.flow.assign(u=(("y", "x"), u), v=(("y", "x"), v))
+            noise = problem.camera.position_noise * float(factors[k, 2])
+            camera = replace(problem.camera, position_noise=noise)
+            own = replace(problem, flow=flow, camera=camera, threads=1)
+            begin = float(series.time[0])
+            return _simulated(own, keys[flow_of == k], float(drag[k]), float(force[k]), begin)
+
+        with ThreadPoolExecutor(problem.threads) as pool:
+            found = list(pool.map(simulated, range(flows)))
+        parts.append([found[k][j // flows] for j, k in enumerate(flow_of)])
+    return _joined(parts, flow_of)
+
+
+def _draws(
+    fit: xr.Dataset, estimate: Estimate, spread: Floats, count: int, seed: int
+) -> tuple[Floats, Floats]:
+    """Return drawn coefficients of the flow, and factors of C_d, force_std and tracking noise.
+
+    C_d has the variance of the restricted likelihood; the flow follows it as far as the two are
+    correlated.
+    """
+    generator = np.random.default_rng([seed, DRAW_STREAM])
+    size = estimate.point.coefficients.size
+    found = fit["covariance"].values[:3, :3]
+    widest = float(np.sqrt(np.diag(found).max()))
+    if not widest < MOST_LOG_STD:
+        raise InputError(
+            "the fit leaves C_d, the force or the tracking noise open by more than a factor of ten"
+        )
+    logs = generator.multivariate_normal(np.zeros(3), found, size=count)
+    free = generator.normal(size=(count, len(spread))) @ spread.T
+    along = spread[:size] @ spread[size] / (spread[size] @ spread[size])
+    moved = free[:, :size] + (logs[:, :1] - free[:, size : size + 1]) * along
+    shape = (count, *estimate.point.coefficients.shape)
+    coefficients = estimate.point.coefficients + moved.reshape(shape)
+    return coefficients, np.exp(logs * (1.0, 0.5, 1.0))
+
+
+class _World(NamedTuple):
+    steps: Floats
+    path: Path
+    sound: bool
+
+
+def _keys(seed: int, kind: int, index: int, count: int) -> Keys:
+    return world_keys(seed, trial=2 * index + kind, replicate=np.arange(count))
+
+
+def _simulated(
+    problem: Problem, keys: Keys, drag: float, force: float, begin: float = 0.0
+) -> list[_World]:
+    start = problem.start
+    table = world_table(
+        **{**start._asdict(), "theta": world_orientations(start.theta, keys)},
+        drag_coefficient=np.full(keys.size, drag),
+        force_std=force,
+    )
+    x, y, _, status = _core.simulate(
+        problem.model(), table, keys, threads=problem.threads, precision="single"
+    )
+    worlds = []
+    for k in range(keys.size):
+        found = apply_steps(problem.plan, x[k], y[k])
+        steps = np.column_stack([found.step_length, found.turning_angle])
+        path = (begin + problem.sample_time, x[k].astype(np.float64), y[k].astype(np.float64))
+        worlds.append(_World(steps, path, bool(status[k] == 0 and len(steps) > 0)))
+    return worlds
+
+
+def _joined(parts: Sequence[Sequence[_World]], flow_of: npt.NDArray[np.int64]) -> Replicates:
+    """Put the recordings of each replicate together."""
+    whole = list(zip(*parts, strict=True))
+    sound = np.array([all(world.sound for world in one) for one in whole])
+    kept = [whole[k] for k in np.flatnonzero(sound)]
+    return Replicates(
+        [np.concatenate([world.steps for world in one]) for one in kept],
+        [[world.path for world in one] for one in kept],
+        flow_of[sound],
+        int(np.count_nonzero(~sound)),
+    )

@@ -1,0 +1,330 @@
+"""One pass of the innovations filter over the recordings: likelihood, score and information.
+
+The filter predicts each position from the past. Its innovations e_k are independent normals with
+covariances S_k if the parameters are right, so twice the negative log likelihood is the sum of
+``ln det S_k + e_k' S_k^-1 e_k``. The parameters are, in this order, the flow's coefficients,
+ln C_d, and the noises: ln q (intensity of the stochastic acceleration), ln r (tracking noise) and,
+where the angle is a part of the state, the logarithms of the force's lever and of the angle's
+noise. For the first two the filter itself adds up the products of the derivatives of its
+predictions; for the noises it is run again with slightly larger values, and the derivatives of S_k
+enter as well. Where the pumps were switched each flow has coefficients of its own; a series is in
+one flow and adds to the block of that flow alone, and to the parameters that all share.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk import _core
+from driftwalk.likelihood.spline import Floats, Spline
+
+Flags = npt.NDArray[np.bool_]
+Place = tuple[slice, slice]
+
+LARGEST_STEP_S = 0.05
+"""Longest step of the filter's integrator."""
+LONGEST_GAP_S = 1.0
+"""Longest gap that is predicted over; after a longer one the motion is found anew."""
+STEP = 1e-4
+"""Relative change of a noise for the derivatives by it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """One track as the filter takes it, shapes (n,)."""
+
+    time: Floats
+    x: Floats
+    y: Floats
+    theta: Floats
+    omega: Floats
+    excluded: npt.NDArray[np.uint8]
+    """Samples that end an interval which is left out."""
+    flow: int = 0
+    """Number of the flow that the water has meanwhile."""
+    recording: int = 0
+    """Number of the recording, which may be cut into several series."""
+    near_wall: int = 0
+    """Intervals that are left out because the block may touch the wall."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """The block and the water."""
+
+    side: float
+    mass: float
+    depth: float
+    strips: int
+    water_density: float
+    orientation: str
+    """"state", "given" or "none": the track's angle is measured like the position, is an input, or
+    is not used."""
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Values of everything that is estimated."""
+
+    coefficients: Floats
+    """Of the flow, shape (2, rows, columns) [m/s]; (flows, 2, rows, columns) with several flows."""
+    log_drag: float
+    """ln C_d."""
+    log_intensity: float
+    """ln q, q in m^2/s^3."""
+    log_noise: float
+    """ln r, r in m."""
+    log_lever: float | None = None
+    """Logarithm of the rms distance [m] from the centre at which the stochastic force acts; with
+    the angle in the state only."""
+    log_angle_noise: float | None = None
+    """Logarithm of the noise of the angle [rad]; with the angle in the state only."""
+
+    @property
+    def noises(self) -> dict[str, float]:
+        """Names and values of the noises, in the order of the parameters."""
+        names = ("log_intensity", "log_noise", "log_lever", "log_angle_noise")
+        found = {name: getattr(self, name) for name in names}
+        return {name: value for name, value in found.items() if value is not None}
+
+    def in_flow(self, flow: int) -> Point:
+        """Return the point with the coefficients of one flow alone."""
+        if self.coefficients.ndim == 3:
+            return self
+        return replace(self, coefficients=self.coefficients[flow])
+
+    def moved(self, step: Floats) -> Point:
+        """Return the point after a step in (coefficients, ln C_d, noises)."""
+        size = self.coefficients.size
+        noises = zip(self.noises.items(), step[size + 1 :], strict=True)
+        changed: dict[str, Any] = {name: old + float(change) for (name, old), change in noises}
+        return replace(
+            self,
+            coefficients=self.coefficients + step[:size].reshape(self.coefficients.shape),
+            log_drag=self.log_drag + float(step[size]),
+            **changed,
+        )
+
+
+class Sums(NamedTuple):
+    """What a pass adds up over all samples."""
+
+    deviance: float
+    """Negative log likelihood, without its constant."""
+    score: Floats
+    """Its derivatives, with the sign turned."""
+    information: Floats
+    """Expected second derivatives."""
+    used: int
+    """Samples whose innovations were used."""
+
+
+@dataclass(frozen=True, eq=False)
+class Passes:
+    """Runs the filter over the recordings of one tank.
+
+    Attributes
+    ----------
+    series : sequence of Series
+        The recordings.
+    body : Body
+        The block.
+    spline : Spline
+        Knots of the flow.
+    flows : int
+        Number of flows.
+    """
+
+    series: Sequence[Series]
+    body: Body
+    spline: Spline
+    flows: int = 1
+
+    def columns_of(self, flow: int, others: int) -> tuple[Place, Place]:
+        """Return where the derivatives in one flow stand among those in all.
+
+        Parameters
+        ----------
+        flow : int
+            The flow.
+        others : int
+            Number of parameters that are not coefficients of a flow.
+
+        Returns
+        -------
+        tuple
+            For the coefficients and for the others: their place in one flow, and among all.
+        """
+        count = 2 * self.spline.size
+        shared = self.flows * count
+        return (
+            (slice(0, count), slice(flow * count, (flow + 1) * count)),
+            (slice(count, count + others), slice(shared, shared + others)),
+        )
+
+    def sums(self, point: Point, *, noise: str = "with") -> Sums:
+        """Return likelihood, score and information at a point.
+
+        Parameters
+        ----------
+        point : Point
+            Where.
+        noise : {"with", "without"}
+            Whether the noises have derivatives; without them score and information end with
+            ln C_d.
+        """
+        names = list(point.noises) if noise == "with" else []
+        others = 1 + len(names)
+        size = 2 * self.spline.size * self.flows + others
+        deviance, used = 0.0, 0
+        score, information = np.zeros(size), np.zeros((size, size))
+        for series in self.series:
+            one = self._sums_of(series, point.in_flow(series.flow), names)
+            places = self.columns_of(series.flow, others)
+            for own, row in places:
+                score[row] += one.score[own]
+                for own_column, column in places:
+                    information[row, column] += one.information[own, own_column]
+            deviance, used = deviance + one.deviance, used + one.used
+        return Sums(deviance, score, information, used)
+
+    def _sums_of(self, series: Series, point: Point, names: list[str]) -> Sums:
+        base = self._run(series, point)
+        others = []
+        for name in names:
+            more: dict[str, Any] = {name: point.noises[name] + STEP}
+            others.append(self._run(series, replace(point, **more)))
+        used = np.logical_and.reduce([_used(one) for one in (base, *others)])
+        white, changes, spreads = _noise_derivatives(base, others, used)
+        right = np.zeros((used.size, white.shape[1], 1 + len(changes)))
+        right[used] = np.stack([white, *changes], axis=-1)
+        found = self._filter(series, point, sensitivities=True).sums(used.astype(np.uint8), right)
+        deviance = 0.5 * float((white**2).sum()) + float(
+            np.log(np.einsum("aan->an", factor(base["covariance"][used]))).sum()
+        )
+        count = len(found["information"])
+        size = count + len(names)
+        score, information = np.empty(size), np.empty((size, size))
+        score[:count] = found["products"][0]
+        information[:count, :count] = found["information"]
+        information[count:, :count] = found["products"][1:]
+        information[:count, count:] = found["products"][1:].T
+        for k, (change, spread) in enumerate(zip(changes, spreads, strict=True)):
+            bent = np.einsum("abn,na,nb->", spread, white, white, optimize=True)
+            score[count + k] = (change * white).sum() + 0.5 * (bent - np.einsum("aan->", spread))
+            for other in range(len(names)):
+                information[count + k, count + other] = (change * changes[other]).sum() + 0.5 * (
+                    spread * spreads[other]
+                ).sum()
+        return Sums(deviance, score, information, int(used.sum()))
+
+    def innovations(self, point: Point) -> list[tuple[Floats, Flags]]:
+        """Return each recording's whitened innovations, shape (n, D), and which were used.
+
+        D is 3 with the angle in the state, else 2. The innovation of a missing angle is 0.
+        """
+        found = [self._run(series, point.in_flow(series.flow)) for series in self.series]
+        return [(_whitened(one), _used(one)) for one in found]
+
+    def _run(self, series: Series, point: Point) -> dict[str, Any]:
+        return dict(self._filter(series, point).run(series.time.size))
+
+    def _filter(self, series: Series, point: Point, *, sensitivities: bool = False) -> Any:
+        body, spline = self.body, self.spline
+        pose: dict[str, float] = {}
+        if point.log_lever is not None and point.log_angle_noise is not None:
+            pose["force_lever"] = math.exp(point.log_lever)
+            pose["angle_noise"] = math.exp(point.log_angle_noise)
+        return _core.InnovationsFilter(
+            series.time,
+            series.x,
+            series.y,
+            series.theta,
+            series.omega,
+            series.excluded,
+            side=body.side,
+            mass=body.mass,
+            depth=body.depth,
+            strips=body.strips,
+            water_density=body.water_density,
+            origin_x=spline.origin_x,
+            origin_y=spline.origin_y,
+            spacing=spline.spacing,
+            columns=spline.columns,
+            rows=spline.rows,
+            coefficients=np.ascontiguousarray(point.coefficients),
+            drag_coefficient=math.exp(point.log_drag),
+            noise_intensity=math.exp(point.log_intensity),
+            position_noise=math.exp(point.log_noise),
+            largest_step=LARGEST_STEP_S,
+            longest_gap=LONGEST_GAP_S,
+            orientation=body.orientation,
+            sensitivities=sensitivities,
+            **pose,
+        )
+
+
+def _whitened(found: dict[str, Any]) -> Floats:
+    white = forward(factor(found["covariance"]), found["innovation"].T).T
+    # To the filter a missing angle is one measured where it was predicted, with an enormous error.
+    return np.where(found["innovation"] == 0.0, 0.0, white)
+
+
+def _used(found: dict[str, Any]) -> Flags:
+    return np.asarray(found["used"], dtype=bool)
+
+
+def _noise_derivatives(
+    base: dict[str, Any], others: list[dict[str, Any]], used: Flags
+) -> tuple[Floats, list[Floats], list[Floats]]:
+    """Return whitened innovations (n, D), their derivatives by the noises, and those of S.
+
+    The derivatives of S are whitened from both sides, L^-1 dS L^-T, shape (D, D, n).
+    """
+    root = factor(base["covariance"][used])
+    white = forward(root, base["innovation"][used].T).T
+    changes, spreads = [], []
+    for other in others:
+        change = (base["innovation"][used] - other["innovation"][used]) / STEP
+        changes.append(forward(root, change.T).T)
+        widening = unpacked((other["covariance"][used] - base["covariance"][used]) / STEP)
+        half = forward(root, widening)
+        spreads.append(forward(root, half.transpose(1, 0, 2)))
+    return white, changes, spreads
+
+
+def unpacked(lower: Floats) -> Floats:
+    """Return symmetric matrices (D, D, n) from their lower parts (n, D (D + 1) / 2), row by row."""
+    count = {3: 2, 6: 3}[lower.shape[1]]
+    full = np.empty((count, count, lower.shape[0]))
+    for column, (a, b) in enumerate(zip(*np.tril_indices(count), strict=True)):
+        full[a, b] = full[b, a] = lower[:, column]
+    return full
+
+
+def factor(lower: Floats) -> Floats:
+    """Return the Cholesky factors L (D, D, n), L L' the matrices of which these are lower parts."""
+    full = unpacked(lower)
+    root = np.zeros_like(full)
+    for a in range(len(full)):
+        for b in range(a + 1):
+            rest = full[a, b] - (root[a, :b] * root[b, :b]).sum(axis=0)
+            root[a, b] = np.sqrt(rest) if a == b else rest / root[b, b]
+    return root
+
+
+def forward(root: Floats, right: Floats) -> Floats:
+    """Return L^-1 b for n triangular L (D, D, n) and b (D, n), or (D, m, n)."""
+    found = np.empty_like(right)
+    for a in range(len(root)):
+        rest = right[a].copy()
+        for b in range(a):
+            rest -= root[a, b] * found[b]
+        found[a] = rest / root[a, a]
+    return found

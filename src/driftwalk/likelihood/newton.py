@@ -1,0 +1,235 @@
+"""The maximum of the penalised likelihood, by Gauss-Newton, and the smoothness of the flow.
+
+Prior of the flow's coefficients: ``exp(-(lam_r c' R c + lam_s c' S c) / 2)`` per component, R and S
+the roughness and the size of `driftwalk.likelihood.spline.penalties`; with several flows the
+weights are the same for all. The two weights follow from the data: each step sets a weight to the
+degrees of freedom that the data have taken from its prior, over ``c' R c`` or ``c' S c`` (MacKay's
+fixed point of the evidence).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from driftwalk.likelihood.filter_pass import Passes, Point, Sums
+from driftwalk.likelihood.solution import cholesky
+from driftwalk.likelihood.spline import Floats, penalties
+
+PRIOR_DRAG = 0.5
+"""Centre of the weak prior of C_d, and where the search begins."""
+PRIOR_LOG_DRAG_STD = 0.7
+HELD = ((0, 2, 3, 4), (0,))
+"""Parameters, counted from C_d on, that the first steps leave as they are: flow and q have to
+settle before a step of C_d or of the other noises means anything."""
+PRIOR_LEVER = 0.01
+"""Centre of the weak prior of the force's lever, in sides of the block, and its first value."""
+PRIOR_LOG_LEVER_STD = 1.0
+PRIOR_ANGLE_NOISE = 0.01
+"""Centre of the prior of the angle's noise [rad], so weak that it counts only where the turning is
+so restless that nothing is known of the noise."""
+PRIOR_LOG_ANGLE_NOISE_STD = 2.3
+LEVER, ANGLE_NOISE = 3, 4
+"""Places of the lever and of the angle's noise, counted from C_d on."""
+MOST_LOG_STEP = 1.0
+"""Of the lever and of the angle's noise."""
+MOST_LOG_DRAG_STEP = 0.5
+MOST_FACTOR = 10.0
+"""By which q, r^2 or the weight of a penalty may change in a step."""
+CLOSE = 0.1
+"""Converged when the steps of C_d, q and r, and in the mean those of the coefficients, are below
+this part of their standard deviations."""
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Weights of the two penalties."""
+
+    roughness: float
+    size: float
+
+
+class Prior:
+    """The prior of all parameters as a quadratic form."""
+
+    def __init__(self, passes: Passes) -> None:
+        self.roughness, self.size = penalties(passes.spline)
+        self.log_lever = math.log(PRIOR_LEVER * passes.body.side)
+
+    def matrix(self, weights: Weights) -> Floats:
+        """Return the precision of one component's coefficients."""
+        return weights.roughness * self.roughness + weights.size * self.size
+
+    def add(self, sums: Sums, point: Point, weights: Weights) -> Sums:
+        """Return the sums with the prior of the coefficients, of C_d and of the lever in them."""
+        precision = self.matrix(weights)
+        count = len(precision)
+        coefficients = point.coefficients.reshape(-1, count)
+        score, information = sums.score.copy(), sums.information.copy()
+        pull = coefficients @ precision
+        for component in range(len(coefficients)):
+            part = slice(component * count, (component + 1) * count)
+            information[part, part] += precision
+            score[part] -= pull[component]
+        deviance = sums.deviance + 0.5 * float((pull * coefficients).sum())
+        drag = coefficients.size
+        single = [(drag, point.log_drag - math.log(PRIOR_DRAG), PRIOR_LOG_DRAG_STD)]
+        if point.log_lever is not None:
+            single.append((drag + LEVER, point.log_lever - self.log_lever, PRIOR_LOG_LEVER_STD))
+        if point.log_angle_noise is not None:
+            off = point.log_angle_noise - math.log(PRIOR_ANGLE_NOISE)
+            single.append((drag + ANGLE_NOISE, off, PRIOR_LOG_ANGLE_NOISE_STD))
+        for index, off, std in single:
+            deviance += 0.5 * (off / std) ** 2
+            # Without derivatives by the noises there is no row of the lever.
+            if index < score.size:
+                information[index, index] += 1.0 / std**2
+                score[index] -= off / std**2
+        return Sums(deviance, score, information, sums.used)
+
+    def updated(self, weights: Weights, point: Point, covariance: Floats) -> Weights:
+        """Return the weights after one step of the evidence's fixed point."""
+        inverse = np.linalg.inv(self.matrix(weights))
+        count = len(inverse)
+        coefficients = point.coefficients.reshape(-1, count)
+        parts = [
+            covariance[k * count : (k + 1) * count, k * count : (k + 1) * count]
+            for k in range(len(coefficients))
+        ]
+        new = []
+        for old, form in ((weights.roughness, self.roughness), (weights.size, self.size)):
+            prior = len(parts) * float((form * inverse).sum())
+            posterior = sum(float((form * part).sum()) for part in parts)
+            value = float(np.einsum("ka,ab,kb->", coefficients, form, coefficients))
+            wanted = old * (prior - posterior) / max(value, 1e-300)
+            new.append(float(np.clip(wanted, old / MOST_FACTOR, old * MOST_FACTOR)))
+        return Weights(*new)
+
+
+@dataclass(frozen=True, eq=False)
+class Mode:
+    """Where the search has come to."""
+
+    point: Point
+    weights: Weights
+    covariance: Floats
+    """Of all parameters, at the last step."""
+    used: int
+    iterations: int
+    converged: bool
+
+
+Tell = Callable[[int, int, str], None]
+
+
+def silent(done: int, total: int, what: str) -> None:
+    """Tell nobody."""
+
+
+def find_mode(
+    passes: Passes,
+    start: Point,
+    weights: Weights,
+    prior: Prior,
+    *,
+    iterations: int,
+    tell: Tell = silent,
+    hold_first: bool = True,
+) -> Mode:
+    """Search the maximum of the penalised likelihood.
+
+    Parameters
+    ----------
+    passes : Passes
+        The filter.
+    start : Point
+        Where to begin.
+    weights : Weights
+        Of the penalties, at the beginning.
+    prior : Prior
+        Their forms.
+    iterations : int
+        Most steps.
+    tell : callable
+        Told the number of steps done, the most, and what is done.
+    hold_first : bool
+        Whether the first steps leave C_d and some noises as they are: not where the search begins
+        near its end.
+    """
+    point, used, converged = start, 0, False
+    covariance = np.zeros((0, 0))
+    last = np.zeros(start.coefficients.size + 1 + len(start.noises))
+    for index in range(iterations):
+        tell(index, iterations, "likelihood")
+        sums = prior.add(passes.sums(point), point, weights)
+        used = sums.used
+        drag = point.coefficients.size
+        held = [drag + k for k in (HELD[index] if hold_first and index < len(HELD) else ())]
+        held = [one for one in held if one < sums.score.size]
+        covariance = inverse(sums.information)
+        step = limited(newton_step(sums, covariance, held=held), drag)
+        step = last = damped(step, last, sums.information)
+        point = point.moved(step)
+        weights = prior.updated(weights, point, covariance)
+        moves = np.abs(step) / np.sqrt(np.diag(covariance))
+        # A lever that is known from its prior alone may go to and fro without moving anything else.
+        moves[drag + LEVER : drag + LEVER + 1] = 0.0
+        near = max(float(moves[drag:].max()), float(np.sqrt((moves[:drag] ** 2).mean())))
+        if len(held) == 0 and near < CLOSE:
+            converged = True
+            break
+    return Mode(point, weights, covariance, used, index + 1, converged)
+
+
+def newton_step(sums: Sums, covariance: Floats, *, held: Sequence[int] = ()) -> Floats:
+    """Return the Gauss-Newton step, the best one that leaves the `held` parameters as they are."""
+    step = covariance @ sums.score
+    if held:
+        at = list(held)
+        step = step - covariance[:, at] @ np.linalg.solve(covariance[np.ix_(at, at)], step[at])
+    return np.asarray(step)
+
+
+def damped(step: Floats, last: Floats, information: Floats) -> Floats:
+    """Return the step, shortened where it takes back the last one.
+
+    Gauss and Newton's step leaves out how the derivatives change; where they change much it goes
+    too far, and back again. If a step is lambda times the last one, lambda < 0, then the sum of all
+    the steps to come is 1 / (1 - lambda) of it.
+    """
+    length = float(last @ information @ last)
+    ratio = float(step @ information @ last) / length if length > 0.0 else 0.0
+    return step / (1.0 - ratio) if ratio < 0.0 else step
+
+
+def limited(step: Floats, drag: int) -> Floats:
+    """Return the step, shortened where it would jump, with q and r taken as factors.
+
+    The step is the same whether it is made in the logarithm of a variance or in the variance; made
+    in the variance it finds a wrong one in one step, from whatever side. Lever and noise of the
+    angle are another matter: they may be known from their priors alone, which are those of
+    logarithms.
+
+    Parameters
+    ----------
+    step : ndarray
+        In (coefficients, ln C_d, noises).
+    drag : int
+        Where ln C_d stands in it.
+    """
+    shorter = step * min(1.0, MOST_LOG_DRAG_STEP / max(abs(float(step[drag])), 1e-300))
+    for index, power in ((1, 1.0), (2, 2.0)):
+        factor = np.clip(1.0 + power * step[drag + index], 1.0 / MOST_FACTOR, MOST_FACTOR)
+        shorter[drag + index] = math.log(factor) / power
+    shorter[drag + LEVER :] = np.clip(step[drag + LEVER :], -MOST_LOG_STEP, MOST_LOG_STEP)
+    return np.asarray(shorter)
+
+
+def inverse(information: Floats) -> Floats:
+    """Return the inverse of a symmetric positive definite matrix."""
+    from scipy.linalg import cho_solve
+
+    return np.asarray(cho_solve(cholesky(information), np.eye(len(information))))

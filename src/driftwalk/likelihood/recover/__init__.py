@@ -1,0 +1,1 @@
+"""How well a set-up recovers a known truth: simulated recordings, fitted and scored."""

@@ -1,0 +1,184 @@
+"""The recovery study: how well a set-up gives back a truth that is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import nullcontext
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from driftwalk.likelihood.recover.check import angles_of, check_recovery
+from driftwalk.likelihood.recover.one import (
+    FACTS,
+    FLOW_PARTS,
+    MESSAGE,
+    PARTS,
+    STATUS,
+    Truth,
+    recover_one,
+)
+from driftwalk.likelihood.recover.score import SCORED
+from driftwalk.likelihood.recover.summary import COVERAGE_CONFIDENCE, NEEDED_CONFIDENCE, add_summary
+from driftwalk.likelihood.warnings import MOST_WALL_SHARE
+from driftwalk.model.recover import RANDOM
+from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
+from driftwalk.sweep.processes import single_threaded_processes
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+SCHEMA_VERSION: Final = 1
+Tell = Callable[[int, int], None]
+
+_UNITS: Final = {"drag_coefficient": "1", "force_std_N": "N", "tracking_noise_m": "m"}
+_NAMES: Final = dict(zip(SCORED, ("drag_coefficient", "force_std", "tracking_noise"), strict=True))
+"""From a parameter as a score names it to the variable."""
+
+
+def recovery_study(
+    study: Study,
+    flow: xr.Dataset | None = None,
+    *,
+    store: Store | None = None,
+    threads: int | None = None,
+    tell: Tell | None = None,
+) -> xr.Dataset:
+    """Simulate recordings of known truth, fit them, and say how well the truth comes back.
+
+    Parameters
+    ----------
+    study : Study
+        The truth ([forces], [observation], block, tank), how it is recorded ([recover]) and how it
+        is fitted ([fit]).
+    flow : xarray.Dataset, optional
+        The true `flow_field`, steady. It may be left out where ``[recover] flow`` is "random".
+    store : Store, optional
+        Where finished recordings are kept; memory when left out.
+    threads : int, optional
+        Processes that fit recordings at the same time; one after the other in this one when left
+        out. The numbers are the same to the rounding of the linear algebra library, and the same
+        bits for any number of processes.
+    tell : callable, optional
+        Told how many fits are done and how many there are.
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind "recovery". On (duration, angle, recording): estimates, their intervals and errors,
+        flow error, wall share and what became of the recording; on (parameter, duration, angle)
+        their summary over the recordings that were fitted with at most 30 % of the intervals at the
+        wall (``used``); on (angle) how the error of C_d falls with the length of a recording, and
+        the length that the asked precision needs.
+
+    Raises
+    ------
+    InputError
+        When a true value is missing, a recording is shorter than the fit needs, or the flow does
+        not cover the tank.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> noise = {"position_noise_m": "0.3mm", "orientation_noise_rad": "0.5deg"}
+    >>> study = dw.Study(observation=noise)
+    >>> found = dw.recovery_study(study, dw.tank30_flow())  # doctest: +SKIP
+    >>> float(found["rms_error"].sel(parameter="drag_coefficient").squeeze())  # doctest: +SKIP
+    0.04
+    """
+    check_recovery(study, flow)
+    settings = study.recover
+    angles = angles_of(study)
+    # Recordings vary slowest, so that the time that is left can be told from what is done.
+    design = grid(
+        recording=np.arange(settings.recordings),
+        duration=np.array(settings.durations_s),
+        angle=np.arange(len(angles)),
+    )
+    function = partial(_compute, Truth(study, flow), angles)
+    units = design.units(1)
+    with nullcontext() if threads is None else single_threaded_processes(threads) as executor:
+        found = run_sweep(function, units, store=store, executor=executor, progress=tell)
+    return _dataset(study, angles, design.unstack(found), flow)
+
+
+def _compute(truth: Truth, angles: tuple[str, ...], unit: WorkUnit) -> dict[str, Any]:
+    """Return what one setting gives, as arrays of one entry."""
+    one = {name: values[0] for name, values in unit.settings.items()}
+    found = recover_one(
+        truth,
+        recording=int(one["recording"]),
+        duration=float(one["duration"]),
+        angle=angles[int(one["angle"])],
+    )
+    text = np.array([found.pop("message")], dtype=f"U{MESSAGE}")
+    status = np.array([found.pop("status")], dtype=np.int32)
+    return {**{key: np.array([value]) for key, value in found.items()}, "status": status} | {
+        "message": text
+    }
+
+
+def _dataset(
+    study: Study, angles: tuple[str, ...], found: dict[str, Any], flow: xr.Dataset | None
+) -> xr.Dataset:
+    import xarray as xr
+
+    dims = ("duration", "angle", "recording")
+    tables = {key: np.moveaxis(values, 0, -1) for key, values in found.items()}
+    data: dict[str, Any] = {}
+    for key, name in _NAMES.items():
+        for part in PARTS:
+            units = _UNITS[key] if part in ("", "_low", "_high") else "1"
+            data[f"{name}{part}"] = (dims, tables[f"{key}{part}"], {"units": units})
+    for key in (*FLOW_PARTS, *FACTS):
+        data[key] = (dims, tables[key], {"units": "s" if key == "fit_time" else "1"})
+    flags = {
+        "flag_values": np.array(list(STATUS.values()), dtype=np.int32),
+        "flag_meanings": " ".join(STATUS),
+    }
+    data["status"] = (dims, tables["status"], flags)
+    data["message"] = (dims, tables["message"].astype(object))
+    fitted = tables["status"] == STATUS["fitted"]
+    used = fitted & (np.where(fitted, tables["wall_share"], 1.0) <= MOST_WALL_SHARE)
+    data["used"] = (dims, used.astype(np.int8), {"long_name": "enters the summary"})
+    coords = {
+        "duration": ("duration", np.array(study.recover.durations_s), {"units": "s"}),
+        "angle": ("angle", np.array(angles, dtype=object)),
+        "recording": np.arange(study.recover.recordings),
+    }
+    dataset = xr.Dataset(data, coords=coords, attrs=_attrs(study, flow))
+    return add_summary(dataset, precision=study.recover.drag_coefficient_precision)
+
+
+def _attrs(study: Study, flow: xr.Dataset | None) -> dict[str, Any]:
+    settings, forces = study.recover, study.forces
+    asked = settings.drag_coefficient_precision
+    return {
+        "kind": "recovery",
+        "schema_version": SCHEMA_VERSION,
+        "drag_coefficient": forces.drag_coefficient,
+        "force_std_N": forces.force_std_N,
+        "force_interval_s": forces.force_interval_s,
+        "tracking_noise_m": Truth(study, flow).tracking_noise,
+        "flow": _flow_name(study, flow),
+        "sample_interval_s": settings.sample_interval_s,
+        "recordings_per_fit": settings.recordings_per_fit,
+        "missing_share": settings.missing_share,
+        "seed": settings.seed,
+        "confidence": study.fit.confidence,
+        "coverage_confidence": COVERAGE_CONFIDENCE,
+        "needed_confidence": NEEDED_CONFIDENCE,
+        "most_wall_share": MOST_WALL_SHARE,
+        "drag_coefficient_precision": np.nan if asked is None else asked,
+        "study": study.to_toml(),
+    }
+
+
+def _flow_name(study: Study, flow: xr.Dataset | None) -> str:
+    if flow is None:
+        return f"random, {study.recover.flow_family}"
+    named = study.recover.flow
+    return str(flow.attrs.get("source", "given")) if named in (None, RANDOM) else str(named)

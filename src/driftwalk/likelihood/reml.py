@@ -1,0 +1,203 @@
+"""C_d from the restricted likelihood, which allows for the flow being estimated along with it.
+
+The maximum of the likelihood over C_d and hundreds of flow coefficients together gives too large a
+C_d: the fitted flow takes up part of the scatter of the velocity, and what is left seems to be
+pulled back to it more strongly (as a mean-reversion rate is biased upwards when means are
+estimated). The restricted likelihood integrates the coefficients out instead. To first order
+(Laplace) that adds ``ln det(J' J + Lambda) / 2`` of the coefficients' block of the information to
+the profile of the negative log likelihood; its minimum over ln C_d is the estimate. The stochastic
+force comes out too small in the same way, as a variance does when means are estimated, by one or
+two parts in a hundred: one Newton step with the slope of the same determinant puts it right.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from driftwalk.likelihood.filter_pass import Passes, Point
+from driftwalk.likelihood.newton import Mode, Prior
+from driftwalk.likelihood.solution import cholesky
+from driftwalk.likelihood.spline import Floats
+
+SPAN = 2.0
+"""The profile is looked at this many standard deviations around the first guess of its minimum."""
+NEAR = 1.0
+"""A first guess within so many standard deviations of the likelihood's maximum is the minimum."""
+LATTICE = 2001
+INTENSITY_STEP = 0.05
+"""Change of ln q for the slope of the determinant."""
+MOST_STD_RATIO = 4.0
+"""A criterion that is so much flatter or sharper than the likelihood has no minimum worth the name:
+the motion does not follow the model, or tells nothing of C_d."""
+
+
+class Profile(NamedTuple):
+    """The profile of the likelihood at one C_d."""
+
+    log_drag: float
+    deviance: float
+    """Negative log likelihood, with the priors, at the best coefficients."""
+    slope: float
+    """Its derivative by ln C_d."""
+    half_log_determinant: float
+    """Of the coefficients' block of the information."""
+    coefficients: Floats
+    """The best coefficients, flat."""
+
+
+class Restricted(NamedTuple):
+    """The minimum of the restricted criterion."""
+
+    point: Point
+    log_drag_std: float
+    """From the curvature of the criterion."""
+    profiles: list[Profile]
+    """Where it was computed, in the order of C_d."""
+    has_minimum: bool
+    """Whether the criterion has a minimum; if not, point and std are the likelihood's."""
+
+
+def profile_at(
+    passes: Passes, mode: Mode, prior: Prior, log_drag: float, coefficients: Floats
+) -> Profile:
+    """Return the profile at a C_d, from one pass at coefficients that are nearly the best."""
+    from scipy.linalg import cho_solve
+
+    point = replace(
+        mode.point,
+        log_drag=log_drag,
+        coefficients=coefficients.reshape(mode.point.coefficients.shape),
+    )
+    sums = prior.add(passes.sums(point, noise="without"), point, mode.weights)
+    factor = cholesky(sums.information[:-1, :-1])
+    step = cho_solve(factor, sums.score[:-1])
+    return Profile(
+        log_drag,
+        sums.deviance - 0.5 * float(step @ sums.score[:-1]),
+        -float(sums.score[-1] - sums.information[-1, :-1] @ step),
+        float(np.log(np.diag(factor[0])).sum()),
+        coefficients.ravel() + step,
+    )
+
+
+def restricted_drag(
+    passes: Passes, mode: Mode, prior: Prior, *, intensity: bool = True
+) -> Restricted:
+    """Minimise the restricted criterion over ln C_d.
+
+    Parameters
+    ----------
+    passes : Passes
+        The filter.
+    mode : Mode
+        The maximum of the likelihood; noises and smoothness stay as they are there.
+    prior : Prior
+        The penalties.
+    intensity : bool
+        Whether q, too, is made that of the restricted criterion.
+
+    Returns
+    -------
+    Restricted
+        With the coefficients that belong to the C_d found.
+    """
+    start = mode.point
+    drag = start.coefficients.size
+    sd = math.sqrt(float(mode.covariance[drag, drag]))
+    slopes = mode.covariance[:, drag] / mode.covariance[drag, drag]
+    found = [profile_at(passes, mode, prior, start.log_drag, start.coefficients.ravel())]
+
+    def look(log_drag: float) -> None:
+        near = min(found, key=lambda one: abs(one.log_drag - log_drag))
+        guess = near.coefficients + slopes[:drag] * (log_drag - near.log_drag)
+        found.append(profile_at(passes, mode, prior, log_drag, guess))
+
+    look(start.log_drag - SPAN * sd)
+    # Two points give the slope of the determinant and with it a first guess of the minimum.
+    guess, _ = _minimum(found)
+    guess = float(np.clip(guess, start.log_drag - 2 * SPAN * sd, start.log_drag + SPAN * sd))
+    if abs(guess - start.log_drag) > NEAR * sd:
+        look(guess)
+        look(guess - SPAN * sd)
+    found.sort(key=lambda one: one.log_drag)
+    log_drag, std = _minimum(found)
+    if not sd / MOST_STD_RATIO <= std <= sd * MOST_STD_RATIO:
+        return Restricted(start, sd, found, has_minimum=False)
+    nearest = min(found, key=lambda one: abs(one.log_drag - log_drag))
+    coefficients = _coefficients_at(found, nearest, log_drag)
+    # The noises that belong to this C_d follow along the ridge of the likelihood.
+    point = start.moved(slopes * (log_drag - start.log_drag))
+    point = replace(
+        point, log_drag=log_drag, coefficients=coefficients.reshape(start.coefficients.shape)
+    )
+    if intensity:
+        point = _with_restricted_intensity(passes, mode, prior, point, found)
+    return Restricted(point, std, found, has_minimum=True)
+
+
+def _with_restricted_intensity(
+    passes: Passes, mode: Mode, prior: Prior, point: Point, found: list[Profile]
+) -> Point:
+    """Return the point after one Newton step in ln q on the restricted criterion.
+
+    The other noises go along the ridge of the likelihood; their own slopes, and that of the lever,
+    are too small to matter.
+    """
+    at = np.array([one.log_drag for one in found])
+    order = np.argsort(at)
+    values = np.array([one.half_log_determinant for one in found])
+    here = float(np.interp(point.log_drag, at[order], values[order]))
+    more = replace(point, log_intensity=point.log_intensity + INTENSITY_STEP)
+    there = profile_at(
+        passes, replace(mode, point=more), prior, point.log_drag, point.coefficients.ravel()
+    )
+    slope = (there.half_log_determinant - here) / INTENSITY_STEP
+    drag = point.coefficients.size
+    with_drag = mode.covariance[drag + 1 :, drag]
+    # Of the noises with ln q, at this C_d.
+    column = mode.covariance[drag + 1 :, drag + 1] - with_drag * (
+        with_drag[0] / mode.covariance[drag, drag]
+    )
+    step = np.zeros(drag + 1 + column.size)
+    step[drag + 1 :] = -column * slope
+    return point.moved(step)
+
+
+def _minimum(found: list[Profile]) -> tuple[float, float]:
+    """Return the minimum of the criterion through some points, and its standard deviation.
+
+    The standard deviation is infinite where there is no minimum near the points.
+
+    Slopes alone are used of the likelihood. They are those of the predictions, as in the search;
+    its values also hold what the covariances of the innovations have to say about C_d, which is
+    wrong to the order in which a Kalman filter is.
+    """
+    centre = found[0].log_drag
+    scale = max(abs(one.log_drag - other.log_drag) for one in found for other in found)
+    at = (np.array([one.log_drag for one in found]) - centre) / scale
+    degree = min(2, len(found) - 1)
+    polynomial = np.polynomial.Polynomial
+    slopes = [one.slope * scale for one in found]
+    determinants = [one.half_log_determinant - found[0].half_log_determinant for one in found]
+    slope = polynomial.fit(at, slopes, degree).convert()
+    slope = slope + polynomial.fit(at, determinants, degree).convert().deriv()
+    lattice = np.linspace(at.min() - 0.5, at.max() + 0.5, LATTICE)
+    values = slope(lattice)
+    upward = np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))
+    if not upward.size:
+        downhill = -1 if values.sum() < 0.0 else 0
+        return centre + scale * float(lattice[downhill]), math.inf
+    best = lattice[upward[np.argmin(np.abs(lattice[upward]))]]
+    return centre + scale * float(best), scale / math.sqrt(float(slope.deriv()(best)))
+
+
+def _coefficients_at(found: list[Profile], nearest: Profile, log_drag: float) -> Floats:
+    """Return the best coefficients at a C_d on the line through the two nearest profiles."""
+    others = [one for one in found if one is not nearest]
+    second = min(others, key=lambda one: abs(one.log_drag - log_drag))
+    share = (log_drag - nearest.log_drag) / (second.log_drag - nearest.log_drag)
+    return nearest.coefficients + share * (second.coefficients - nearest.coefficients)

@@ -1,0 +1,118 @@
+"""Where the search of the likelihood fit begins."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from driftwalk.calibration.own_flow import flow_from_track
+from driftwalk.core.errors import InputError
+from driftwalk.likelihood.filter_pass import Point
+from driftwalk.likelihood.newton import PRIOR_DRAG, PRIOR_LEVER, Weights
+from driftwalk.likelihood.spline import Floats, Spline, penalties
+from driftwalk.schema import FLAGS, Track
+from driftwalk.simulate import recorded_camera
+
+if TYPE_CHECKING:
+    from driftwalk.model import Study
+
+SMOOTHING = 1e-3
+"""Weight of the roughness, against the data, in the spline through the first flow field."""
+UNREST = 0.1
+"""Share of U^3 / a (speed U, block side a) that the first q is: rather too large than too small, as
+a small one makes the filter lose the track."""
+SMALLEST_NOISE = 1e-3
+"""Least tracking noise at the start, of the step between samples."""
+
+
+def first_point(
+    tracks: Sequence[Track],
+    study: Study,
+    spline: Spline,
+    *,
+    angle: str,
+    in_flows: Sequence[Track] = (),
+) -> Point:
+    """Return the first values: C_d = 0.5, the flow of Eq. 4, the noise of `driftwalk info`.
+
+    Parameters
+    ----------
+    tracks : sequence of Track
+        The recordings.
+    study, spline
+        Block and tank, and the knots of the flow.
+    angle : {"state", "given", "none"}
+        How orientations are used.
+    in_flows : sequence of Track
+        With several flows: a track in each of them.
+    """
+    cameras = [recorded_camera(track, study, position_quantum=0.0) for track in tracks]
+    steps = np.concatenate([np.hypot(np.diff(track.x), np.diff(track.y)) for track in tracks])
+    least = max(SMALLEST_NOISE * float(np.median(steps[steps > 0.0])), 1e-9)
+    point = Point(
+        coefficients=(
+            np.stack([_flow_coefficients(one, study, spline) for one in in_flows])
+            if len(in_flows) > 1
+            else _flow_coefficients(tracks[0], study, spline)
+        ),
+        log_drag=math.log(PRIOR_DRAG),
+        log_intensity=math.log(UNREST * typical_speed(tracks) ** 3 / study.block.side_m),
+        log_noise=_log_noise([camera.position_noise for camera in cameras], least),
+    )
+    if angle != "state":
+        return point
+    # The angle that a noise of the position at a corner would make.
+    least_angle = least / study.block.side_m
+    return replace(
+        point,
+        log_lever=math.log(PRIOR_LEVER * study.block.side_m),
+        log_angle_noise=_log_noise([camera.orientation_noise for camera in cameras], least_angle),
+    )
+
+
+def _log_noise(estimates: Sequence[float], least: float) -> float:
+    """Return the logarithm of the mean of the estimates there are, and of the least if none."""
+    seen = [value for value in estimates if math.isfinite(value)]
+    return math.log(max(float(np.mean(seen)) if seen else least, least))
+
+
+def first_weights(tracks: Sequence[Track], spline: Spline) -> Weights:
+    """Return weights for a flow of the body's speed that changes over one or two knots."""
+    power = typical_speed(tracks) ** 2 * spline.spacing**2
+    return Weights(roughness=10.0 * spline.spacing**4 / power, size=0.02 / power)
+
+
+def typical_speed(tracks: Sequence[Track]) -> float:
+    """Return the root mean square speed over some ten samples [m/s], robust to outliers."""
+    speeds = []
+    for track in tracks:
+        stride = max(1, min(10, track.time.size // 10))
+        way = np.hypot(*(axis[stride:] - axis[:-stride] for axis in (track.x, track.y)))
+        speeds.append(way / (track.time[stride:] - track.time[:-stride]))
+    speed = np.concatenate(speeds)
+    return float(np.sqrt(np.mean(np.minimum(speed, np.quantile(speed, 0.99)) ** 2)))
+
+
+def _flow_coefficients(track: Track, study: Study, spline: Spline) -> Floats:
+    """Return a smooth spline through the flow field of Eq. 4; still water where there is none."""
+    try:
+        field = flow_from_track(track, study)
+    except InputError:
+        return np.zeros((2, spline.rows, spline.columns))
+    along_x, along_y = spline.design(field["x"].values, field["y"].values)
+    weight = (field["flag"].values == FLAGS["measured"]).astype(np.float64)
+    # Products of the bases over a node, for all pairs of coefficients of a direction.
+    pairs_x = np.einsum("xi,xk->xik", along_x, along_x)
+    pairs_y = np.einsum("yj,yl->yjl", along_y, along_y)
+    normal = np.einsum("yx,yjl,xik->jilk", weight, pairs_y, pairs_x, optimize=True)
+    normal = normal.reshape(spline.size, spline.size)
+    roughness, size = penalties(spline)
+    share = float(np.trace(normal)) / float(np.trace(roughness))
+    normal += SMOOTHING * share * (roughness + 1e-3 * size / spline.spacing**4)
+    right = [(along_y.T @ (weight * field[name].values) @ along_x).ravel() for name in ("u", "v")]
+    found = np.linalg.solve(normal, np.stack(right, axis=1)).T
+    return np.ascontiguousarray(found.reshape(2, spline.rows, spline.columns))

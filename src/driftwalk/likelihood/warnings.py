@@ -1,0 +1,165 @@
+"""What the user of a fit has to know, in sentences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+from driftwalk.likelihood.agreement import NOTABLE_DISAGREEMENT
+from driftwalk.likelihood.intervals import Intervals
+from driftwalk.likelihood.length import USUAL_PRECISION, in_words, needed_duration
+from driftwalk.likelihood.result import Whiteness
+
+if TYPE_CHECKING:
+    from driftwalk.model import Study
+
+MOST_WALL_SHARE: Final = 0.3
+"""Share of intervals at the wall above which C_d means little."""
+LEAST_USED: Final = 0.9
+"""Share of the usable intervals below which what the filter takes is not the whole motion."""
+LEAST_VISITED: Final = 0.3
+"""Share of the tank's nodes below which a fitted flow is mostly made of its prior."""
+NOTABLE_LEVER: Final = 0.005
+"""Lever of the force, in sides of the block, above which the turning is not that of the model: on
+recordings of the model it comes out at 0.001 to 0.004, with angles 5 degrees off at 0.015."""
+NOTABLE_AUTOCORRELATION: Final = 0.05
+NOTABLE_STDS: Final = 4.0
+
+
+def precision_facts(std: float, duration: float, study: Study) -> dict[str, float]:
+    """Return what stands in the fit on the precision of C_d.
+
+    Parameters
+    ----------
+    std : float
+        Standard deviation of ln C_d.
+    duration : float
+        Length of the recordings together [s].
+    study : Study
+        Its [fit] drag_coefficient_precision.
+    """
+    wanted = study.fit.drag_coefficient_precision
+    facts = {"drag_coefficient_relative_std": std}
+    if wanted is not None:
+        facts["drag_coefficient_precision"] = wanted
+    facts["needed_duration_s"] = needed_duration(duration, std, wanted or USUAL_PRECISION)
+    return facts
+
+
+def warnings_of(
+    facts: Mapping[str, Any],
+    whiteness: Whiteness,
+    visited: Sequence[float],
+    intervals: Intervals,
+    *,
+    side_m: float,
+) -> list[str]:
+    """Return the warnings.
+
+    Parameters
+    ----------
+    facts : mapping
+        The attributes of the fit.
+    whiteness : Whiteness
+        The check of the innovations.
+    visited : sequence of float
+        Share of the tank that the block has been over, in each flow.
+    intervals : Intervals
+        Names of the flows.
+    side_m : float
+        Side of the block [m].
+    """
+    return [
+        *_on_the_data(facts, visited, intervals),
+        *_on_the_search(facts),
+        *_on_the_model(facts, whiteness),
+        *_on_the_turning(facts, side_m),
+    ]
+
+
+def _on_the_data(
+    facts: Mapping[str, Any], visited: Sequence[float], intervals: Intervals
+) -> list[str]:
+    found = []
+    if facts["wall_share"] > MOST_WALL_SHARE:
+        found.append(
+            f"{facts['wall_share']:.0%} of the intervals are at the wall and were left out: C_d is "
+            "not to be trusted above 30 %; record where the block keeps away from the wall"
+        )
+    used, usable = facts["samples_used"], facts["intervals_usable"]
+    if used < LEAST_USED * usable:
+        found.append(
+            f"the fit used {used} of {usable} intervals only: at the end of the others the body "
+            "was more than 6 standard deviations from where the model predicted it; what was "
+            "fitted is only a part of the motion"
+        )
+    std = facts["drag_coefficient_relative_std"]
+    wanted = facts.get("drag_coefficient_precision")
+    if std > (wanted or USUAL_PRECISION):
+        # Infinite where the criterion is flat.
+        needed = facts["needed_duration_s"]
+        length = f"about {in_words(needed)}" if math.isfinite(needed) else "another recording"
+        found.append(
+            f"C_d is known to {100 * std:.2g} % only (one standard deviation) from "
+            f"{in_words(facts['duration_s'])}: for {100 * (wanted or USUAL_PRECISION):.3g} % "
+            f"{length} like this would be needed"
+        )
+    for flow, share in enumerate(visited):
+        if share < LEAST_VISITED:
+            name = "" if intervals.steady else f"in {intervals.describe_flow(flow)} "
+            found.append(
+                f"{name}the block has been over {share:.0%} of the tank only: elsewhere the flow "
+                "is continued smoothly and not measured (flag filled)"
+            )
+    return found
+
+
+def _on_the_search(facts: Mapping[str, Any]) -> list[str]:
+    found = []
+    if facts["converged"] == "no":
+        found.append(
+            f"the search has not come to its end in {facts['iterations']} steps ([fit] iterations)"
+        )
+    if facts["restricted"] == "no":
+        found.append(
+            "the restricted likelihood has no minimum: C_d is that of the plain one, likely too "
+            "large, and the motion tells little of it or does not follow the model"
+        )
+    return found
+
+
+def _on_the_model(facts: Mapping[str, Any], whiteness: Whiteness) -> list[str]:
+    found = []
+    if facts["angle"] == "none":
+        found.append(
+            "no orientation was used: the drag is averaged over all orientations of the block, "
+            "which made C_d 31 % too small to 6 % too large on recordings of known truth"
+        )
+    off = abs(whiteness.autocorrelation)
+    if off > max(NOTABLE_STDS * whiteness.autocorrelation_std, NOTABLE_AUTOCORRELATION):
+        found.append(
+            f"the errors of prediction are correlated ({whiteness.autocorrelation:+.2f} from one "
+            "sample to the next): the motion has something that the model has not, and the "
+            "intervals are too narrow"
+        )
+    return found
+
+
+def _on_the_turning(facts: Mapping[str, Any], side_m: float) -> list[str]:
+    found = []
+    apart = facts.get("angle_disagreement_std", 0.0)
+    if apart > NOTABLE_DISAGREEMENT:
+        found.append(
+            f"with the angle as an input C_d is {facts['drag_coefficient_angle_given']:.3g}, "
+            f"{apart:.1f} combined standard deviations away: the turning of the block and its "
+            "motion do not agree on one drag law, and the intervals are too narrow"
+        )
+    lever = facts.get("force_lever_m_interval", (0.0, 0.0))[0]
+    if lever > NOTABLE_LEVER * side_m:
+        found.append(
+            f"the block turns as if the force acted {1e3 * facts['force_lever_m']:.2g} mm from its "
+            "centre: the recorded angle is late, or not that of the block's faces, or the turning "
+            "has an unrest of its own; C_d and the force are then wrong"
+        )
+    return found
