@@ -19,7 +19,7 @@ import driftwalk as dw
 from driftwalk import _core
 from driftwalk.core.seeds import world_keys
 from driftwalk.schema import build_flow_field
-from driftwalk.simulate.backend import Camera, native_model
+from driftwalk.simulation.backend import Camera, native_model
 
 Floats = npt.NDArray[np.float64]
 Found = dict[str, Any]

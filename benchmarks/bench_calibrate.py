@@ -30,8 +30,8 @@ from driftwalk.cli.demo import demo_study
 from driftwalk.datasets import tank30_flow, tank30_recording, tank30_truth
 from driftwalk.report import write_figures
 from driftwalk.schema import body_track
-from driftwalk.simulate import recorded_camera
-from driftwalk.simulate.backend import default_threads
+from driftwalk.simulation import recorded_camera
+from driftwalk.simulation.backend import default_threads
 
 TARGET_MAP_S = 60.0
 TARGET_ALL_S = 120.0

@@ -27,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.compare import KsComparison, block_permutation_test, ks_compare, ks_reference
+from driftwalk.comparison import KsComparison, block_permutation_test, ks_compare, ks_reference
 
 Points = npt.NDArray[np.float64]
 LOOP_ORIGINS = 2000

@@ -31,7 +31,7 @@ from cases import STEP_S, STEPS, Case, contact_heavy, share_near_wall
 from timing import Times, interleaved, machine, spread
 
 from driftwalk import _core
-from driftwalk.simulate.reference import simulate_reference
+from driftwalk.simulation.reference import simulate_reference
 
 Floats = npt.NDArray[np.float64]
 

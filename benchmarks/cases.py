@@ -18,8 +18,8 @@ from driftwalk import _core
 from driftwalk.core.seeds import world_keys
 from driftwalk.model import Study
 from driftwalk.schema import build_flow_field
-from driftwalk.simulate.backend import Camera, native_model, world_table
-from driftwalk.simulate.reference import TwinModel
+from driftwalk.simulation.backend import Camera, native_model, world_table
+from driftwalk.simulation.reference import TwinModel
 
 Floats = npt.NDArray[np.float64]
 

@@ -32,7 +32,7 @@ from driftwalk.calibration.region import (
 )
 from driftwalk.calibration.search import Map, Window, window_smoother
 from driftwalk.schema import body_track
-from driftwalk.simulate import recorded_camera
+from driftwalk.simulation import recorded_camera
 
 TRUTHS = ((0.45, 0.55e-3), (0.80, 0.90e-3))
 STEPS = (0.01, 2e-5)

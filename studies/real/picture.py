@@ -28,7 +28,7 @@ from driftwalk.report.style import (
     print_style,
 )
 from driftwalk.schema import body_track
-from driftwalk.simulate import recorded_camera
+from driftwalk.simulation import recorded_camera
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

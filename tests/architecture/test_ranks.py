@@ -19,23 +19,23 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "record": GROUND,
     "flow": GROUND,
     "model": GROUND,
-    "compare": GROUND,
+    "comparison": GROUND,
     "sweep": GROUND,
     # `record` for the tracking noise of a recording, which is what "estimate" stands for.
-    "simulate": GROUND | {"model", "record"},
-    "calibration": GROUND | {"simulate", "compare", "flow", "model", "sweep"},
+    "simulation": GROUND | {"model", "record"},
+    "calibration": GROUND | {"simulation", "comparison", "flow", "model", "sweep"},
     # `calibration` for the check of a fit: how far simulated steps are from the recording's.
-    "likelihood": GROUND | {"simulate", "compare", "flow", "model", "sweep", "calibration"},
-    "assemble": GROUND | {"simulate", "compare", "flow", "model", "sweep"},
+    "likelihood": GROUND | {"simulation", "comparison", "flow", "model", "sweep", "calibration"},
+    "assemble": GROUND | {"simulation", "comparison", "flow", "model", "sweep"},
     # `assemble` for the observer: what is seen is classified by the rules of simulated runs.
     "track": GROUND | {"record", "model", "assemble"},
-    "datasets": GROUND | {"record", "flow", "model", "compare", "sweep", "simulate"},
+    "datasets": GROUND | {"record", "flow", "model", "comparison", "sweep", "simulation"},
     "report": GROUND,
     # `track` for its live server, through which the playground's tank can be watched.
     "viewer": GROUND
-    | {"record", "flow", "model", "compare", "simulate", "assemble", "track", "report"},
+    | {"record", "flow", "model", "comparison", "simulation", "assemble", "track", "report"},
     "cli": GROUND
-    | {"record", "flow", "model", "compare", "sweep", "simulate", "assemble"}
+    | {"record", "flow", "model", "comparison", "sweep", "simulation", "assemble"}
     | {"calibration", "likelihood", "track", "datasets", "report", "viewer"},
 }
 HEAVY = frozenset(

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from driftwalk.compare import ks_compare, ks_distance
+from driftwalk.comparison import ks_compare, ks_distance
 
-pytestmark = pytest.mark.filterwarnings("ignore::driftwalk.compare.ComparisonWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::driftwalk.comparison.ComparisonWarning")
 
 # Few distinct values, so that ties abound, and both zeros among them.
 coordinate = st.one_of(

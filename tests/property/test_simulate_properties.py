@@ -18,7 +18,7 @@ from single_block import (
 from driftwalk import _core
 from driftwalk.core.seeds import world_keys
 from driftwalk.model import Tank
-from driftwalk.simulate.backend import wall_edges
+from driftwalk.simulation.backend import wall_edges
 
 TANKS = {
     "circle": Tank(diameter_m=0.3),

@@ -19,7 +19,7 @@ import driftwalk as dw
 from driftwalk import _core
 from driftwalk.assemble.reference import assemble_reference
 from driftwalk.core.seeds import world_keys
-from driftwalk.simulate.backend import Camera, native_model
+from driftwalk.simulation.backend import Camera, native_model
 
 TOLERANCE = 1e-9
 # The kernel turns a wedged block's axes by atan(angle), its angle by angle, 0.02 at most.

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from ks_by_definition import differences, peacock
 
-from driftwalk.compare import ks_compare, ks_distance, ks_reference
+from driftwalk.comparison import ks_compare, ks_distance, ks_reference
 
-pytestmark = pytest.mark.filterwarnings("ignore::driftwalk.compare.ComparisonWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::driftwalk.comparison.ComparisonWarning")
 
 
 def rounded(rng: np.random.Generator, n: int, levels: int) -> np.ndarray:

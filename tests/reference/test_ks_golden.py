@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from driftwalk.compare import ks_compare, ks_distance
+from driftwalk.comparison import ks_compare, ks_distance
 
 GOLDEN = Path(__file__).resolve().parents[1] / "data" / "ks_golden.json"
 DATASETS: list[dict[str, Any]] = json.loads(GOLDEN.read_text())["datasets"]
@@ -17,7 +17,7 @@ LIMITS = "numpy oracle 'limits' (max over the four open/closed choices per axis)
 PEACOCK = "numpy Peacock, all pooled (x,y) grid"
 
 # Two of the golden samples are made of ties, and say so.
-pytestmark = pytest.mark.filterwarnings("ignore::driftwalk.compare.ComparisonWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::driftwalk.comparison.ComparisonWarning")
 
 
 @pytest.mark.parametrize("case", DATASETS, ids=lambda case: case["name"])

@@ -8,7 +8,7 @@ from single_block import model, one_world, random_worlds, run, swirl, twin, wrap
 
 from driftwalk import _core
 from driftwalk.core.seeds import world_keys
-from driftwalk.simulate.reference import drag, simulate_reference
+from driftwalk.simulation.reference import drag, simulate_reference
 
 
 @pytest.mark.parametrize("friction", [pytest.param(0.0, marks=pytest.mark.slow), 0.4])

@@ -10,7 +10,7 @@ from single_block import MASS, SIDE, model, one_world, run, still, study, swirl
 
 import driftwalk as dw
 from driftwalk.core.seeds import world_keys
-from driftwalk.simulate import initial
+from driftwalk.simulation import initial
 
 FALSE_ALARM = 1e-5
 

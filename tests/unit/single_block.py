@@ -11,7 +11,7 @@ import numpy.typing as npt
 import driftwalk as dw
 from driftwalk import _core
 from driftwalk.core.seeds import world_keys
-from driftwalk.simulate.reference import TwinModel
+from driftwalk.simulation.reference import TwinModel
 
 Floats = npt.NDArray[np.float64]
 Velocity = Callable[[Floats, Floats], tuple[Any, Any]]

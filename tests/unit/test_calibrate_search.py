@@ -20,12 +20,12 @@ from driftwalk.calibration.search import (
     run_map,
 )
 from driftwalk.calibration.surface import Optimum
-from driftwalk.compare import apply_steps
+from driftwalk.comparison import apply_steps
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.schema import Track, body_track
-from driftwalk.simulate import Start, recorded_camera
-from driftwalk.simulate.backend import Camera
+from driftwalk.simulation import Start, recorded_camera
+from driftwalk.simulation.backend import Camera
 
 STEPS = (0.01, 2e-5)
 
@@ -64,7 +64,7 @@ def test_a_map_is_what_simulating_and_comparing_each_setting_gives(problem):
     # The address of setting 2 of the coarse stage, replicate 1.
     key = world_keys(1, trial=(1 << 40) + 2, replicate=1)
     from driftwalk import _core
-    from driftwalk.simulate.backend import native_model, world_table
+    from driftwalk.simulation.backend import native_model, world_table
 
     worlds = world_table(**problem.start._asdict(), drag_coefficient=0.5, force_std=4e-4)
     native = native_model(model, problem.flow, problem.sample_time, problem.camera)

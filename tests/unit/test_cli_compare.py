@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 from driftwalk.cli.main import main
-from driftwalk.compare import ks_distance, steps
+from driftwalk.comparison import ks_distance, steps
 from driftwalk.record import load
 from driftwalk.schema import body_track
 

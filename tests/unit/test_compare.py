@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 import driftwalk
-from driftwalk.compare import (
+from driftwalk.comparison import (
     compare,
     joint_density,
     ks_distance,

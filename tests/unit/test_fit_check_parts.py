@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from driftwalk.compare import ks_distance
+from driftwalk.comparison import ks_distance
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.check.errors import Contrast, Errors, Leverage, velocity_at
 from driftwalk.likelihood.check.motion import compare_motion

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from driftwalk import _core
-from driftwalk.compare import ComparisonWarning, ks_compare, ks_distance, ks_reference
+from driftwalk.comparison import ComparisonWarning, ks_compare, ks_distance, ks_reference
 from driftwalk.core.errors import InputError
 
 GOOD = [[0.0, 1.0], [1.0, 0.0]]
@@ -114,7 +114,7 @@ def test_threads_share_a_reference() -> None:
 INSTRUCTION_SETS = """
 import warnings
 import numpy as np
-from driftwalk.compare import ks_compare
+from driftwalk.comparison import ks_compare
 warnings.simplefilter("ignore")
 rng = np.random.default_rng(5)
 for n, m in ((3, 5), (700, 700), (1000, 777), (40_000, 30_000)):

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import binom
 
-from driftwalk.compare import (
+from driftwalk.comparison import (
     autocorrelation_time,
     block_permutation_test,
     ks_distance,

@@ -25,7 +25,7 @@ from driftwalk import _core
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.schema import build_flow_field, build_trajectory
-from driftwalk.simulate import Start
+from driftwalk.simulation import Start
 
 QUIET = {"force_std_N": 0.0}
 STILL = dw.uniform_flow(0.0, 0.0)
@@ -154,7 +154,7 @@ def test_random_start_is_inside_and_stays_inside(tank: dict) -> None:
     if outline.radius_m is not None:
         outside = np.hypot(x, y).max() - outline.radius_m
     else:
-        from driftwalk.simulate.backend import wall_edges
+        from driftwalk.simulation.backend import wall_edges
 
         edges = wall_edges(outline)
         outside = max((x * a + y * b - d).max() for a, b, d in edges)

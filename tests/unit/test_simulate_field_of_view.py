@@ -10,7 +10,7 @@ from driftwalk.calibration.problem import prepare_problem, score_worlds, worlds_
 from driftwalk.core.errors import InputError
 from driftwalk.model import apply_overrides
 from driftwalk.schema import body_track
-from driftwalk.simulate.backend import Camera
+from driftwalk.simulation.backend import Camera
 
 VIEWS = {
     "circle": {"shape": "circle", "diameter_m": 0.2, "center_m": (0.02, 0.0)},

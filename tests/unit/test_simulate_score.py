@@ -10,7 +10,7 @@ from single_block import model, random_worlds, run, swirl
 
 import driftwalk as dw
 from driftwalk import _core
-from driftwalk.compare import apply_steps, plan_steps
+from driftwalk.comparison import apply_steps, plan_steps
 from driftwalk.core.seeds import world_keys
 
 WORLDS = 21

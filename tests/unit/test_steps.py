@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
-from driftwalk.compare import ComparisonWarning, apply_steps, plan_steps, steps
+from driftwalk.comparison import ComparisonWarning, apply_steps, plan_steps, steps
 from driftwalk.core.errors import InputError
 from driftwalk.schema import build_trajectory
 from driftwalk.schema.steps import check_steps

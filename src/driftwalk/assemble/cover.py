@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
 from driftwalk.schema import FLAGS, check_flow_field
-from driftwalk.simulate.backend import wall_edges
+from driftwalk.simulation.backend import wall_edges
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assemble.events import ReplayedEvents, replay_events
-from driftwalk.simulate.backend import STATUS
+from driftwalk.simulation.backend import STATUS
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,7 +13,7 @@ from driftwalk.assemble.address import stream_keys
 from driftwalk.assemble.cover import require_cover
 from driftwalk.assemble.start import given_start, place_blocks, require_room
 from driftwalk.core.errors import InputError
-from driftwalk.simulate.backend import Camera, default_threads, native_model
+from driftwalk.simulation.backend import Camera, default_threads, native_model
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -1,9 +1,9 @@
 """The NumPy twin of the self-assembly kernel: the same rules, written plainly, for tests.
 
 One world at a time, float64, the same random numbers as the native core. Drag, random numbers and
-the algebra of impulses are those of the one-block twin (`driftwalk.simulate.reference`). It is slow
-and is no product: results come from the native core, which is held against these pages. The two
-agree to rounding until a collision amplifies it, and in distribution after.
+the algebra of impulses are those of the one-block twin (`driftwalk.simulation.reference`). It is
+slow and is no product: results come from the native core, which is held against these pages. The
+two agree to rounding until a collision amplifies it, and in distribution after.
 
     reference_body      a rigid assembly of blocks on a lattice
     reference_wall      assemblies against the wall
@@ -47,8 +47,8 @@ from driftwalk.assemble.reference_contacts import collide, overlapping_pairs, se
 from driftwalk.assemble.reference_latch import Joined, Latch, Latching, candidates, latch_once
 from driftwalk.assemble.reference_wall import Wall, meet_wall
 from driftwalk.core.errors import InputError
-from driftwalk.simulate.backend import wall_edges
-from driftwalk.simulate.reference import TwinModel, drag, force_normals
+from driftwalk.simulation.backend import wall_edges
+from driftwalk.simulation.reference import TwinModel, drag, force_normals
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,7 +10,7 @@ import numpy as np
 
 from driftwalk.assemble.reference_body import Assembly, Floats, cross
 from driftwalk.assemble.reference_wall import JAM_TOLERANCE, Wall, push_inside, take_back_outside
-from driftwalk.simulate.reference import resolve_contacts
+from driftwalk.simulation.reference import resolve_contacts
 
 SHIFT_ROUNDS = 10
 SEPARATION_ROUNDS = 40

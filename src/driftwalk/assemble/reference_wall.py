@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from driftwalk.assemble.reference_body import Assembly, Floats, cross, turned
-from driftwalk.simulate.reference import resolve_contacts
+from driftwalk.simulation.reference import resolve_contacts
 
 INSIDE_TOLERANCE = 1e-6
 JAM_TOLERANCE = 1e-4

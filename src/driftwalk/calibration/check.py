@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from driftwalk.calibration.problem import prepare_problem
 from driftwalk.schema import body_track
-from driftwalk.simulate import recorded_camera
+from driftwalk.simulation import recorded_camera
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.compare import StepPlan, apply_steps, plan_steps
+from driftwalk.comparison import StepPlan, apply_steps, plan_steps
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
-from driftwalk.simulate.backend import Camera, default_threads, native_model, world_table
-from driftwalk.simulate.initial import Start, recorded_start, world_orientations
-from driftwalk.simulate.run import without_gaps
+from driftwalk.simulation.backend import Camera, default_threads, native_model, world_table
+from driftwalk.simulation.initial import Start, recorded_start, world_orientations
+from driftwalk.simulation.run import without_gaps
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from driftwalk.calibration.problem import DENSITY_BINS, Floats, Problem
 from driftwalk.calibration.search import Map
-from driftwalk.simulate.backend import STATUS
+from driftwalk.simulation.backend import STATUS
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -36,7 +36,7 @@ from driftwalk.calibration.search import (
 from driftwalk.calibration.surface import FINENESS, Optimum
 from driftwalk.core.errors import InputError
 from driftwalk.schema import Track, body_track
-from driftwalk.simulate import recorded_camera
+from driftwalk.simulation import recorded_camera
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from driftwalk.calibration.problem import Floats, Problem, score_worlds, worlds_of
 from driftwalk.calibration.surface import Optimum, Smoother, make_smoother
-from driftwalk.simulate.backend import STATUS
+from driftwalk.simulation.backend import STATUS
 from driftwalk.sweep import Design, Store, WorkUnit, grid, run_sweep
 
 Progress = Callable[[int, int], None]

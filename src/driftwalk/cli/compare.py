@@ -78,7 +78,7 @@ def compare(
     is the two-sample Kolmogorov-Smirnov statistic of Fasano and Franceschini. How to read the
     recording applies to both files.
     """
-    from driftwalk.compare import compare as compare_motions
+    from driftwalk.comparison import compare as compare_motions
 
     if out is not None:
         require_place(out, existing="replace" if overwrite else "error")

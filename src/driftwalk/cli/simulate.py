@@ -83,8 +83,8 @@ def simulate(
     """Simulate the motion of the block."""
     from driftwalk.core.atomic import write_atomic
     from driftwalk.flow import load_flow
-    from driftwalk.simulate import simulate as run
-    from driftwalk.simulate import simulate_like
+    from driftwalk.simulation import simulate as run
+    from driftwalk.simulation import simulate_like
 
     if backend not in ("cpu", "reference"):
         raise InputError(f"--backend takes cpu or reference, got '{backend}'")

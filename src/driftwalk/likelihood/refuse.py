@@ -9,7 +9,7 @@ import numpy as np
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.length import length_advice
 from driftwalk.likelihood.start import typical_speed
-from driftwalk.simulate import recorded_camera
+from driftwalk.simulation import recorded_camera
 
 if TYPE_CHECKING:
     from driftwalk.model import Study

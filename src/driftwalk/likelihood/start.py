@@ -15,7 +15,7 @@ from driftwalk.likelihood.filter_pass import Point
 from driftwalk.likelihood.newton import PRIOR_DRAG, PRIOR_LEVER, Weights
 from driftwalk.likelihood.spline import Floats, Spline, penalties
 from driftwalk.schema import FLAGS, Track
-from driftwalk.simulate import recorded_camera
+from driftwalk.simulation import recorded_camera
 
 if TYPE_CHECKING:
     from driftwalk.model import Study

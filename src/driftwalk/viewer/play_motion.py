@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.compare import (
+from driftwalk.comparison import (
     KsReference,
     apply_steps,
     block_permutation_test,
@@ -25,7 +25,7 @@ from driftwalk.compare import (
 from driftwalk.core.errors import InputError
 from driftwalk.report import encode_array
 from driftwalk.schema import body_track
-from driftwalk.simulate import recorded_camera
+from driftwalk.simulation import recorded_camera
 from driftwalk.viewer.recording_steps import RecordedSteps, recorded_steps
 
 if TYPE_CHECKING:

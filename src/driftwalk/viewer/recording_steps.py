@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.compare import apply_steps, joint_density, plan_steps
+from driftwalk.comparison import apply_steps, joint_density, plan_steps
 from driftwalk.schema import body_track
-from driftwalk.simulate.run import without_gaps
+from driftwalk.simulation.run import without_gaps
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -38,7 +38,7 @@ from driftwalk.assemble.reference_contacts import Pair, collide, contact_points,
 from driftwalk.assemble.reference_latch import Latch, candidates, latch_once, merged
 from driftwalk.assemble.reference_wall import meet_wall
 from driftwalk.core.errors import InputError
-from driftwalk.simulate.reference import TwinModel, flow_at, simulate_reference
+from driftwalk.simulation.reference import TwinModel, flow_at, simulate_reference
 
 HALF = SIDE / 2
 DIMER, LINE, CORNER = [[0, 0], [1, 0]], [[0, 0], [1, 0], [2, 0]], [[0, 0], [1, 0], [0, 1]]

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from driftwalk import _core
 from driftwalk.calibration.problem import Problem, prepare_problem
-from driftwalk.compare import apply_steps, plan_steps
+from driftwalk.comparison import apply_steps, plan_steps
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.likelihood.check.errors import Estimate
@@ -22,9 +22,9 @@ from driftwalk.likelihood.intervals import fitted_intervals
 from driftwalk.likelihood.result import fitted_flow
 from driftwalk.likelihood.spline import Floats
 from driftwalk.schema import Track
-from driftwalk.simulate import recorded_camera
-from driftwalk.simulate.backend import world_table
-from driftwalk.simulate.initial import world_orientations
+from driftwalk.simulation import recorded_camera
+from driftwalk.simulation.backend import world_table
+from driftwalk.simulation.initial import world_orientations
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -19,7 +19,7 @@ from driftwalk.likelihood.recover.score import SCORED, score_fit
 from driftwalk.model import Study, apply_overrides
 from driftwalk.model.recover import true_time_step_s
 from driftwalk.schema import build_trajectory
-from driftwalk.simulate import simulate
+from driftwalk.simulation import simulate
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -4,9 +4,9 @@
 general tool for any two sets of points in the plane.
 """
 
-from driftwalk.compare.autocorrelation import autocorrelation_time, memory_time
-from driftwalk.compare.density import joint_density, step_length_edges, turning_angle_edges
-from driftwalk.compare.ks import (
+from driftwalk.comparison.autocorrelation import autocorrelation_time, memory_time
+from driftwalk.comparison.density import joint_density, step_length_edges, turning_angle_edges
+from driftwalk.comparison.ks import (
     QUADRANTS,
     KsComparison,
     KsPlace,
@@ -15,11 +15,11 @@ from driftwalk.compare.ks import (
     ks_distance,
     ks_reference,
 )
-from driftwalk.compare.motion import compare
-from driftwalk.compare.plan import AppliedSteps, StepPlan, apply_steps, plan_steps
-from driftwalk.compare.significance import PermutationTest, block_permutation_test
-from driftwalk.compare.walk import steps
-from driftwalk.compare.warn import ComparisonWarning
+from driftwalk.comparison.motion import compare
+from driftwalk.comparison.plan import AppliedSteps, StepPlan, apply_steps, plan_steps
+from driftwalk.comparison.significance import PermutationTest, block_permutation_test
+from driftwalk.comparison.walk import steps
+from driftwalk.comparison.warn import ComparisonWarning
 
 __all__ = [
     "QUADRANTS",

@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.compare.autocorrelation import steps_memory_time
-from driftwalk.compare.ks import Points, Ties, checked_points
+from driftwalk.comparison.autocorrelation import steps_memory_time
+from driftwalk.comparison.ks import Points, Ties, checked_points
 from driftwalk.core.errors import InputError
 
 # Blocks of six autocorrelation times: shorter ones reject too often.

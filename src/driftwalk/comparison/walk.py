@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from driftwalk.compare.plan import AppliedSteps, StepPlan, apply_steps, plan_steps
-from driftwalk.compare.warn import ComparisonWarning
+from driftwalk.comparison.plan import AppliedSteps, StepPlan, apply_steps, plan_steps
+from driftwalk.comparison.warn import ComparisonWarning
 from driftwalk.core.errors import InputError
 from driftwalk.schema import body_track
 from driftwalk.schema.steps import build_steps

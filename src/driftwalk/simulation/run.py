@@ -10,14 +10,8 @@ import numpy.typing as npt
 from driftwalk import _core
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
-from driftwalk.simulate.backend import (
-    STATUS,
-    Camera,
-    default_threads,
-    native_model,
-    world_table,
-)
-from driftwalk.simulate.initial import Start, random_start, recorded_start, world_orientations
+from driftwalk.simulation.backend import STATUS, Camera, default_threads, native_model, world_table
+from driftwalk.simulation.initial import Start, random_start, recorded_start, world_orientations
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -150,7 +144,7 @@ def simulate_like(
     """
     from driftwalk.model import apply_overrides
     from driftwalk.schema import body_track
-    from driftwalk.simulate.camera import recorded_camera
+    from driftwalk.simulation.camera import recorded_camera
 
     track = body_track(recording, body)
     quantum = float(recording.attrs.get("position_quantum_m", 0.0))

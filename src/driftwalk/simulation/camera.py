@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from driftwalk.record import estimate_tracking_noise
-from driftwalk.simulate.backend import Camera
+from driftwalk.simulation.backend import Camera
 
 if TYPE_CHECKING:
     from driftwalk.model import Study

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.compare.warn import ComparisonWarning
+from driftwalk.comparison.warn import ComparisonWarning
 from driftwalk.core.errors import InputError
 
 Points = npt.NDArray[np.float64]

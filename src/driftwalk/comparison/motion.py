@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.compare.density import joint_density, step_length_edges, turning_angle_edges
-from driftwalk.compare.ks import KsComparison, Points, Ties, ks_compare
-from driftwalk.compare.plan import usual_interval
-from driftwalk.compare.significance import PermutationTest, block_permutation_test
-from driftwalk.compare.walk import steps
+from driftwalk.comparison.density import joint_density, step_length_edges, turning_angle_edges
+from driftwalk.comparison.ks import KsComparison, Points, Ties, ks_compare
+from driftwalk.comparison.plan import usual_interval
+from driftwalk.comparison.significance import PermutationTest, block_permutation_test
+from driftwalk.comparison.walk import steps
 from driftwalk.core.errors import InputError
 from driftwalk.core.json_text import parse_json
 from driftwalk.schema import body_track

@@ -1,7 +1,0 @@
-"""What would this model do? Simulated trajectories of one block in a stirred tank."""
-
-from driftwalk.simulate.camera import recorded_camera
-from driftwalk.simulate.initial import Start, recorded_start
-from driftwalk.simulate.run import simulate, simulate_like
-
-__all__ = ["Start", "recorded_camera", "recorded_start", "simulate", "simulate_like"]
