@@ -155,7 +155,7 @@ def print_scaling(*, rounds: int, plot: Path | None) -> None:
 
 
 def draw_scaling(file: Path, rates: dict[str, list[list[float]]]) -> None:
-    from driftwalk.report.style import BLUE, ORANGE, new_figure, print_style
+    from driftwalk.plot.parts.style import BLUE, ORANGE, new_figure, print_style
 
     labels = {"collision": "latching upon collision", "none": "hard blocks"}
     with print_style():

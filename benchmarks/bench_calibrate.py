@@ -28,7 +28,7 @@ from driftwalk.calibration import calibrate
 from driftwalk.calibration.problem import prepare_problem, worlds_of
 from driftwalk.cli.demo import demo_study
 from driftwalk.datasets import tank30_flow, tank30_recording, tank30_truth
-from driftwalk.report import write_figures
+from driftwalk.figures import write_figures
 from driftwalk.schema import body_track
 from driftwalk.simulation import recorded_camera
 from driftwalk.simulation.backend import default_threads

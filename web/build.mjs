@@ -12,7 +12,7 @@ import { parseArgs } from "node:util";
 import { build } from "esbuild";
 
 const HERE = path.dirname(fileURLToPath(import.meta.url));
-const PACKAGE = path.join(HERE, "../src/driftwalk/report/static");
+const PACKAGE = path.join(HERE, "../src/driftwalk/page/static");
 
 const { values } = parseArgs({
   options: { tests: { type: "boolean", default: false }, into: { type: "string" } },

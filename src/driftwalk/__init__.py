@@ -22,10 +22,12 @@ _STAGES = (
     "comparison",
     "calibration",
     "likelihood",
-    "assemble",
+    "assembly",
     "track",
     "datasets",
-    "report",
+    "plot",
+    "figures",
+    "page",
     "viewer",
 )
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from model import simulate
 
 import driftwalk as dw
-from driftwalk.report.style import new_figure, print_style
+from driftwalk.plot.parts.style import new_figure, print_style
 
 RUNS = 1000
 DPI = 110

@@ -13,8 +13,8 @@ from run import read_lines
 
 import driftwalk as dw
 from driftwalk.likelihood.recover.score import block_flow
-from driftwalk.report.arena import draw_arena, label_position
-from driftwalk.report.style import (
+from driftwalk.plot.parts.arena import draw_arena, label_position
+from driftwalk.plot.parts.style import (
     DOUBLE_COLUMN_MM,
     INK,
     MUTED,

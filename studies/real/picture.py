@@ -18,8 +18,7 @@ import xarray as xr
 
 from driftwalk.calibration.problem import Problem, prepare_problem, score_worlds, worlds_of
 from driftwalk.model import parse_study
-from driftwalk.report.plot_steps import DENSITY_LABEL, density_mesh, density_of
-from driftwalk.report.style import (
+from driftwalk.plot.parts.style import (
     INK,
     ORANGE,
     add_colorbar,
@@ -27,6 +26,7 @@ from driftwalk.report.style import (
     new_figure,
     print_style,
 )
+from driftwalk.plot.step_density import DENSITY_LABEL, density_mesh, density_of
 from driftwalk.schema import body_track
 from driftwalk.simulation import recorded_camera
 

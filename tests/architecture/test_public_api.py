@@ -21,10 +21,12 @@ STAGES = (
     "sweep",
     "calibration",
     "likelihood",
-    "assemble",
+    "assembly",
     "track",
     "datasets",
-    "report",
+    "plot",
+    "figures",
+    "page",
     "viewer",
 )
 

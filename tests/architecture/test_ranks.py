@@ -26,17 +26,19 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "calibration": GROUND | {"simulation", "comparison", "flow", "model", "sweep"},
     # `calibration` for the check of a fit: how far simulated steps are from the recording's.
     "likelihood": GROUND | {"simulation", "comparison", "flow", "model", "sweep", "calibration"},
-    "assemble": GROUND | {"simulation", "comparison", "flow", "model", "sweep"},
+    "assembly": GROUND | {"simulation", "comparison", "flow", "model", "sweep"},
     # `assemble` for the observer: what is seen is classified by the rules of simulated runs.
-    "track": GROUND | {"record", "model", "assemble"},
+    "track": GROUND | {"record", "model", "assembly"},
     "datasets": GROUND | {"record", "flow", "model", "comparison", "sweep", "simulation"},
-    "report": GROUND,
+    "plot": GROUND,
+    "figures": GROUND | {"plot"},
+    "page": GROUND | {"plot"},
     # `track` for its live server, through which the playground's tank can be watched.
     "viewer": GROUND
-    | {"record", "flow", "model", "comparison", "simulation", "assemble", "track", "report"},
+    | {"record", "flow", "model", "comparison", "simulation", "assembly", "track", "plot", "page"},
     "cli": GROUND
-    | {"record", "flow", "model", "comparison", "sweep", "simulation", "assemble"}
-    | {"calibration", "likelihood", "track", "datasets", "report", "viewer"},
+    | {"record", "flow", "model", "comparison", "sweep", "simulation", "assembly"}
+    | {"calibration", "likelihood", "track", "datasets", "plot", "figures", "page", "viewer"},
 }
 HEAVY = frozenset(
     {"xarray", "scipy", "pandas", "cv2", "matplotlib", "dask", "optuna", "h5netcdf", "SALib"}

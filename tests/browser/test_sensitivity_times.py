@@ -19,7 +19,7 @@ from browser.all_kinds import page_of
 from browser.conftest import PHONE, Visit
 from browser.pictures import drawn_share, path_points, pixels
 from driftwalk.core.rundir import RunDirectory
-from driftwalk.report import sensitivity_sections
+from driftwalk.page import sensitivity_sections
 
 pytestmark = pytest.mark.browser
 
@@ -35,7 +35,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("sensitivity") / "run"
     with pytest.MonkeyPatch.context() as patch:
         for name in ("write_assembly_figures", "write_sensitivity_figures"):
-            patch.setattr(f"driftwalk.report.{name}", lambda *folders, **datasets: [])
+            patch.setattr(f"driftwalk.figures.{name}", lambda *folders, **datasets: [])
         done = here("sensitivity", "--flow", FLOW, *SIZE, *MAP, "--threads", "1", "-o", folder)
     assert done.code == 0, done.err
     return folder
@@ -219,7 +219,9 @@ def test_a_running_analysis_shows_the_settings_that_are_there(
     with RunDirectory(tmp_path / "run", specification=specification) as opened:
         store = opened.store("map")
         reference = dw.sensitivity_reference(study, flow, store=opened.store("reference"))
-        monkeypatch.setattr("driftwalk.assemble.settings.BLOCK_STEPS_PER_UNIT", 40 * 3 * 6000 * 4)
+        monkeypatch.setattr(
+            "driftwalk.assembly.sensitivity.settings.BLOCK_STEPS_PER_UNIT", 40 * 3 * 6000 * 4
+        )
         with pytest.raises(KeyboardInterrupt):
             dw.sensitivity_map(study, flow, reference=reference, store=store, progress=stop_at(8))
         with served("view", opened.path) as server:

@@ -180,7 +180,7 @@ def test_an_image_that_is_none_is_one_line(tmp_path: Path, capfd: pytest.Capture
 
 
 def test_memory_that_runs_out_is_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    from driftwalk.cli.errors import one_line
+    from driftwalk.cli.terminal.errors import one_line
 
     assert one_line(MemoryError("Unable to allocate 74 GiB")) == (
         "there is not enough memory for this: Unable to allocate 74 GiB"
@@ -208,7 +208,7 @@ def test_a_foreign_flow_of_text_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_value_beyond_single_precision_is_none_on_a_page() -> None:
-    from driftwalk.report.page_arrays import decode_array, encode_array
+    from driftwalk.page.arrays import decode_array, encode_array
 
     np.testing.assert_array_equal(decode_array(encode_array([1.0, 1e300])), [1.0, np.nan])
 

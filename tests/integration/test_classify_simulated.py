@@ -11,10 +11,10 @@ import pytest
 import xarray as xr
 from command_line import here, refusal
 
-from driftwalk.assemble.classify import classify
-from driftwalk.assemble.events import class_at
-from driftwalk.assemble.path_recording import path_recording
-from driftwalk.assemble.run import assemble, assembly_path
+from driftwalk.assembly.classify import classify
+from driftwalk.assembly.lattice.events import class_at
+from driftwalk.assembly.runs.path_recording import path_recording
+from driftwalk.assembly.runs.run import assemble, assembly_path
 from driftwalk.core.errors import InputError
 from driftwalk.datasets import tank30_flow
 from driftwalk.model import Study

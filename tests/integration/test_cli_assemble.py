@@ -42,7 +42,7 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     study = place / "study.toml"
     study.write_text(GRID, encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("driftwalk.report.write_figures", lambda *datasets, **options: [])
+        patch.setattr("driftwalk.figures.write_figures", lambda *datasets, **options: [])
         done = here(
             *("calibrate", RECORDING, "--to", "60s", "--study", study, "--out", place / "run"),
             *("--tank-diameter", "30cm", "--threads", "1"),
@@ -54,8 +54,8 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(autouse=True)
 def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the figures, which take most of the time of a short run in this process."""
-    monkeypatch.setattr("driftwalk.report.write_assembly_figures", lambda *folders, **datasets: [])
-    monkeypatch.setattr("driftwalk.report.write_animation", lambda *words: None)
+    monkeypatch.setattr("driftwalk.figures.write_assembly_figures", lambda *folders, **datasets: [])
+    monkeypatch.setattr("driftwalk.plot.write_animation", lambda *words: None)
 
 
 @pytest.fixture(scope="module")
@@ -291,11 +291,11 @@ def test_a_finished_run_is_kept_until_overwrite(calibrated: Path, tmp_path: Path
 
 # Small units, without figures.
 SMALL = """
-import driftwalk.report
-import driftwalk.assemble.run
-driftwalk.report.write_assembly_figures = lambda *folders, **datasets: []
-driftwalk.assemble.run.BLOCKS_PER_UNIT = 100
-driftwalk.assemble.run.FEWEST_RUNS_PER_UNIT = 1
+import driftwalk.figures
+import driftwalk.assembly.runs.run
+driftwalk.figures.write_assembly_figures = lambda *folders, **datasets: []
+driftwalk.assembly.runs.run.BLOCKS_PER_UNIT = 100
+driftwalk.assembly.runs.run.FEWEST_RUNS_PER_UNIT = 1
 """
 
 

@@ -45,7 +45,7 @@ REQUIRED = (
 @pytest.fixture
 def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the figures, which take most of the time of a short run."""
-    monkeypatch.setattr("driftwalk.report.write_figures", lambda *datasets, **options: [])
+    monkeypatch.setattr("driftwalk.figures.write_figures", lambda *datasets, **options: [])
 
 
 @pytest.fixture(scope="module")
@@ -275,9 +275,9 @@ def test_a_setting_in_which_nothing_moves_has_distance_1_and_is_hatched(tmp_path
 
 # In processes of their own: what depends on the terminal, the threads and the instruction set.
 
-PLAIN = "import driftwalk.report\ndriftwalk.report.write_figures = lambda *a, **k: []\n"
+PLAIN = "import driftwalk.figures\ndriftwalk.figures.write_figures = lambda *a, **k: []\n"
 CHATTY = (
-    "from driftwalk.cli.progress import ProgressReporter\n"
+    "from driftwalk.cli.terminal.progress import ProgressReporter\n"
     "ProgressReporter.__init__.__kwdefaults__['seconds_between_lines'] = 0.0\n"
 )
 

@@ -34,7 +34,7 @@ from signals_at_units import after_units, go_on, halted
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
 # Figures take most of the time of a short run, and come after everything that resumes.
-PLAIN = "import driftwalk.report\ndriftwalk.report.write_figures = lambda *a, **k: []\n"
+PLAIN = "import driftwalk.figures\ndriftwalk.figures.write_figures = lambda *a, **k: []\n"
 
 
 @pytest.fixture(scope="module")

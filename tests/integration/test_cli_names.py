@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from command_line import FLOW, apart, here
 
+from driftwalk.page import report_page
 from driftwalk.record import load
-from driftwalk.report import report_page
 
 TRACK = b"t_s,x_m,y_m\n" + b"".join(b"%.1f,%.3f,0\n" % (k / 10, k / 1000) for k in range(30))
 ASCII = {**os.environ, "PYTHONIOENCODING": "ascii"}

@@ -20,7 +20,7 @@ from command_line import FLOW, GRID, RECORDING, calibration, contents, here, ref
 from page_reading import page_in, part_of, values
 
 from driftwalk import decode_array
-from driftwalk.report import report_html
+from driftwalk.page import report_html
 
 TANK = ("--tank-diameter", "30cm")
 DOCS = Path(__file__).parents[2] / "docs"
@@ -54,7 +54,7 @@ def no_figures() -> Iterator[None]:
     """Leave out the figures, which take most of the time of short runs."""
     with pytest.MonkeyPatch.context() as patch:
         for name in FIGURES:
-            patch.setattr(f"driftwalk.report.{name}", lambda *folders, **datasets: [])
+            patch.setattr(f"driftwalk.figures.{name}", lambda *folders, **datasets: [])
         yield
 
 

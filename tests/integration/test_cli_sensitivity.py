@@ -42,7 +42,7 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     study = place / "study.toml"
     study.write_text(GRID.replace("bootstrap = 10", "bootstrap = 0"), encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("driftwalk.report.write_figures", lambda *datasets, **options: [])
+        patch.setattr("driftwalk.figures.write_figures", lambda *datasets, **options: [])
         done = here(
             *("calibrate", RECORDING, "--to", "60s", "--study", study, "--out", place / "run"),
             *("--tank-diameter", "30cm", "--threads", "1"),
@@ -55,7 +55,7 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the figures, which take most of the time of a short run in this process."""
     for name in ("write_assembly_figures", "write_sensitivity_figures"):
-        monkeypatch.setattr(f"driftwalk.report.{name}", lambda *folders, **datasets: [])
+        monkeypatch.setattr(f"driftwalk.figures.{name}", lambda *folders, **datasets: [])
 
 
 @pytest.fixture(scope="module")
@@ -188,7 +188,7 @@ def test_figures_of_three_axes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         drawn[folder.relative_to(tmp_path / "run" / "figures").as_posix()] = sensitivity
         return []
 
-    monkeypatch.setattr("driftwalk.report.write_sensitivity_figures", keep)
+    monkeypatch.setattr("driftwalk.figures.write_sensitivity_figures", keep)
     words = ["--vary", "latching=collision,none", *MAP]
     done = here("sensitivity", "--flow", FLOW, *SIZE, *words, "-o", tmp_path / "run")
     assert done.code == 0, done.err
@@ -261,7 +261,7 @@ def test_an_unfinished_run_whose_units_keep_less_is_refused(
 
     with monkeypatch.context() as patch:
         patch.setattr("driftwalk.cli.sensitivity_run.SHARD_FORM", 1)
-        patch.setattr("driftwalk.assemble.sensitivity_map", stop)
+        patch.setattr("driftwalk.assembly.sensitivity_map", stop)
         assert here(*words).code == 130
     line = refusal(here(*words))
     assert "differs in shard_form" in line
@@ -270,10 +270,10 @@ def test_an_unfinished_run_whose_units_keep_less_is_refused(
 
 # One setting per unit, without figures.
 SMALL = """
-import driftwalk.report
-from driftwalk.assemble import settings
-driftwalk.report.write_assembly_figures = lambda *folders, **datasets: []
-driftwalk.report.write_sensitivity_figures = lambda *folders, **datasets: []
+import driftwalk.figures
+from driftwalk.assembly.sensitivity import settings
+driftwalk.figures.write_assembly_figures = lambda *folders, **datasets: []
+driftwalk.figures.write_sensitivity_figures = lambda *folders, **datasets: []
 settings.BLOCK_STEPS_PER_UNIT = 1
 """
 

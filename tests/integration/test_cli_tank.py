@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 
 import driftwalk as dw
-from driftwalk.cli.recording_options import RecordingOptions
-from driftwalk.cli.study_recording import load_for_run
-from driftwalk.cli.tank import study_in_arena
+from driftwalk.cli.inputs.study_recording import load_for_run
+from driftwalk.cli.inputs.tank import study_in_arena
+from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.record import save_trajectory
 
 

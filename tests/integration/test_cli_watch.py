@@ -11,7 +11,7 @@ import xarray as xr
 from command_line import here
 
 import driftwalk as dw
-from driftwalk.assemble import assembly_path
+from driftwalk.assembly import assembly_path
 from driftwalk.datasets import tank30_flow
 from driftwalk.model import Study
 from driftwalk.schema import build_trajectory

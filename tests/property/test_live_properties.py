@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import driftwalk as dw
-from driftwalk.assemble.plan import make_plan, simulate_rows, start_poses
+from driftwalk.assembly.runs.plan import make_plan, simulate_rows, start_poses
 
 STEP = 0.01
 # Crowded tanks, so that blocks join within seconds; 26 blocks are beyond looking at all pairs.

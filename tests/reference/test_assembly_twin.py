@@ -17,7 +17,7 @@ from twin_assembly import SIDE, Floats, study, swirl
 
 import driftwalk as dw
 from driftwalk import _core
-from driftwalk.assemble.reference import assemble_reference
+from driftwalk.assembly.reference import assemble_reference
 from driftwalk.core.seeds import world_keys
 from driftwalk.simulation.backend import Camera, native_model
 

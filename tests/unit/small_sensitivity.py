@@ -7,7 +7,7 @@ from typing import Any
 import xarray as xr
 
 import driftwalk as dw
-from driftwalk.assemble.run import assemble
+from driftwalk.assembly.runs.run import assemble
 
 RUNS, REALISATIONS = 12, 3
 # A stream towards one side of a narrow tank: within ten seconds most blocks have met.

@@ -125,8 +125,8 @@ def test_damaged_simulation_is_refused(
 
 
 def test_replicates_of_a_simulation_are_trajectories(synthetic: dict[str, Path]) -> None:
-    from driftwalk.cli.motion import load_motion
-    from driftwalk.cli.recording_options import RecordingOptions
+    from driftwalk.cli.inputs.motion import load_motion
+    from driftwalk.cli.options.recording import RecordingOptions
 
     motion = load_motion(synthetic["simulation"], RecordingOptions(), replicate=1)
     assert motion.attrs["kind"] == "trajectory"

@@ -19,9 +19,9 @@ import typer
 
 from driftwalk import __version__
 from driftwalk.cli import main as cli_main
-from driftwalk.cli import options
 from driftwalk.cli.main import COMMANDS, Command, main
-from driftwalk.cli.options import (
+from driftwalk.cli.options import shared as options
+from driftwalk.cli.options.shared import (
     CALIBRATION_KEYS,
     STUDY_KEYS,
     DragCoefficient,
@@ -33,8 +33,8 @@ from driftwalk.cli.options import (
     resolve_study,
     study_overrides,
 )
-from driftwalk.cli.output import plain, print_json, print_table, to_json
-from driftwalk.cli.progress import ProgressReporter, duration_text
+from driftwalk.cli.terminal.output import plain, print_json, print_table, to_json
+from driftwalk.cli.terminal.progress import ProgressReporter, duration_text
 from driftwalk.core.errors import ConfigurationError, FormatError, InputError
 from driftwalk.model import Study, load_study
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
+from driftwalk.cli.inputs.other_files import what_else
 from driftwalk.cli.main import main
-from driftwalk.cli.other_files import what_else
 
 RECORDING = Path(str(files("driftwalk.datasets") / "tank30_ode_a" / "recording.csv"))
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from driftwalk.cli.recording_options import RecordingOptions
-from driftwalk.cli.study_recording import completed, load_with_study
+from driftwalk.cli.inputs.study_recording import completed, load_with_study
+from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.model import Study, Tank
 
 

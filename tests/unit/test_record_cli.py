@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from driftwalk.cli.main import main
-from driftwalk.cli.recording_options import parse_columns
+from driftwalk.cli.options.recording import parse_columns
 from driftwalk.core.errors import InputError
 from driftwalk.record import load
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from recovery_worlds import synthetic_recovery
 
-from driftwalk.cli.recover_answer import length_text, summary, warnings
+from driftwalk.cli.terminal.recover_answer import length_text, summary, warnings
 from driftwalk.likelihood.recover.summary import add_summary
 
 

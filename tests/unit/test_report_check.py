@@ -11,12 +11,12 @@ import xarray as xr
 from matplotlib.patches import Rectangle
 
 from driftwalk.core.errors import InputError
-from driftwalk.report import (
+from driftwalk.figures import write_check_figures
+from driftwalk.plot import (
     plot_innovations,
     plot_predicted_steps,
     plot_residual_map,
     plot_residual_time,
-    write_check_figures,
 )
 
 LAGS, CELLS, PARTS, BINS = 20, 5, 4, 6

@@ -9,9 +9,9 @@ from matplotlib.collections import QuadMesh
 from synthetic_calibration import synthetic_calibration
 
 from driftwalk.core.errors import InputError
-from driftwalk.report import plot_density_panels
-from driftwalk.report.plot_density_panels import choose_settings, shared_setting_text
-from driftwalk.report.style import new_figure
+from driftwalk.plot import plot_density_panels
+from driftwalk.plot.panels import choose_settings, shared_setting_text
+from driftwalk.plot.parts.style import new_figure
 
 
 @pytest.fixture(scope="module")

@@ -13,8 +13,9 @@ import pytest
 from synthetic_calibration import bundled_flow, bundled_recording, synthetic_calibration
 
 from driftwalk.core.errors import InputError
-from driftwalk.report import figures, write_figures
-from driftwalk.report.style import STYLE, print_style
+from driftwalk.figures import calibration as figures
+from driftwalk.figures import write_figures
+from driftwalk.plot.parts.style import STYLE, print_style
 
 NAMES = [
     "flow",
@@ -82,9 +83,9 @@ def test_style_is_restored_even_after_an_error() -> None:
 
 def test_importing_is_light_and_drawing_needs_no_pyplot() -> None:
     code = (
-        "import sys, driftwalk.report as report\n"
+        "import sys, driftwalk.plot as plot\n"
         "assert 'matplotlib' not in sys.modules\n"
-        "report.plot_steps([0.001, 0.002], [0.0, 0.1])\n"
+        "plot.plot_steps([0.001, 0.002], [0.0, 0.1])\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)

@@ -13,9 +13,9 @@ from matplotlib.quiver import Quiver
 from synthetic_calibration import ARENA, bundled_flow
 
 from driftwalk.core.errors import InputError
-from driftwalk.report import plot_flow
-from driftwalk.report.arena import arena_of, arena_patch
-from driftwalk.report.style import new_figure
+from driftwalk.plot import plot_flow
+from driftwalk.plot.parts.arena import arena_of, arena_patch
+from driftwalk.plot.parts.style import new_figure
 from driftwalk.schema import FLAGS, build_flow_field
 
 

@@ -13,8 +13,8 @@ from matplotlib.patches import Polygon, Rectangle
 from synthetic_calibration import synthetic_calibration
 
 from driftwalk.core.errors import InputError
-from driftwalk.report import plot_ks_map, plot_refined_map
-from driftwalk.report.plot_ks_map import cell_edges
+from driftwalk.plot import plot_ks_map, plot_refined_map
+from driftwalk.plot.distances import cell_edges
 
 
 @pytest.fixture(scope="module")

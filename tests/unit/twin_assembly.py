@@ -10,9 +10,9 @@ import numpy.typing as npt
 import xarray as xr
 
 import driftwalk as dw
-from driftwalk.assemble.reference import Rules, World, make_rules, start_world
-from driftwalk.assemble.reference_body import Assembly, Square
-from driftwalk.assemble.reference_latch import Latch
+from driftwalk.assembly.reference import Rules, World, make_rules, start_world
+from driftwalk.assembly.reference_body import Assembly, Square
+from driftwalk.assembly.reference_latch import Latch
 
 Floats = npt.NDArray[np.float64]
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from driftwalk.cli.assembly_source import (
+from driftwalk.cli.calibrate import Overwrite, Threads
+from driftwalk.cli.inputs.assembly_source import (
     refuse_found,
     source_from_calibration,
     source_from_flow,
 )
-from driftwalk.cli.calibrate import Overwrite, Threads
-from driftwalk.cli.options import (
+from driftwalk.cli.options.shared import (
     ASSEMBLY_KEYS,
     BlockFriction,
     BlockLatching,
@@ -43,7 +43,7 @@ from driftwalk.cli.options import (
     WallRestitution,
     study_overrides,
 )
-from driftwalk.cli.output import print_json, print_note, print_table, report_command
+from driftwalk.cli.terminal.output import print_json, print_note, print_table, report_command
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -209,7 +209,7 @@ def _drawn(distribution: xr.Dataset) -> list[str]:
 
 def _difference(result: AssemblyResult) -> dict[str, float]:
     """Return how far the two distributions are apart, and how far they would be by chance."""
-    from driftwalk.assemble import l1_distance, l1_noise_floor
+    from driftwalk.assembly import l1_distance, l1_noise_floor
 
     if result.drawn is None:
         return {}

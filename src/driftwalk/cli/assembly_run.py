@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.cli.calibration_run import dataset_hash, netcdf_bytes
-from driftwalk.cli.progress import ProgressReporter
 from driftwalk.cli.run_folder import open_run
+from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.schema.netcdf import open_netcdf
 
 if TYPE_CHECKING:
@@ -119,7 +119,7 @@ def run_assembly(
 
 def _check(work: AssemblyWork) -> None:
     """Refuse what cannot be simulated before anything is written for it."""
-    from driftwalk.assemble import check_assembly
+    from driftwalk.assembly import check_assembly
 
     trials = (FIXED_TRIAL,) if work.calibration is None else (FIXED_TRIAL, DRAWN_TRIAL)
     for trial in trials:
@@ -127,14 +127,14 @@ def _check(work: AssemblyWork) -> None:
 
 
 def _simulate(work: AssemblyWork, run: RunDirectory, progress: ProgressReporter) -> AssemblyResult:
-    from driftwalk.assemble import (
+    from driftwalk.assembly import (
         assemble,
         assemble_drawn,
         assembly_path,
         class_times,
         outcome_distribution,
     )
-    from driftwalk.report import write_assembly_figures
+    from driftwalk.figures import write_assembly_figures
 
     confidence = work.study.assembly.confidence
     drawn = None
@@ -188,7 +188,7 @@ def _simulate(work: AssemblyWork, run: RunDirectory, progress: ProgressReporter)
 
 def _write_film(run: RunDirectory, film: str, progress: ProgressReporter) -> None:
     """Film the first run from what is stored of it."""
-    from driftwalk.report import write_animation
+    from driftwalk.plot import write_animation
 
     progress.update(1, 1, "film")
     write_animation(open_netcdf(run.path / "path.nc"), run.folder("figures") / f"run.{film}")

@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from driftwalk.cli.options import (
+from driftwalk.cli.inputs.require_motion import require_motion
+from driftwalk.cli.inputs.study_recording import load_for_run
+from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
+from driftwalk.cli.options.shared import (
     CALIBRATION_KEYS,
     Depth,
     FlowFile,
@@ -29,14 +32,7 @@ from driftwalk.cli.options import (
     resolve_study,
     study_overrides,
 )
-from driftwalk.cli.output import print_json, print_note, report_command
-from driftwalk.cli.recording_options import (
-    RecordingFile,
-    RecordingOptions,
-    with_recording_options,
-)
-from driftwalk.cli.require_motion import require_motion
-from driftwalk.cli.study_recording import load_for_run
+from driftwalk.cli.terminal.output import print_json, print_note, report_command
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -91,7 +87,7 @@ def calibrate(
     model explains the motion. Killed and started again, it continues.
     """
     from driftwalk.cli.calibration_run import Work, run_calibration
-    from driftwalk.cli.tank import require_inside, study_in_arena
+    from driftwalk.cli.inputs.tank import require_inside, study_in_arena
     from driftwalk.flow import load_flow
 
     overrides = study_overrides(

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from driftwalk.cli.output import print_note
-from driftwalk.cli.progress import ProgressReporter
 from driftwalk.cli.run_folder import open_run
+from driftwalk.cli.terminal.output import print_note
+from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def run_calibration(work: Work, folder: Path, *, overwrite: bool) -> xr.Dataset:
         When the directory is in use, holds another run, or cannot be written.
     """
     from driftwalk.calibration import calibrate
-    from driftwalk.report import write_figures
+    from driftwalk.figures import write_figures
 
     flow = _checked_flow(work)
     with open_run(

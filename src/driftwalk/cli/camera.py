@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 import typer
 
 from driftwalk.cli.main import paragraphs
-from driftwalk.cli.options import Json, quantity_option
-from driftwalk.cli.output import print_json, print_note, print_table
+from driftwalk.cli.options.shared import Json, quantity_option
+from driftwalk.cli.terminal.output import print_json, print_note, print_table
 from driftwalk.core.errors import FormatError, InputError
 
 if TYPE_CHECKING:

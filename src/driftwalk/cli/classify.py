@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from driftwalk.cli.options import Json, Side, StudyFile, quantity_option, resolve_study
-from driftwalk.cli.output import print_json, print_note, print_table
-from driftwalk.cli.recording_options import RecordingOptions, with_recording_options
-from driftwalk.cli.study_recording import load_with_study
+from driftwalk.cli.inputs.study_recording import load_with_study
+from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
+from driftwalk.cli.options.shared import Json, Side, StudyFile, quantity_option, resolve_study
+from driftwalk.cli.terminal.output import print_json, print_note, print_table
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.schema.contents import check_contents
 from driftwalk.schema.netcdf import kind_of, open_netcdf
@@ -98,7 +98,7 @@ def classify(
     class is the multiset of the shapes that they make up. The side of the blocks is that of the
     study, by default 3 cm.
     """
-    from driftwalk.assemble import classify as classify_recording
+    from driftwalk.assembly import classify as classify_recording
     from driftwalk.core.atomic import require_target
 
     if out is not None:
@@ -160,7 +160,7 @@ def _load(
     path: Path, how: RecordingOptions, study: Path | None, side: float | None, run: int | None
 ) -> tuple[xr.Dataset, float]:
     """Return the recording, or the simulated run, and the side of its blocks [m]."""
-    from driftwalk.assemble import path_recording
+    from driftwalk.assembly import path_recording
     from driftwalk.model import Study
 
     simulated = _simulated_path(path)

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from driftwalk.cli.motion import load_motion
-from driftwalk.cli.options import Json, StepInterval
-from driftwalk.cli.output import print_json, print_note, print_table, require_place
-from driftwalk.cli.recording_options import RecordingOptions, with_recording_options
+from driftwalk.cli.inputs.motion import load_motion
+from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
+from driftwalk.cli.options.shared import Json, StepInterval
+from driftwalk.cli.terminal.output import print_json, print_note, print_table, require_place
 
 if TYPE_CHECKING:
     import xarray as xr

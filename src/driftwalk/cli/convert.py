@@ -8,13 +8,9 @@ from typing import Annotated
 
 import typer
 
-from driftwalk.cli.options import Json, Side, TankDiameter
-from driftwalk.cli.output import print_json, print_note
-from driftwalk.cli.recording_options import (
-    RecordingFile,
-    RecordingOptions,
-    with_recording_options,
-)
+from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
+from driftwalk.cli.options.shared import Json, Side, TankDiameter
+from driftwalk.cli.terminal.output import print_json, print_note
 
 
 @with_recording_options

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from driftwalk.cli.calibrate import Overwrite, Threads
-from driftwalk.cli.demo_answer import (
+from driftwalk.cli.options.shared import Json
+from driftwalk.cli.terminal.demo_answer import (
     Fitted,
     in_json,
     print_calibration,
@@ -19,8 +20,7 @@ from driftwalk.cli.demo_answer import (
     print_next,
     print_places,
 )
-from driftwalk.cli.options import Json
-from driftwalk.cli.output import print_json, print_note
+from driftwalk.cli.terminal.output import print_json, print_note
 from driftwalk.schema.netcdf import open_netcdf
 
 if TYPE_CHECKING:
@@ -147,7 +147,7 @@ def _calibrate(
 
 def _write_page(out: Path, *runs: str) -> None:
     """Write the page of the runs that are there, in place of the one before."""
-    from driftwalk.report import joined_page, report_page, write_report
+    from driftwalk.page import joined_page, report_page, write_report
 
     pages = [report_page(out / run) for run in runs]
     write_report(joined_page(pages, title="Demo"), out / PAGE, existing="replace")

@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from driftwalk.cli.options import (
+from driftwalk.cli.inputs.require_motion import require_motion
+from driftwalk.cli.inputs.study_recording import load_for_run
+from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
+from driftwalk.cli.options.shared import (
     PANEL,
     STUDY_KEYS,
     Depth,
@@ -23,10 +26,7 @@ from driftwalk.cli.options import (
     resolve_study,
     study_overrides,
 )
-from driftwalk.cli.output import print_json, print_note, report_command
-from driftwalk.cli.recording_options import RecordingOptions, with_recording_options
-from driftwalk.cli.require_motion import require_motion
-from driftwalk.cli.study_recording import load_for_run
+from driftwalk.cli.terminal.output import print_json, print_note, report_command
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -120,7 +120,7 @@ def fit(
     (check.nc), figures and manifest.json.
     """
     from driftwalk.cli.fit_run import FitWork, run_fit
-    from driftwalk.cli.tank import require_inside, study_in_arena
+    from driftwalk.cli.inputs.tank import require_inside, study_in_arena
 
     overrides = study_overrides(
         keys=FIT_KEYS,

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from driftwalk.cli.calibration_run import dataset_hash, netcdf_bytes
-from driftwalk.cli.output import print_note
-from driftwalk.cli.progress import ProgressReporter
 from driftwalk.cli.run_folder import open_run
+from driftwalk.cli.terminal.output import print_note
+from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -85,8 +85,8 @@ def run_fit(
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
     """
+    from driftwalk.figures import write_check_figures, write_fit_figures
     from driftwalk.likelihood import check_fit, check_model, fit_motion, fitted_flow
-    from driftwalk.report import write_check_figures, write_fit_figures
 
     check_fit(work.recordings, work.study, body=work.body)
     with open_run(

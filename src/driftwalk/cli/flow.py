@@ -7,7 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from driftwalk.cli.options import (
+from driftwalk.cli.inputs.require_motion import require_motion
+from driftwalk.cli.inputs.study_recording import load_with_study
+from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
+from driftwalk.cli.options.shared import (
     STUDY_KEYS,
     Depth,
     Json,
@@ -19,14 +22,7 @@ from driftwalk.cli.options import (
     resolve_study,
     study_overrides,
 )
-from driftwalk.cli.output import print_json, print_note
-from driftwalk.cli.recording_options import (
-    RecordingFile,
-    RecordingOptions,
-    with_recording_options,
-)
-from driftwalk.cli.require_motion import require_motion
-from driftwalk.cli.study_recording import load_with_study
+from driftwalk.cli.terminal.output import print_json, print_note
 
 if TYPE_CHECKING:
     import xarray as xr

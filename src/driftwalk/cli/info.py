@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from driftwalk.cli.options import Json, Side, TankDiameter
-from driftwalk.cli.output import print_json, print_note, print_table
-from driftwalk.cli.recording_options import (
-    RecordingFile,
-    RecordingOptions,
-    with_recording_options,
-)
+from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
+from driftwalk.cli.options.shared import Json, Side, TankDiameter
+from driftwalk.cli.terminal.output import print_json, print_note, print_table
 
 SIDE_BY_SIDE = 5
 """Bodies shown as columns; more are shown as rows, with fewer numbers."""

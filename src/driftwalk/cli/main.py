@@ -18,7 +18,7 @@ import typer
 from typer.core import TyperGroup
 from typer.main import get_command as to_click_command
 
-from driftwalk.cli.errors import PastTyper, exit_code_of
+from driftwalk.cli.terminal.errors import PastTyper, exit_code_of
 
 
 class Command(NamedTuple):

@@ -7,10 +7,10 @@ from typing import Annotated, Any
 
 import typer
 
-from driftwalk.cli import tracking_options as given
 from driftwalk.cli.main import paragraphs
-from driftwalk.cli.output import print_note, print_table
-from driftwalk.cli.tracking_options import TrackingOptions
+from driftwalk.cli.options import tracking as given
+from driftwalk.cli.options.tracking import TrackingOptions
+from driftwalk.cli.terminal.output import print_note, print_table
 from driftwalk.core.errors import DriftwalkError, InputError
 
 _REMEDY = (
@@ -36,7 +36,7 @@ def teach(
 
     A picture beside the file, of the same name with .png, shows what was found: look at it.
     """
-    from driftwalk.cli.tracking_parts import find_camera
+    from driftwalk.cli.tracking.parts import find_camera
     from driftwalk.core.atomic import require_free, require_target
     from driftwalk.track import propose_markers, sample_images, save_markers, save_picture
 

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from driftwalk.cli.options import (
+from driftwalk.cli.inputs.study_recording import load_for_run
+from driftwalk.cli.options.recording import RecordingOptions
+from driftwalk.cli.options.shared import (
     ASSEMBLY_KEYS,
     Blocks,
     FlowFile,
@@ -19,9 +21,7 @@ from driftwalk.cli.options import (
     resolve_study,
     study_overrides,
 )
-from driftwalk.cli.output import print_note
-from driftwalk.cli.recording_options import RecordingOptions
-from driftwalk.cli.study_recording import load_for_run
+from driftwalk.cli.terminal.output import print_note
 from driftwalk.cli.view import Host, Open, Port, show
 
 if TYPE_CHECKING:

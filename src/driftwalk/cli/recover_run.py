@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from driftwalk.cli.calibration_run import dataset_hash, netcdf_bytes
-from driftwalk.cli.progress import ProgressReporter
 from driftwalk.cli.run_folder import open_run
+from driftwalk.cli.terminal.progress import ProgressReporter
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,8 +62,8 @@ def run_recovery(work: RecoverWork, folder: Path, *, overwrite: bool) -> xr.Data
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
     """
+    from driftwalk.figures import write_recovery_figures
     from driftwalk.likelihood import check_recovery, recovery_study
-    from driftwalk.report import write_recovery_figures
 
     check_recovery(work.study, work.flow)
     with open_run(

@@ -8,10 +8,10 @@ from typing import Annotated, Any
 
 import typer
 
-from driftwalk.cli.motion import load_simulation
-from driftwalk.cli.options import TankDiameter
-from driftwalk.cli.output import print_note, require_place
-from driftwalk.cli.recording_options import RecordingOptions, with_recording_options
+from driftwalk.cli.inputs.motion import load_simulation
+from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
+from driftwalk.cli.options.shared import TankDiameter
+from driftwalk.cli.terminal.output import print_note, require_place
 from driftwalk.core.errors import InputError
 
 
@@ -39,7 +39,7 @@ def report(
     cite. It opens by a double click, without a network. Of a simulation it shows the first
     replicate. The options on reading are for a recording.
     """
-    from driftwalk.report import write_report
+    from driftwalk.page import write_report
 
     existing = "replace" if overwrite else "error"
     require_place(out, existing=existing)
@@ -53,8 +53,8 @@ def report(
 
 def _page(path: Path, how: RecordingOptions, tank_diameter: float | None) -> dict[str, Any]:
     """Return the page data of a run directory, or of a recording."""
+    from driftwalk.page import recording_page, report_page
     from driftwalk.record import describe
-    from driftwalk.report import recording_page, report_page
 
     if not path.is_file():
         if path.is_dir():

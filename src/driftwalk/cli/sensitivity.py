@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Final
 import numpy as np
 import typer
 
-from driftwalk.cli.assembly_source import (
+from driftwalk.cli.calibrate import Overwrite, Threads
+from driftwalk.cli.inputs.assembly_source import (
     Source,
     load_flow_for,
     refuse_found,
     source_from_calibration,
     source_from_flow,
 )
-from driftwalk.cli.calibrate import Overwrite, Threads
-from driftwalk.cli.options import (
+from driftwalk.cli.options.shared import (
     SENSITIVITY_KEYS,
     BlockFriction,
     BlockLatching,
@@ -48,9 +48,9 @@ from driftwalk.cli.options import (
     WallRestitution,
     study_overrides,
 )
-from driftwalk.cli.output import print_json, print_note
-from driftwalk.cli.sensitivity_answer import print_answer, summary
-from driftwalk.cli.vary import VARY_KEYS, vary_overrides
+from driftwalk.cli.options.vary import VARY_KEYS, vary_overrides
+from driftwalk.cli.terminal.output import print_json, print_note
+from driftwalk.cli.terminal.sensitivity_answer import print_answer, summary
 
 if TYPE_CHECKING:
     from driftwalk.cli.sensitivity_run import SensitivityResult

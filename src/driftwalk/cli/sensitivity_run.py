@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.cli.calibration_run import dataset_hash, netcdf_bytes
-from driftwalk.cli.progress import ProgressReporter
 from driftwalk.cli.run_folder import open_run
+from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -144,7 +144,7 @@ class _Overall:
 
 def _checked_sizes(work: SensitivityWork) -> dict[str, int]:
     """Return the settings of each stage, after refusing what cannot be simulated."""
-    from driftwalk.assemble import check_indices, check_sensitivity
+    from driftwalk.assembly import check_indices, check_sensitivity
 
     options: dict[str, Any] = {"threads": work.threads}
     sizes = {
@@ -157,7 +157,7 @@ def _checked_sizes(work: SensitivityWork) -> dict[str, int]:
 
 
 def _simulate(work: SensitivityWork, run: RunDirectory, overall: _Overall) -> SensitivityResult:
-    from driftwalk.assemble import sensitivity_indices, sensitivity_map, sensitivity_reference
+    from driftwalk.assembly import sensitivity_indices, sensitivity_map, sensitivity_reference
 
     reference = sensitivity_reference(
         work.study,
@@ -196,7 +196,7 @@ def _simulate(work: SensitivityWork, run: RunDirectory, overall: _Overall) -> Se
 
 def _components(sensitivity: xr.Dataset) -> xr.Dataset | None:
     """Return the principal components; None where there is one setting or all are alike."""
-    from driftwalk.assemble import principal_components
+    from driftwalk.assembly import principal_components
 
     try:
         return principal_components(sensitivity)
@@ -207,7 +207,7 @@ def _components(sensitivity: xr.Dataset) -> xr.Dataset | None:
 def _draw(result: SensitivityResult, run: RunDirectory) -> None:
     import xarray as xr
 
-    from driftwalk.report import write_assembly_figures, write_sensitivity_figures
+    from driftwalk.figures import write_assembly_figures, write_sensitivity_figures
 
     folder = run.folder("figures")
     repeated = result.reference["realisation_proportion"]

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from driftwalk.cli.options import (
+from driftwalk.cli.options.recording import RecordingOptions
+from driftwalk.cli.options.shared import (
     Depth,
     DragCoefficient,
     Duration,
@@ -30,8 +31,7 @@ from driftwalk.cli.options import (
     resolve_study,
     study_overrides,
 )
-from driftwalk.cli.output import print_json, print_note, require_place
-from driftwalk.cli.recording_options import RecordingOptions
+from driftwalk.cli.terminal.output import print_json, print_note, require_place
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from driftwalk.cli.main import paragraphs
-from driftwalk.cli.options import Json
-from driftwalk.cli.output import print_json, print_note, require_place
+from driftwalk.cli.options.shared import Json
 from driftwalk.cli.study_recover import recover
+from driftwalk.cli.terminal.output import print_json, print_note, require_place
 
 study_app = typer.Typer(name="study", add_completion=False, help="Write and check study files.")
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from driftwalk.cli.options import (
+from driftwalk.cli.options.shared import (
     Json,
     Seed,
     quantity_option,
@@ -15,7 +15,7 @@ from driftwalk.cli.options import (
     resolve_study,
     study_overrides,
 )
-from driftwalk.cli.output import print_json
+from driftwalk.cli.terminal.output import print_json
 from driftwalk.core.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -86,8 +86,8 @@ def recover(
     flow tell? The directory holds recovery.nc, figures and manifest.json. Killed and started again,
     it continues.
     """
-    from driftwalk.cli.recover_answer import print_answer, summary
     from driftwalk.cli.recover_run import RecoverWork, run_recovery
+    from driftwalk.cli.terminal.recover_answer import print_answer, summary
 
     read = quantity_parser("s")
     overrides = study_overrides(
@@ -125,7 +125,7 @@ def _require_stated(path: Path) -> None:
 
 def _flow(study: Study, truth: Path, given: Path | None) -> tuple[xr.Dataset | None, Path | None]:
     """Return the true flow field and its file; None where every recording has a random one."""
-    from driftwalk.cli.assembly_source import load_flow_for
+    from driftwalk.cli.inputs.assembly_source import load_flow_for
 
     named: Any = study.recover.flow
     if given is None and named in (None, "random"):

@@ -7,10 +7,10 @@ from typing import Annotated, Any
 
 import typer
 
-from driftwalk.cli import tracking_options as given
-from driftwalk.cli.options import Json
-from driftwalk.cli.output import print_json, print_note, print_table
-from driftwalk.cli.tracking_options import TrackingOptions
+from driftwalk.cli.options import tracking as given
+from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.tracking import TrackingOptions
+from driftwalk.cli.terminal.output import print_json, print_note, print_table
 from driftwalk.core.errors import InputError
 
 _SHOWN = {"duplicates": "doubled"}
@@ -64,8 +64,8 @@ def track(
     The recording holds the poses as they were measured, each with its covariance, and marks where
     identities could have been exchanged. Ctrl-C ends it; what was tracked up to then is kept.
     """
-    from driftwalk.cli.tracking_parts import build_parts
-    from driftwalk.cli.tracking_run import TrackingRun, summary
+    from driftwalk.cli.tracking.parts import build_parts
+    from driftwalk.cli.tracking.run import TrackingRun, summary
     from driftwalk.core.atomic import require_free, require_target
 
     existing = "replace" if overwrite else "error"
@@ -125,7 +125,7 @@ def _print(found: dict[str, Any]) -> None:
 
 def _explain(options: TrackingOptions, number: int, out: Path | None, existing: str) -> None:
     """Draw one frame with everything that was found in it."""
-    from driftwalk.cli.tracking_parts import build_parts
+    from driftwalk.cli.tracking.parts import build_parts
     from driftwalk.core.atomic import require_target
     from driftwalk.track import explain_frame, open_source, save_picture
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from driftwalk.cli.output import print_note
+from driftwalk.cli.terminal.output import print_note
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from driftwalk.cli import tracking_options as given
-from driftwalk.cli.output import print_note
-from driftwalk.cli.tracking_options import TrackingOptions
+from driftwalk.cli.options import tracking as given
+from driftwalk.cli.options.tracking import TrackingOptions
+from driftwalk.cli.terminal.output import print_note
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -49,8 +49,8 @@ def watch(
     A line for each join or parting and each change of the class, and one a second with the poses.
     While a block is hidden, the classes that are possible are named.
     """
-    from driftwalk.cli.tracking_parts import build_parts
-    from driftwalk.cli.tracking_run import TrackingRun
+    from driftwalk.cli.tracking.parts import build_parts
+    from driftwalk.cli.tracking.run import TrackingRun
     from driftwalk.core.atomic import require_free, require_target
 
     existing = "replace" if overwrite else "error"

@@ -11,7 +11,7 @@ import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.opencv import require_opencv
-from driftwalk.track.tracker import TrackState
+from driftwalk.track.follow.tracker import TrackState
 from driftwalk.track.types import Image, PixelToWorld
 
 # Blue, green, red; of Okabe and Ito, told apart with any kind of colour vision.
@@ -52,7 +52,7 @@ def draw_states(image: Image, states: Iterable[TrackState], camera: PixelToWorld
 
     Examples
     --------
-    >>> from driftwalk.track.camera import Camera
+    >>> from driftwalk.track.camera.model import Camera
     >>> state = TrackState("0", 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, None, 0.0)
     >>> camera = Camera.from_scale(80, 60, px_per_m=100.0)
     >>> bool(draw_states(np.zeros((60, 80, 3), np.uint8), [state], camera).any())

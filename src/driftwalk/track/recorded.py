@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.track.tracks import COVARIANCE, Track
+from driftwalk.track.follow.tracks import COVARIANCE, Track
 
 if TYPE_CHECKING:
     import xarray as xr

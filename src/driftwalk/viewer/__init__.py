@@ -5,10 +5,10 @@ FastAPI and uvicorn, the extra ``[view]``, are imported when a server is started
 
 from driftwalk.viewer.hub import Source
 from driftwalk.viewer.live_client import LiveSource
-from driftwalk.viewer.play_stream import hello_line
-from driftwalk.viewer.playground import PlaySource
+from driftwalk.viewer.play.playground import PlaySource
+from driftwalk.viewer.play.stream import hello_line
 from driftwalk.viewer.server import require_server, serve
-from driftwalk.viewer.watch_run import RunSource
+from driftwalk.viewer.watch.run import RunSource
 
 __all__ = [
     "LiveSource",

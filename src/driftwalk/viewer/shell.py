@@ -93,7 +93,7 @@ def bundle_file(name: str) -> bytes:
         When the installation lacks it.
     """
     try:
-        return (files("driftwalk.report") / "static" / name).read_bytes()
+        return (files("driftwalk.page") / "static" / name).read_bytes()
     except FileNotFoundError as error:
         raise InputError(
             f"this installation of driftwalk lacks the front end ({name}); install it again"

@@ -9,8 +9,8 @@ import pytest
 import xarray as xr
 from scipy.linalg import eigh
 
-from driftwalk.assemble.components import disconnected_alignment, principal_components
-from driftwalk.assemble.outcome import outcome_classes
+from driftwalk.assembly.outcomes.classes import outcome_classes
+from driftwalk.assembly.outcomes.components import disconnected_alignment, principal_components
 from driftwalk.core.errors import InputError
 
 CLASSES = list(outcome_classes(4))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import driftwalk as dw
-from driftwalk.assemble.dataset import build_assembly, build_path, times_of
-from driftwalk.assemble.plan import Plan, make_plan
+from driftwalk.assembly.runs.dataset import build_assembly, build_path, times_of
+from driftwalk.assembly.runs.plan import Plan, make_plan
 from driftwalk.model import Study
 
 

@@ -9,14 +9,14 @@ import pytest
 import xarray as xr
 from scipy.stats import binom, binomtest
 
-from driftwalk.assemble.distribution import (
+from driftwalk.assembly.outcomes.classes import outcome_classes
+from driftwalk.assembly.outcomes.distribution import (
     class_names,
     outcome_distribution,
     outcomes_at,
     proportion_interval,
     sampling_variance,
 )
-from driftwalk.assemble.outcome import outcome_classes
 from driftwalk.core.errors import InputError
 
 CLASSES = outcome_classes(4)

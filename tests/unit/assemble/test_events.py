@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lattice_runs import Run, random_run, raw_arrays, small_name
 
-from driftwalk.assemble.events import ReplayedEvents, class_at, replay_events
-from driftwalk.assemble.outcome import outcome_classes, sort_classes
+from driftwalk.assembly.lattice.events import ReplayedEvents, class_at, replay_events
+from driftwalk.assembly.outcomes.classes import outcome_classes, sort_classes
 from driftwalk.core.errors import InputError
 
 Chirality = Literal["merged", "distinct"]

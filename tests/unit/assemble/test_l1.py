@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.stats import binom
 
-from driftwalk.assemble.distribution import outcome_distribution
-from driftwalk.assemble.l1 import l1_distance, l1_in_floors, l1_noise_floor, pairwise_l1
+from driftwalk.assembly.outcomes.distribution import outcome_distribution
+from driftwalk.assembly.outcomes.l1 import l1_distance, l1_in_floors, l1_noise_floor, pairwise_l1
 from driftwalk.core.errors import InputError
 
 
@@ -87,7 +87,7 @@ def test_classes_that_never_occur_change_nothing_and_the_seed_decides() -> None:
 
 
 def test_a_large_table_is_drawn_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    import driftwalk.assemble.l1 as module
+    import driftwalk.assembly.outcomes.l1 as module
 
     monkeypatch.setattr(module, "ENTRIES_AT_ONCE", 1000)
     distance, weight = two_class_law(0.5, 20, 20)

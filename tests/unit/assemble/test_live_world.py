@@ -15,9 +15,9 @@ from twin_assembly import study as tank_study
 from twin_assembly import swirl
 
 import driftwalk as dw
-from driftwalk.assemble.address import stream_keys
-from driftwalk.assemble.reference import advance, block_normals, make_rules, start_world
-from driftwalk.assemble.reference_latch import Latch
+from driftwalk.assembly.reference import advance, block_normals, make_rules, start_world
+from driftwalk.assembly.reference_latch import Latch
+from driftwalk.assembly.runs.address import stream_keys
 from driftwalk.core.errors import InputError
 
 STILL = dw.uniform_flow(0.0, 0.0)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lattice_runs import form, random_run, raw_arrays
 
-from driftwalk.assemble.outcome import (
+from driftwalk.assembly.outcomes.classes import (
     class_cells,
     class_name,
     class_shapes,

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lattice_runs import NAMED, form
 
-from driftwalk.assemble.polyomino import polyomino_cells, polyomino_name, polyominoes
+from driftwalk.assembly.lattice.polyomino import polyomino_cells, polyomino_name, polyominoes
 from driftwalk.core.errors import InputError
 
 Chirality = Literal["merged", "distinct"]

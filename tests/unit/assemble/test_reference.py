@@ -24,7 +24,7 @@ from twin_assembly import (
 
 import driftwalk as dw
 from driftwalk import _core
-from driftwalk.assemble.reference import (
+from driftwalk.assembly.reference import (
     World,
     advance,
     assemble_reference,
@@ -32,11 +32,11 @@ from driftwalk.assemble.reference import (
     drag_sums,
     integrate,
 )
-from driftwalk.assemble.reference_body import Assembly
-from driftwalk.assemble.reference_body import single_block as one_block
-from driftwalk.assemble.reference_contacts import Pair, collide, contact_points, overlap, separate
-from driftwalk.assemble.reference_latch import Latch, candidates, latch_once, merged
-from driftwalk.assemble.reference_wall import meet_wall
+from driftwalk.assembly.reference_body import Assembly
+from driftwalk.assembly.reference_body import single_block as one_block
+from driftwalk.assembly.reference_contacts import Pair, collide, contact_points, overlap, separate
+from driftwalk.assembly.reference_latch import Latch, candidates, latch_once, merged
+from driftwalk.assembly.reference_wall import meet_wall
 from driftwalk.core.errors import InputError
 from driftwalk.simulation.reference import TwinModel, flow_at, simulate_reference
 

@@ -11,9 +11,9 @@ from command_line import assert_same_bits
 from quadratic_calibration import quadratic
 
 import driftwalk as dw
-from driftwalk.assemble.drawn_flow import RUNS_PER_FLOW, draw_flow
-from driftwalk.assemble.parameters import draw_parameters
-from driftwalk.assemble.run import (
+from driftwalk.assembly.runs.drawn_flow import RUNS_PER_FLOW, draw_flow
+from driftwalk.assembly.runs.parameters import draw_parameters
+from driftwalk.assembly.runs.run import (
     assemble,
     assemble_drawn,
     assembly_path,
@@ -120,14 +120,14 @@ def test_a_path_is_the_run_again(flow: xr.Dataset, found: xr.Dataset) -> None:
 def test_finished_units_are_not_computed_again(
     flow: xr.Dataset, found: xr.Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("driftwalk.assemble.run.BLOCKS_PER_UNIT", 75)
-    monkeypatch.setattr("driftwalk.assemble.run.FEWEST_RUNS_PER_UNIT", 1)
+    monkeypatch.setattr("driftwalk.assembly.runs.run.BLOCKS_PER_UNIT", 75)
+    monkeypatch.setattr("driftwalk.assembly.runs.run.FEWEST_RUNS_PER_UNIT", 1)
     assert runs_per_unit(3) == 25
     store, told = MemoryStore(), []
     options: dict[str, Any] = {"store": store, "progress": lambda *done: told.append(done)}
     assert_same_bits(assemble(Study(), flow, **SHORT, **options), found)
     assert told == [(0, 60), (25, 60), (50, 60), (60, 60)]
-    monkeypatch.setattr("driftwalk.assemble.run.simulate_rows", None)
+    monkeypatch.setattr("driftwalk.assembly.runs.run.simulate_rows", None)
     assert_same_bits(assemble(Study(), flow, **SHORT, **options), found)
 
 

@@ -15,8 +15,8 @@ import xarray as xr
 from small_sensitivity import FLOW, REALISATIONS, RUNS, by_hand, small
 
 import driftwalk as dw
-from driftwalk.assemble import settings as engine
-from driftwalk.assemble.run import assemble
+from driftwalk.assembly.runs.run import assemble
+from driftwalk.assembly.sensitivity import settings as engine
 from driftwalk.core.errors import InputError
 from driftwalk.core.shards import ShardStore
 from driftwalk.sweep import MemoryStore

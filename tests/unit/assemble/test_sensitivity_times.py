@@ -18,9 +18,9 @@ from hypothesis import strategies as st
 from small_sensitivity import FLOW, REALISATIONS, RUNS, by_hand
 
 import driftwalk as dw
-from driftwalk.assemble import sensitivity_times as times
-from driftwalk.assemble import settings as engine
-from driftwalk.assemble.run import assembly_path
+from driftwalk.assembly.runs.run import assembly_path
+from driftwalk.assembly.sensitivity import settings as engine
+from driftwalk.assembly.sensitivity import times as times
 
 AXES = {"drag_coefficient": [0.2, 1.0], "force_std": [5e-4, 2e-3]}
 

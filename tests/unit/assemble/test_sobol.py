@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from driftwalk.assemble.distribution import sampling_variance
-from driftwalk.assemble.sobol import sobol_design, sobol_indices
+from driftwalk.assembly.outcomes.distribution import sampling_variance
+from driftwalk.assembly.sensitivity.sobol import sobol_design, sobol_indices
 from driftwalk.core.errors import InputError
 
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from driftwalk.assemble.start import given_start, overlap_depth, require_room, tank_area
+from driftwalk.assembly.runs.start import given_start, overlap_depth, require_room, tank_area
 from driftwalk.core.errors import InputError
 from driftwalk.model import Study, Tank
 

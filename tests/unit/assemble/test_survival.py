@@ -9,9 +9,9 @@ import pytest
 import xarray as xr
 from scipy.stats import binom, binomtest, norm
 
-from driftwalk.assemble.distribution import outcomes_at
-from driftwalk.assemble.outcome import outcome_classes
-from driftwalk.assemble.survival import class_times, survival_curve
+from driftwalk.assembly.outcomes.classes import outcome_classes
+from driftwalk.assembly.outcomes.distribution import outcomes_at
+from driftwalk.assembly.outcomes.survival import class_times, survival_curve
 from driftwalk.core.errors import InputError
 
 CLASSES = list(outcome_classes(4))

@@ -15,9 +15,9 @@ from synthetic_assembly import (
 )
 
 from driftwalk.core.errors import InputError
-from driftwalk.report import assembly_figures
-from driftwalk.report.assembly_figures import write_assembly_figures, write_sensitivity_figures
-from driftwalk.report.style import print_style
+from driftwalk.figures import assembly as assembly_figures
+from driftwalk.figures.assembly import write_assembly_figures, write_sensitivity_figures
+from driftwalk.plot.parts.style import print_style
 
 
 @pytest.fixture(scope="module")

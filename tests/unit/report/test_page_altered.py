@@ -12,8 +12,8 @@ import pytest
 import xarray as xr
 from finished_run import write_finished_run
 
-from driftwalk.report import report_page
-from driftwalk.viewer.watch_run import RunSource
+from driftwalk.page import report_page
+from driftwalk.viewer.watch.run import RunSource
 
 Alter = Callable[[xr.Dataset], xr.Dataset]
 OTHER_FORM = "not in the form that this version of driftwalk reads"

@@ -13,9 +13,9 @@ from hypothesis.extra.numpy import array_shapes, arrays
 from page_reading import values
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.report import decode_array, encode_array
-from driftwalk.report.page_arrays import SHORT, nice_step, number, numbers, plain_list
-from driftwalk.report.page_parts import settings_of
+from driftwalk.page import decode_array, encode_array
+from driftwalk.page.arrays import SHORT, nice_step, number, numbers, plain_list
+from driftwalk.page.parts import settings_of
 
 SHAPES = array_shapes(min_dims=1, max_dims=3, min_side=0, max_side=9)
 FLOATS = st.floats(-1e9, 1e9) | st.just(np.nan)

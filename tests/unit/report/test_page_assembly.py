@@ -19,10 +19,10 @@ from synthetic_assembly import (
     sensitivity,
 )
 
-from driftwalk.report import assembly_sections, sensitivity_sections
-from driftwalk.report.page_assembly import l1_and_chance
-from driftwalk.report.page_classes import cells_of
-from driftwalk.report.page_replay import MOST_POSES
+from driftwalk.page import assembly_sections, sensitivity_sections
+from driftwalk.page.sections.assembly import l1_and_chance
+from driftwalk.page.sections.classes import cells_of
+from driftwalk.page.sections.replay import MOST_POSES
 
 
 def made_up_assembly(path: xr.Dataset) -> xr.Dataset:

@@ -12,7 +12,7 @@ from page_reading import numbers_of, part_of, values
 from synthetic_calibration import bundled_recording, synthetic_calibration
 
 from driftwalk.core.errors import InputError
-from driftwalk.report import calibration_sections, map_section
+from driftwalk.page import calibration_sections, map_section
 
 SAMPLES = 51
 
@@ -262,7 +262,7 @@ def test_a_fault_of_the_program_is_not_swallowed(
     def fail(*arguments: object) -> None:
         raise AttributeError("a fault")
 
-    monkeypatch.setattr("driftwalk.report.page_calibration.map_section", fail)
+    monkeypatch.setattr("driftwalk.page.sections.calibration.map_section", fail)
     with pytest.raises(AttributeError, match="a fault"):
         calibration_sections(calibration)
 

@@ -11,7 +11,7 @@ from page_reading import numbers_of, part_of, values
 from recovery_worlds import TRUTH, synthetic_recovery
 from synthetic_calibration import bundled_recording
 
-from driftwalk.report import fit_sections, recovery_sections
+from driftwalk.page import fit_sections, recovery_sections
 
 
 @pytest.fixture(scope="module")

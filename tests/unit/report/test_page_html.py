@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from page_reading import Document, page_in
 
 from driftwalk.core.errors import InputError
-from driftwalk.report import report_html, write_report
-from driftwalk.report.page_html import embedded
+from driftwalk.page import report_html, write_report
+from driftwalk.page.html import embedded
 
 HOSTILE = [
     "<script>alert(1)</script>",
@@ -117,7 +117,7 @@ def test_what_json_lacks_is_refused() -> None:
 
 
 def test_a_missing_front_end_is_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("driftwalk.report.page_html.files", lambda package: tmp_path)
+    monkeypatch.setattr("driftwalk.page.html.files", lambda package: tmp_path)
     with pytest.raises(InputError, match=r"lacks driftwalk\.css.*install driftwalk again"):
         report_html(page())
 
@@ -129,7 +129,7 @@ def test_a_front_end_that_would_end_its_element_is_refused(
     (tmp_path / "static").mkdir()
     (tmp_path / "static" / "driftwalk.css").write_text("p {}", encoding="utf-8")
     (tmp_path / "static" / "driftwalk.js").write_text(content, encoding="utf-8")
-    monkeypatch.setattr("driftwalk.report.page_html.files", lambda package: tmp_path)
+    monkeypatch.setattr("driftwalk.page.html.files", lambda package: tmp_path)
     with pytest.raises(InputError, match="would end it inside a page"):
         report_html(page())
 

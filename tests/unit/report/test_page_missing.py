@@ -21,7 +21,7 @@ from synthetic_assembly import (
 )
 from synthetic_calibration import bundled_recording, synthetic_calibration
 
-from driftwalk.report import (
+from driftwalk.page import (
     assembly_sections,
     calibration_sections,
     fit_sections,

@@ -22,14 +22,8 @@ from driftwalk.core.errors import InputError, RunDirectoryError
 from driftwalk.core.provenance import manifest
 from driftwalk.core.rundir import RunDirectory
 from driftwalk.model import Study
-from driftwalk.report import (
-    joined_page,
-    manifest_section,
-    report_html,
-    report_page,
-    write_report,
-)
-from driftwalk.report.page_manifest import (
+from driftwalk.page import joined_page, manifest_section, report_html, report_page, write_report
+from driftwalk.page.sections.manifest import (
     PAPER_AUTHORS,
     PAPER_TITLE,
     PAPER_VENUE,

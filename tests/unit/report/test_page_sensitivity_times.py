@@ -12,8 +12,9 @@ from page_reading import part_of, values
 from synthetic_assembly import one_axis, outcome_classes, sensitivity, with_courses
 
 import driftwalk as dw
-from driftwalk.report import page_sensitivity_times, sensitivity_sections
-from driftwalk.report.page_classes import cells_of
+from driftwalk.page import sensitivity_sections
+from driftwalk.page.sections import sensitivity_times as page_sensitivity_times
+from driftwalk.page.sections.classes import cells_of
 
 
 @pytest.fixture(scope="module")

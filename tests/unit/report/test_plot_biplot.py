@@ -12,8 +12,8 @@ from matplotlib.text import Annotation
 from synthetic_assembly import components, one_axis, outcome_classes, sensitivity
 
 from driftwalk.core.errors import InputError
-from driftwalk.report.plot_biplot import place_labels, plot_biplot
-from driftwalk.report.style import print_style
+from driftwalk.plot.components import place_labels, plot_biplot
+from driftwalk.plot.parts.style import print_style
 
 
 @pytest.fixture(scope="module")

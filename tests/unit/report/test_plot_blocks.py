@@ -16,8 +16,8 @@ from PIL import Image
 from synthetic_assembly import assembly_end, assembly_path
 
 from driftwalk.core.errors import InputError
-from driftwalk.report.assembly_labels import PALETTE
-from driftwalk.report.plot_blocks import (
+from driftwalk.plot.parts.assembly_labels import PALETTE
+from driftwalk.plot.tank import (
     FRAMES_PER_S,
     block_corners,
     plot_blocks,

@@ -12,9 +12,9 @@ from scipy.optimize import minimize
 from synthetic_assembly import class_times, outcome_classes
 
 from driftwalk.core.errors import InputError
-from driftwalk.report.assembly_labels import class_colors
-from driftwalk.report.plot_class_times import plot_class_times, plot_survival, spread_apart
-from driftwalk.report.style import print_style
+from driftwalk.plot.class_courses import plot_class_times, plot_survival, spread_apart
+from driftwalk.plot.parts.assembly_labels import class_colors
+from driftwalk.plot.parts.style import print_style
 
 
 def areas(ax) -> dict[str, PolyCollection]:

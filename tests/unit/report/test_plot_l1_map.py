@@ -10,8 +10,8 @@ from matplotlib.offsetbox import AnnotationBbox
 from synthetic_assembly import one_axis, outcome_classes, sensitivity
 
 from driftwalk.core.errors import InputError
-from driftwalk.report.plot_l1_map import plot_class_key, plot_class_panels, plot_l1_map
-from driftwalk.report.style import axes_or_new
+from driftwalk.plot.parts.style import axes_or_new
+from driftwalk.plot.sensitivity_maps import plot_class_key, plot_class_panels, plot_l1_map
 
 
 def mesh_of(ax) -> QuadMesh:

@@ -12,9 +12,9 @@ from matplotlib.offsetbox import AnnotationBbox
 from synthetic_assembly import distribution, outcome_classes, realisations
 
 from driftwalk.core.errors import InputError
-from driftwalk.report.assembly_labels import classes_to_show
-from driftwalk.report.plot_outcomes import plot_outcomes
-from driftwalk.report.style import print_style
+from driftwalk.plot.outcome_bars import plot_outcomes
+from driftwalk.plot.parts.assembly_labels import classes_to_show
+from driftwalk.plot.parts.style import print_style
 
 
 def bars(ax) -> list[BarContainer]:

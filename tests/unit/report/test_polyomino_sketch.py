@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 from synthetic_assembly import outcome_classes
 
 from driftwalk.core.errors import InputError
-from driftwalk.report.polyomino_sketch import (
+from driftwalk.plot.parts.polyomino_sketch import (
     GAP,
     class_cells,
     draw_sketches_below,
@@ -23,7 +23,7 @@ from driftwalk.report.polyomino_sketch import (
     sketch_box,
     sketch_size,
 )
-from driftwalk.report.style import axes_or_new
+from driftwalk.plot.parts.style import axes_or_new
 
 # As seen from above with y upwards; written by hand: (column, row) from the lower left.
 TETROMINOES = {

@@ -11,13 +11,13 @@ from matplotlib.axes import Axes
 from recovery_worlds import synthetic_recovery
 
 from driftwalk.core.errors import InputError
-from driftwalk.report import (
+from driftwalk.figures import (
     plot_flow_recovery,
     plot_recovery,
     plot_recovery_error,
-    recovery_sections,
     write_recovery_figures,
 )
+from driftwalk.page import recovery_sections
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from driftwalk.track.blobs import usual_polarity
+from driftwalk.track.detect.blobs import usual_polarity
 
 
 def frames(levels: list[int], sides: list[int]) -> tuple[list[np.ndarray], np.ndarray]:

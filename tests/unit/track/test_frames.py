@@ -17,8 +17,8 @@ from matroska import give_times
 
 import driftwalk as dw
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.track.frames import FrameFilter
-from driftwalk.track.gaps import FrameGaps
+from driftwalk.track.source.frames import FrameFilter
+from driftwalk.track.source.gaps import FrameGaps
 
 
 def small(level: str = "moderate") -> dw.VideoSettings:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from driftwalk.track.gaps import FrameGaps
+from driftwalk.track.source.gaps import FrameGaps
 
 
 def running(gaps: list[float]) -> list[int]:

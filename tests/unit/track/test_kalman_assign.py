@@ -10,8 +10,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from driftwalk.track.assign import assign, connected_groups
-from driftwalk.track.kalman import Motion, predict, start_state, update
+from driftwalk.track.follow.assign import assign, connected_groups
+from driftwalk.track.follow.kalman import Motion, predict, start_state, update
 
 STILL = Motion(1e-30, 1e-30)
 

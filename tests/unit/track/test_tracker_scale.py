@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import driftwalk as dw
-from driftwalk.cli.tracking_options import TrackingOptions
-from driftwalk.cli.tracking_parts import tracker_for
+from driftwalk.cli.options.tracking import TrackingOptions
+from driftwalk.cli.tracking.parts import tracker_for
 from driftwalk.track.types import Detection
 
 FRAMES = 400

@@ -13,8 +13,8 @@ import numpy.typing as npt
 import pytest
 
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.track.settings import TrackerSettings
-from driftwalk.track.tracker import Tracker
+from driftwalk.track.follow.settings import TrackerSettings
+from driftwalk.track.follow.tracker import Tracker
 from driftwalk.track.types import Detection
 
 NOISE = np.array([0.15e-3, 0.15e-3, math.radians(0.5)])

@@ -17,10 +17,10 @@ import driftwalk as dw
 from driftwalk.core.errors import InputError
 from driftwalk.model import Study
 from driftwalk.schema import build_trajectory
-from driftwalk.viewer.play_motion import MotionWindow, beside
-from driftwalk.viewer.play_settings import FILLED, KNOBS
-from driftwalk.viewer.play_stream import frame_line, hello_line, joined_faces
-from driftwalk.viewer.playground import PlaySource, flow_arrows
+from driftwalk.viewer.play.motion import MotionWindow, beside
+from driftwalk.viewer.play.playground import PlaySource, flow_arrows
+from driftwalk.viewer.play.settings import FILLED, KNOBS
+from driftwalk.viewer.play.stream import frame_line, hello_line, joined_faces
 
 STILL = dw.uniform_flow(0.0, 0.0)
 KNOB = {knob.name: knob for knob in KNOBS}

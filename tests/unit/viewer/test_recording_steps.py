@@ -11,7 +11,7 @@ import xarray as xr
 import driftwalk as dw
 from driftwalk.model import Study
 from driftwalk.schema import build_trajectory
-from driftwalk.viewer.recording_steps import recorded_steps
+from driftwalk.viewer.watch.recording_steps import recorded_steps
 
 ONE_SETTING = {
     "calibration.drag_coefficient_min": 0.4,

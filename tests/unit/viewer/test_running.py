@@ -20,10 +20,10 @@ from driftwalk.core.rundir import RunDirectory
 from driftwalk.core.shards import ShardStore
 from driftwalk.model import Study
 from driftwalk.sweep import grid
-from driftwalk.viewer.run_shards import StoreReader
-from driftwalk.viewer.running_sensitivity import RunningSensitivity
 from driftwalk.viewer.shell import page_frame
-from driftwalk.viewer.watch_run import RunSource
+from driftwalk.viewer.watch.run import RunSource
+from driftwalk.viewer.watch.sensitivity import RunningSensitivity
+from driftwalk.viewer.watch.shards import StoreReader
 
 DRAG, FORCE = [0.2, 0.3, 0.4], [1e-4, 2e-4, 3e-4, 4e-4]
 SEARCH = {
@@ -412,7 +412,7 @@ def test_a_finished_run_that_cannot_be_shown_is_read_once(
         looked.append(folder)
         return page_frame("report", "Calibration")
 
-    monkeypatch.setattr("driftwalk.report.report_page", report_page)
+    monkeypatch.setattr("driftwalk.page.report_page", report_page)
     assert source.look() == source.look() == []
     assert looked == []
     # Another file in its place is looked at.

@@ -1,0 +1,91 @@
+"""What many blocks build, with what certainty, and how much that depends on the model."""
+
+from driftwalk.assembly.classify import classify
+from driftwalk.assembly.lattice.events import ReplayedEvents, class_at, replay_events
+from driftwalk.assembly.lattice.polyomino import polyomino_cells, polyomino_name, polyominoes
+from driftwalk.assembly.live_world import LiveEvent, LiveTank
+from driftwalk.assembly.outcomes.classes import (
+    class_cells,
+    class_name,
+    class_shapes,
+    merge_chirality,
+    outcome_classes,
+    sort_classes,
+    world_class,
+)
+from driftwalk.assembly.outcomes.components import (
+    Alignment,
+    disconnected_alignment,
+    principal_components,
+)
+from driftwalk.assembly.outcomes.distribution import (
+    outcome_distribution,
+    proportion_interval,
+    sampling_variance,
+)
+from driftwalk.assembly.outcomes.l1 import (
+    L1NoiseFloor,
+    PairwiseL1,
+    l1_distance,
+    l1_in_floors,
+    l1_noise_floor,
+    pairwise_l1,
+)
+from driftwalk.assembly.outcomes.survival import SurvivalCurve, class_times, survival_curve
+from driftwalk.assembly.runs.parameters import draw_parameters
+from driftwalk.assembly.runs.path_recording import path_recording
+from driftwalk.assembly.runs.run import assemble, assemble_drawn, assembly_path, check_assembly
+from driftwalk.assembly.sensitivity.indices import check_indices, sensitivity_indices
+from driftwalk.assembly.sensitivity.run import (
+    check_sensitivity,
+    sensitivity_map,
+    sensitivity_reference,
+)
+from driftwalk.assembly.sensitivity.sobol import sobol_design, sobol_indices
+
+__all__ = [
+    "Alignment",
+    "L1NoiseFloor",
+    "LiveEvent",
+    "LiveTank",
+    "PairwiseL1",
+    "ReplayedEvents",
+    "SurvivalCurve",
+    "assemble",
+    "assemble_drawn",
+    "assembly_path",
+    "check_assembly",
+    "check_indices",
+    "check_sensitivity",
+    "class_at",
+    "class_cells",
+    "class_name",
+    "class_shapes",
+    "class_times",
+    "classify",
+    "disconnected_alignment",
+    "draw_parameters",
+    "l1_distance",
+    "l1_in_floors",
+    "l1_noise_floor",
+    "merge_chirality",
+    "outcome_classes",
+    "outcome_distribution",
+    "pairwise_l1",
+    "path_recording",
+    "polyomino_cells",
+    "polyomino_name",
+    "polyominoes",
+    "principal_components",
+    "proportion_interval",
+    "replay_events",
+    "sampling_variance",
+    "sensitivity_indices",
+    "sensitivity_map",
+    "sensitivity_reference",
+    "sobol_design",
+    "sobol_indices",
+    "sort_classes",
+    "survival_curve",
+    "world_class",
+]

@@ -1,0 +1,288 @@
+"""Outcome classes of a recording of many blocks: what they had assembled into, at every time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.assembly.lattice.join_history import Event, JoinHistory
+from driftwalk.assembly.lattice.joined_faces import (
+    ROUNDING,
+    Booleans,
+    Floats,
+    JoinRules,
+    Poses,
+    find_joins,
+    smallest_distance,
+)
+from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
+from driftwalk.assembly.outcomes.classes import listed_classes, listed_shapes
+from driftwalk.core.errors import InputError
+from driftwalk.schema import body_names, check_trajectory
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SCHEMA_VERSION: Final = 1
+JOIN_DISTANCE: Final = 0.1
+"""Default distance of faces that are joined, in sides."""
+JOIN_ANGLE: Final = math.radians(10.0)
+"""Default angle between faces that are joined [rad]."""
+LOOSER: Final = 2.0
+"""Default of the tolerances to let go, in units of those to join."""
+MIN_DURATION: Final = 0.5
+"""Default of the shortest duration that counts [s]."""
+HOLD: Final = 1.0
+"""Default time for which a block that is not seen keeps its joins [s], if frames are not rarer."""
+FRAMES_HELD: Final = 3.0
+UNKNOWN: Final = -1
+
+
+def classify(
+    recording: xr.Dataset,
+    *,
+    side: float,
+    chirality: Chirality = "merged",
+    join_distance: float | None = None,
+    join_angle: float = JOIN_ANGLE,
+    release_distance: float | None = None,
+    release_angle: float | None = None,
+    min_duration: float = MIN_DURATION,
+    hold: float | None = None,
+) -> xr.Dataset:
+    """Say which outcome class the blocks of a recording were in, at every time.
+
+    Two blocks are joined from the first sample at which the centres of two of their faces are
+    within `join_distance` and the faces look at each other within `join_angle`, if that lasts for
+    `min_duration`; they come apart at the first sample beyond `release_distance` or
+    `release_angle`, if that lasts as long. Assemblies are blocks connected by joins, on a lattice;
+    where joins contradict each other there, the loosest are dropped and counted.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        A `trajectory` of one or more bodies with orientation; theta is the direction of face 0.
+    side : float
+        Side of a block [m].
+    chirality : {"merged", "distinct"}
+        Whether mirror images are one shape or two.
+    join_distance : float, optional
+        Largest distance between the centres of two faces that join [m]; default: a tenth of a side.
+    join_angle : float
+        Largest angle between them [rad], below pi/4.
+    release_distance, release_angle : float, optional
+        The same for faces that stay joined; not smaller, default: twice as large.
+    min_duration : float
+        Shortest duration of a join, and of coming apart [s]. With more than 0 it takes two samples
+        in a row, so that a single noisy one changes nothing. What begins later than this before the
+        end of the recording is not seen.
+    hold : float, optional
+        How long a block that is not seen keeps its joins [s]; after that its state is unknown until
+        it is seen again. Default: 1 s, or three sampling intervals if that is longer.
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind "classification". ``outcome`` (time): index into ``class``, -1 unknown; ``assembly``
+        (time, body): lowest body of the assembly, -1 unknown; ``proportion`` (class): share of the
+        time in which the class is known. Joins as in a simulated run: ``event_count``,
+        ``event_time`` [s], ``event_block``, ``event_face``, ``event_assembly``, ``event_shape``,
+        ``event_class``; blocks that came apart: ``split_count``, ``split_time`` [s],
+        ``split_block``, ``split_face``, ``split_class``; padded with NaN and -1 to at least one.
+        Several at one sample are in order, those that came apart before those that joined.
+        ``attrs``: the tolerances, ``dropped_joins``, ``unknown_samples``, ``known_s`` (time in
+        which the class is known), ``closest_m`` (smallest distance of two centres).
+
+    Raises
+    ------
+    InputError
+        When there is no sample, a body has no orientation, no two bodies are ever seen in the same
+        sample, or a tolerance is out of range.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from driftwalk.schema import build_trajectory
+    >>> x = np.column_stack([np.zeros(20), np.r_[np.full(10, 0.05), np.full(10, 0.03)]])
+    >>> recording = build_trajectory(0.1 * np.arange(20), x, np.zeros((20, 2)), np.zeros((20, 2)))
+    >>> found = classify(recording, side=0.03)
+    >>> found["class"].values[found["outcome"].values[[0, -1]]].tolist()
+    ['1+1', '2']
+    """
+    require_chirality(chirality)
+    poses = _checked_poses(recording)
+    join_distance = JOIN_DISTANCE * side if join_distance is None else join_distance
+    rules = JoinRules(
+        side=side,
+        join_distance=join_distance,
+        join_angle=join_angle,
+        release_distance=LOOSER * join_distance if release_distance is None else release_distance,
+        release_angle=LOOSER * join_angle if release_angle is None else release_angle,
+        min_duration=min_duration,
+        hold=_usual_hold(poses.time) if hold is None else hold,
+    )
+    history = JoinHistory(poses.x.shape, find_joins(poses, rules), chirality=chirality)
+    return _dataset(recording, poses, rules, history)
+
+
+def _checked_poses(recording: xr.Dataset) -> Poses:
+    check_trajectory(recording)
+    names = body_names(recording)
+    if not names:
+        raise InputError("the recording has no body: there is nothing to classify")
+    if not recording.sizes["time"]:
+        raise InputError("the recording has no sample: there is nothing to classify")
+    poses = Poses(*(recording[name].values for name in ("time", "x", "y", "theta")))
+    blind = [name for index, name in enumerate(names) if not poses.seen[:, index].any()]
+    if len(blind) == len(names):
+        raise InputError(
+            "the recording has no orientation: without the angle of each block nobody can say "
+            "which faces are joined (--theta or --columns theta=NAME where the file has it)"
+        )
+    if blind:
+        raise InputError(
+            f"no sample has position and orientation of body {', '.join(blind[:8])}: leave it out "
+            "of the recording, or add its angle"
+        )
+    if len(names) > 1 and (poses.seen.sum(axis=1) < 2).all():
+        raise InputError(
+            "no two bodies are ever seen in the same sample: give all bodies common time stamps"
+        )
+    return poses
+
+
+def _usual_hold(time: Floats) -> float:
+    usual = float(np.median(np.diff(time))) if time.size > 1 else 0.0
+    return max(HOLD, FRAMES_HELD * usual)
+
+
+def _unknown_blocks(poses: Poses, hold: float) -> Booleans:
+    """Return where a block was last seen too long ago, (time, block)."""
+    sample = np.arange(poses.time.size)[:, None]
+    last = np.maximum.accumulate(np.where(poses.seen, sample, -1), axis=0)
+    age = poses.time[:, None] - poses.time[last]
+    unknown: Booleans = (last < 0) | (age > hold * (1.0 + ROUNDING))
+    return unknown
+
+
+def _known_time(time: Floats, known: Booleans, hold: float) -> Floats:
+    """Return for how long each sample stands [s]: until the next one, if that comes in time."""
+    lasts = np.append(np.minimum(np.diff(time), hold), 0.0)
+    return np.where(known, lasts, 0.0)
+
+
+def _shares(outcome: npt.NDArray[np.int32], lasts: Floats, classes: int) -> Floats:
+    """Return the share of each class in the time in which the class is known."""
+    known = outcome >= 0
+    # A recording of one sample lasts no time at all.
+    weights = lasts[known] if lasts[known].any() else np.ones(int(known.sum()))
+    sums = np.bincount(outcome[known], weights=weights, minlength=classes)
+    return sums / sums.sum() if known.any() else np.full(classes, np.nan)
+
+
+def _dataset(
+    recording: xr.Dataset, poses: Poses, rules: JoinRules, history: JoinHistory
+) -> xr.Dataset:
+    import xarray as xr
+
+    classes, shapes = _listed(history, poses.x.shape[1])
+    known = ~_unknown_blocks(poses, rules.hold)
+    sound: Booleans = np.logical_and.reduce(known, axis=1)
+    outcome = np.where(sound, _places(history.outcome, classes), UNKNOWN).astype(np.int32)
+    assembly = np.where(known, history.assembly, UNKNOWN).astype(np.int32)
+    lasts = _known_time(poses.time, sound, rules.hold)
+    share = {"units": "1", "long_name": "share of the time in which the class is known"}
+    data: dict[str, Any] = {
+        "outcome": ("time", outcome, {"long_name": "outcome class, -1 unknown"}),
+        "assembly": (
+            ("time", "body"),
+            assembly,
+            {"long_name": "lowest body of the assembly, -1 unknown"},
+        ),
+        "proportion": ("class", _shares(outcome, lasts, len(classes)), share),
+        **_event_variables("event", history.joined, poses.time, classes),
+        **_event_variables("split", history.split, poses.time, classes),
+        **_assembly_variables(history.joined, shapes),
+    }
+    return xr.Dataset(
+        data,
+        coords={
+            "time": recording["time"],
+            "body": recording["body"],
+            "class": ("class", np.array(classes, dtype=object), {"long_name": "outcome class"}),
+            "shape": ("shape", np.array(shapes, dtype=object), {"long_name": "shape"}),
+        },
+        attrs=_attributes(recording, poses, rules, history)
+        | {"unknown_samples": int((~sound).sum()), "known_s": float(lasts.sum())},
+    )
+
+
+def _listed(history: JoinHistory, blocks: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the classes and the shapes that the dataset lists."""
+    events = (*history.joined, *history.split)
+    classes = {*history.outcome, *(event.outcome for event in events)}
+    shapes = {shape for name in classes for shape in name.split("+")}
+    return (
+        listed_classes(classes, blocks, chirality=history.chirality),
+        listed_shapes(shapes, blocks, chirality=history.chirality),
+    )
+
+
+def _places(names: Iterable[str], listed: Sequence[str]) -> list[int]:
+    place = {name: index for index, name in enumerate(listed)}
+    return [place[name] for name in names]
+
+
+def _event_variables(
+    kind: str, events: list[Event], time: Floats, classes: Sequence[str]
+) -> dict[str, Any]:
+    """Return when and where assemblies joined or came apart, padded to at least one."""
+    clock = [time[event.sample] for event in events] or [math.nan]
+    after = _places([event.outcome for event in events], classes) or [UNKNOWN]
+    return {
+        f"{kind}_count": ((), np.int32(len(events))),
+        f"{kind}_time": (kind, np.array(clock, dtype=np.float64), {"units": "s"}),
+        f"{kind}_block": ((kind, "side"), _padded([event.blocks for event in events], 2)),
+        f"{kind}_face": ((kind, "side"), _padded([event.faces for event in events], 2)),
+        f"{kind}_class": (kind, np.array(after, dtype=np.int32)),
+    }
+
+
+def _assembly_variables(events: list[Event], shapes: Sequence[str]) -> dict[str, Any]:
+    """Return which assemblies joined, and their shapes."""
+    rows = [_places(event.shapes, shapes) for event in events]
+    return {
+        "event_assembly": (("event", "side"), _padded([event.assemblies for event in events], 2)),
+        "event_shape": (("event", "part"), _padded(rows, 3)),
+    }
+
+
+def _padded(rows: Sequence[Sequence[int]], width: int) -> npt.NDArray[np.int32]:
+    """Return rows of whole numbers, one of -1 where there is none."""
+    return np.array(rows or [(UNKNOWN,) * width], dtype=np.int32)
+
+
+def _attributes(
+    recording: xr.Dataset, poses: Poses, rules: JoinRules, history: JoinHistory
+) -> dict[str, Any]:
+    kept = ("source", "arena")
+    return {
+        "kind": "classification",
+        "schema_version": SCHEMA_VERSION,
+        **{name: recording.attrs[name] for name in kept if name in recording.attrs},
+        "blocks": poses.x.shape[1],
+        "chirality": history.chirality,
+        "block_side_m": rules.side,
+        "join_distance_m": rules.join_distance,
+        "join_angle_rad": rules.join_angle,
+        "release_distance_m": rules.release_distance,
+        "release_angle_rad": rules.release_angle,
+        "min_duration_s": rules.min_duration,
+        "hold_s": rules.hold,
+        "dropped_joins": len(history.dropped),
+        "closest_m": smallest_distance(poses),
+    }

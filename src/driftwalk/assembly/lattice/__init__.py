@@ -1,0 +1,1 @@
+"""Blocks on the lattice of their assembly: shapes, joins, and what the events of a run built."""

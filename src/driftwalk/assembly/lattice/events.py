@@ -1,0 +1,348 @@
+"""What the events of simulated runs made: replayed on the lattice, all runs side by side.
+
+The native core gives, for each event, the two blocks and the faces that joined. Everything else
+follows: which assemblies they were, what shapes these had, and the outcome class of the world.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.assembly.lattice.polyomino import (
+    Chirality,
+    moved_to_origin,
+    name_of,
+    require_chirality,
+)
+from driftwalk.assembly.outcomes.classes import class_name, listed_classes, listed_shapes
+from driftwalk.core.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Integers = npt.NDArray[np.int64]
+
+STEP: Final = np.array([(1, 0), (0, 1), (-1, 0), (0, -1)])
+"""From a cell to its neighbour at each face."""
+
+
+class ReplayedEvents(NamedTuple):
+    """What the events of some runs made; -1 where a run had no such event."""
+
+    event_assembly: npt.NDArray[np.int32]
+    """Lowest block of the assembly that stayed and of the one that moved, (run, event, side)."""
+    event_shape: npt.NDArray[np.int32]
+    """Shapes of the two and of what they became, (run, event, part): indices into `shapes`."""
+    event_class: npt.NDArray[np.int32]
+    """Outcome class of the world after the event, (run, event): an index into `classes`."""
+    outcome: npt.NDArray[np.int32]
+    """Outcome class at the end, (run,): an index into `classes`."""
+    classes: tuple[str, ...]
+    """Names of the classes: all for up to 8 blocks, beyond that those that occurred."""
+    shapes: tuple[str, ...]
+    """Names of the shapes, by the same rule."""
+
+
+def replay_events(
+    event_count: npt.ArrayLike,
+    event_block: npt.ArrayLike,
+    event_face: npt.ArrayLike,
+    *,
+    cell: npt.ArrayLike,
+    quarter: npt.ArrayLike,
+    assembly: npt.ArrayLike,
+    chirality: Chirality = "merged",
+) -> ReplayedEvents:
+    """Replay the events of simulated runs on the lattice.
+
+    Parameters
+    ----------
+    event_count : array_like of int, shape (runs,)
+        Number of events of each run.
+    event_block : array_like of int, shape (runs, events, 2)
+        The blocks whose faces joined, first that of the assembly that stayed.
+    event_face : array_like of int, shape (runs, events, 2)
+        The faces, 0 to 3, in the blocks' own frames.
+    cell : array_like of int, shape (runs, blocks, 2)
+        Cells at the end, on any lattice of their assembly.
+    quarter : array_like of int, shape (runs, blocks)
+        Quarter turns of the blocks at the end, on the same lattice.
+    assembly : array_like of int, shape (runs, blocks)
+        Lowest block of the assembly of each block at the end.
+    chirality : {"merged", "distinct"}
+        Whether mirror images are one shape or two.
+
+    Returns
+    -------
+    ReplayedEvents
+        Assemblies, shapes and classes.
+
+    Raises
+    ------
+    InputError
+        When shapes disagree, an event cannot be (a face of no block, two blocks of one assembly, a
+        cell taken twice), or the events do not lead to the state at the end; names the run.
+
+    Examples
+    --------
+    >>> made = replay_events(
+    ...     [1], [[[0, 1]]], [[[0, 2]]],
+    ...     cell=[[(0, 0), (1, 0)]], quarter=[[0, 0]], assembly=[[0, 0]],
+    ... )
+    >>> made.classes[made.outcome[0]]
+    '2'
+    """
+    require_chirality(chirality)
+    events = _Events(*map(_whole, (event_count, event_block, event_face)))
+    end = _Lattice(*map(_whole, (cell, quarter, assembly)))
+    _check_arrays(events, end)
+    replay = _Replay(*end.assembly.shape, slots=events.block.shape[1], chirality=chirality)
+    for event in range(int(events.number.max(initial=0))):
+        replay.apply(event, np.flatnonzero(events.number > event), events)
+    _check_end(replay.lattice, end)
+    return replay.result()
+
+
+def class_at(assembly: xr.Dataset, time: npt.ArrayLike) -> npt.NDArray[np.int32]:
+    """Return the outcome class that runs had at earlier times.
+
+    Parameters
+    ----------
+    assembly : xarray.Dataset
+        Kind "assembly".
+    time : array_like
+        Times [s], 0 to the duration of the runs; an event at that very time has happened.
+
+    Returns
+    -------
+    numpy.ndarray of int32, shape (..., runs)
+        Indices into the coordinate ``class``, for each time and run. A run that ended early, as
+        one assembly, keeps its class; one without an outcome has -1.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind or a time is out of range.
+
+    Examples
+    --------
+    >>> class_at(runs, [0.0, 60.0, 300.0]).shape  # doctest: +SKIP
+    (3, 1000)
+    """
+    times = _checked_times(assembly, time)
+    names = [str(name) for name in assembly["class"].values]
+    apart = class_name(["1"] * assembly.sizes["block"])
+    rows = classes_at(assembly, times.ravel(), start=names.index(apart))
+    return rows.reshape(*times.shape, rows.shape[1])
+
+
+def classes_at(
+    assembly: xr.Dataset, times: npt.NDArray[np.float64], *, start: int
+) -> npt.NDArray[np.int32]:
+    """Return what `class_at` does for times in a row, unchecked: (time, run).
+
+    `start` is the index of the class in which every block is alone.
+    """
+    events = assembly["event_class"].values
+    begin = np.full((len(events), 1), start)
+    history = np.concatenate([begin, events], axis=1).astype(np.int32)
+    clock, run = assembly["event_time"].values, np.arange(len(events))
+    history[assembly["outcome"].values < 0] = -1
+    rows = [history[run, (clock <= moment).sum(axis=1)] for moment in times]
+    return np.array(rows, dtype=np.int32).reshape(len(times), len(events))
+
+
+class _Events(NamedTuple):
+    number: Integers
+    block: Integers
+    face: Integers
+
+
+class _Lattice(NamedTuple):
+    """Where the blocks of many runs are: (run, block[, 2])."""
+
+    cell: Integers
+    quarter: Integers
+    assembly: Integers
+
+
+class _Names:
+    """Names by number, in the order in which they came."""
+
+    def __init__(self, *names: str) -> None:
+        self.known = {name: number for number, name in enumerate(names)}
+
+    def number(self, name: str) -> int:
+        return self.known.setdefault(name, len(self.known))
+
+    def index_into(self, listed: tuple[str, ...]) -> npt.NDArray[np.int32]:
+        """Return from number to place in a list; at its end -1, so that -1 stays what it is."""
+        place = {name: index for index, name in enumerate(listed)}
+        return np.array([*(place[name] for name in self.known), -1], dtype=np.int32)
+
+
+class _Replay:
+    """The state of all runs while their events are applied."""
+
+    def __init__(self, runs: int, blocks: int, *, slots: int, chirality: Chirality) -> None:
+        self.chirality = chirality
+        self.blocks = blocks
+        self.lattice = _Lattice(
+            np.zeros((runs, blocks, 2), dtype=np.int64),
+            np.zeros((runs, blocks), dtype=np.int64),
+            np.tile(np.arange(blocks), (runs, 1)),
+        )
+        self.shapes, self.classes = _Names("1"), _Names(class_name(["1"] * blocks))
+        # The number of the shape at the lowest block of each assembly, -1 at the other blocks.
+        self.shape_of = np.zeros((runs, blocks), dtype=np.int64)
+        self.event_assembly = np.full((runs, slots, 2), -1, dtype=np.int32)
+        self.event_shape = np.full((runs, slots, 3), -1, dtype=np.int32)
+        self.event_class = np.full((runs, slots), -1, dtype=np.int32)
+        self.outcome = np.zeros(runs, dtype=np.int32)
+
+    def apply(self, event: int, at: Integers, events: _Events) -> None:
+        """Apply the event of this number to the runs that have it."""
+        labels = self.lattice.assembly[at]
+        own = np.take_along_axis(labels, events.block[at, event], axis=1)
+        _refuse(own[:, 0] == own[:, 1], at, event, "joins two blocks of one assembly")
+        self.event_assembly[at, event] = own
+        self.event_shape[at, event, :2] = np.take_along_axis(self.shape_of[at], own, axis=1)
+        self._align(at, events.block[at, event], events.face[at, event])
+        low, high = own.min(axis=1), own.max(axis=1)
+        member = (labels == low[:, None]) | (labels == high[:, None])
+        self.lattice.assembly[at] = np.where(member, low[:, None], labels)
+        became = self._shape_numbers(at, event, member)
+        self.shape_of[at, high] = -1
+        self.shape_of[at, low] = became
+        self.event_shape[at, event, 2] = became
+        self.outcome[at] = self.event_class[at, event] = self._class_numbers(at)
+
+    def result(self) -> ReplayedEvents:
+        listing: dict[str, Any] = {"chirality": self.chirality}
+        shapes = listed_shapes(self.shapes.known, self.blocks, **listing)
+        classes = listed_classes(self.classes.known, self.blocks, **listing)
+        shape_index, class_index = (
+            self.shapes.index_into(shapes),
+            self.classes.index_into(classes),
+        )
+        return ReplayedEvents(
+            self.event_assembly,
+            shape_index[self.event_shape],
+            class_index[self.event_class],
+            class_index[self.outcome],
+            classes,
+            shapes,
+        )
+
+    def _align(self, at: Integers, block: Integers, face: Integers) -> None:
+        """Turn and shift the assemblies that move so that the two faces of each event coincide."""
+        cell, quarter, labels = (array[at] for array in self.lattice)
+        row = np.arange(at.size)
+        stays, moves = block.T
+        outward = (face[:, 0] + quarter[row, stays]) % 4
+        turn = outward + 2 - face[:, 1] - quarter[row, moves]
+        moved = labels == labels[row, moves][:, None]
+        arm = rotate(cell - cell[row, moves][:, None], turn[:, None])
+        there = arm + (cell[row, stays] + STEP[outward])[:, None]
+        self.lattice.cell[at] = np.where(moved[..., None], there, cell)
+        self.lattice.quarter[at] = np.where(moved, (quarter + turn[:, None]) % 4, quarter)
+
+    def _shape_numbers(self, at: Integers, event: int, member: npt.NDArray[np.bool_]) -> Integers:
+        """Return the numbers of the shapes that the members of each run make up."""
+        cell, far = self.lattice.cell[at], 2 * self.blocks
+        lowest = np.where(member[..., None], cell, cell.max(initial=0) + 1).min(axis=1)
+        place = cell - lowest[:, None]
+        codes = np.where(member, place[..., 0] * far + place[..., 1], far * far)
+        codes.sort(axis=1)
+        twice = (np.diff(codes, axis=1) == 0) & (codes[:, 1:] < far * far)
+        _refuse(twice.any(axis=1), at, event, "puts two blocks into one cell")
+        codes, inverse = np.unique(codes, axis=0, return_inverse=True)
+        numbers = []
+        for row in codes:
+            cells = tuple(divmod(code, far) for code in row[row < far * far].tolist())
+            numbers.append(self.shapes.number(name_of(moved_to_origin(cells), self.chirality)))
+        return np.array(numbers, dtype=np.int64)[inverse.reshape(-1)]
+
+    def _class_numbers(self, at: Integers) -> npt.NDArray[np.int32]:
+        """Return the numbers of the outcome classes of the runs."""
+        present = np.sort(self.shape_of[at], axis=1)
+        worlds, inverse = np.unique(present, axis=0, return_inverse=True)
+        names = list(self.shapes.known)
+        numbers = [
+            self.classes.number(class_name(names[shape] for shape in row[row >= 0].tolist()))
+            for row in worlds
+        ]
+        return np.array(numbers, dtype=np.int32)[inverse.reshape(-1)]
+
+
+def rotate(cell: Integers, turn: Integers) -> Integers:
+    """Turn cells (..., 2) by quarters (...) about the origin."""
+    x, y = cell[..., 0], cell[..., 1]
+    turns = [(x, y), (-y, x), (-x, -y), (y, -x)]
+    return np.stack([np.choose(turn % 4, [pair[axis] for pair in turns]) for axis in (0, 1)], -1)
+
+
+def _whole(values: npt.ArrayLike) -> Integers:
+    array = np.asarray(values)
+    if array.dtype.kind not in "iu":
+        raise InputError(f"events and cells are whole numbers, got {array.dtype}")
+    return array.astype(np.int64)
+
+
+def _check_arrays(events: _Events, end: _Lattice) -> None:
+    runs, blocks = end.assembly.shape if end.assembly.ndim == 2 else (-1, -1)
+    slots = events.block.shape[1] if events.block.ndim == 3 else -1
+    wanted = [(runs,), (runs, slots, 2), (runs, slots, 2), (runs, blocks, 2), (runs, blocks)]
+    found = [array.shape for array in (*events, *end)]
+    if found[:-1] != wanted or blocks < 1:
+        raise InputError(f"the events and the cells of runs do not fit together: shapes {found}")
+    most = min(slots, blocks - 1)
+    wrong = (events.number < 0) | (events.number > most)
+    if wrong.any():
+        run = int(np.argmax(wrong))
+        raise InputError(f"run {run}: {events.number[run]} events among {blocks} blocks")
+    real = np.arange(slots) < events.number[:, None]
+    for what, values, limit in (("block", events.block, blocks), ("face", events.face, 4)):
+        bad = real[..., None] & ((values < 0) | (values >= limit))
+        if bad.any():
+            run, event, side = map(int, np.argwhere(bad)[0])
+            raise InputError(f"run {run}, event {event}: no {what} {values[run, event, side]}")
+
+
+def _check_end(replayed: _Lattice, end: _Lattice) -> None:
+    """Refuse a state at the end that differs by more than a motion of whole assemblies."""
+    differs = replayed.assembly != end.assembly
+    if not differs.any():
+        (cell, quarter), (end_cell, end_quarter) = _from_lowest(replayed), _from_lowest(end)
+        differs = (cell != end_cell).any(axis=2) | (quarter != end_quarter)
+    if differs.any():
+        run, block = map(int, np.argwhere(differs)[0])
+        raise InputError(f"run {run}: the events do not lead block {block} to where it is")
+
+
+def _from_lowest(lattice: _Lattice) -> tuple[Integers, Integers]:
+    """Return cells and quarters as seen from the lowest block of each assembly."""
+    lowest = lattice.assembly
+    origin = np.take_along_axis(lattice.cell, lowest[..., None], axis=1)
+    turned = np.take_along_axis(lattice.quarter, lowest, axis=1)
+    return rotate(lattice.cell - origin, -turned), (lattice.quarter - turned) % 4
+
+
+def _refuse(wrong: npt.NDArray[np.bool_], at: Integers, event: int, what: str) -> None:
+    if wrong.any():
+        raise InputError(f"run {at[int(np.argmax(wrong))]}, event {event}: {what}")
+
+
+def _checked_times(assembly: xr.Dataset, time: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    kind = assembly.attrs.get("kind")
+    if kind != "assembly":
+        raise InputError(f"an 'assembly' dataset is needed, got kind '{kind}'")
+    times = np.asarray(time, dtype=np.float64)
+    last = float(assembly.attrs["duration_s"])
+    wrong = ~((times >= 0) & (times <= last))
+    if wrong.any():
+        raise InputError(f"time {times[wrong].flat[0]:g} s is outside the runs, 0 to {last:g} s")
+    return times

@@ -1,0 +1,396 @@
+"""A tank of blocks that keeps its state, to be looked at and changed while it runs."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from threading import Lock
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk import _core
+from driftwalk.assembly.lattice.live import Lattice
+from driftwalk.assembly.runs.dataset import BROKEN, times_of
+from driftwalk.assembly.runs.plan import MOST_STEPS, make_plan, start_poses
+from driftwalk.assembly.runs.start import require_room
+from driftwalk.core.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+    from driftwalk.model.assembly import HiddenFaceDrag, Latching
+
+Floats = npt.NDArray[np.float64]
+
+ROUNDING: Final = 1e-9
+"""Share of a time step by which durations may miss its end."""
+
+
+class LiveEvent(NamedTuple):
+    """Two blocks have joined."""
+
+    time: float
+    """End of the time step [s]."""
+    blocks: tuple[int, int]
+    """First that of the assembly that stayed, then of the one that was moved into line."""
+    outcome: str
+    """Outcome class of the whole world from then on."""
+
+
+class _Moment:
+    """The state of a world at one time, for those who read; its outcome is named when asked for."""
+
+    def __init__(self, world: _core.LiveWorld, study: Study) -> None:
+        self.state: dict[str, npt.NDArray[Any]] = world.state()
+        self.time = float(times_of(np.array(world.step), time_step=study.time_step_s))
+        self._chirality = study.assembly.chirality
+
+    @cached_property
+    def outcome(self) -> str:
+        return Lattice.of(self.state).outcome(self._chirality)
+
+
+class _Wishes(NamedTuple):
+    """What a world is to be like from its next force interval on."""
+
+    study: Study
+    flow_scale: float
+    part: bool = False
+    """Whether what is joined then is to be parted."""
+
+
+class LiveTank:
+    """One tank of blocks that advances by a duration and whose parameters change while it runs.
+
+    The world is that of `assemble` with ``backend="reference"``: while nothing is changed, it is
+    run 0 of `assembly_path` with the same seed, bit for bit, in whatever pieces it is advanced. It
+    goes on when all blocks have become one assembly, and has no end.
+
+    Everything may be called from several threads at once. `advance`, `part`, `events` and `restart`
+    wait for each other. `set` and the properties do not wait for them, except `set` for a
+    `restart`, and `advance` does not hold the interpreter lock: while it runs, other threads see
+    the state before it. No change is lost
+    when several threads call `set` at once. Each property is read on its own, though: when another
+    thread advances in between, `x` and `y` are those of two moments.
+
+    Parameters
+    ----------
+    study : Study
+        Block, tank, water, forces and assembly, to begin with.
+    flow : xarray.Dataset
+        The water's velocity, a `flow_field` that covers the tank. One that changes in time begins
+        with the world, and stays as it is at its end from there on.
+    blocks, seed : int, optional
+        Over the study's values.
+    start : array_like, shape (blocks, 3), optional
+        Poses at the start [m, m, rad], at rest; default: random ones that do not overlap.
+
+    Raises
+    ------
+    InputError
+        When there are more blocks than fit the tank, the flow does not cover it, or an option is
+        out of range.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> tank = dw.LiveTank(dw.Study(), dw.uniform_flow(0.0, 0.0), blocks=3)
+    >>> tank.advance(0.5)
+    >>> tank.set(force_std=2e-3, latching="none")
+    >>> tank.advance(0.5)
+    >>> tank.time, tank.x.shape, tank.outcome
+    (1.0, (3,), '1+1+1')
+    """
+
+    def __init__(
+        self,
+        study: Study,
+        flow: xr.Dataset,
+        *,
+        blocks: int | None = None,
+        seed: int | None = None,
+        start: npt.ArrayLike | None = None,
+    ) -> None:
+        plan = make_plan(study, flow, settings={"blocks": blocks, "seed": seed}, index=np.arange(1))
+        self._flow = flow
+        self._lock = Lock()
+        # Never held while the world advances. Where both are held, this one is taken second.
+        self._wishes_lock = Lock()
+        self._wishes = _Wishes(plan.study, 1.0)
+        self._model = plan.model(flow)
+        self.restart(start=start)
+
+    def restart(self, *, seed: int | None = None, start: npt.ArrayLike | None = None) -> None:
+        """Begin again at time 0, with the parameters and the number of blocks wanted last.
+
+        Parameters
+        ----------
+        seed : int, optional
+            Of the start and of the forces; default: as before, so that it is the same run again.
+        start : array_like, shape (blocks, 3), optional
+            Poses at the start [m, m, rad], at rest; default: random ones that do not overlap.
+
+        Raises
+        ------
+        InputError
+            As the class.
+        """
+        with self._lock, self._wishes_lock:
+            plan = make_plan(
+                self._wishes.study, self._flow, settings={"seed": seed}, index=np.arange(1)
+            )
+            rules, forces = plan.study.assembly, plan.study.forces
+            self._world = _core.LiveWorld(
+                self._model,
+                start=np.ascontiguousarray(start_poses(plan, start)[0]),
+                key=int(plan.keys[0]),
+                drag_coefficient=forces.drag_coefficient,
+                force_std=forces.force_std_N,
+                latching=rules.latching,
+                connector_distance=rules.connector_distance_m,
+                connector_axis=rules.connector_axis_rad,
+                hidden_face_drag=rules.hidden_face_drag,
+                block_restitution=rules.block_restitution,
+                block_friction=rules.block_friction,
+            )
+            self._wishes = self._active = _Wishes(plan.study, self._wishes.flow_scale)
+            self._set_forces()
+            self._steps_per_interval = round(forces.force_interval_s / plan.study.time_step_s)
+            self._due = 0.0
+            self._events: list[LiveEvent] = []
+            self._look()
+
+    def advance(self, duration_s: float) -> None:
+        """Let the world go on for a while.
+
+        It goes by whole time steps; what is left of a duration counts for the next one.
+
+        Parameters
+        ----------
+        duration_s : float
+            How long [s], from 0.
+
+        Raises
+        ------
+        InputError
+            When the duration is negative or too long, or the forces have become so large that the
+            numbers are lost: then only `restart` helps.
+        """
+        if not 0.0 <= duration_s < math.inf:
+            raise InputError(f"duration_s must be a finite number from 0 s on, got {duration_s}")
+        with self._lock:
+            step = self._wishes.study.time_step_s
+            due = self._due + duration_s
+            steps = math.floor(min(due / step, 2.0 * MOST_STEPS) + ROUNDING)
+            if self._world.step + steps >= MOST_STEPS:
+                raise InputError(
+                    f"a world has at most {MOST_STEPS - 1} time steps of {step:g} s and has had "
+                    f"{self._world.step}: advance by less than {duration_s:g} s, or restart it"
+                )
+            self._due = due - steps * step
+            self._go(steps)
+            self._look()
+            if self._world.status & BROKEN:
+                raise InputError(
+                    f"the blocks' positions were lost by {self.time:g} s: forces or flow are too "
+                    f"strong for a time step of {step:g} s; weaken them and restart"
+                )
+
+    def set(
+        self,
+        *,
+        drag_coefficient: float | None = None,
+        force_std: float | None = None,
+        flow_scale: float | None = None,
+        latching: Latching | None = None,
+        hidden_face_drag: HiddenFaceDrag | None = None,
+        blocks: int | None = None,
+        part: bool = False,
+    ) -> None:
+        """Change parameters from the next force interval on; None leaves one as it is.
+
+        Parameters
+        ----------
+        drag_coefficient : float
+            C_d.
+        force_std : float
+            sigma_F [N].
+        flow_scale : float
+            Factor on the velocity of the water, from 0 (still water); 1 at first.
+        latching : {"collision", "connector", "none"}
+            How blocks latch from then on. What is joined stays so, even with "none", unless it is
+            parted.
+        hidden_face_drag : {"none", "full"}
+            Drag on faces that are joined.
+        blocks : int
+            Number of blocks. The last ones are removed; what is left of their assemblies goes on as
+            it was moving, as several where it no longer hangs together. New ones come to rest at
+            random free places; those for which there is none yet wait (`waiting`).
+        part : bool
+            Whether all assemblies are parted into their blocks at that moment, as by `part`.
+
+        Raises
+        ------
+        InputError
+            When a value is out of range or the blocks cannot fit the tank. Nothing changes then.
+        """
+        from driftwalk.model import apply_overrides
+
+        given = {
+            "forces.drag_coefficient": drag_coefficient,
+            "forces.force_std_N": force_std,
+            "assembly.latching": latching,
+            "assembly.hidden_face_drag": hidden_face_drag,
+            "assembly.blocks": blocks,
+        }
+        overrides = {key: value for key, value in given.items() if value is not None}
+        with self._wishes_lock:
+            wishes = self._wishes
+            study = apply_overrides(wishes.study, overrides)
+            require_room(study)
+            scale = wishes.flow_scale if flow_scale is None else flow_scale
+            if not 0.0 <= scale < math.inf:
+                raise InputError(f"flow_scale must be a finite number from 0 on, got {scale}")
+            self._wishes = _Wishes(study, float(scale), part or wishes.part)
+
+    def part(self) -> None:
+        """Part all assemblies into their blocks, which move on as they did.
+
+        They lie face to face then and latch again at once, unless latching is "none".
+        """
+        with self._lock:
+            self._world.part()
+            self._look()
+
+    def events(self) -> list[LiveEvent]:
+        """Return the joinings since the last call: time [s], the two blocks, the class after it."""
+        with self._lock:
+            events, self._events = self._events, []
+        return events
+
+    @property
+    def study(self) -> Study:
+        """The study with the values wanted last."""
+        return self._wishes.study
+
+    @property
+    def flow_scale(self) -> float:
+        """The factor on the velocity of the water wanted last."""
+        return self._wishes.flow_scale
+
+    @property
+    def time(self) -> float:
+        """Time of the state since the start [s]: the end of a time step."""
+        return self._moment.time
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks in the tank."""
+        return int(self._moment.state["assembly"].size)
+
+    @property
+    def waiting(self) -> int:
+        """Number of blocks that are wanted but not in the tank yet."""
+        return max(self._wishes.study.assembly.blocks - self.blocks, 0)
+
+    @property
+    def x(self) -> Floats:
+        """Positions x of the blocks' centres [m]."""
+        return self._column("pose", 0)
+
+    @property
+    def y(self) -> Floats:
+        """Positions y [m]."""
+        return self._column("pose", 1)
+
+    @property
+    def theta(self) -> Floats:
+        """Orientations of the blocks [rad], within [-pi, pi], counter-clockwise from x."""
+        return self._column("pose", 2)
+
+    @property
+    def vx(self) -> Floats:
+        """Velocities x of the blocks' centres [m/s]."""
+        return self._column("velocity", 0)
+
+    @property
+    def vy(self) -> Floats:
+        """Velocities y [m/s]."""
+        return self._column("velocity", 1)
+
+    @property
+    def omega(self) -> Floats:
+        """Spins [rad/s]."""
+        return self._column("velocity", 2)
+
+    @property
+    def assembly(self) -> npt.NDArray[np.int32]:
+        """Lowest block of each block's assembly: blocks with equal numbers are joined."""
+        labels: npt.NDArray[np.int32] = self._moment.state["assembly"].copy()
+        return labels
+
+    @property
+    def outcome(self) -> str:
+        """Outcome class of the world, as `assemble` and `classify` name it."""
+        return self._moment.outcome
+
+    def _column(self, name: str, part: int) -> Floats:
+        return np.array(self._moment.state[name][:, part])
+
+    def _look(self) -> None:
+        """Keep a copy of the state for those who read."""
+        self._moment = _Moment(self._world, self._active.study)
+
+    def _go(self, steps: int) -> None:
+        """Take time steps, and what is wished at the beginning of force intervals."""
+        while steps > 0:
+            into = self._world.step % self._steps_per_interval
+            if into == 0:
+                self._fulfil()
+            waits = self._wishes is not self._active or self.waiting > 0
+            now = min(steps, self._steps_per_interval - into) if waits else steps
+            self._step(now)
+            steps -= now
+
+    def _fulfil(self) -> None:
+        """Give the world what is wished, at the beginning of a force interval."""
+        with self._wishes_lock:
+            wished = self._wishes
+            changed = wished is not self._active
+            self._wishes = self._active = wished._replace(part=False) if wished.part else wished
+        if changed:
+            self._set_forces()
+            rules = self._active.study.assembly
+            self._world.set_rules(latching=rules.latching, hidden_face_drag=rules.hidden_face_drag)
+        if wished.part:
+            self._world.part()
+            self._look()
+        if self._active.study.assembly.blocks != self.blocks:
+            self._world.set_blocks(self._active.study.assembly.blocks)
+            self._look()
+
+    def _set_forces(self) -> None:
+        forces = self._active.study.forces
+        self._world.set_forces(
+            drag_coefficient=forces.drag_coefficient,
+            force_std=forces.force_std_N,
+            flow_scale=self._active.flow_scale,
+        )
+
+    def _step(self, steps: int) -> None:
+        """Take time steps and note what has joined in them."""
+        study = self._active.study
+        lattice = Lattice.of(self._world.state())
+        found = self._world.advance(steps)
+        for step, blocks, faces in zip(found["step"], found["block"], found["face"], strict=True):
+            lattice = lattice.joined(blocks, faces)
+            self._events.append(
+                LiveEvent(
+                    float(times_of(step, time_step=study.time_step_s)),
+                    (int(blocks[0]), int(blocks[1])),
+                    lattice.outcome(study.assembly.chirality),
+                )
+            )

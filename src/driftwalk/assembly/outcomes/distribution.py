@@ -1,0 +1,336 @@
+"""How often does each outcome come? Proportions of the classes, with intervals that hold together.
+
+A class is named by its polyominoes joined by "+", so a class without "+" is one single assembly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from numbers import Real
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.assembly.lattice.events import classes_at
+from driftwalk.assembly.lattice.polyomino import shape_size
+from driftwalk.assembly.outcomes.classes import class_shapes
+from driftwalk.core.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+SCHEMA_VERSION = 1
+METHOD = "Clopper-Pearson, Bonferroni over the classes; `complete` on its own"
+NOT_COPIED = ("kind", "schema_version", "runs")
+
+
+def outcome_distribution(
+    assembly_or_counts: xr.Dataset | Mapping[str, int],
+    *,
+    confidence: float = 0.9,
+    time: float | None = None,
+) -> xr.Dataset:
+    """Return the proportion of every outcome class with simultaneous confidence intervals.
+
+    Parameters
+    ----------
+    assembly_or_counts : xarray.Dataset or mapping of str to int
+        An `assembly` dataset, or the number of runs by class name. Runs without an outcome (-1) are
+        left out and counted.
+    confidence : float
+        Probability with which all intervals hold at once, in (0, 1).
+    time : float, optional
+        Read the outcomes at this time [s] of the runs, see `class_at`; default: at their end.
+        Only for an `assembly` dataset.
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind "outcome_distribution": by ``class``, ``count``, ``proportion``, ``interval_low``,
+        ``interval_high``. ``attrs``: ``runs``, ``left_out``, ``confidence``, ``method``,
+        ``complete`` (share of runs with one assembly), ``complete_low``, ``complete_high``,
+        ``blocks``, and for an `assembly` its other attributes and ``time_s``.
+
+    Raises
+    ------
+    InputError
+        When there are no runs, a name is no outcome class, a count is negative or no whole number,
+        or an option is out of range.
+
+    Notes
+    -----
+    Each of the C classes has a Clopper-Pearson interval of level ``1 - (1 - confidence) / C``. By
+    Bonferroni's inequality all of them hold at once with at least the stated probability, for any
+    number of runs and however rare a class. Goodman's intervals (Technometrics 7, 247, 1965) are
+    the same construction with the normal approximation. At 1000 runs of 10 classes the widths
+    differ by 2 % for common classes, but with five classes of 1e-3 and less Goodman's hold in 79 %
+    of samples instead of 90 %, and rare classes are what a distribution of outcomes is full of.
+    The interval of ``complete`` answers a question of its own and is not part of the joint
+    statement. The statement covers the classes that are listed: beyond 8 blocks, where only the
+    classes that occurred are listed, it says nothing of the others.
+
+    Examples
+    --------
+    >>> found = outcome_distribution({"I": 2, "O": 7, "2+2": 1})
+    >>> found["proportion"].values.tolist()
+    [0.2, 0.7, 0.1]
+    >>> found.attrs["complete"]
+    0.9
+    """
+    import xarray as xr
+
+    _check_confidence(confidence)
+    if isinstance(assembly_or_counts, xr.Dataset):
+        require_assembly(assembly_or_counts, "outcome")
+        names = class_names(assembly_or_counts)
+        attrs = {k: v for k, v in assembly_or_counts.attrs.items() if k not in NOT_COPIED}
+        if time is None:
+            outcome = assembly_or_counts["outcome"].values
+            attrs["time_s"] = duration(assembly_or_counts)
+        else:
+            outcome = outcomes_at(assembly_or_counts, time)
+            attrs["time_s"] = float(time)
+        attrs["left_out"] = int((outcome < 0).sum())
+        count = np.bincount(outcome[outcome >= 0], minlength=len(names)).astype(np.int64)
+    elif time is not None:
+        raise InputError("time: plain counts have no times; give the assembly dataset")
+    else:
+        names, count = _checked_counts(assembly_or_counts)
+        attrs = {"left_out": 0, "blocks": _blocks(names)}
+    return _dataset(names, count, confidence, attrs)
+
+
+def outcomes_at(assembly: xr.Dataset, time: float) -> Integers:
+    """Return the outcome class of every run as it stood at a time.
+
+    That is the class after the last event at or before this time; before the first event all blocks
+    are single.
+
+    Parameters
+    ----------
+    assembly : xarray.Dataset
+        An `assembly` dataset.
+    time : float
+        Time from the start of the runs [s], from 0 to their duration.
+
+    Returns
+    -------
+    ndarray of int, shape (run,)
+        Indices into `class_names`; -1 for a run without an outcome.
+
+    Raises
+    ------
+    InputError
+        When it is no `assembly` dataset or the time lies outside the runs.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> two_blocks = xr.Dataset(
+    ...     {
+    ...         "event_time": (("run", "event"), [[20.0], [np.nan]]),
+    ...         "event_class": (("run", "event"), [[0], [-1]]),
+    ...         "outcome": ("run", [0, 1]),
+    ...     },
+    ...     coords={"class": ["2", "1+1"]},
+    ...     attrs={"kind": "assembly", "blocks": 2, "duration_s": 60.0},
+    ... )
+    >>> outcomes_at(two_blocks, 10.0).tolist(), outcomes_at(two_blocks, 20.0).tolist()
+    ([1, 1], [0, 1])
+    """
+    require_assembly(assembly, "outcome", "event_time", "event_class")
+    moment = np.array([time])
+    check_times(moment, duration(assembly))
+    start = class_names(assembly).index(all_single(assembly))
+    index: Integers = classes_at(assembly, moment, start=start)[0].astype(np.int64)
+    return index
+
+
+def proportion_interval(
+    count: npt.ArrayLike, runs: npt.ArrayLike, *, confidence: float
+) -> tuple[Floats, Floats]:
+    """Return the Clopper-Pearson interval of a proportion.
+
+    Parameters
+    ----------
+    count, runs : array_like of int
+        Successes and trials, 0 <= count <= runs; broadcast against each other.
+    confidence : float
+        Probability with which the interval holds, at least, in (0, 1).
+
+    Returns
+    -------
+    low, high : ndarray
+        Limits; 0 and 1 where there were no trials.
+
+    Raises
+    ------
+    InputError
+        When a number or the confidence is out of range.
+
+    Examples
+    --------
+    >>> low, high = proportion_interval(0, 10, confidence=0.9)
+    >>> float(low), round(float(high), 4)
+    (0.0, 0.2589)
+    """
+    from scipy.special import betaincinv
+
+    _check_confidence(confidence)
+    k, n = np.broadcast_arrays(np.asarray(count, np.float64), np.asarray(runs, np.float64))
+    if not ((k >= 0) & (k <= n)).all():
+        raise InputError("a proportion needs 0 <= count <= runs")
+    tail = (1.0 - confidence) / 2
+    # The parameters are clipped where the limit is known and the beta law is not defined.
+    low = np.where(k > 0, betaincinv(np.maximum(k, 1.0), n - k + 1.0, tail), 0.0)
+    high = np.where(k < n, betaincinv(k + 1.0, np.maximum(n - k, 1.0), 1.0 - tail), 1.0)
+    return low, high
+
+
+def sampling_variance(proportion: npt.ArrayLike, runs: npt.ArrayLike) -> Floats:
+    """Return the variance that a proportion has because the number of runs is finite.
+
+    The unbiased estimate p (1 - p) / (n - 1).
+
+    Parameters
+    ----------
+    proportion : array_like
+        Observed proportions, in [0, 1].
+    runs : array_like of int
+        Runs of which each is a share, >= 2; broadcast against `proportion`.
+
+    Returns
+    -------
+    ndarray
+        Variances.
+
+    Raises
+    ------
+    InputError
+        When a value is out of range.
+
+    Examples
+    --------
+    >>> float(sampling_variance(0.5, 101))
+    0.0025
+    """
+    p, n = np.asarray(proportion, dtype=np.float64), np.asarray(runs, dtype=np.float64)
+    if not ((p >= 0) & (p <= 1)).all():
+        raise InputError("proportion: expected numbers from 0 to 1")
+    if not (n >= 2).all():
+        raise InputError("runs: the sampling variance needs at least 2 runs of each proportion")
+    return np.asarray(p * (1 - p) / (n - 1))
+
+
+def class_names(assembly: xr.Dataset) -> list[str]:
+    """Return the class names of an assembly dataset, "1+1+..." among them.
+
+    Beyond 8 blocks only classes that occurred are listed; the state in which every run begins is
+    then added at the end, where the order has it.
+    """
+    names = [str(name) for name in assembly["class"].values]
+    start = all_single(assembly)
+    return names if start in names else [*names, start]
+
+
+def all_single(assembly: xr.Dataset) -> str:
+    """Return the name of the class in which every block is alone."""
+    return "+".join(["1"] * int(assembly.attrs["blocks"]))
+
+
+def is_complete(names: list[str]) -> npt.NDArray[np.bool_]:
+    """Return which classes are one single assembly."""
+    return np.array(["+" not in name for name in names], dtype=bool)
+
+
+def duration(assembly: xr.Dataset) -> float:
+    """Return the simulated time of a run [s]."""
+    return float(assembly.attrs["duration_s"])
+
+
+def require_assembly(dataset: xr.Dataset, *variables: str) -> None:
+    """Raise `InputError` unless the dataset is an `assembly` with these variables."""
+    kind = dataset.attrs.get("kind")
+    if kind != "assembly":
+        raise InputError(f"not an assembly dataset: its kind is {kind!r}; give what assemble made")
+    missing = [name for name in (*variables, "class") if name not in dataset.variables]
+    missing += [name for name in ("blocks", "duration_s") if name not in dataset.attrs]
+    if missing:
+        raise InputError(f"not an assembly dataset: '{missing[0]}' is missing")
+
+
+def check_times(time: Floats, longest: float) -> None:
+    """Raise `InputError` unless all times lie within the runs."""
+    # A time that was computed, like 100 * 0.3, may miss the duration by rounding.
+    wrong = time[~((time >= 0) & (time <= longest * (1 + 1e-9)))]
+    if wrong.size:
+        raise InputError(f"time: {wrong[0]:g} s lies outside the runs, which last {longest:g} s")
+
+
+def _check_confidence(confidence: float) -> None:
+    if not 0 < confidence < 1:
+        raise InputError(f"confidence must lie between 0 and 1, got {confidence}")
+
+
+def _checked_counts(counts: Mapping[str, int]) -> tuple[list[str], Integers]:
+    if not isinstance(counts, Mapping):
+        raise InputError(
+            "outcomes: expected an assembly dataset or counts by class name, such as "
+            f"{{'O': 7, 'I': 3}}, got {type(counts).__name__}"
+        )
+    for name, value in counts.items():
+        if not (isinstance(value, Real) and value >= 0 and float(value).is_integer()):
+            raise InputError(f"class '{name}': expected a number of runs from 0, got {value}")
+    return [str(name) for name in counts], np.array([int(n) for n in counts.values()], np.int64)
+
+
+def _blocks(names: list[str]) -> int:
+    """Return of how many blocks the classes are."""
+    if not names:
+        raise InputError("there are no classes: a distribution needs at least one")
+    sizes = {name: sum(shape_size(shape) for shape in class_shapes(name)) for name in names}
+    first, last = min(names, key=sizes.__getitem__), max(names, key=sizes.__getitem__)
+    if sizes[first] < sizes[last]:
+        raise InputError(
+            f"class '{first}' is of {sizes[first]} blocks and class '{last}' of {sizes[last]}: "
+            "a distribution has one number of blocks"
+        )
+    return sizes[first]
+
+
+def _dataset(
+    names: list[str], count: Integers, confidence: float, attrs: dict[str, Any]
+) -> xr.Dataset:
+    import xarray as xr
+
+    runs = int(count.sum())
+    if runs == 0:
+        raise InputError("there is no run with an outcome: proportions need at least one")
+    low, high = proportion_interval(count, runs, confidence=1 - (1 - confidence) / len(names))
+    complete = int(count[is_complete(names)].sum())
+    complete_low, complete_high = proportion_interval(complete, runs, confidence=confidence)
+    limit = "limit of the simultaneous confidence interval"
+    return xr.Dataset(
+        {
+            "count": ("class", count, {"units": "1", "long_name": "runs of this class"}),
+            "proportion": ("class", count / runs, {"units": "1", "long_name": "share of runs"}),
+            "interval_low": ("class", low, {"units": "1", "long_name": f"lower {limit}"}),
+            "interval_high": ("class", high, {"units": "1", "long_name": f"upper {limit}"}),
+        },
+        coords={"class": ("class", np.array(names, dtype=object), {"long_name": "outcome class"})},
+        attrs={
+            **attrs,
+            "kind": "outcome_distribution",
+            "schema_version": SCHEMA_VERSION,
+            "runs": runs,
+            "confidence": confidence,
+            "complete": complete / runs,
+            "complete_low": float(complete_low),
+            "complete_high": float(complete_high),
+            "method": METHOD,
+        },
+    )

@@ -1,0 +1,165 @@
+"""What is simulated: the study with the options over it, and every run's address and parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk import _core
+from driftwalk.assembly.runs.address import stream_keys
+from driftwalk.assembly.runs.cover import require_cover
+from driftwalk.assembly.runs.start import given_start, place_blocks, require_room
+from driftwalk.core.errors import InputError
+from driftwalk.simulation.backend import Camera, default_threads, native_model
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+Backend = Literal["cpu", "reference"]
+Arrays = dict[str, npt.NDArray[Any]]
+Floats = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.int64]
+
+MOST_STEPS: Final = 2**31 - 1
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Runs to be simulated; one entry per run in every array."""
+
+    study: Study
+    flow: xr.Dataset
+    steps: int
+    trial: int
+    index: Indices
+    keys: npt.NDArray[np.uint64]
+    drag_coefficient: Floats
+    force_std: Floats
+    flow_draw: Indices | None
+    """Which drawn flow a run has; None: the flow as it is."""
+    threads: int
+    backend: Backend
+
+    def model(self, flow: xr.Dataset) -> _core.Model:
+        """Return the native core's form of the model in one flow."""
+        return native_model(self.study, flow, np.zeros(1), Camera())
+
+
+def make_plan(
+    study: Study,
+    flow: xr.Dataset,
+    *,
+    settings: dict[str, Any],
+    index: Indices | None = None,
+    drag_coefficient: npt.ArrayLike | None = None,
+    force_std: npt.ArrayLike | None = None,
+    trial: int = 0,
+    threads: int | None = None,
+    backend: Backend = "cpu",
+) -> Plan:
+    """Put options over the study, and check everything but the start.
+
+    Parameters
+    ----------
+    study, flow, drag_coefficient, force_std, trial, threads, backend
+        As in `driftwalk.assembly.assemble`.
+    settings : dict
+        Values by the keys of [assembly]; None leaves the study's.
+    index : ndarray of int, optional
+        The runs, by index; default: all of the study's.
+
+    Raises
+    ------
+    InputError
+        When an option is out of range, the blocks have no room, or the flow does not cover the
+        tank.
+    """
+    from driftwalk.model import apply_overrides
+
+    if backend not in get_args(Backend):
+        raise InputError(f"backend must be one of {', '.join(get_args(Backend))}, got {backend!r}")
+    if not 0 <= trial < 2**40:
+        raise InputError(f"trial: expected a whole number from 0 to 2**40 - 1, got {trial}")
+    given = {f"assembly.{key}": value for key, value in settings.items() if value is not None}
+    for key, value in (("drag_coefficient", drag_coefficient), ("force_std_N", force_std)):
+        if value is not None and np.ndim(value) == 0:
+            given[f"forces.{key}"] = float(np.asarray(value))
+    chosen = apply_overrides(study, given)
+    require_room(chosen)
+    require_cover(flow, chosen.tank)
+    runs = np.arange(chosen.assembly.runs) if index is None else index
+    forces = chosen.forces
+    return Plan(
+        study=chosen,
+        flow=flow,
+        steps=whole_steps(chosen),
+        trial=trial,
+        index=runs,
+        keys=stream_keys("run", seed=chosen.assembly.seed, trial=trial, index=runs),
+        drag_coefficient=_of_each(
+            "drag_coefficient", drag_coefficient, forces.drag_coefficient, runs.size
+        ),
+        force_std=_of_each("force_std", force_std, forces.force_std_N, runs.size),
+        flow_draw=None,
+        threads=threads or default_threads(),
+        backend=backend,
+    )
+
+
+def whole_steps(study: Study) -> int:
+    """Return the whole time steps of a run: those that end within its duration, at least one."""
+    steps = max(int(np.floor(study.assembly.duration_s / study.time_step_s + 1e-9)), 1)
+    if steps > MOST_STEPS:
+        raise InputError(
+            f"a run of {study.assembly.duration_s:g} s has {steps} time steps of "
+            f"{study.time_step_s:g} s, at most {MOST_STEPS} are possible: shorten it (--duration)"
+        )
+    return steps
+
+
+def _of_each(name: str, given: npt.ArrayLike | None, default: float, runs: int) -> Floats:
+    values = np.asarray(default if given is None else given, dtype=np.float64)
+    if values.shape not in ((), (runs,)):
+        raise InputError(
+            f"{name}: expected one number, or one for each of {runs} runs, got shape {values.shape}"
+        )
+    if not (np.isfinite(values) & (values >= 0)).all():
+        raise InputError(f"{name}: expected finite numbers from 0 on")
+    return np.ascontiguousarray(np.broadcast_to(values, (runs,)))
+
+
+def start_poses(plan: Plan, start: npt.ArrayLike | None = None) -> Floats:
+    """Return the start poses of all runs: the given ones, or random ones that do not overlap."""
+    if start is not None:
+        return given_start(plan.study, start, runs=plan.index.size)
+    return place_blocks(plan.study, plan.model(plan.flow), plan.keys, threads=plan.threads)
+
+
+def simulate_rows(
+    plan: Plan, start: Floats, rows: slice, flow: xr.Dataset, *, sample_every: int = 0
+) -> Arrays:
+    """Simulate some of the runs in one flow; one entry per run in every array."""
+    rules = plan.study.assembly
+    found = _core.assemble(
+        plan.model(flow),
+        start=np.ascontiguousarray(start[rows]),
+        key=np.ascontiguousarray(plan.keys[rows]),
+        drag_coefficient=np.ascontiguousarray(plan.drag_coefficient[rows]),
+        force_std=np.ascontiguousarray(plan.force_std[rows]),
+        steps=plan.steps,
+        latching=rules.latching,
+        connector_distance=rules.connector_distance_m,
+        connector_axis=rules.connector_axis_rad,
+        hidden_face_drag=rules.hidden_face_drag,
+        block_restitution=rules.block_restitution,
+        block_friction=rules.block_friction,
+        sample_every=sample_every,
+        threads=plan.threads,
+        precision="double" if plan.backend == "reference" else "single",
+    )
+    return {name: values for name, values in found.items() if isinstance(values, np.ndarray)}

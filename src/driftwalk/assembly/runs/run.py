@@ -1,0 +1,339 @@
+"""Simulated self-assembly: many blocks in the stirred tank, as many runs as asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.assembly.runs.dataset import build_assembly, build_path
+from driftwalk.assembly.runs.drawn_flow import RUNS_PER_FLOW, draw_flow, has_standard_error
+from driftwalk.assembly.runs.parameters import draw_parameters
+from driftwalk.assembly.runs.plan import (
+    Arrays,
+    Backend,
+    Plan,
+    make_plan,
+    simulate_rows,
+    start_poses,
+)
+from driftwalk.core.errors import InputError
+from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+FlowDraws = Literal["standard_error", "none"]
+Progress = Callable[[int, int], None]
+
+BLOCKS_PER_UNIT: Final = 2000
+"""Blocks of a work unit: a few seconds' work, so that a kill or Ctrl-C loses no more."""
+FEWEST_RUNS_PER_UNIT: Final = 100
+"""With fewer the lanes of two threads would be empty for much of a unit's time."""
+
+
+def assemble(
+    study: Study,
+    flow: xr.Dataset,
+    *,
+    blocks: int | None = None,
+    runs: int | None = None,
+    duration: float | None = None,
+    start: npt.ArrayLike | None = None,
+    drag_coefficient: npt.ArrayLike | None = None,
+    force_std: npt.ArrayLike | None = None,
+    seed: int | None = None,
+    trial: int = 0,
+    store: Store | None = None,
+    progress: Progress | None = None,
+    threads: int | None = None,
+    backend: Backend = "cpu",
+) -> xr.Dataset:
+    """Simulate the self-assembly of blocks in a stirred tank.
+
+    Each block moves as in `simulate`; blocks that touch latch face to face and are one rigid body
+    from then on. How they latch stands in the study's section [assembly].
+
+    Parameters
+    ----------
+    study : Study
+        Block, tank, water, forces and assembly.
+    flow : xarray.Dataset
+        The water's velocity, a `flow_field` that covers the tank.
+    blocks, runs : int, optional
+        Over the study's values.
+    duration : float, optional
+        Length of a run [s], over the study's value.
+    start : array_like, shape (blocks, 3) or (runs, blocks, 3), optional
+        Poses at the start [m, m, rad], at rest; default: random ones that do not overlap.
+    drag_coefficient, force_std : float or array_like, shape (runs,), optional
+        C_d and sigma_F [N], for all runs or of each, over the study's values.
+    seed : int, optional
+        Over the study's value.
+    trial : int
+        Index of the parameter set within a larger piece of work: with the seed and the run's index
+        it is the address of a run's random numbers, so that two trials are independent.
+    store : Store, optional
+        Where finished work units are kept (`driftwalk.core.rundir`); memory when left out.
+    progress : callable, optional
+        Told the number of runs done and in all.
+    threads : int, optional
+        Default: all processors. The result does not depend on it.
+    backend : {"cpu", "reference"}
+        The batch kernels in single precision, or the same source in double precision.
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind "assembly", see `driftwalk.assembly.runs.dataset`: events, times, poses at the end, and
+        ``outcome``, the class of every run.
+
+    Raises
+    ------
+    InputError
+        When there are more blocks than fit the tank, the flow does not cover it, or an option is
+        out of range.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> still = dw.uniform_flow(0.0, 0.0)
+    >>> found = dw.assemble(dw.Study(), still, blocks=2, runs=3, duration=1.0)
+    >>> found["outcome"].dims, found["class"].values.tolist()
+    (('run',), ['2', '1+1'])
+    """
+    plan = make_plan(
+        study,
+        flow,
+        settings={"blocks": blocks, "runs": runs, "duration_s": duration, "seed": seed},
+        drag_coefficient=drag_coefficient,
+        force_std=force_std,
+        trial=trial,
+        threads=threads,
+        backend=backend,
+    )
+    return _run(plan, start, store=store, progress=progress, drawn="no")
+
+
+def assemble_drawn(
+    study: Study,
+    flow: xr.Dataset,
+    calibration: xr.Dataset,
+    *,
+    blocks: int | None = None,
+    runs: int | None = None,
+    duration: float | None = None,
+    start: npt.ArrayLike | None = None,
+    seed: int | None = None,
+    trial: int = 1,
+    flow_draws: FlowDraws = "standard_error",
+    store: Store | None = None,
+    progress: Progress | None = None,
+    threads: int | None = None,
+) -> xr.Dataset:
+    """Simulate self-assembly with the parameters that a calibration leaves open.
+
+    Every run has its own drag coefficient and stochastic force, drawn from the calibration's joint
+    region (`draw_parameters`). Where the flow field states standard errors, every 25 runs have
+    their own flow field too: its measured nodes are moved at random by them, each on its own.
+
+    Parameters
+    ----------
+    study, flow, blocks, runs, duration, start, seed, store, progress, threads
+        As in `assemble`.
+    calibration : xarray.Dataset
+        A `calibration` with its joint region.
+    trial : int
+        As in `assemble`; 1, so that these runs are independent of those of `assemble`.
+    flow_draws : {"standard_error", "none"}
+        Whether flow fields are drawn where standard errors are known.
+
+    Returns
+    -------
+    xarray.Dataset
+        As of `assemble`; ``drag_coefficient``, ``force_std`` of each run, and where flows were
+        drawn ``flow_draw``, the index of its flow.
+
+    Raises
+    ------
+    InputError
+        As `assemble`, and when the calibration has no region.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> recording = dw.tank30_recording()
+    >>> calibration = dw.calibrate(recording, flow=dw.tank30_flow())  # doctest: +SKIP
+    >>> found = dw.assemble_drawn(dw.Study(), dw.tank30_flow(), calibration)  # doctest: +SKIP
+    """
+    if flow_draws not in get_args(FlowDraws):
+        raise InputError(
+            f"flow_draws must be one of {', '.join(get_args(FlowDraws))}, got {flow_draws!r}"
+        )
+    plan = make_plan(
+        study,
+        flow,
+        settings={"blocks": blocks, "runs": runs, "duration_s": duration, "seed": seed},
+        trial=trial,
+        threads=threads,
+    )
+    settings = plan.study.assembly
+    drawn = draw_parameters(calibration, runs=settings.runs, seed=settings.seed, trial=trial)
+    moves = flow_draws == "standard_error" and has_standard_error(flow)
+    plan = replace(
+        plan,
+        drag_coefficient=drawn.drag_coefficient,
+        force_std=drawn.force_std,
+        flow_draw=np.arange(settings.runs) // RUNS_PER_FLOW if moves else None,
+    )
+    what = "drag_coefficient force_std" + (" flow" if moves else "")
+    return _run(plan, start, store=store, progress=progress, drawn=what)
+
+
+def assembly_path(
+    study: Study,
+    flow: xr.Dataset,
+    *,
+    runs: Sequence[int] = (0,),
+    sample_interval: float = 0.1,
+    blocks: int | None = None,
+    duration: float | None = None,
+    start: npt.ArrayLike | None = None,
+    drag_coefficient: npt.ArrayLike | None = None,
+    force_std: npt.ArrayLike | None = None,
+    seed: int | None = None,
+    trial: int = 0,
+    threads: int | None = None,
+    backend: Backend = "cpu",
+) -> xr.Dataset:
+    """Simulate chosen runs of `assemble` again, and keep their motion.
+
+    Parameters
+    ----------
+    study, flow, blocks, duration, seed, trial, threads, backend
+        As in `assemble`: with the same values the runs are the same.
+    runs : sequence of int
+        Indices of the runs.
+    sample_interval : float
+        Time between samples [s]; the next whole number of time steps, at least one, is taken.
+    start : array_like, shape (blocks, 3) or (len(runs), blocks, 3), optional
+        As in `assemble`, of the chosen runs.
+    drag_coefficient, force_std : float or array_like, shape (len(runs),), optional
+        As in `assemble`, of the chosen runs.
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind "assembly_path": ``x``, ``y`` [m], ``theta`` [rad] and ``assembly`` (lowest block of
+        the block's assembly) on (run, time, block), from 0 to the duration.
+
+    Raises
+    ------
+    InputError
+        As `assemble`, and when no run is named or an index is negative.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> still = dw.uniform_flow(0.0, 0.0)
+    >>> path = dw.assembly_path(dw.Study(), still, blocks=2, duration=1.0, sample_interval=0.5)
+    >>> path["time"].values.tolist()
+    [0.0, 0.5, 1.0]
+    """
+    index = np.atleast_1d(np.asarray(runs))
+    if index.size == 0 or index.ndim != 1 or index.dtype.kind not in "iu" or index.min() < 0:
+        raise InputError(f"runs: expected the indices of runs, whole numbers from 0, got {runs}")
+    plan = make_plan(
+        study,
+        flow,
+        settings={"blocks": blocks, "duration_s": duration, "seed": seed},
+        index=index.astype(np.int64),
+        drag_coefficient=drag_coefficient,
+        force_std=force_std,
+        trial=trial,
+        threads=threads,
+        backend=backend,
+    )
+    if not sample_interval > 0:
+        raise InputError(f"sample_interval must be above 0 s, got {sample_interval}")
+    every = min(max(round(sample_interval / plan.study.time_step_s), 1), plan.steps)
+    found = simulate_rows(plan, start_poses(plan, start), slice(None), flow, sample_every=every)
+    return build_path(plan, found, every=every)
+
+
+def check_assembly(
+    study: Study,
+    flow: xr.Dataset,
+    *,
+    trial: int = 0,
+    threads: int | None = None,
+) -> None:
+    """Refuse what `assemble` would refuse, before any run is simulated.
+
+    Parameters
+    ----------
+    study, flow, trial, threads
+        As in `assemble`.
+
+    Raises
+    ------
+    InputError
+        When there are more blocks than fit the tank, or the flow does not cover it.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> dw.check_assembly(dw.Study(), dw.uniform_flow(0.0, 0.0))
+    """
+    start_poses(make_plan(study, flow, settings={}, trial=trial, threads=threads), None)
+
+
+def _run(
+    plan: Plan,
+    start: npt.ArrayLike | None,
+    *,
+    store: Store | None,
+    progress: Progress | None,
+    drawn: str,
+) -> xr.Dataset:
+    """Simulate the runs unit by unit, and put them into one dataset."""
+    poses = start_poses(plan, start)
+
+    def compute(unit: WorkUnit) -> Arrays:
+        parts = [
+            simulate_rows(plan, poses, rows, flow)
+            for rows, flow in _by_flow(plan, unit.start, unit.stop)
+        ]
+        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+    units = grid(run=plan.index).units(runs_per_unit(plan.study.assembly.blocks))
+    arrays = run_sweep(compute, units, store=store, progress=progress)
+    return build_assembly(plan, arrays, attrs={"drawn": drawn})
+
+
+def runs_per_unit(blocks: int) -> int:
+    """Return the runs of a work unit: a whole number of drawn flows."""
+    runs = max(BLOCKS_PER_UNIT // blocks, FEWEST_RUNS_PER_UNIT)
+    return max(runs // RUNS_PER_FLOW, 1) * RUNS_PER_FLOW
+
+
+def _by_flow(plan: Plan, first: int, last: int) -> Sequence[tuple[slice, xr.Dataset]]:
+    """Return the rows of a unit that share a flow, and that flow."""
+    if plan.flow_draw is None:
+        return [(slice(first, last), plan.flow)]
+    draws = plan.flow_draw[first:last]
+    edges = [0, *(np.flatnonzero(np.diff(draws)) + 1).tolist(), draws.size]
+    seed = plan.study.assembly.seed
+    return [
+        (
+            slice(first + low, first + high),
+            draw_flow(plan.flow, seed=seed, trial=plan.trial, draw=int(draws[low])),
+        )
+        for low, high in pairwise(edges)
+    ]

@@ -1,0 +1,1 @@
+"""How much the outcomes depend on the model: maps over settings and Sobol' indices."""

@@ -1,0 +1,206 @@
+"""How much does what blocks build depend on the model? Outcomes over settings, and a reference."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from driftwalk.assembly.sensitivity.axes import Axes, make_axes
+from driftwalk.assembly.sensitivity.dataset import map_dataset, reference_dataset
+from driftwalk.assembly.sensitivity.settings import (
+    Progress,
+    Settings,
+    place_first,
+    simulate_settings,
+    world_plan,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+    from driftwalk.sweep import Store
+
+MAP_TRIAL: Final = 1 << 32
+REFERENCE_TRIAL: Final = 2 << 32
+"""First trials: runs of the map, of the reference and of `assemble` share no random number."""
+
+
+def sensitivity_map(
+    study: Study,
+    flow: xr.Dataset,
+    *,
+    axes: Mapping[str, Any] | None = None,
+    reference: xr.Dataset | None = None,
+    store: Store | None = None,
+    progress: Progress | None = None,
+    threads: int | None = None,
+) -> xr.Dataset:
+    """Simulate self-assembly at many settings, and measure how far outcomes lie from a reference.
+
+    The paper's study is that of a default `Study`: C_d from 0 to 1.5, sigma_F from 0 to 1.5 mN,
+    1000 runs of 5 minutes each.
+
+    Parameters
+    ----------
+    study : Study
+        Its [sensitivity] says what varies, how many runs a setting has, and the seed; all else,
+        drag coefficient and force_std too, is as in the reference unless it varies.
+    flow : xarray.Dataset
+        The water's velocity, a `flow_field` that covers every tank. It does not change with the
+        tank: a smaller one cuts it off.
+    axes : mapping, optional
+        Values to compare, by the names ``tank_diameter`` [m], ``blocks``, ``flow`` (datasets by
+        name, or files), ``latching``, ``hidden_face_drag``, ``drag_coefficient``, ``force_std``
+        [N]; every combination is simulated. Default: the axes of [sensitivity].
+    reference : xarray.Dataset, optional
+        An `outcome_distribution`; default: `sensitivity_reference` of the study, in memory.
+    store : Store, optional
+        Where finished work units are kept (`driftwalk.core.rundir`); memory when left out.
+    progress : callable, optional
+        Told the number of settings done and in all.
+    threads : int, optional
+        Default: all processors. The result does not depend on it.
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind "sensitivity", dimensions in the order above. On (axes..., class) ``count`` and
+        ``proportion``; on (axes...) ``runs`` (with an outcome), ``left_out``, ``complete`` (share
+        of runs with one assembly), ``first_contact_median`` and ``completion_median`` [s, NaN when
+        not reached], ``l1_distance`` to the reference, ``l1_in_floors`` (see the function of that
+        name), both NaN where the number of blocks is another, and ``trial``: with it
+        `assemble` simulates a setting again. On (class) ``reference``. On (axes..., time,
+        class_over_time) ``count_over_time``, the runs in each class at 101 times, and on (time,
+        class_over_time) ``reference_over_time``, the shares of a reference that has the same times;
+        the classes are the 24 that are most frequent somewhere, and "other". ``attrs``:
+        ``reference_runs``, ``noise_floor_mean`` and ``noise_floor_95``, the l1 distance that the
+        reference itself would have with so many runs; with a reference of this study what it was
+        made with, ``reference_drag_coefficient``, ``reference_force_std_N``, ...
+
+    Raises
+    ------
+    InputError
+        When an axis is not known, a value is out of range, blocks do not fit a tank, or a flow does
+        not cover one.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> few = {"runs": 3, "reference_realisations": 2}
+    >>> quick = dw.Study(assembly={"blocks": 2, "duration_s": 1.0}, sensitivity=few)
+    >>> still = dw.uniform_flow(0.0, 0.0)
+    >>> found = dw.sensitivity_map(quick, still, axes={"latching": ["collision", "none"]})
+    >>> dict(found["proportion"].sizes)
+    {'latching': 2, 'class': 2}
+    """
+    chosen = make_axes(study, axes)
+    settings = _map_settings(chosen, flow, threads)
+    if reference is None:
+        reference = sensitivity_reference(chosen.study, flow, threads=threads)
+    outcomes = simulate_settings(settings, store=store, progress=progress)
+    return map_dataset(chosen, settings, outcomes, reference)
+
+
+def sensitivity_reference(
+    study: Study,
+    flow: xr.Dataset,
+    *,
+    store: Store | None = None,
+    progress: Progress | None = None,
+    threads: int | None = None,
+) -> xr.Dataset:
+    """Simulate the reference of a sensitivity analysis: several realisations of one setting.
+
+    Parameters
+    ----------
+    study : Study
+        Its [sensitivity] says how many realisations there are, of how many runs each, and the
+        seed; parameters and blocks are the study's.
+    flow, store, threads
+        As in `sensitivity_map`.
+    progress : callable, optional
+        Told the number of realisations done and in all.
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind "outcome_distribution" of all runs, with ``realisation_count`` and
+        ``realisation_proportion`` (realisation, class), ``standard_deviation`` (class) over the
+        realisations, ``count_over_time`` (time, class_over_time) as in `sensitivity_map`, of every
+        class that occurs, and the attributes ``realisations``, ``mean_pairwise_l1`` (the mean l1
+        distance of two realisations; the paper has 0.065 for 10 realisations of 1000 runs) and
+        ``expected_pairwise_l1``: what multinomial sampling predicts for it.
+
+    Raises
+    ------
+    InputError
+        When the blocks do not fit the tank, the flow does not cover it, or no run of a realisation
+        has an outcome.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> few = {"runs": 3, "reference_realisations": 2}
+    >>> quick = dw.Study(assembly={"blocks": 2, "duration_s": 1.0}, sensitivity=few)
+    >>> found = dw.sensitivity_reference(quick, dw.uniform_flow(0.0, 0.0))
+    >>> found.attrs["runs"], dict(found["realisation_count"].sizes)
+    (6, {'realisation': 2, 'class': 2})
+    """
+    settings = _reference_settings(study, flow, threads)
+    outcomes = simulate_settings(settings, store=store, progress=progress)
+    return reference_dataset(settings.worlds[0], outcomes)
+
+
+def check_sensitivity(
+    study: Study,
+    flow: xr.Dataset,
+    *,
+    axes: Mapping[str, Any] | None = None,
+    threads: int | None = None,
+) -> int:
+    """Refuse what `sensitivity_map` would refuse, before any run is simulated.
+
+    Parameters
+    ----------
+    study, flow, axes, threads
+        As in `sensitivity_map`.
+
+    Returns
+    -------
+    int
+        Number of settings.
+
+    Raises
+    ------
+    InputError
+        As `sensitivity_map`.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> dw.check_sensitivity(dw.Study(), dw.uniform_flow(0.0, 0.0))
+    961
+    """
+    chosen = make_axes(study, axes)
+    settings = _map_settings(chosen, flow, threads)
+    place_first(settings)
+    place_first(_reference_settings(chosen.study, flow, threads))
+    return settings.size
+
+
+def _map_settings(axes: Axes, flow: xr.Dataset, threads: int | None) -> Settings:
+    return axes.settings(flow, first_trial=MAP_TRIAL, threads=threads)
+
+
+def _reference_settings(study: Study, flow: xr.Dataset, threads: int | None) -> Settings:
+    number, forces = study.sensitivity.reference_realisations, study.forces
+    return Settings(
+        worlds=[world_plan(study, flow, threads=threads)],
+        world=np.zeros(number, dtype=np.int64),
+        drag_coefficient=np.full(number, forces.drag_coefficient),
+        force_std=np.full(number, forces.force_std_N),
+        trial=REFERENCE_TRIAL + np.arange(number),
+    )

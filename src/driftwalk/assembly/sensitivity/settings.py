@@ -1,0 +1,311 @@
+"""Outcomes of many settings, each of many runs: the engine under a sensitivity analysis.
+
+Every setting has random numbers of its own, by its trial: what comes out depends neither on the
+order of the settings nor on how they are cut into work units.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.assembly.lattice.events import replay_events
+from driftwalk.assembly.runs.address import stream_keys
+from driftwalk.assembly.runs.dataset import BROKEN, completion_step, times_of
+from driftwalk.assembly.runs.plan import Arrays, Plan, make_plan, simulate_rows
+from driftwalk.assembly.runs.start import place_blocks
+from driftwalk.assembly.sensitivity.times import Courses, added, courses_of, courses_to_text
+from driftwalk.core.errors import DriftwalkError
+from driftwalk.core.shards import Unit, UnitT
+from driftwalk.sweep import MemoryStore, Store, SweepError, WorkUnit, grid, run_sweep
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+Progress = Callable[[int, int], None]
+
+BLOCK_STEPS_PER_UNIT: Final = 2_000_000_000
+"""Steps of single blocks in a work unit, if no run ends early: about half a minute on two
+processors, so that a kill loses no more, and enough runs at once to keep all lanes busy."""
+NUMBERS: Final = ("left_out", "first_contact_median", "completion_median")
+"""What is one number of a setting."""
+BLOCKS_AT_ONCE: Final = 1_000_000
+"""Blocks of one call of the native core: about 100 MB."""
+
+
+@dataclass(frozen=True, eq=False)
+class Settings:
+    """Settings to simulate, one entry per setting in every array.
+
+    Attributes
+    ----------
+    worlds : sequence of Plan
+        Everything but drag coefficient, force and random numbers; each with one entry per run.
+    world : ndarray of int
+        Which of the worlds a setting has.
+    drag_coefficient, force_std : ndarray
+        C_d and sigma_F [N].
+    trial : ndarray of int
+        Address of the random numbers.
+    """
+
+    worlds: Sequence[Plan]
+    world: Integers
+    drag_coefficient: Floats
+    force_std: Floats
+    trial: Integers
+
+    @property
+    def size(self) -> int:
+        """Number of settings."""
+        return self.trial.size
+
+    def per_unit(self) -> int:
+        """Return the settings of a work unit."""
+        longest = max(w.index.size * w.steps * w.study.assembly.blocks for w in self.worlds)
+        return max(BLOCK_STEPS_PER_UNIT // longest, 1)
+
+
+@dataclass(frozen=True, eq=False)
+class Outcomes:
+    """What came out, one entry per setting.
+
+    Attributes
+    ----------
+    count : list of dict
+        Number of runs by class name.
+    left_out : ndarray of int
+        Runs without an outcome.
+    first_contact_median, completion_median : ndarray
+        Time at which it has happened in half of the runs [s], NaN when not reached.
+    courses : list of str
+        Numbers of runs by class over time, see `driftwalk.assembly.sensitivity.times`.
+    """
+
+    count: list[dict[str, int]]
+    left_out: Integers
+    first_contact_median: Floats
+    completion_median: Floats
+    courses: list[str]
+
+
+def world_plan(study: Study, flow: xr.Dataset, *, threads: int | None) -> Plan:
+    """Return everything about some settings but drag coefficient, force and random numbers.
+
+    As many runs as [sensitivity] says, with its seed.
+
+    Raises
+    ------
+    InputError
+        When the blocks have no room, or the flow does not cover the tank.
+    """
+    chosen = study.sensitivity
+    return make_plan(
+        study, flow, settings={"runs": chosen.runs, "seed": chosen.seed}, threads=threads
+    )
+
+
+def simulate_settings(
+    settings: Settings, *, store: Store | None = None, progress: Progress | None = None
+) -> Outcomes:
+    """Simulate all settings, skipping what a store holds already.
+
+    Raises
+    ------
+    InputError
+        When the blocks of a run find no place in the tank.
+    """
+    units = grid(setting=np.arange(settings.size)).units(settings.per_unit())
+    kept = _TextStore(MemoryStore() if store is None else store)
+    try:
+        found = run_sweep(
+            lambda unit: _compute(settings, unit), units, store=kept, progress=progress
+        )
+    except SweepError as error:
+        # A mistake in the study is the user's, whichever setting shows it.
+        if isinstance(error.__cause__, DriftwalkError):
+            raise error.__cause__ from None
+        raise
+    return Outcomes(
+        [json.loads(text) for text in found["count"]],
+        **{name: found[name] for name in NUMBERS},
+        courses=found["courses"].tolist(),
+    )
+
+
+def place_first(settings: Settings) -> None:
+    """Place the blocks of the first setting of each world, to find out whether they fit.
+
+    Raises
+    ------
+    InputError
+        When the blocks of a run find no place in the tank.
+    """
+    for world, plan in enumerate(settings.worlds):
+        first = int(settings.trial[np.flatnonzero(settings.world == world)[0]])
+        keys = _keys(plan, first, range(plan.index.size))
+        place_blocks(plan.study, plan.model(plan.flow), keys, threads=plan.threads)
+
+
+class _Tally:
+    """What the runs of one setting came to, gathered piece by piece."""
+
+    def __init__(self) -> None:
+        self.count: Counter[str] = Counter()
+        self.left_out = 0
+        self.first_contact: list[Integers] = []
+        self.completion: list[Integers] = []
+        self.courses: list[Courses] = []
+
+    def add(self, found: Arrays, classes: Sequence[str], plan: Plan) -> None:
+        """Add runs, as `_simulate` returns them."""
+        sound = (found["status"].astype(np.int64) & BROKEN) == 0
+        self.left_out += int((~sound).sum())
+        occurred, number = np.unique(found["outcome"][sound], return_counts=True)
+        names = [classes[place] for place in occurred.tolist()]
+        self.count.update(dict(zip(names, number.tolist(), strict=True)))
+        step, became = (found[f"event_{what}"][sound] for what in ("step", "class"))
+        self.courses.append(courses_of(step, became, classes, plan))
+        self.first_contact.append(found["first_contact_step"][sound])
+        self.completion.append(completion_step(found)[sound])
+
+
+def _compute(settings: Settings, unit: WorkUnit) -> Arrays:
+    """Simulate the settings of a unit, those of one world side by side."""
+    rows = np.arange(unit.start, unit.stop)
+    tally = {int(row): _Tally() for row in rows}
+    for world in dict.fromkeys(settings.world[rows].tolist()):
+        plan = settings.worlds[world]
+        same = rows[settings.world[rows] == world].tolist()
+        for pieces in _calls(same, plan.index.size, BLOCKS_AT_ONCE // plan.study.assembly.blocks):
+            found, classes = _simulate(plan, settings, pieces)
+            begin = 0
+            for piece in pieces:
+                part = slice(begin, begin + len(piece.runs))
+                mine = {name: values[part] for name, values in found.items()}
+                tally[piece.setting].add(mine, classes, plan)
+                begin = part.stop
+    return _arrays(list(tally.values()), settings.worlds[0].study.time_step_s)
+
+
+class _Piece(NamedTuple):
+    """Some runs of a setting."""
+
+    setting: int
+    runs: range
+
+
+def _calls(settings: list[int], runs: int, most: int) -> Iterator[list[_Piece]]:
+    """Give the runs of settings in groups of at most so many, each one call of the core."""
+    group: list[_Piece] = []
+    room = most
+    for setting in settings:
+        for first in range(0, runs, most):
+            piece = _Piece(setting, range(first, min(first + most, runs)))
+            if len(piece.runs) > room:
+                yield group
+                group, room = [], most
+            group.append(piece)
+            room -= len(piece.runs)
+    yield group
+
+
+def _simulate(
+    plan: Plan, settings: Settings, pieces: list[_Piece]
+) -> tuple[Arrays, tuple[str, ...]]:
+    """Simulate the runs of some settings in one call.
+
+    Returns
+    -------
+    found : dict of ndarray
+        What the native core returns, and ``event_class`` and ``outcome`` of every run.
+    classes : tuple of str
+        Names of the classes, into which these are indices.
+    """
+    model = plan.model(plan.flow)
+    keys = [_keys(plan, int(settings.trial[piece.setting]), piece.runs) for piece in pieces]
+    start = [place_blocks(plan.study, model, own, threads=plan.threads) for own in keys]
+    length = [len(piece.runs) for piece in pieces]
+    chosen = [piece.setting for piece in pieces]
+    filled = replace(
+        plan,
+        keys=np.concatenate(keys),
+        drag_coefficient=np.repeat(settings.drag_coefficient[chosen], length),
+        force_std=np.repeat(settings.force_std[chosen], length),
+    )
+    found = simulate_rows(filled, np.concatenate(start), slice(None), plan.flow)
+    replayed = replay_events(
+        *(found[f"event_{name}"] for name in ("count", "block", "face")),
+        **{name: found[name] for name in ("cell", "quarter", "assembly")},
+        chirality=plan.study.assembly.chirality,
+    )
+    made = {"event_class": replayed.event_class, "outcome": replayed.outcome}
+    return found | made, replayed.classes
+
+
+def _keys(plan: Plan, trial: int, runs: range) -> npt.NDArray[np.uint64]:
+    return stream_keys("run", seed=plan.study.assembly.seed, trial=trial, index=runs)
+
+
+def _arrays(tallies: list[_Tally], time_step: float) -> Arrays:
+    """Return what a work unit gives: one entry per setting."""
+    medians = {
+        name: np.array([_median(getattr(tally, name), time_step) for tally in tallies])
+        for name in ("first_contact", "completion")
+    }
+    return {
+        "count": np.array([json.dumps(tally.count) for tally in tallies], dtype=object),
+        "left_out": np.array([tally.left_out for tally in tallies]),
+        **{f"{name}_median": values for name, values in medians.items()},
+        "courses": np.array([courses_to_text(added(t.courses)) for t in tallies], dtype=object),
+    }
+
+
+def _median(steps: list[Integers], time_step: float) -> float:
+    """Return the time at which it has happened in half of the runs, as `class_times` has it."""
+    step = np.concatenate(steps)
+    happened = np.sort(step[step >= 0])
+    half = -(-step.size // 2)
+    if not 0 < half <= happened.size:
+        return float("nan")
+    return float(times_of(happened[half - 1], time_step=time_step))
+
+
+class _TextStore:
+    """A store that keeps text too: class names differ from unit to unit, in number and length."""
+
+    def __init__(self, inner: Store) -> None:
+        self._inner = inner
+
+    def missing(self, units: Iterable[UnitT]) -> list[UnitT]:
+        """Return the units that have no result yet."""
+        return self._inner.missing(units)
+
+    def write(self, unit: Unit, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
+        """Keep what a unit gave, text as arrays of bytes."""
+        self._inner.write(
+            unit,
+            {
+                name: np.array([text.encode() for text in values]) if values.dtype == object
+                else values
+                for name, values in arrays.items()
+            },
+        )  # fmt: skip
+
+    def read(self, unit: Unit) -> Arrays:
+        """Return what was kept for a unit."""
+        return {
+            name: np.array([text.decode() for text in values], dtype=object)
+            if values.dtype.kind == "S" else values
+            for name, values in self._inner.read(unit).items()
+        }  # fmt: skip

@@ -1,0 +1,167 @@
+"""Where a command on self-assembly takes its model from: a calibration, or a study and a flow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from driftwalk.cli.options.shared import option_name, override_study, resolve_study
+from driftwalk.core.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+FOUND_BY_CALIBRATION: Final = (
+    "forces.drag_coefficient",
+    "forces.force_std_N",
+    "forces.force_interval_s",
+)
+SEARCHED: Final = FOUND_BY_CALIBRATION[:2]
+"""What a calibration is there to find: a study file may hold anything for it."""
+MODEL_KEYS: Final = ("block", "tank", "water", "forces", "simulation.time_step_s")
+"""What a study file must not contradict when a calibration gives the model."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """The model, and where it is from.
+
+    Attributes
+    ----------
+    study : Study
+        The study with the options over it.
+    flow : xarray.Dataset
+        The flow field.
+    region : xarray.Dataset or None
+        The calibration where it has a joint region.
+    inputs : dict of str to Path
+        The files that were read, by their role.
+    warnings : list of str
+        What the user should know.
+    """
+
+    study: Study
+    flow: xr.Dataset
+    region: xr.Dataset | None
+    inputs: dict[str, Path]
+    warnings: list[str]
+
+
+def source_from_flow(
+    study_file: Path | None,
+    flow_file: Path | None,
+    overrides: Mapping[str, Any],
+    *,
+    keys: Mapping[str, str],
+) -> Source:
+    """Return the model of a study, in a flow field from a file.
+
+    Parameters
+    ----------
+    study_file, flow_file : Path or None
+        The files; without a study file the default study.
+    overrides, keys : mapping
+        As in `resolve_study`.
+
+    Raises
+    ------
+    InputError
+        When there is no flow field, or a file or option is wrong.
+    """
+    if flow_file is None:
+        raise InputError(
+            "nothing says how the water moves: give the run directory of a calibration, or a flow "
+            "field (--flow)"
+        )
+    chosen = resolve_study(study_file, overrides, keys=keys)
+    inputs = {"flow": flow_file, **({} if study_file is None else {"study": study_file})}
+    return Source(chosen, load_flow_for(flow_file, chosen), None, inputs, [])
+
+
+def refuse_found(folder: Path, overrides: Mapping[str, Any], *, also: Sequence[str] = ()) -> None:
+    """Refuse options for what a calibration has found.
+
+    Raises
+    ------
+    InputError
+        Names the options.
+    """
+    refused = [*(option_name(key) for key in FOUND_BY_CALIBRATION if key in overrides), *also]
+    if refused:
+        raise InputError(
+            f"{', '.join(refused)}: not with a calibration run, whose own values are used; to give "
+            f"them, take the run's flow field alone: --flow {folder / 'flow.nc'}"
+        )
+
+
+def source_from_calibration(
+    folder: Path,
+    flow_file: Path | None,
+    overrides: Mapping[str, Any],
+    *,
+    keys: Mapping[str, str],
+    study_file: Path | None = None,
+) -> Source:
+    """Return the model that a calibration has found, in its flow field.
+
+    Parameters
+    ----------
+    folder : Path
+        The run directory of the calibration.
+    flow_file : Path or None
+        Another flow field.
+    overrides, keys : mapping
+        As in `resolve_study`.
+    study_file : Path, optional
+        Its sections [assembly] and [sensitivity] take the place of the run's; the model is the
+        run's.
+
+    Raises
+    ------
+    InputError
+        When the calibration cannot be used, the study file says another model, or a file or option
+        is wrong.
+    """
+    from driftwalk.cli.inputs.calibrated import read_calibrated
+
+    found = read_calibrated(folder)
+    base, study, inputs = f"the study of {folder}", found.study, dict(found.files)
+    if study_file is not None:
+        base, study = str(study_file), _with_sections(found.study, study_file, folder)
+        inputs["study"] = study_file
+    chosen = override_study(study, overrides, base=base, keys=keys)
+    warnings = [f"of the calibration: {warning}" for warning in found.warnings]
+    field = found.flow
+    if flow_file is not None:
+        field, inputs["flow"] = load_flow_for(flow_file, chosen), flow_file
+    return Source(chosen, field, found.region, inputs, warnings)
+
+
+def load_flow_for(path: Path, study: Study) -> xr.Dataset:
+    """Return the flow field of a file; one that knows no tank is that of the study's."""
+    from driftwalk.flow import load_flow
+
+    return load_flow(path, arena=study.tank.to_arena(), own_flags="keep")
+
+
+def _with_sections(study: Study, path: Path, folder: Path) -> Study:
+    """Return the run's study with the sections of a file that say what is simulated."""
+    from driftwalk.model import load_study
+
+    given = load_study(path)
+    for name in MODEL_KEYS:
+        section, _, one = name.partition(".")
+        theirs, ours = getattr(given, section), getattr(study, section)
+        for key in [one] if one else sorted(theirs.model_fields_set):
+            stated = key in theirs.model_fields_set and f"{section}.{key}" not in SEARCHED
+            if stated and getattr(theirs, key) != getattr(ours, key):
+                raise InputError(
+                    f"{path}: [{section}] {key} is {getattr(theirs, key)}, and {folder} was "
+                    f"calibrated with {getattr(ours, key)}; leave it out of the file, or take "
+                    f"the run's flow field alone: --flow {folder / 'flow.nc'}"
+                )
+    return study.model_copy(update={"assembly": given.assembly, "sensitivity": given.sensitivity})

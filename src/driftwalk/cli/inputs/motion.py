@@ -1,0 +1,76 @@
+"""A motion from a file: a recording in any format, or one replicate of a simulation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from driftwalk.cli.inputs.require_motion import require_motion
+from driftwalk.cli.options.recording import RecordingOptions
+from driftwalk.core.errors import InputError
+from driftwalk.core.file_names import text_of_name
+from driftwalk.schema.contents import check_contents
+from driftwalk.schema.netcdf import kind_of, open_netcdf
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def load_motion(path: Path, how: RecordingOptions, *, replicate: int = 0) -> xr.Dataset:
+    """Load a `trajectory` from a recording, or from a file that `driftwalk simulate` wrote.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    how : RecordingOptions
+        How to read a recording; a simulation says all of it itself.
+    replicate : int
+        Which replicate of a simulation, counted from 0.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, has no such replicate, or the body never moves.
+    """
+    simulated = load_simulation(path, replicate=replicate)
+    if simulated is not None:
+        return simulated
+    recording = how.load(path)
+    require_motion(recording, path, body=how.body)
+    return recording
+
+
+def load_simulation(path: Path, *, replicate: int = 0) -> xr.Dataset | None:
+    """Load a `trajectory` from a file that `driftwalk simulate` wrote; None of any other file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    replicate : int
+        Which replicate, counted from 0.
+
+    Raises
+    ------
+    InputError
+        When it has no such replicate.
+    """
+    simulation = _open_simulation(path)
+    if simulation is None:
+        return None
+    count = simulation.sizes["replicate"]
+    if not 0 <= replicate < count:
+        raise InputError(
+            f"{path}: no replicate {replicate}; it has {count}, counted from 0 (--replicate)"
+        )
+    chosen = simulation[["x", "y", "theta"]].isel(replicate=replicate, drop=True)
+    return chosen.assign_attrs(kind="trajectory", source=text_of_name(path.name), simulated="yes")
+
+
+def _open_simulation(path: Path) -> xr.Dataset | None:
+    """Return the simulation that the file holds, None when it is anything else."""
+    if not path.is_file():
+        return None
+    # Damaged, or no NetCDF: the loaders of recordings say what is wrong.
+    return check_contents(open_netcdf(path), path) if kind_of(path) == "simulation" else None

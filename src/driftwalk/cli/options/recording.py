@@ -1,0 +1,195 @@
+"""The options that say how to read a recording, shared by every command that takes one.
+
+A command has one parameter of type `RecordingOptions` and the decorator spreads it into options::
+
+    @with_recording_options
+    def info(recording: RecordingFile, how: RecordingOptions, json: Json = False) -> None:
+        trajectory = how.load(recording)
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+
+import typer
+
+from driftwalk.cli.options.shared import quantity_parser
+from driftwalk.core.errors import FormatError, InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+PANEL = "How to read the recording"
+RecordingFile = Annotated[
+    Path, typer.Argument(metavar="RECORDING", help="Recording, in any readable format.")
+]
+
+
+def _option(name: str, help: str, *, metavar: str = "", unit: str = "") -> Any:
+    return typer.Option(
+        name,
+        help=help,
+        metavar=metavar or (f"<{unit}>" if unit else None),
+        parser=quantity_parser(unit) if unit else None,
+        rich_help_panel=PANEL,
+        show_default=False,
+    )
+
+
+@dataclass(frozen=True)
+class RecordingOptions:
+    """How to read a recording; the fields are the options, with the words of `driftwalk.load`."""
+
+    format: Annotated[
+        str | None, _option("--format", "Format of the file; recognised by content without it.")
+    ] = None
+    body: Annotated[str | None, _option("--body", "Body to keep, or all.", metavar="NAME|all")] = (
+        None
+    )
+    start: Annotated[float | None, _option("--from", "First time to keep.", unit="s")] = None
+    stop: Annotated[float | None, _option("--to", "Last time to keep.", unit="s")] = None
+    arena: Annotated[
+        str | None,
+        _option(
+            "--arena",
+            "Arena; @X,Y after a size gives its centre in metres.",
+            metavar="circle:D|rect:WxH|polygon:FILE|fit",
+        ),
+    ] = None
+    frame_rate: Annotated[
+        float | None, _option("--frame-rate", "Frames per second, where frames count.", unit="Hz")
+    ] = None
+    metres_per_pixel: Annotated[
+        float | None, _option("--metres-per-pixel", "Scale of positions in pixels.", unit="m")
+    ] = None
+    length_unit: Annotated[
+        str | None,
+        _option(
+            "--length-unit", "Unit of positions, where none is named.", metavar="m|cm|mm|um|px"
+        ),
+    ] = None
+    y_axis: Annotated[
+        str | None,
+        _option("--y-axis", "Direction of y and of angles in the file.", metavar="up|down"),
+    ] = None
+    max_speed: Annotated[
+        float | None,
+        _option("--max-speed", "Samples beyond the reach of this speed are gaps.", unit="m/s"),
+    ] = None
+    sort: Annotated[bool, _option("--sort", "Sort times that go backwards.")] = False
+    columns: Annotated[
+        list[str] | None,
+        _option(
+            "--columns",
+            "Columns of a plain table by name or number from 1; :unit may follow. Repeatable.",
+            metavar="t=NAME,x=NAME,y=NAME",
+        ),
+    ] = None
+    delimiter: Annotated[
+        str | None, _option("--delimiter", "Character between fields; also: tab, space.")
+    ] = None
+    x: Annotated[
+        Path | None, _option("--x", "Matrix of x: a row per frame, a column per body.")
+    ] = None
+    y: Annotated[Path | None, _option("--y", "Matrix of y.", metavar="FILE")] = None
+    theta: Annotated[Path | None, _option("--theta", "Matrix of angles.", metavar="FILE")] = None
+    keypoint: Annotated[
+        str | None, _option("--keypoint", "Keypoint of a pose file that is the body.")
+    ] = None
+
+    def load(
+        self, path: Path, *, tank_diameter: float | None = None, side: float | None = None
+    ) -> xr.Dataset:
+        """Load the recording.
+
+        Parameters
+        ----------
+        path : Path
+            The recording.
+        tank_diameter : float, optional
+            Diameter of a round tank [m], as ``--arena circle:D``.
+        side : float, optional
+            Side of the block [m], for ``--arena fit``.
+
+        Raises
+        ------
+        InputError
+            As `driftwalk.load`, and it says what a file is that is no recording; when no row holds
+            a position; when ``--arena`` and ``--tank-diameter`` are both given.
+        """
+        from driftwalk.cli.inputs.other_files import what_else
+        from driftwalk.cli.inputs.require_motion import require_positions
+        from driftwalk.record import load
+
+        values: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
+        if tank_diameter is not None:
+            if self.arena is not None:
+                raise InputError("give --arena or --tank-diameter, not both")
+            values["arena"] = f"circle:{tank_diameter!r}"
+        values["sort"] = "sort" if self.sort else "error"
+        values["columns"] = parse_columns(self.columns or [])
+        words = {"tab": "\t", "\\t": "\t", "space": " "}
+        values["delimiter"] = words.get(self.delimiter or "", self.delimiter)
+        try:
+            recording = load(path, block_side=side, **values)
+        except FormatError as error:
+            other = what_else(path)
+            if other is None:
+                raise
+            raise InputError(f"{path} {other}") from error
+        require_positions(recording, path)
+        return recording
+
+
+def parse_columns(texts: list[str]) -> dict[str, str]:
+    """Read ``t=Time:ms,x=3`` into a mapping.
+
+    Examples
+    --------
+    >>> parse_columns(["t=Time:ms,x=3", "y=4"])
+    {'t': 'Time:ms', 'x': '3', 'y': '4'}
+    """
+    columns: dict[str, str] = {}
+    for part in (part for text in texts for part in text.split(",")):
+        quantity, equals, name = part.partition("=")
+        if not equals or not name:
+            raise InputError(f"--columns takes QUANTITY=NAME such as t=Time,x=2; got '{part}'")
+        columns[quantity.strip()] = name.strip()
+    return columns
+
+
+def with_recording_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Spread a command's parameter of type `RecordingOptions` into one option per field."""
+    hints = get_type_hints(function, include_extras=True)
+    field_hints = get_type_hints(RecordingOptions, include_extras=True)
+    signature = inspect.signature(function)
+    name = next(key for key, hint in hints.items() if hint is RecordingOptions)
+    own = [
+        parameter.replace(annotation=hints.get(key, Any))
+        for key, parameter in signature.parameters.items()
+        if key != name
+    ]
+    spread = [
+        inspect.Parameter(
+            field.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=field.default,
+            annotation=field_hints[field.name],
+        )
+        for field in fields(RecordingOptions)
+    ]
+
+    @functools.wraps(function)
+    def command(**values: Any) -> Any:
+        options = {field.name: values.pop(field.name) for field in fields(RecordingOptions)}
+        return function(**values, **{name: RecordingOptions(**options)})
+
+    keywords = [item.replace(kind=inspect.Parameter.KEYWORD_ONLY) for item in own]
+    command.__signature__ = signature.replace(parameters=[*keywords, *spread])  # type: ignore[attr-defined]
+    command.__annotations__ = {item.name: item.annotation for item in (*keywords, *spread)}
+    return command

@@ -1,0 +1,157 @@
+"""What the demo prints: the fit, then the calibration, each beside the truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from driftwalk.cli.calibrate import summary as calibration_summary
+from driftwalk.cli.fit import answer
+from driftwalk.cli.fit import summary as fit_summary
+from driftwalk.cli.terminal.output import print_note
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+ROWS: Final = (
+    ("drag coefficient C_d", "drag_coefficient", 1.0),
+    ("stochastic force σ_F [mN]", "force_std_N", 1e3),
+    ("tracking noise [mm]", "tracking_noise_m", 1e3),
+)
+KNOWN: Final = ("drag_coefficient", "force_std_N", "force_interval_s", "tracking_noise_m")
+STEP_REMARK: Final = (
+    "The engine's steps of 16 ms\nmake its drag act some 2 % stronger than its C_d says."
+)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What the first half of the demo found.
+
+    Attributes
+    ----------
+    fit : xarray.Dataset
+        A `fit`.
+    check : xarray.Dataset
+        Its `model_check`.
+    recording : xarray.Dataset
+        The `trajectory`.
+    """
+
+    fit: xr.Dataset
+    check: xr.Dataset
+    recording: xr.Dataset
+
+    @property
+    def flow_error(self) -> float:
+        """Relative error of the fitted flow, averaged over the block; see `score_fit`."""
+        from driftwalk.datasets import tank30_flow
+        from driftwalk.likelihood import score_fit
+
+        truth = demo_truth()
+        score = score_fit(
+            self.fit,
+            drag_coefficient=truth["drag_coefficient"],
+            force_std=truth["force_std_N"],
+            tracking_noise=truth["tracking_noise_m"],
+            flow=tank30_flow(),
+            recordings=self.recording,
+        )
+        return float(score["flow_error"])
+
+
+def demo_truth() -> dict[str, float]:
+    """Return what made the recording, units in the keys."""
+    from driftwalk.datasets import tank30_truth
+
+    truth = tank30_truth()
+    return {key: truth[key] for key in KNOWN}
+
+
+def in_json(fitted: Fitted, calibration: xr.Dataset) -> dict[str, Any]:
+    """Return what ``--json`` prints: the two answers and the truth."""
+    return {
+        "truth": demo_truth(),
+        "fit": answer(fitted.fit, fitted.check) | {"flow_error": fitted.flow_error},
+        "calibration": calibration_summary(calibration),
+    }
+
+
+def print_fit(fit: xr.Dataset) -> None:
+    """Print the estimates of the fit beside the truth, as soon as they are there."""
+    every = 1e3 * demo_truth()["force_interval_s"]
+    print("This recording was simulated by another engine (ODE): the truth is known.")
+    _print_estimates("likelihood fit", fit_summary(fit))
+    # Through a pipe the answer would wait in the buffer for the check and the map.
+    print(
+        f"Intervals of 90 %; σ_F drawn anew every {every:g} ms. {STEP_REMARK}",
+        flush=True,
+    )
+
+
+def print_check(fitted: Fitted) -> None:
+    """Print how far the flow is off, whether the model explains the recording, and what warns."""
+    fit = answer(fitted.fit, fitted.check)
+    print_row("flow past the block", "", f"{fitted.flow_error:.1%} off")
+    print_row("KS distance, floor", "", _distance(fit, "ks_noise_floor"))
+    print_row("model explains it", "", _word(fit["explained"]))
+    for finding in fit["findings"]:
+        print_note(f"model check: {finding}")
+    for warning in fit["warnings"]:
+        print_note(f"warning: fit: {warning}")
+
+
+def print_next(page: Path) -> None:
+    """Say what comes next; whoever waits may open the page of the fit meanwhile."""
+    print(f"Its page: {page}")
+    print(
+        "Next, the paper's method: a map of KS distances in the fitted flow, a minute or two.\n",
+        flush=True,
+    )
+
+
+def print_calibration(calibration: xr.Dataset) -> None:
+    """Print the minimum of the map beside the truth, and what speaks against it."""
+    search = calibration_summary(calibration)
+    near = search["distance_to_floor_ratio"] < calibration.attrs["far_above_floor"]
+    _print_estimates("KS map in the fitted flow", search)
+    print_row("KS distance, floor", "", _distance(search))
+    print_row("model explains it", "", _word(near))
+    for warning in search["warnings"]:
+        print_note(f"warning: KS map: {warning}")
+
+
+def print_places(folder: Path, page: Path) -> None:
+    """Print where the figures are and, last, the page to open."""
+    print(f"\nfigures: {folder}/fit/figures, {folder}/calibrate/figures")
+    print(f"open in a browser: {page}")
+
+
+def _print_estimates(method: str, facts: dict[str, Any]) -> None:
+    truth = demo_truth()
+    print_row("", "truth", method)
+    for name, key, scale in ROWS:
+        print_row(name, f"{scale * truth[key]:.4g}", _estimate(facts, key, scale))
+
+
+def print_row(name: str, *cells: str) -> None:
+    """Print a row of the table."""
+    widths = (9, 0)
+    line = "".join(f"{cell:{width}}" for cell, width in zip(cells, widths, strict=True))
+    print(f"{name:27}{line}".rstrip())
+
+
+def _estimate(facts: dict[str, Any], key: str, scale: float) -> str:
+    if f"{key}_interval" not in facts:
+        return "taken from the recording"
+    low, high = (scale * end for end in facts[f"{key}_interval"])
+    return f"{scale * facts[key]:.4f} ({low:.4f} to {high:.4f})"
+
+
+def _distance(facts: dict[str, Any], floor: str = "noise_floor") -> str:
+    return f"{facts['ks_distance']:.3f}, {facts[floor]:.3f}"
+
+
+def _word(yes: bool) -> str:
+    return "yes" if yes else "no"

@@ -1,0 +1,25 @@
+"""The figures of a run: all of them, written into one folder."""
+
+from driftwalk.figures.assembly import write_assembly_figures, write_sensitivity_figures
+from driftwalk.figures.calibration import write_figures
+from driftwalk.figures.fit import plot_flow_error, write_fit_figures
+from driftwalk.figures.model_check import write_check_figures
+from driftwalk.figures.recovery import (
+    plot_flow_recovery,
+    plot_recovery,
+    plot_recovery_error,
+    write_recovery_figures,
+)
+
+__all__ = [
+    "plot_flow_error",
+    "plot_flow_recovery",
+    "plot_recovery",
+    "plot_recovery_error",
+    "write_assembly_figures",
+    "write_check_figures",
+    "write_figures",
+    "write_fit_figures",
+    "write_recovery_figures",
+    "write_sensitivity_figures",
+]

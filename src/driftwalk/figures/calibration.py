@@ -1,0 +1,255 @@
+"""All figures of a calibration, written into one folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from driftwalk.core.atomic import atomic_path
+from driftwalk.core.errors import InputError
+from driftwalk.plot.distances import LEGEND_ORDER, plot_ks_map, plot_refined_map
+from driftwalk.plot.flow_field import COMPONENTS, SPEED_LABEL, plot_flow, velocity_of
+from driftwalk.plot.panels import plot_density_panels, shared_setting_text
+from driftwalk.plot.parts.style import (
+    DOUBLE_COLUMN_MM,
+    SINGLE_COLUMN_MM,
+    add_colorbar,
+    add_footer,
+    letter_panels,
+    new_figure,
+    print_style,
+)
+from driftwalk.plot.path import plot_trajectory
+from driftwalk.plot.step_density import plot_steps
+from driftwalk.plot.uncertainty import plot_distance_profile, plot_validation
+from driftwalk.schema import body_track
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+FOOTER = "recording simulated by another engine (ODE)"
+# Length of the sample of the path that is drawn [s].
+EXCERPT_S = 60.0
+# What would make two files of the same figure differ (the date) or says nothing of the data.
+METADATA: dict[str, dict[str, Any]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None},
+    "pdf": {"CreationDate": None},
+}
+
+
+def write_figures(
+    calibration: xr.Dataset,
+    *,
+    flow: xr.Dataset,
+    trajectory: xr.Dataset,
+    folder: str | Path,
+    body: str | None = None,
+    formats: Sequence[str] = ("png", "svg"),
+) -> list[Path]:
+    """Write every figure of a calibration: the paper's 2, 5, 6, 7 and 8, and one on validation.
+
+    The same datasets give the same files, byte for byte, with one version of matplotlib.
+
+    Parameters
+    ----------
+    calibration : xarray.Dataset
+        What `driftwalk.calibration.calibrate` returns.
+    flow : xarray.Dataset
+        The `flow_field` that was used.
+    trajectory : xarray.Dataset
+        The recording.
+    folder : path-like
+        Where to write; made when absent.
+    body : str, optional
+        Body of the recording; may be left out when there is only one.
+    formats : sequence of {"png", "svg", "pdf"}
+        File formats.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files: ``flow``, ``trajectory``, ``steps``, ``ks_map``, ``drag_coefficient_panels``,
+        ``force_std_panels`` and ``validation``, each in every format.
+
+    Raises
+    ------
+    InputError
+        When a format is not known, or a dataset lacks what a figure draws.
+    RunDirectoryError
+        When a figure cannot be written.
+
+    Examples
+    --------
+    ``write_figures(calibration, flow=flow, trajectory=recording, folder="run/figures")``
+    """
+    makers: dict[str, Callable[[], Figure]] = {
+        "flow": lambda: flow_figure(flow),
+        "trajectory": lambda: trajectory_figure(trajectory, body=body),
+        "steps": lambda: steps_figure(calibration),
+        "ks_map": lambda: ks_map_figure(calibration),
+        "drag_coefficient_panels": lambda: panels_figure(calibration, "drag_coefficient"),
+        "force_std_panels": lambda: panels_figure(calibration, "force_std"),
+        "validation": lambda: validation_figure(calibration),
+    }
+    footer = FOOTER if calibration.attrs.get("simulated_recording") == "yes" else ""
+    return write_each(makers, folder, formats, footer=footer)
+
+
+def flow_figure(flow: xr.Dataset) -> Figure:
+    """Return Fig. 2: the block's velocity beside the water's, or the water's alone."""
+    has_block = all(name in flow for name in COMPONENTS["block"])
+    if not has_block:
+        figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=76.0, layout="compressed")
+        plot_flow(flow, figure.add_subplot())
+        return figure
+    import numpy as np
+
+    top = max(
+        float(np.nanmax(np.hypot(*velocity_of(flow, field)[:2]), initial=0.0)) / 100.0
+        for field in ("block", "water")
+    )
+    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=92.0, layout="compressed")
+    row = list(figure.subplots(1, 2, sharex=True, sharey=True))
+    plot_flow(flow, row[0], field="block", speed_limit=top, colorbar="none")
+    plot_flow(flow, row[1], field="water", speed_limit=top, colorbar="none")
+    row[1].set_ylabel("")
+    filled = any(str(patch.get_label()).startswith("filled") for patch in row[1].patches)
+    letter_panels(
+        row,
+        [
+            "block velocity",
+            "corrected flow" + (" (hatched: filled, not measured)" if filled else ""),
+        ],
+    )
+    add_colorbar(row[1].collections[0], row, SPEED_LABEL)
+    return figure
+
+
+def trajectory_figure(trajectory: xr.Dataset, *, body: str | None = None) -> Figure:
+    """Return Fig. 5a: the first minute of the path."""
+    figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=80.0, layout="compressed")
+    ax = figure.add_subplot()
+    time = body_track(trajectory, body).time
+    if time.size and time[-1] - time[0] > EXCERPT_S:
+        start = float(time[0])
+        plot_trajectory(trajectory, ax, body=body, start=start, stop=start + EXCERPT_S)
+        ax.set_title(f"first {EXCERPT_S:g} s of {time[-1] - start:.4g} s", loc="left")
+    else:
+        plot_trajectory(trajectory, ax, body=body)
+    handles = [line for line in ax.lines if line.get_label() == "start"]
+    ax.legend(handles=handles, loc="lower right", bbox_to_anchor=(1.02, 0.99), borderaxespad=0.0)
+    return figure
+
+
+def steps_figure(calibration: xr.Dataset) -> Figure:
+    """Return Fig. 5b: the recording's steps with their marginals."""
+    figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=76.0)
+    plot_steps(
+        calibration["recording_step_length"].values,
+        calibration["recording_turning_angle"].values,
+        figure.add_subplot(),
+    )
+    return figure
+
+
+def ks_map_figure(calibration: xr.Dataset) -> Figure:
+    """Return Fig. 6: the whole map beside the refined one, or the whole map alone."""
+    if "refined_ks_distance" not in calibration:
+        figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=80.0)
+        _legend_above(plot_ks_map(calibration, figure.add_subplot()))
+        return figure
+    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=80.0)
+    row = list(figure.subplots(1, 2))
+    plot_ks_map(calibration, row[0])
+    plot_refined_map(calibration, row[1])
+    letter_panels(row, ["whole box", "near the optimum (lines: fitted surface)"])
+    handles, labels = row[0].get_legend_handles_labels()
+    order = sorted(range(len(labels)), key=lambda index: LEGEND_ORDER.index(labels[index]))
+    figure.legend(
+        [handles[index] for index in order],
+        [labels[index] for index in order],
+        loc="outside upper center",
+        ncols=6,
+    )
+    return figure
+
+
+def panels_figure(calibration: xr.Dataset, parameter: Any) -> Figure:
+    """Return Fig. 7 (drag coefficient) or Fig. 8 (stochastic force)."""
+    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=62.0)
+    row = list(figure.subplots(1, 4, sharex=True, sharey=True))
+    plot_density_panels(calibration, row, parameter=parameter)
+    figure.suptitle(f"simulated with {shared_setting_text(calibration, parameter=parameter)}")
+    return figure
+
+
+def validation_figure(calibration: xr.Dataset) -> Figure:
+    """Return the distance around the optimum and, where there are any, the bootstrap estimates."""
+    if "bootstrap_drag_coefficient" not in calibration:
+        return _profiles_figure(calibration)
+    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=68.0)
+    row = plot_validation(calibration, list(figure.subplots(1, 3)))
+    letter_panels(row, ["along $C_d$", r"along $\sigma_F$", "estimates"])
+    handles, labels = row[0].get_legend_handles_labels()
+    more = zip(*row[2].get_legend_handles_labels(), strict=True)
+    for handle, label in more:
+        if label not in labels and not label.startswith("optimum"):
+            handles.append(handle)
+            labels.append(label)
+    figure.legend(handles, labels, loc="outside upper center", ncols=7)
+    return figure
+
+
+def _profiles_figure(calibration: xr.Dataset) -> Figure:
+    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=68.0)
+    row = list(figure.subplots(1, 2))
+    plot_distance_profile(calibration, row[0], parameter="drag_coefficient")
+    plot_distance_profile(calibration, row[1], parameter="force_std")
+    letter_panels(row, ["along $C_d$", r"along $\sigma_F$"])
+    figure.legend(*row[0].get_legend_handles_labels(), loc="outside upper center", ncols=7)
+    return figure
+
+
+def _legend_above(ax: Any) -> None:
+    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)
+
+
+def write_each(
+    makers: Mapping[str, Callable[[], Figure]],
+    folder: str | Path,
+    formats: Sequence[str],
+    *,
+    footer: str = "",
+) -> list[Path]:
+    """Make every figure and write it by its name; nothing is made when a format is not known."""
+    unknown = [name for name in formats if name not in METADATA]
+    if unknown:
+        raise InputError(
+            f"no figure can be written as {', '.join(unknown)}: choose from {', '.join(METADATA)}"
+        )
+    target = Path(folder)
+    target.mkdir(parents=True, exist_ok=True)
+    written: list[Path] = []
+    with print_style():
+        for name, make in makers.items():
+            figure = make()
+            if footer:
+                add_footer(figure, footer)
+            written += _save(figure, target / name, formats)
+    return written
+
+
+def _save(figure: Figure, stem: Path, formats: Sequence[str]) -> list[Path]:
+    """Lay the figure out once and write it in every format."""
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    written = []
+    for name in formats:
+        path = stem.with_suffix(f".{name}")
+        with atomic_path(path) as temporary:
+            figure.savefig(temporary, metadata=METADATA[name])
+        written.append(path)
+    return written

@@ -1,0 +1,312 @@
+"""The figures of a recovery study: estimates beside the truth, and how their error falls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+from driftwalk.figures.calibration import write_each
+from driftwalk.plot.parts.style import (
+    BLUE,
+    DOUBLE_COLUMN_MM,
+    INK,
+    MUTED,
+    ORANGE,
+    PALE,
+    SINGLE_COLUMN_MM,
+    axes_or_new,
+    letter_panels,
+    new_figure,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Floats = npt.NDArray[np.float64]
+
+SHOWN: Final = {
+    "drag_coefficient": ("drag_coefficient", 1.0, "$C_d$"),
+    "force_std": ("force_std_N", 1e3, "$\\sigma_F$ (mN)"),
+    "tracking_noise": ("tracking_noise_m", 1e3, "tracking noise (mm)"),
+}
+"""Attribute that holds the truth, factor to the unit shown, and label."""
+COLORS: Final = (BLUE, ORANGE, "#009E73", "#CC79A7")
+"""By use of the angle."""
+LABELLED: Final = ("drag_coefficient", "force_std")
+BETWEEN_GROUPS: Final = 2.0
+SPREAD: Final = 0.5
+
+
+def plot_recovery(
+    recovery: xr.Dataset, parameter: str = "drag_coefficient", ax: Axes | None = None
+) -> Axes:
+    """Draw the estimates of a parameter with their intervals, and the truth as a line.
+
+    Recordings stand side by side, grouped by their length. Those that are left out of the summary
+    are open.
+
+    Parameters
+    ----------
+    recovery : xarray.Dataset
+        What `recovery_study` returns.
+    parameter : {"drag_coefficient", "force_std", "tracking_noise"}
+        What is drawn.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset is no recovery study, or the parameter is unknown.
+
+    Examples
+    --------
+    ``plot_recovery(recovery, "force_std")``
+    """
+    _require_recovery(recovery)
+    if parameter not in SHOWN:
+        raise InputError(f"parameter must be one of {', '.join(SHOWN)}, got {parameter!r}")
+    attribute, factor, label = SHOWN[parameter]
+    ax = axes_or_new(ax)
+    for at, used, color, angle, part in _groups(recovery):
+        value, low, high = (
+            factor * part[f"{parameter}{end}"].values for end in ("", "_low", "_high")
+        )
+        for kept, face in ((used, color), (~used, "white")):
+            # A missing estimate is NaN, and not drawn.
+            ax.errorbar(
+                at[kept], value[kept], yerr=[(value - low)[kept], (high - value)[kept]], fmt="o",
+                ms=2.4, mfc=face, mec=color, mew=0.6, ecolor=color, elinewidth=0.7,
+                label=angle if face == color else None,
+            )  # fmt: skip
+    truth = factor * float(recovery.attrs[attribute])
+    ax.axhline(truth, color=INK, lw=0.7, zorder=0, label="truth")
+    ax.set_ylabel(label)
+    _label_groups(ax, recovery)
+    return ax
+
+
+def plot_flow_recovery(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw the error of the flow in every recording, averaged over the block, in percent.
+
+    Parameters
+    ----------
+    recovery : xarray.Dataset
+        What `recovery_study` returns.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset is no recovery study.
+
+    Examples
+    --------
+    ``plot_flow_recovery(recovery)``
+    """
+    _require_recovery(recovery)
+    ax = axes_or_new(ax)
+    for at, used, color, angle, part in _groups(recovery):
+        error = 100.0 * part["flow_error"].values
+        for kept, face in ((used, color), (~used, "white")):
+            ax.plot(
+                at[kept], error[kept], "o", ms=2.4, mfc=face, mec=color, mew=0.6,
+                label=angle if face == color else None,
+            )  # fmt: skip
+    ax.set_ylim(bottom=0.0)
+    ax.set_ylabel("flow error (% of rms speed)")
+    _label_groups(ax, recovery)
+    return ax
+
+
+def plot_recovery_error(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw how the error of C_d falls with the length of a recording.
+
+    Points are the rms of ln(estimate / truth), lines the law T^(-1/2) fitted to them with the band
+    that the number of recordings leaves, crosses the median standard deviation that the fits state.
+
+    Parameters
+    ----------
+    recovery : xarray.Dataset
+        What `recovery_study` returns.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset is no recovery study.
+
+    Examples
+    --------
+    ``plot_recovery_error(recovery)``
+    """
+    _require_recovery(recovery)
+    ax = axes_or_new(ax)
+    minutes = recovery["duration"].values / 60.0
+    needed = recovery["needed_duration"].values / 60.0
+    drawn = np.geomspace(minutes[0] / 1.5, 1.5 * np.nanmax([minutes[-1], *needed]), 50)
+    for color, angle in zip(COLORS, recovery["angle"].values, strict=False):
+        part = recovery.sel(angle=angle)
+        used = part["used"].values == 1
+        stated = np.where(used, part["drag_coefficient_sd"].values, np.nan)
+        known = used.any(axis=1)
+        rms = part["rms_error"].sel(parameter="drag_coefficient").values
+        ax.plot(minutes, 100.0 * rms, "o", ms=3.5, color=color, label=f"{angle}: measured")
+        ax.plot(
+            minutes[known], 100.0 * np.nanmedian(stated[known], axis=1), "x", ms=4.0, color=color,
+            label=f"{angle}: stated by the fit",
+        )  # fmt: skip
+        low, middle, high = (
+            float(part[f"drag_coefficient_error_scale{end}"]) for end in ("_low", "", "_high")
+        )
+        root = np.sqrt(60.0 * drawn)
+        ax.plot(drawn, 100.0 * middle / root, color=color, lw=0.9)
+        ax.fill_between(drawn, 100.0 * low / root, 100.0 * high / root, color=color, alpha=0.15)
+    asked = float(recovery.attrs["drag_coefficient_precision"])
+    if np.isfinite(asked):
+        ax.axhline(100.0 * asked, color=MUTED, lw=0.7, dashes=(3, 3), label="wanted")
+    if np.isfinite(recovery["drag_coefficient_error_scale"].values).any():
+        # Without a point a logarithmic axis has no range.
+        _logarithmic(ax)
+    ax.set_xlabel("length of a recording (min)")
+    ax.set_ylabel("error of $C_d$, rms (%)")
+    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=6.0)
+    return ax
+
+
+def write_recovery_figures(
+    folder: str | Path, *, recovery: xr.Dataset, formats: Sequence[str] = ("png", "svg")
+) -> list[Path]:
+    """Write the figures of a recovery study.
+
+    Parameters
+    ----------
+    folder : path-like
+        Where to write; made when absent.
+    recovery : xarray.Dataset
+        What `recovery_study` returns.
+    formats : sequence of {"png", "svg", "pdf"}
+        File formats.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files: ``recovery`` and ``error_by_length`` in every format.
+
+    Raises
+    ------
+    InputError
+        When a format is not known, or the dataset is no recovery study.
+    RunDirectoryError
+        When a figure cannot be written.
+
+    Examples
+    --------
+    ``write_recovery_figures("recover/figures", recovery=recovery)``
+    """
+    _require_recovery(recovery)
+    makers: dict[str, Callable[[], Figure]] = {
+        "recovery": lambda: _recovery_figure(recovery),
+        "error_by_length": lambda: _error_figure(recovery),
+    }
+    return write_each(makers, folder, formats, footer="")
+
+
+def _recovery_figure(recovery: xr.Dataset) -> Figure:
+    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=125.0)
+    rows = list(figure.subplots(3, 1, sharex=True))
+    for name, ax in zip(LABELLED, rows, strict=False):
+        plot_recovery(recovery, name, ax)
+    plot_flow_recovery(recovery, rows[-1])
+    for ax in rows[:-1]:
+        ax.set_xlabel("")
+    handles, texts = rows[0].get_legend_handles_labels()
+    figure.legend(handles, texts, loc="outside upper right", ncols=len(texts))
+    confidence = float(recovery.attrs["confidence"])
+    titles = (f"drag coefficient, {confidence:.0%} intervals", "stochastic force", "flow")
+    letter_panels(rows, list(titles))
+    return figure
+
+
+def _error_figure(recovery: xr.Dataset) -> Figure:
+    figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=75.0)
+    plot_recovery_error(recovery, figure.add_subplot())
+    return figure
+
+
+def _require_recovery(recovery: xr.Dataset) -> None:
+    if recovery.attrs.get("kind") != "recovery":
+        raise InputError(
+            f"not a recovery study: its kind is {recovery.attrs.get('kind')!r}; recovery_study "
+            "makes one"
+        )
+
+
+def _groups(
+    recovery: xr.Dataset,
+) -> Iterator[tuple[Floats, npt.NDArray[np.bool_], str, str, xr.Dataset]]:
+    """Give place, which are used, colour, name and dataset of each group of recordings."""
+    angles = recovery["angle"].values
+    count = recovery.sizes["recording"]
+    for number in range(recovery.sizes["duration"]):
+        for index, angle in enumerate(angles):
+            part = recovery.isel(duration=number, angle=index)
+            shift = SPREAD * ((index + 0.5) / len(angles) - 0.5)
+            at = number * (count + BETWEEN_GROUPS) + np.arange(count) + shift
+            # The legend has one entry for all lengths.
+            name = f"angle {angle}" if number == 0 else "_"
+            color = COLORS[index % len(COLORS)]
+            yield np.asarray(at, np.float64), part["used"].values == 1, color, name, part
+
+
+def _label_groups(ax: Axes, recovery: xr.Dataset) -> None:
+    """Name the lengths below the groups, and set them apart."""
+    count, groups = recovery.sizes["recording"], recovery.sizes["duration"]
+    first = np.arange(groups) * (count + BETWEEN_GROUPS)
+    ax.set_xticks(first + 0.5 * (count - 1), [_length(s) for s in recovery["duration"].values])
+    ax.tick_params(axis="x", length=0.0)
+    for begin in first[1:]:
+        ax.axvline(begin - 0.5 * (BETWEEN_GROUPS + 1.0), color=PALE, lw=0.8)
+    ax.set_xlim(-1.5, first[-1] + count + 0.5)
+    ax.set_xlabel(f"length of the recording; each point is one of {count}")
+
+
+def _length(seconds: float) -> str:
+    return f"{seconds / 60.0:g} min" if seconds >= 60.0 else f"{seconds:g} s"
+
+
+def _logarithmic(ax: Axes) -> None:
+    """Set both axes to logarithms with plain numbers."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    plain: Any = FuncFormatter(lambda value, _: f"{value:g}")
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(plain)
+        axis.set_minor_formatter(NullFormatter())

@@ -1,0 +1,33 @@
+"""Pages: the data of a report as one JSON object, and the HTML file that shows it."""
+
+from driftwalk.page.arrays import decode_array, encode_array
+from driftwalk.page.html import report_html, write_report
+from driftwalk.page.run_page import joined_page, recording_page, report_page
+from driftwalk.page.sections.assembly import assembly_sections
+from driftwalk.page.sections.calibration import calibration_sections
+from driftwalk.page.sections.fit import fit_sections
+from driftwalk.page.sections.flow import flow_section
+from driftwalk.page.sections.manifest import manifest_section
+from driftwalk.page.sections.map import map_section
+from driftwalk.page.sections.recording import trajectory_section
+from driftwalk.page.sections.recovery import recovery_sections
+from driftwalk.page.sections.sensitivity import sensitivity_sections
+
+__all__ = [
+    "assembly_sections",
+    "calibration_sections",
+    "decode_array",
+    "encode_array",
+    "fit_sections",
+    "flow_section",
+    "joined_page",
+    "manifest_section",
+    "map_section",
+    "recording_page",
+    "recovery_sections",
+    "report_html",
+    "report_page",
+    "sensitivity_sections",
+    "trajectory_section",
+    "write_report",
+]

@@ -1,0 +1,172 @@
+"""The one HTML file: page data, style sheet and program, with nothing to load from anywhere."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import json
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from driftwalk.core.atomic import require_target, write_atomic
+from driftwalk.core.errors import InputError
+
+BUNDLE: Final = ("driftwalk.css", "driftwalk.js")
+# What could end the element that holds the data, or break it as a program.
+_ESCAPES: Final = {
+    character: f"\\u{ord(character):04x}" for character in ("<", ">", "&", "\u2028", "\u2029")
+}
+_NO_SCRIPT: Final = (
+    "This page needs JavaScript, which is switched off here. It loads nothing from anywhere."
+)
+
+
+def report_html(page: Mapping[str, Any], *, connect: Literal["none", "self"] = "none") -> str:
+    """Return a page as one HTML document that loads nothing from anywhere.
+
+    Parameters
+    ----------
+    page : mapping
+        What `report_page` returns.
+    connect : {"none", "self"}
+        Whether the document may talk to the server that it came from.
+
+    Returns
+    -------
+    str
+        The document, ASCII where the data stand. Its content security policy admits the style
+        sheet and the program by their hashes and nothing else.
+
+    Raises
+    ------
+    InputError
+        When the installation lacks the program that shows a page, or the page holds a number that
+        JSON lacks.
+
+    Examples
+    --------
+    ``Path("report.html").write_text(report_html(report_page("run")), encoding="utf-8")``
+    """
+    style, program = (_bundled(name) for name in BUNDLE)
+    policy = "; ".join(
+        [
+            "default-src 'none'",
+            f"script-src {_hash_source(program)}",
+            f"style-src {_hash_source(style)}",
+            "img-src data: blob:",
+            *(["connect-src 'self'"] if connect == "self" else []),
+            "base-uri 'none'",
+            "form-action 'none'",
+        ]
+    )
+    return "\n".join(
+        [
+            "<!doctype html>",
+            '<html lang="en">',
+            "<head>",
+            '<meta charset="utf-8">',
+            f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            '<meta name="referrer" content="no-referrer">',
+            f"<title>{_text(_title(page))}</title>",
+            f"<style>{style}</style>",
+            "</head>",
+            "<body>",
+            '<div id="app"></div>',
+            f"<noscript><p>{_NO_SCRIPT}</p></noscript>",
+            f'<script type="application/json" id="driftwalk-page">{embedded(page)}</script>',
+            f"<script>{program}</script>",
+            "</body>",
+            "</html>",
+            "",
+        ]
+    )
+
+
+def write_report(
+    page: Mapping[str, Any], path: str | Path, *, existing: Literal["error", "replace"] = "error"
+) -> Path:
+    """Write a page as one HTML file, whole or not at all.
+
+    Parameters
+    ----------
+    page : mapping
+        What `report_page` returns.
+    path : path-like
+        The file, which ends in ``.html`` or ``.htm``.
+    existing : {"error", "replace"}
+        What to do when it is there already.
+
+    Returns
+    -------
+    pathlib.Path
+        The file. The same page gives the same bytes.
+
+    Raises
+    ------
+    InputError
+        When the file is there already, its folder is not, or its name ends otherwise.
+    RunDirectoryError
+        When it cannot be written.
+
+    Examples
+    --------
+    ``write_report(report_page("run"), "report.html")``
+    """
+    target = Path(path)
+    require_target(target, existing=existing, endings=(".html", ".htm"))
+    write_atomic(target, report_html(page).encode("utf-8"))
+    return target
+
+
+def embedded(page: Mapping[str, Any]) -> str:
+    """Return page data as JSON that can stand inside a script element and is never run.
+
+    Examples
+    --------
+    >>> "<" in embedded({"title": "</script>"})
+    False
+    """
+    try:
+        text = json.dumps(page, allow_nan=False, separators=(",", ":"))
+    except ValueError as error:
+        raise InputError(f"the page cannot be written as JSON: {error}") from error
+    # `<`, `>` and `&` occur in JSON only inside strings, where an escape means the same.
+    for character, escape in _ESCAPES.items():
+        text = text.replace(character, escape)
+    return text
+
+
+def _title(page: Mapping[str, Any]) -> str:
+    parts = (page.get("title"), page.get("subtitle"))
+    return " · ".join(str(part) for part in parts if part) or "driftwalk"
+
+
+def _text(value: str) -> str:
+    """Return text for HTML; what no document may hold, such as half a surrogate, becomes "?"."""
+    shown = "".join(c if c.isprintable() else "?" for c in value)
+    return html.escape(shown.encode("utf-8", "replace").decode("utf-8"))
+
+
+def _bundled(name: str) -> str:
+    """Return a file of the built front end, with the line ends that a browser will see."""
+    try:
+        text = (files("driftwalk.page") / "static" / name).read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(
+            f"the installation lacks {name}, which shows the page: install driftwalk again, or in "
+            "a clone of it run 'make web'"
+        ) from error
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    closing = "</style" if name.endswith(".css") else "</script"
+    if closing in text.lower() or "<!--" in text:
+        raise InputError(f"{name} holds '{closing}' or '<!--', which would end it inside a page")
+    return text
+
+
+def _hash_source(text: str) -> str:
+    digest = hashlib.sha256(text.encode("utf-8")).digest()
+    return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"

@@ -1,0 +1,212 @@
+"""What every section of a page is made of, and what becomes of one that cannot be made."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from itertools import product
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from driftwalk.core.errors import DriftwalkError, FormatError, InputError
+from driftwalk.core.json_text import parse_json
+from driftwalk.page.arrays import number
+from driftwalk.plot.parts.arena import arena_of
+from driftwalk.plot.parts.labels import interval_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Section = dict[str, Any]
+
+_ARENA_KEYS: Final = {
+    "circle": ("diameter_m",),
+    "rectangle": ("width_m", "height_m"),
+    "polygon": ("vertices_m",),
+}
+LONGEST_REASON: Final = 200
+"""Letters of an error that are shown."""
+FOUND_TITLE: Final = "What was found"
+SIMULATED: Final = "The recording was simulated: it is no measurement."
+MOST_SETTINGS: Final = 50_000
+"""Combinations of parameters that a page names; a cube of 31 values a side has 29,791."""
+
+
+def section(id: str, kind: str, title: str, note: str | None = None, **content: Any) -> Section:
+    """Return a section of a page.
+
+    Examples
+    --------
+    >>> section("notes", "warnings", "Warnings", items=[])["id"]
+    'notes'
+    """
+    return {"id": id, "kind": kind, "title": title, "note": note, **content}
+
+
+def empty_section(id: str, title: str, reason: str) -> Section:
+    """Return the section that stands where there is nothing to show, and why."""
+    return section(id, "empty", title, reason=" ".join(reason.split()))
+
+
+def attempt(id: str, title: str, make: Callable[[], Section | list[Section]]) -> list[Section]:
+    """Make sections; what the data do not allow becomes an empty section with the reason.
+
+    Another version of driftwalk, or another program, may have written the data in another form:
+    that costs the section, and not the page. Errors that no data explain are faults of driftwalk,
+    and pass.
+    """
+    try:
+        made = make()
+    except DriftwalkError as error:
+        return [empty_section(id, title, str(error))]
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+        words = f"{type(error).__name__}: {error}"[:LONGEST_REASON]
+        reason = f"The data are not in the form that this version of driftwalk reads ({words})."
+        return [empty_section(id, title, reason)]
+    return made if isinstance(made, list) else [made]
+
+
+def head_sections(
+    summary: Callable[[], Section], warnings: Callable[[], Sequence[str]]
+) -> list[Section]:
+    """Return what the page of every kind of run begins with: what was found, and its warnings."""
+    return [
+        *attempt("summary", FOUND_TITLE, summary),
+        *attempt("warnings", "Warnings", lambda: warnings_section(warnings())),
+    ]
+
+
+def empty_head(reason: str) -> list[Section]:
+    """Return what stands there while nothing has been found, and why."""
+    return [empty_section("summary", FOUND_TITLE, reason)]
+
+
+def require(dataset: xr.Dataset, *names: str) -> None:
+    """Raise `InputError` naming the variables that a dataset lacks."""
+    missing = [name for name in names if name not in dataset.variables]
+    if missing:
+        kind = dataset.attrs.get("kind", "dataset")
+        raise InputError(f"the {kind} holds no {', '.join(missing)}")
+
+
+def required(dataset: xr.Dataset, name: str) -> Any:
+    """Return an attribute, or raise `InputError` naming it."""
+    if name not in dataset.attrs:
+        raise InputError(f"the {dataset.attrs.get('kind', 'dataset')} has no attribute '{name}'")
+    return dataset.attrs[name]
+
+
+def value_of(dataset: xr.Dataset, name: str) -> float | None:
+    """Return a number of the attributes, None when it is absent or not finite."""
+    found = dataset.attrs.get(name)
+    return None if isinstance(found, str) else number(found)
+
+
+def texts_of(dataset: xr.Dataset, name: str) -> list[str]:
+    """Return a list of sentences that an attribute holds as JSON; empty when it is absent."""
+    try:
+        found = parse_json(str(dataset.attrs.get(name, "[]")))
+    except FormatError as error:
+        raise InputError(f"the attribute '{name}' is no JSON: {error}") from error
+    return [str(item) for item in found] if isinstance(found, list) else [str(found)]
+
+
+def is_simulated(dataset: xr.Dataset) -> bool:
+    """Return whether a result comes from a simulated recording."""
+    words = (dataset.attrs.get(name) for name in ("simulated_recording", "simulated"))
+    return "yes" in [str(word) for word in words]
+
+
+def arena_part(dataset: xr.Dataset) -> dict[str, Any] | None:
+    """Return the arena of a dataset as a page has it, None when nobody knows it."""
+    arena = arena_of(dataset)
+    needed = _ARENA_KEYS.get(str(arena.get("shape")))
+    if needed is None or any(key not in arena for key in needed):
+        return None
+    kept = ("shape", *needed, "center_m")
+    return {key: plain_json(arena[key]) for key in kept if key in arena}
+
+
+def axis(name: str, label: str, unit: str, values: Any) -> dict[str, Any]:
+    """Return an axis of a map."""
+    found = np.asarray(values, dtype=np.float64)
+    return {"name": name, "label": label, "unit": unit, "values": [number(v) for v in found]}
+
+
+def estimate(
+    dataset: xr.Dataset, name: str, *, label: str, symbol: str, unit: str, note: str | None = None
+) -> dict[str, Any]:
+    """Return an estimate of the attributes with its interval, for a summary."""
+    ends = interval_of(dataset, f"{name}_interval")
+    return {
+        "label": label,
+        "symbol": symbol,
+        "value": number(required(dataset, name)),
+        "unit": unit,
+        "low": None if ends is None else ends[0],
+        "high": None if ends is None else ends[1],
+        "confidence": None if ends is None else value_of(dataset, "confidence"),
+        "note": note,
+    }
+
+
+def figure(
+    label: str, value: Any, unit: str = "1", *, symbol: str = "", note: str | None = None
+) -> dict[str, Any]:
+    """Return a number without an interval, for a summary."""
+    return {
+        "label": label, "symbol": symbol, "value": number(value), "unit": unit, "low": None,
+        "high": None, "confidence": None, "note": note,
+    }  # fmt: skip
+
+
+def settings_of(*values: Sequence[Any]) -> list[tuple[Any, ...]]:
+    """Return every combination of values, the last one fastest.
+
+    Parameters
+    ----------
+    *values : sequence
+        The values of each parameter.
+
+    Raises
+    ------
+    InputError
+        When there are more: a damaged file may declare an axis of any length.
+
+    Examples
+    --------
+    >>> settings_of("ab", [1, 2])
+    [('a', 1), ('a', 2), ('b', 1), ('b', 2)]
+    """
+    total = math.prod(len(each) for each in values)
+    if total > MOST_SETTINGS:
+        raise InputError(f"{total} settings are more than the {MOST_SETTINGS} that a page shows")
+    return list(product(*values))
+
+
+def warnings_section(items: Sequence[str], *, title: str = "Warnings") -> Section:
+    """Return the warnings; that there are none is said too."""
+    note = None if items else "None."
+    return section("warnings", "warnings", title, note, items=list(items))
+
+
+def plain_json(value: Any) -> Any:
+    """Return a value in JSON's own types: what is not finite becomes null, the unknown its text.
+
+    Examples
+    --------
+    >>> plain_json({"a": np.float64("nan"), 1: (True, 2)})
+    {'a': None, '1': [True, 2]}
+    """
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if value is None or isinstance(value, (str, bool, int)):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): plain_json(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain_json(item) for item in value]
+    return str(value)

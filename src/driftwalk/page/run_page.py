@@ -1,0 +1,315 @@
+"""Page data: what the report and the live page show of a run, as one JSON object."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from driftwalk.core.errors import InputError
+from driftwalk.page.parts import (
+    FOUND_TITLE,
+    SIMULATED,
+    Section,
+    attempt,
+    is_simulated,
+    section,
+    warnings_section,
+)
+from driftwalk.page.sections.assembly import assembly_sections
+from driftwalk.page.sections.calibration import calibration_sections
+from driftwalk.page.sections.fit import fit_sections
+from driftwalk.page.sections.manifest import manifest_section
+from driftwalk.page.sections.recording import noise_of, recording_sections
+from driftwalk.page.sections.recovery import recovery_sections
+from driftwalk.page.sections.sensitivity import sensitivity_sections
+from driftwalk.page.sections.tracking import tracking_sections, tracking_warnings
+from driftwalk.page.stored_run import MAIN_FILES, Run, open_run_folder
+from driftwalk.schema import body_names
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FORMAT: Final = "driftwalk page"
+VERSION: Final = 1
+TITLES: Final = {
+    "calibration": "Calibration",
+    "fit": "Likelihood fit",
+    "assembly": "Self-assembly",
+    "sensitivity": "Sensitivity of self-assembly",
+    "recovery": "Recovery study",
+    None: "Run",
+}
+
+
+_SHOWN_ONCE: Final = ("trajectory", "flow")
+"""Kinds of sections that several runs have in common: what they were made of."""
+_BESIDE_CONTENT: Final = ("id", "note", "facts")
+"""What two pages may say differently of one thing, such as the noise of a recording."""
+
+
+def report_page(folder: str | Path) -> dict[str, Any]:
+    """Return the page data of a run directory, finished or not.
+
+    Parameters
+    ----------
+    folder : path-like
+        What `driftwalk calibrate`, `fit`, `assemble`, `sensitivity` or `study recover` made.
+
+    Returns
+    -------
+    dict
+        Plain JSON: format, version, title, state and sections, see
+        ``docs/reference/page-data.md``. What a run lacks is an empty section with the reason.
+        The same run gives the same data.
+
+    Raises
+    ------
+    InputError
+        When there is no run, or a finished one of which nothing can be read.
+    RunDirectoryError
+        When the directory cannot be read.
+
+    Examples
+    --------
+    ``[part["title"] for part in report_page("run")["sections"]]``
+    """
+    run = open_run_folder(Path(folder))
+    sections = _sections_of(run)
+    if run.state == "finished" and run.read == 0:
+        reason = "; ".join(run.problems) or "none of the results that driftwalk knows is there"
+        raise InputError(f"{run.folder} holds a finished run, but {reason}")
+    words = _words_of_state(run)
+    if words is not None:
+        sections = [_state_section(words), *sections]
+    sections = _with_remarks(sections, _remarks(run))
+    sections.append(manifest_section(run.manifest))
+    return _page(
+        title=TITLES[run.kind],
+        subtitle=run.name,
+        finished=run.state == "finished",
+        words=words,
+        created=run.manifest.get("finished_utc"),
+        sections=sections,
+    )
+
+
+def recording_page(
+    trajectory: xr.Dataset, described: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Return the page data of a recording alone.
+
+    Parameters
+    ----------
+    trajectory : xarray.Dataset
+        A `trajectory`, as from `driftwalk.load`.
+    described : mapping, optional
+        What `driftwalk.describe` returns: for the tracking, its noise and the warnings.
+
+    Returns
+    -------
+    dict
+        Plain JSON, as of `report_page`.
+
+    Raises
+    ------
+    InputError
+        When the dataset is no trajectory.
+
+    Examples
+    --------
+    >>> from driftwalk.schema import build_trajectory
+    >>> moving = build_trajectory([0.0, 0.1, 0.2], [0.0, 0.01, 0.02], [0.0, 0.0, 0.0])
+    >>> [part["kind"] for part in recording_page(moving)["sections"]]
+    ['warnings', 'trajectory']
+    """
+    facts = {} if described is None else described
+    names = body_names(trajectory)
+    tracking = facts.get("tracking")
+    remarks = [SIMULATED] if is_simulated(trajectory) else []
+    remarks += [*tracking_warnings(tracking), *(str(text) for text in facts.get("warnings", []))]
+    sections = [
+        warnings_section(remarks),
+        *tracking_sections(tracking),
+        *recording_sections(trajectory, noise={name: noise_of(facts, name) for name in names}),
+    ]
+    source = trajectory.attrs.get("source")
+    return _page(
+        title="Recording",
+        subtitle=None if source is None else str(source),
+        finished=True,
+        words=None,
+        created=None,
+        sections=sections,
+    )
+
+
+def joined_page(pages: Sequence[Mapping[str, Any]], *, title: str) -> dict[str, Any]:
+    """Return one page with the sections of several, such as the runs that belong together.
+
+    A recording or a flow that an earlier page shows too is not repeated.
+
+    Parameters
+    ----------
+    pages : sequence of mapping
+        What `report_page` returns, at least one; their subtitles differ.
+    title : str
+        Of the page.
+
+    Returns
+    -------
+    dict
+        Plain JSON, as of `report_page`. The identifier of a section begins with the subtitle of its
+        page; with several pages its title names that page.
+
+    Raises
+    ------
+    InputError
+        When no page is given, or two have the same subtitle.
+
+    Examples
+    --------
+    ``joined_page([report_page("fit"), report_page("run")], title="Tank")``
+    """
+    names = [str(page["subtitle"]) for page in pages]
+    if not names or len(set(names)) < len(names):
+        raise InputError(f"pages to join need names of their own, got {', '.join(names) or 'none'}")
+    shown: list[Section] = []
+    sections: list[Section] = []
+    for name, page in zip(names, pages, strict=True):
+        for part in page["sections"]:
+            if part["kind"] in _SHOWN_ONCE:
+                content = {key: value for key, value in part.items() if key not in _BESIDE_CONTENT}
+                if content in shown:
+                    continue
+                shown.append(content)
+            heading = part["title"] if len(names) == 1 else f"{page['title']}: {part['title']}"
+            sections.append({**part, "id": f"{name}-{part['id']}", "title": heading})
+    words = [str(page["state"]["words"]) for page in pages if page["state"]["words"]]
+    return _page(
+        title=title,
+        subtitle=", ".join(names),
+        finished=all(page["state"]["finished"] for page in pages),
+        words=" ".join(words) or None,
+        created=max((page["created_utc"] for page in pages if page["created_utc"]), default=None),
+        sections=sections,
+    )
+
+
+def _page(
+    *,
+    title: str,
+    subtitle: str | None,
+    finished: bool,
+    words: str | None,
+    created: Any,
+    sections: list[Section],
+) -> dict[str, Any]:
+    from driftwalk import __version__
+
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "view": "report",
+        "title": title,
+        "subtitle": subtitle,
+        "state": {"finished": finished, "progress": 1.0 if finished else None, "words": words},
+        "driftwalk_version": __version__,
+        "created_utc": None if created is None else str(created),
+        "sections": sections,
+    }
+
+
+def _words_of_state(run: Run) -> str | None:
+    """Return what there is to say about a run that has not come to its end."""
+    if run.state == "finished":
+        return None
+    since = run.manifest.get("started_utc")
+    begun = "" if since is None else f" It was begun on {since}."
+    return (
+        f"This run is not finished.{begun} The same command, run again, continues it; what is "
+        "there so far is shown."
+    )
+
+
+def _sections_of(run: Run) -> list[Section]:
+    if run.kind is None:
+        return []
+    make = _SECTIONS[run.kind]
+    # What data in another form break outside of any section costs the page, and not the program.
+    return attempt("summary", FOUND_TITLE, lambda: make(run))
+
+
+def _state_section(words: str) -> Section:
+    return section("state", "summary", "Not finished", paragraphs=[words], numbers=[])
+
+
+def _remarks(run: Run) -> list[str]:
+    """Return what a reader has to know of the files themselves."""
+    from driftwalk import __version__
+
+    remarks = [f"{problem}: what it holds is not shown" for problem in run.problems]
+    if run.version is not None and run.version != __version__:
+        remarks.append(
+            f"made by driftwalk {run.version} and shown by {__version__}: what has changed between "
+            "them may be missing here"
+        )
+    if run.kind is None:
+        remarks.append("nothing says which kind of run this is")
+    return remarks
+
+
+def _with_remarks(sections: list[Section], remarks: list[str]) -> list[Section]:
+    """Put remarks in front of the warnings of a page, or of the page."""
+    if not remarks:
+        return sections
+    for part in sections:
+        if part["id"] == "warnings" and part["kind"] == "warnings":
+            part["items"] = [*remarks, *part["items"]]
+            part["note"] = None
+            return sections
+    return [warnings_section(remarks), *sections]
+
+
+def _calibration(run: Run) -> list[Section]:
+    recordings = run.recordings()
+    return calibration_sections(
+        run.dataset("calibration.nc"),
+        flow=run.dataset("flow.nc"),
+        recording=recordings[0] if recordings else None,
+        body=run.body,
+    )
+
+
+def _fit(run: Run) -> list[Section]:
+    return fit_sections(
+        run.dataset("fit.nc"),
+        recordings=run.recordings(),
+        check=run.dataset("check.nc"),
+        body=run.body,
+    )
+
+
+def _assembly(run: Run) -> list[Section]:
+    names = ("assembly", "distribution", "class_times", "path")
+    drawn = ("assembly_drawn", "distribution_drawn")
+    found = {name: run.dataset(f"{name}.nc") for name in (*names, *drawn)}
+    return assembly_sections(**found)
+
+
+def _sensitivity(run: Run) -> list[Section]:
+    names = ("sensitivity", "reference", "components", "sobol")
+    return sensitivity_sections(**{name: run.dataset(f"{name}.nc") for name in names})
+
+
+def _recovery(run: Run) -> list[Section]:
+    return recovery_sections(run.dataset(MAIN_FILES["recovery"]))
+
+
+_SECTIONS: Final[dict[str, Callable[[Run], list[Section]]]] = {
+    "calibration": _calibration,
+    "fit": _fit,
+    "assembly": _assembly,
+    "sensitivity": _sensitivity,
+    "recovery": _recovery,
+}

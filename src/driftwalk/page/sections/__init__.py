@@ -1,0 +1,1 @@
+"""One section of a page per file, from the datasets that it needs."""

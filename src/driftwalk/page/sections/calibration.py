@@ -1,0 +1,293 @@
+"""A page on a calibration: its answer in words, the map, how well it is known."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from driftwalk.page.chart import chart, label, mark, series
+from driftwalk.page.parts import (
+    SIMULATED,
+    Section,
+    attempt,
+    empty_head,
+    empty_section,
+    estimate,
+    figure,
+    head_sections,
+    is_simulated,
+    require,
+    required,
+    section,
+    texts_of,
+    value_of,
+)
+from driftwalk.page.sections.flow import flow_sections
+from driftwalk.page.sections.map import PLANE, drag_axis, force_axis, map_section, region_part
+from driftwalk.page.sections.recording import Noise, recording_sections
+from driftwalk.page.words import count, quantity, with_interval
+from driftwalk.plot.parts.labels import interval_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FAR: Final = 2.0
+"""From this ratio of distance to floor on a fit is far off, where the dataset does not say."""
+_ATTRIBUTE: Final = {"drag_coefficient": "drag_coefficient", "force_std": "force_std_N"}
+
+
+def calibration_sections(
+    calibration: xr.Dataset | None,
+    *,
+    flow: xr.Dataset | None = None,
+    recording: xr.Dataset | None = None,
+    body: str | None = None,
+) -> list[Section]:
+    """Return the sections of a page on a calibration.
+
+    Parameters
+    ----------
+    calibration : xarray.Dataset, optional
+        A `calibration`; None while there is none yet.
+    flow : xarray.Dataset, optional
+        The `flow_field` that it used.
+    recording : xarray.Dataset, optional
+        The `trajectory`.
+    body : str, optional
+        The body that was used, where the recording has several.
+
+    Returns
+    -------
+    list of dict
+        Sections; what cannot be shown is an empty one that says why.
+
+    Examples
+    --------
+    >>> [part["kind"] for part in calibration_sections(None)]
+    ['empty']
+    """
+    noise = None
+    if calibration is None:
+        made = empty_head("There is no calibration yet.")
+    else:
+        made = head_sections(
+            lambda: calibration_summary(calibration), lambda: texts_of(calibration, "warnings")
+        )
+        noise = _noise(calibration)
+    if recording is not None:
+        made += recording_sections(recording, body=body, noise=noise)
+    if flow is not None:
+        made += flow_sections(flow)
+    if calibration is not None:
+        one = _one_body(recording, body)
+        made += attempt("map", "The map", lambda: map_section(calibration, one))
+        made += attempt("profiles", "Along the optimum", lambda: profile_sections(calibration))
+        made += attempt("bootstrap", "The bootstrap", lambda: bootstrap_section(calibration))
+        made += attempt("validation", "Validation", lambda: validation_section(calibration))
+    return made
+
+
+def calibration_summary(calibration: xr.Dataset) -> Section:
+    """Return the answer of a calibration in words and numbers."""
+    require(calibration, "ks_distance")
+    facts = calibration.attrs
+    every = quantity(required(calibration, "force_interval_s"), "s")
+    paragraphs = [SIMULATED] if is_simulated(calibration) else []
+    paragraphs += [_what_was_done(calibration), _what_was_found(calibration)]
+    shown = [
+        estimate(calibration, "drag_coefficient", label="drag coefficient", symbol="C_d", unit="1"),
+        estimate(
+            calibration, "force_std_N", label="stochastic force", symbol="σ_F", unit="N",
+            note=f"drawn anew every {every}",
+        ),
+        figure("noise intensity", facts.get("force_noise_intensity_N2_s"), "N²·s", symbol="σ_F²·τ"),
+        figure("KS distance at the optimum", facts.get("ks_distance"), symbol="D"),
+        figure(
+            "noise floor", facts.get("noise_floor"),
+            note="distance between two runs of one and the same model",
+        ),
+    ]  # fmt: skip
+    paragraphs += _how_good(calibration)
+    return section(
+        "summary", "summary", "What was done and found", paragraphs=paragraphs, numbers=shown
+    )
+
+
+def profile_sections(calibration: xr.Dataset) -> list[Section]:
+    """Return the KS distance along either parameter, the other next to its optimum."""
+    require(calibration, "ks_distance", *PLANE)
+    return [_profile(calibration, along) for along in PLANE]
+
+
+def bootstrap_section(calibration: xr.Dataset) -> Section:
+    """Return the estimates from simulated recordings, with the joint region."""
+    names = ("bootstrap_force_std", "bootstrap_drag_coefficient")
+    title = "How well the parameters are known"
+    if any(name not in calibration for name in names):
+        reason = "The calibration was made without a bootstrap: no interval, no region."
+        return empty_section("bootstrap", title, reason)
+    x, y = (calibration[name].values for name in names)
+    drawn = [series("estimates from simulated recordings", x, y, style="points")]
+    region = region_part(calibration)
+    if region is not None:
+        drawn.append(series("joint region", *([*region[n], region[n][0]] for n in "xy")))
+    best = [value_of(calibration, name) for name in ("force_std_N", "drag_coefficient")]
+    return chart(
+        "bootstrap",
+        title,
+        f"{count(int(x.size), 'recording')} simulated at the optimum, each calibrated like the "
+        "real one.",
+        x=force_axis(calibration),
+        y=drag_axis(calibration),
+        series=drawn,
+        marks=[mark("estimate", *best)],
+    )
+
+
+def validation_section(calibration: xr.Dataset) -> Section:
+    """Return the calibration on the first half, judged on the second."""
+    title = "First half fitted, second half judged"
+    if "second_half_ks_distance" not in calibration.attrs:
+        return empty_section("validation", title, "The recording was not split into halves.")
+    keys = (
+        ("C_d, whole recording", "drag_coefficient", 1.0),
+        ("C_d, first half", "first_half_drag_coefficient", 1.0),
+        ("σ_F [mN], whole recording", "force_std_N", 1e3),
+        ("σ_F [mN], first half", "first_half_force_std_N", 1e3),
+        ("KS distance to the second half", "second_half_ks_distance", 1.0),
+        ("noise floor there", "second_half_noise_floor", 1.0),
+    )
+    rows = [
+        [label, None if (value := value_of(calibration, key)) is None else scale * value]
+        for label, key, scale in keys
+    ]
+    return section("validation", "table", title, columns=["", "value"], rows=rows)
+
+
+def _what_was_done(calibration: xr.Dataset) -> str:
+    facts = calibration.attrs
+    words = f"driftwalk compared the recording {facts.get('recording_name', '')}".rstrip()
+    duration, pairs = (value_of(calibration, name) for name in ("duration_s", "recording_pairs"))
+    if duration is not None and pairs is not None:
+        step = value_of(calibration, "step_interval_s")
+        each = "" if step is None else f" of {quantity(step, 's')}"
+        words += f" ({quantity(duration, 's')}, {count(int(pairs), 'pair')} of steps{each})"
+    settings = calibration["ks_distance"].size
+    words += f" with simulations of {settings} settings of drag and stochastic force"
+    if "replicate" in calibration.sizes:
+        words += f", {count(calibration.sizes['replicate'], 'run')} each"
+    if "refined_ks_distance" in calibration:
+        words += f", then of {calibration['refined_ks_distance'].size} around the best"
+    measure = "the Kolmogorov–Smirnov distance D of step lengths and turning angles"
+    return f"{words}. The measure is {measure}."
+
+
+def _what_was_found(calibration: xr.Dataset) -> str:
+    confidence = value_of(calibration, "confidence")
+    drag, force = (
+        with_interval(
+            required(calibration, name),
+            interval_of(calibration, f"{name}_interval"),
+            unit,
+            confidence,
+        )
+        for name, unit in (("drag_coefficient", "1"), ("force_std_N", "N"))
+    )
+    every = quantity(required(calibration, "force_interval_s"), "s")
+    intensity = quantity(required(calibration, "force_noise_intensity_N2_s"), "N² s")
+    return (
+        f"The best agreement is at a drag coefficient C_d = {drag} and a stochastic force "
+        f"σ_F = {force}, drawn anew every {every}. What the recording can tell is σ_F²·τ = "
+        f"{intensity}: σ_F means nothing "
+        "without its interval."
+    )
+
+
+def _how_good(calibration: xr.Dataset) -> list[str]:
+    """Return what the distance means, in honest words."""
+    distance, floor = (value_of(calibration, name) for name in ("ks_distance", "noise_floor"))
+    if distance is None or floor is None:
+        return []
+    ratio = distance / floor
+    far = ratio >= (value_of(calibration, "far_above_floor") or FAR)
+    verdict = (
+        "far above what chance alone gives: the model does not explain this motion"
+        if far
+        else "near what chance alone gives; a small distance is no proof that the model is right"
+    )
+    words = (
+        f"There D = {distance:.4g}, where two runs of one and the same model are {floor:.4g} apart "
+        f"(noise floor): {ratio:.2f} times it, {verdict}."
+    )
+    second, second_floor = (
+        value_of(calibration, f"second_half_{name}") for name in ("ks_distance", "noise_floor")
+    )
+    if second is None or second_floor is None:
+        return [words]
+    return [
+        words,
+        f"Calibrated on the first half, it is {second:.4g} from the second (noise floor "
+        f"{second_floor:.4g}). In that are the errors of the parameters and the flow of half a "
+        "recording too: some floors are no surprise where it is short.",
+    ]
+
+
+def _profile(calibration: xr.Dataset, along: str) -> Section:
+    other = next(name for name in PLANE if name != along)
+    best = float(required(calibration, _ATTRIBUTE[other]))
+    nearest = int(np.argmin(np.abs(calibration[other].values - best)))
+    line = calibration.isel({other: nearest})
+    marks = [
+        mark(
+            "optimum",
+            value_of(calibration, _ATTRIBUTE[along]),
+            value_of(calibration, "ks_distance"),
+        )
+    ]
+    floor = value_of(calibration, "noise_floor")
+    if floor is not None:
+        marks.append(mark("noise floor", y=floor))
+    drag = along == "drag_coefficient"
+    at = float(line[other])
+    fixed = f"σ_F = {quantity(at, 'N')}" if drag else f"C_d = {quantity(at)}"
+    return chart(
+        f"profile-{along.replace('_', '-')}",
+        f"Distance along the {'drag coefficient' if drag else 'stochastic force'}",
+        f"At {fixed}, the setting of the map next to the optimum.",
+        x=drag_axis(calibration) if drag else force_axis(calibration),
+        y=label("KS distance D", log=True),
+        series=_profile_series(line, along),
+        marks=marks,
+    )
+
+
+def _profile_series(line: xr.Dataset, along: str) -> list[dict[str, Any]]:
+    """Return the replicates as points and their mean as a line with its standard error."""
+    values, distance = line[along].values, line["ks_distance"].values
+    drawn = []
+    if "ks_distance_replicate" in line:
+        replicates = line["ks_distance_replicate"].transpose(along, ...).values
+        each = np.repeat(values, replicates.shape[1])
+        drawn.append(series("replicates", each, replicates.ravel(), style="points"))
+    ends = None
+    if "ks_distance_standard_error" in line:
+        error = line["ks_distance_standard_error"].values
+        ends = (distance - error, distance + error)
+    return [*drawn, series("mean ± standard error", values, distance, ends=ends)]
+
+
+def _noise(calibration: xr.Dataset) -> Noise | None:
+    value = value_of(calibration, "position_noise_m")
+    if value is None:
+        return None
+    return Noise(value, None, None, "what the simulated camera was given")
+
+
+def _one_body(recording: xr.Dataset | None, body: str | None) -> xr.Dataset | None:
+    """Return the recording with the one body that was used, None when that is not said."""
+    if recording is None:
+        return None
+    if body is not None and body in [str(name) for name in recording["body"].values]:
+        return recording.sel(body=[body])
+    return recording if recording.sizes["body"] == 1 else None

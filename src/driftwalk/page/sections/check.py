@@ -1,0 +1,204 @@
+"""The part of a page on a model check: what speaks against the model, where and when."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.page.arrays import encode_array, number
+from driftwalk.page.chart import chart, label, mark, series
+from driftwalk.page.parts import (
+    Section,
+    arena_part,
+    attempt,
+    axis,
+    empty_section,
+    require,
+    section,
+    value_of,
+)
+from driftwalk.page.words import percent
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Floats = npt.NDArray[np.float64]
+
+BAND_STDS: Final = 1.96
+"""95 % of a normal."""
+LEAST_TOP: Final = 4.0
+"""Least upper end of the colours of a residual map [sd], so that chance looks pale."""
+
+
+def check_sections(check: xr.Dataset) -> list[Section]:
+    """Return the sections on a model check.
+
+    Parameters
+    ----------
+    check : xarray.Dataset
+        A `model_check`.
+    """
+    makers: tuple[tuple[str, str, Callable[[xr.Dataset], Section]], ...] = (
+        ("check", "Does the model explain it?", _criteria),
+        ("check-innovations", "Are the errors of prediction white?", _innovations),
+        ("check-place", "Errors of prediction in the tank", _mean_errors),
+        ("check-noise", "Size of the errors in the tank", _noise_ratio),
+        ("check-flow-time", "Strength of the flow over time", _flow_over_time),
+        ("check-noise-time", "Size of the errors over time", _noise_over_time),
+        ("check-drag-speed", "Drag at different speeds", _drag_by_speed),
+        ("check-step-length", "Step lengths, recorded and predicted", _step_lengths),
+        ("check-turning-angle", "Turning angles, recorded and predicted", _turning_angles),
+    )
+    made: list[Section] = []
+    for id, title, make in makers:
+        parts = attempt(id, title, lambda make=make: make(check))  # type: ignore[misc]
+        made += [{**part, "id": id, "title": title} for part in parts]
+    return made
+
+
+def _criteria(check: xr.Dataset) -> Section:
+    require(check, "criterion", "p_value", "failed")
+    rows = [
+        [str(name).replace("_", " "), number(p), "finding" if failed else ""]
+        for name, p, failed in zip(
+            check["criterion"].values, check["p_value"].values, check["failed"].values, strict=True
+        )
+    ]
+    level = value_of(check, "level")
+    note = None if level is None else f"A p value below {level:.3g} is a finding."
+    return section("", "table", "", note, columns=["criterion", "p value", ""], rows=rows)
+
+
+def _innovations(check: xr.Dataset) -> Section:
+    require(check, "lag", "autocorrelation", "autocorrelation_expected", "autocorrelation_std")
+    lag = check["lag"].values
+    expected = check["autocorrelation_expected"].values.mean(axis=0)
+    reach = BAND_STDS * check["autocorrelation_std"].values.mean(axis=0)
+    band = (expected - reach, expected + reach)
+    drawn = [series("95 % if the model is right", lag, expected, ends=band)]
+    for name, values in zip(
+        check["component"].values, check["autocorrelation"].values, strict=True
+    ):
+        shown = "θ" if name == "theta" else name
+        drawn.append(series(f"error in {shown}", lag, values, style="points"))
+    return chart(
+        "", "", "Errors of a right model have no memory.",
+        x=label("lag (samples)"), y=label("autocorrelation"), series=drawn,
+    )  # fmt: skip
+
+
+def _mean_errors(check: xr.Dataset) -> Section:
+    require(check, "residual_distance", "x", "y")
+    distance = check["residual_distance"].values
+    top = max(LEAST_TOP, float(np.nanmax(distance, initial=0.0)))
+    limit = number(check["residual_distance"].attrs.get("limit"))
+    beyond = "" if limit is None else f" Chance alone stays below {limit:.2g} in all cells."
+    return _field(
+        check, distance, f"Distance of the mean error from zero.{beyond}",
+        words="distance from zero (standard deviations)", diverging=False, limits=[0.0, top],
+    )  # fmt: skip
+
+
+def _noise_ratio(check: xr.Dataset) -> Section:
+    require(check, "noise_ratio", "noise_ratio_std", "x", "y")
+    off = (check["noise_ratio"].values - 1.0) / check["noise_ratio_std"].values
+    top = max(LEAST_TOP, float(np.nanmax(np.abs(off), initial=0.0)))
+    return _field(
+        check, off, "Mean square of the errors against that of all cells.",
+        words="off the mean (standard deviations)", diverging=True, limits=[-top, top],
+    )  # fmt: skip
+
+
+def _field(
+    check: xr.Dataset,
+    values: Floats,
+    note: str,
+    *,
+    words: str,
+    diverging: bool,
+    limits: list[float],
+) -> Section:
+    return section(
+        "", "image_grid", "", note,
+        arena=arena_part(check),
+        x=axis("x", "x", "m", check["x"].values),
+        y=axis("y", "y", "m", check["y"].values),
+        value=encode_array(values), label=words, unit="1", diverging=diverging, limits=limits,
+    )  # fmt: skip
+
+
+def _flow_over_time(check: xr.Dataset) -> Section:
+    return _over_time(check, "flow_change", 0.0, "strength of the flow, relative to its mean")
+
+
+def _noise_over_time(check: xr.Dataset) -> Section:
+    return _over_time(check, "part_noise_ratio", 1.0, "squared errors, relative to their mean")
+
+
+def _over_time(check: xr.Dataset, name: str, shift: float, words: str) -> Section:
+    require(check, name, f"{name}_std", "part_start", "part_end", "part_recording")
+    start, end = running_time(check)
+    value = check[name].values - shift
+    reach = BAND_STDS * check[f"{name}_std"].values
+    return chart(
+        "", "", "Tenths of the recording, with 95 % bars; 0 if nothing changes.",
+        x=label("time", "s"), y=label(words),
+        series=[_with_bars("tenths", 0.5 * (start + end), value, reach)],
+        marks=[mark("no change", y=0.0)],
+    )  # fmt: skip
+
+
+def _with_bars(name: str, x: Floats, value: Floats, reach: Floats) -> dict[str, Any]:
+    return series(name, x, value, ends=(value - reach, value + reach), style="points")
+
+
+def running_time(check: xr.Dataset) -> tuple[Floats, Floats]:
+    """Return start and end of the parts [s], recordings one after the other."""
+    recording = check["part_recording"].values.astype(int)
+    start, end = check["part_start"].values, check["part_end"].values
+    lengths = [float(end[recording == k].max(initial=0.0)) for k in range(int(recording.max()) + 1)]
+    before = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])[recording]
+    return start + before, end + before
+
+
+def _drag_by_speed(check: xr.Dataset) -> Section:
+    require(check, "drag_change", "drag_change_std", "speed_low", "speed_high")
+    value = check["drag_change"].values
+    reach = BAND_STDS * check["drag_change_std"].values
+    middle = 0.5 * (check["speed_low"].values + check["speed_high"].values)
+    return chart(
+        "", "", "A right drag law has the same C_d at all speeds; 95 % bars.",
+        x=label("speed through the water", "m/s"), y=label("C_d, relative to that of all"),
+        series=[_with_bars("ranges of speed", middle, value, reach)],
+        marks=[mark("no change", y=0.0)],
+    )  # fmt: skip
+
+
+def _step_lengths(check: xr.Dataset) -> Section:
+    return _density(check, "step_length", label("step length", "m"), "1/m")
+
+
+def _turning_angles(check: xr.Dataset) -> Section:
+    return _density(check, "turning_angle", label("turning angle", "rad"), "1/rad")
+
+
+def _density(check: xr.Dataset, name: str, along: dict[str, Any], unit: str) -> Section:
+    if f"{name}_edge" not in check:
+        reason = f"No recordings were simulated: {check.attrs.get('ks_left_out', 'left out')}."
+        return empty_section("", "", reason)
+    parts = ("recording", "median", "low", "high")
+    require(check, *(f"{name}_density_{part}" for part in parts))
+    edge = check[f"{name}_edge"].values
+    real, median, low, high = (check[f"{name}_density_{part}"].values for part in parts)
+    band = value_of(check, "band")
+    share = "" if band is None else f" and band of {percent(band)}"
+    return chart(
+        "", "", None, x=along, y=label("density", unit),
+        series=[
+            series(f"simulated: median{share}", edge, median, ends=(low, high), style="step"),
+            series("recording", edge, real, style="step"),
+        ],
+    )  # fmt: skip

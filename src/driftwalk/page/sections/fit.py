@@ -1,0 +1,180 @@
+"""A page on a likelihood fit: flow, drag, force and noise with their errors, and the check."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from driftwalk.page.parts import (
+    SIMULATED,
+    Section,
+    empty_head,
+    empty_section,
+    estimate,
+    figure,
+    head_sections,
+    is_simulated,
+    required,
+    section,
+    texts_of,
+    value_of,
+)
+from driftwalk.page.sections.check import check_sections
+from driftwalk.page.sections.flow import flow_sections
+from driftwalk.page.sections.recording import Noise, recording_sections
+from driftwalk.page.words import count, percent, quantity, with_interval
+from driftwalk.plot.parts.labels import interval_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def fit_sections(
+    fit: xr.Dataset | None,
+    *,
+    recordings: Sequence[xr.Dataset] = (),
+    check: xr.Dataset | None = None,
+    body: str | None = None,
+) -> list[Section]:
+    """Return the sections of a page on a likelihood fit.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset, optional
+        A `fit`; None while there is none yet.
+    recordings : sequence of xarray.Dataset
+        The `trajectory` datasets that were fitted.
+    check : xarray.Dataset, optional
+        Its `model_check`.
+    body : str, optional
+        The body that was used, where the recordings have several.
+
+    Returns
+    -------
+    list of dict
+        Sections; what cannot be shown is an empty one that says why.
+
+    Examples
+    --------
+    >>> [part["kind"] for part in fit_sections(None)]
+    ['empty']
+    """
+    noise = None
+    if fit is None:
+        made = empty_head("There is no fit yet.")
+    else:
+        made = head_sections(lambda: fit_summary(fit, check), lambda: _warnings(fit, check))
+        noise = _noise(fit)
+    for number_of, recording in enumerate(recordings, start=1):
+        parts = recording_sections(recording, body=body, noise=noise)
+        if len(recordings) > 1:
+            for part in parts:
+                part["id"] = f"{part['id']}-of-{number_of}"
+                part["title"] += f" ({number_of} of {len(recordings)})"
+        made += parts
+    if fit is not None:
+        made += flow_sections(fit)
+        if check is None:
+            why = fit.attrs.get("check_left_out")
+            reason = f"{why}." if why else "The model was not checked against the recording."
+            made.append(empty_section("check", "Does the model explain it?", reason))
+    if check is not None:
+        made += check_sections(check)
+    return made
+
+
+def fit_summary(fit: xr.Dataset, check: xr.Dataset | None = None) -> Section:
+    """Return the answer of a fit in words and numbers."""
+    every = quantity(required(fit, "force_interval_s"), "s")
+    paragraphs = [SIMULATED] if is_simulated(fit) else []
+    paragraphs += [_what_was_done(fit), _what_was_found(fit)]
+    paragraphs += [] if check is None else [_verdict(check)]
+    shown = [
+        estimate(fit, "drag_coefficient", label="drag coefficient", symbol="C_d", unit="1"),
+        estimate(
+            fit, "force_std_N", label="stochastic force", symbol="σ_F", unit="N",
+            note=f"drawn anew every {every}",
+        ),
+        estimate(
+            fit, "force_noise_intensity_N2_s", label="noise intensity", symbol="σ_F²·τ",
+            unit="N²·s",
+        ),
+        estimate(fit, "tracking_noise_m", label="tracking noise", symbol="", unit="m"),
+        figure("mean squared error of prediction", fit.attrs.get("chi_squared_per_dof"),
+               note="1 if the model is right"),
+    ]  # fmt: skip
+    return section(
+        "summary", "summary", "What was done and found", paragraphs=paragraphs, numbers=shown
+    )
+
+
+def _what_was_done(fit: xr.Dataset) -> str:
+    facts = fit.attrs
+    source = facts.get("source", "the recording")
+    words = f"driftwalk fitted flow, drag, stochastic force and tracking noise together to {source}"
+    samples, used = (value_of(fit, name) for name in ("samples", "samples_used"))
+    parts = []
+    recordings = value_of(fit, "recordings")
+    if recordings is not None and recordings > 1:
+        parts.append(count(int(recordings), "recording"))
+    duration = value_of(fit, "duration_s")
+    if duration is not None:
+        parts.append(quantity(duration, "s"))
+    if samples is not None and used is not None:
+        parts.append(f"{int(used)} of {int(samples)} samples used")
+    wall = value_of(fit, "wall_share")
+    if wall is not None:
+        parts.append(f"{percent(wall)} of the intervals at the wall, left out")
+    words += f" ({'; '.join(parts)})" if parts else ""
+    visited = value_of(fit, "visited_share")
+    seen = "" if visited is None else f" The block has been over {percent(visited)} of the tank."
+    return (
+        f"{words}. A filter predicts each position from the earlier ones; the parameters are those "
+        f"that make its errors likely.{seen}"
+    )
+
+
+def _what_was_found(fit: xr.Dataset) -> str:
+    confidence = value_of(fit, "confidence")
+    drag, force, noise = (
+        with_interval(required(fit, name), interval_of(fit, f"{name}_interval"), unit, confidence)
+        for name, unit in (
+            ("drag_coefficient", "1"),
+            ("force_std_N", "N"),
+            ("tracking_noise_m", "m"),
+        )
+    )
+    every = quantity(required(fit, "force_interval_s"), "s")
+    return (
+        f"The drag coefficient is C_d = {drag}, the stochastic force σ_F = {force}, drawn anew "
+        f"every {every}, the tracking noise {noise}. The intervals hold if the drag law is right."
+    )
+
+
+def _verdict(check: xr.Dataset) -> str:
+    explained = str(required(check, "explained")) == "yes"
+    words = (
+        "The check found nothing that speaks against the model; it finds many faults, not all."
+        if explained
+        else "THE MODEL DOES NOT EXPLAIN THIS RECORDING: see the warnings."
+    )
+    distance, floor = (value_of(check, name) for name in ("ks_distance", "ks_noise_floor"))
+    if distance is None or floor is None:
+        return f"{words} There is no KS distance: {check.attrs.get('ks_left_out', 'left out')}."
+    return (
+        f"{words} Recordings simulated with these parameters have a KS distance of {distance:.3g} "
+        f"to the real one, and of {floor:.3g} among themselves (noise floor)."
+    )
+
+
+def _warnings(fit: xr.Dataset, check: xr.Dataset | None) -> list[str]:
+    findings = [] if check is None else texts_of(check, "findings")
+    return [*texts_of(fit, "warnings"), *(f"model check: {text}" for text in findings)]
+
+
+def _noise(fit: xr.Dataset) -> Noise | None:
+    value = value_of(fit, "tracking_noise_m")
+    if value is None:
+        return None
+    low, high = interval_of(fit, "tracking_noise_m_interval") or (None, None)
+    return Noise(value, low, high, "estimated by the fit")

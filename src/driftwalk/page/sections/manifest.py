@@ -1,0 +1,108 @@
+"""The part of a page on where it comes from: the manifest, the command, and how to cite."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import PurePath
+from typing import Any, Final
+
+from driftwalk.page.parts import Section, plain_json, section
+
+PAPER_TITLE: Final = "A trajectory-based calibration method for stochastic motion models"
+PAPER_AUTHORS: Final = (
+    ("Di Mario", "Ezequiel"),
+    ("Mermoud", "Grégory"),
+    ("Mastrangeli", "Massimo"),
+    ("Martinoli", "Alcherio"),
+)
+"""Family and given names."""
+PAPER_VENUE: Final = "IEEE/RSJ International Conference on Intelligent Robots and Systems (IROS)"
+PAPER_YEAR: Final = 2011
+"""The paper whose method driftwalk implements, as in CITATION.cff."""
+PROGRAM: Final = "The driftwalk developers"
+TITLE: Final = (
+    "driftwalk: calibrated stochastic motion models of floating, drifting and stirred robots"
+)
+
+
+def manifest_section(manifest: Mapping[str, Any]) -> Section:
+    """Return the section on how results were made, and how to cite them.
+
+    Parameters
+    ----------
+    manifest : mapping
+        The manifest of a run, or as much of it as there is.
+
+    Returns
+    -------
+    dict
+        A section of kind "manifest". The study stands in it once.
+
+    Examples
+    --------
+    >>> manifest_section({"command": "driftwalk demo"})["command"]
+    'driftwalk demo'
+    """
+    specification = manifest.get("specification")
+    entries = {key: value for key, value in manifest.items() if key != "command"}
+    if isinstance(specification, Mapping):
+        same = specification.get("study") == manifest.get("study")
+        entries["specification"] = {
+            key: value for key, value in specification.items() if not (key == "study" and same)
+        }
+    version = _version(manifest)
+    return section(
+        "manifest", "manifest", "How this was made",
+        "The command makes the same numbers again from the same inputs.",
+        command=str(manifest.get("command", "")),
+        entries=plain_json(entries),
+        inputs=_inputs(manifest),
+        cite=citation(version),
+        bibtex=bibtex(version),
+    )  # fmt: skip
+
+
+def citation(version: str) -> str:
+    """Return how to cite driftwalk and the paper, as a sentence."""
+    names = [f"{given} {family}" for family, given in PAPER_AUTHORS]
+    authors = f"{', '.join(names[:-1])} and {names[-1]}"
+    return (
+        f"{PROGRAM}, {TITLE}, version {version}; and the paper whose method it implements: "
+        f"{authors}, {PAPER_TITLE}, {PAPER_VENUE}, {PAPER_YEAR}."
+    )
+
+
+def bibtex(version: str) -> str:
+    """Return how to cite driftwalk and the paper, for BibTeX."""
+    authors = " and ".join(f"{family}, {given}" for family, given in PAPER_AUTHORS)
+    return (
+        f"@software{{driftwalk,\n  author = {{{{{PROGRAM}}}}},\n  title = {{{{{TITLE}}}}},\n"
+        f"  version = {{{version}}}\n}}\n\n"
+        f"@inproceedings{{dimario2011trajectory,\n  author = {{{authors}}},\n"
+        f"  title = {{{{{PAPER_TITLE}}}}},\n  booktitle = {{{PAPER_VENUE}}},\n"
+        f"  year = {{{PAPER_YEAR}}}\n}}\n"
+    )
+
+
+def _version(manifest: Mapping[str, Any]) -> str:
+    """Return the version that made the results, that of this program when it is not said."""
+    from driftwalk import __version__
+
+    software = manifest.get("software")
+    found = software.get("driftwalk") if isinstance(software, Mapping) else None
+    return str(found or __version__)
+
+
+def _inputs(manifest: Mapping[str, Any]) -> list[dict[str, str]]:
+    inputs = manifest.get("inputs")
+    if not isinstance(inputs, Mapping):
+        return []
+    return [
+        {
+            "role": str(role),
+            "name": PurePath(str(facts.get("path", ""))).name,
+            "sha256": str(facts.get("sha256", "")),
+        }
+        for role, facts in inputs.items()
+        if isinstance(facts, Mapping)
+    ]

@@ -1,0 +1,241 @@
+"""The part of a page on the map of KS distances: values, causes, what a click on a cell shows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.page.arrays import encode_array, nice_step, numbers, plain_list
+from driftwalk.page.parts import Section, arena_part, axis, require, section, value_of
+from driftwalk.page.words import percent, quantity
+from driftwalk.plot.distances import CAUSES, UNKNOWN_CAUSE
+from driftwalk.plot.parts.labels import force_interval_text
+from driftwalk.schema import body_track
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Floats = npt.NDArray[np.float64]
+
+PLANE: Final = ("drag_coefficient", "force_std")
+"""Rows and columns of every map of a calibration."""
+NOT_COMPUTED: Final = 8
+"""Status of a setting without a distance and without a cause."""
+EXCERPT_PARTS: Final = 5000
+"""Extent of the excerpts in steps of their resolution, at least."""
+DENSITY_PARTS: Final = 2000
+"""The largest share of all bins in steps of their resolution, at least."""
+
+
+def map_section(calibration: xr.Dataset, recording: xr.Dataset | None = None) -> Section:
+    """Return the section on the map of KS distances, with all that a click on a cell needs.
+
+    Parameters
+    ----------
+    calibration : xarray.Dataset
+        A `calibration`; one without excerpts or densities gives a map without them.
+    recording : xarray.Dataset, optional
+        The `trajectory` of one body that it was made from, for an excerpt beside the simulated
+        ones, and for the outline of the tank.
+
+    Returns
+    -------
+    dict
+        A section of kind "map": x is the stochastic force, y the drag coefficient.
+
+    Raises
+    ------
+    InputError
+        When the dataset holds no map.
+
+    Examples
+    --------
+    ``map_section(calibration, recording)["value"]``
+    """
+    require(calibration, "ks_distance", *PLANE)
+    distance = _plane(calibration, "ks_distance")
+    status, causes = _status(calibration, distance)
+    cells = _cells(calibration)
+    return section(
+        "map", "map", "How well each setting explains the recording", _note(calibration, cells),
+        x=force_axis(calibration),
+        y=drag_axis(calibration),
+        value=encode_array(distance, dtype="f8"),
+        standard_error=encode_array(_plane(calibration, "ks_distance_standard_error"))
+        if "ks_distance_standard_error" in calibration
+        else None,
+        status=encode_array(status, dtype="i2"),
+        statuses=causes,
+        best=_lowest(calibration, distance, status),
+        found=_found(calibration),
+        noise_floor=value_of(calibration, "noise_floor"),
+        noise_floor_upper=value_of(calibration, "noise_floor_upper"),
+        region=region_part(calibration),
+        refined=_refined(calibration),
+        cells=cells,
+        recording=_recording(calibration, recording),
+        arena=None if recording is None else arena_part(recording),
+    )  # fmt: skip
+
+
+def force_axis(dataset: xr.Dataset, name: str = "force_std") -> dict[str, Any]:
+    """Return the axis of the stochastic force, which means nothing without its interval."""
+    every = ""
+    if "force_interval_s" in dataset.attrs:
+        every = f", {force_interval_text(dataset)}"
+    return axis("force_std", f"stochastic force σ_F{every}", "N", dataset[name].values)
+
+
+def drag_axis(dataset: xr.Dataset, name: str = "drag_coefficient") -> dict[str, Any]:
+    """Return the axis of the drag coefficient."""
+    return axis("drag_coefficient", "drag coefficient C_d", "1", dataset[name].values)
+
+
+def region_part(calibration: xr.Dataset) -> dict[str, Any] | None:
+    """Return the border of the joint region, None when there is none."""
+    names = ("region_force_std", "region_drag_coefficient")
+    if not _has(calibration, *names):
+        return None
+    x, y = (calibration[name].values for name in names)
+    known = np.isfinite(x) & np.isfinite(y)
+    if known.sum() < 3:
+        return None
+    return {
+        "x": plain_list(x[known]),
+        "y": plain_list(y[known]),
+        "confidence": value_of(calibration, "confidence"),
+    }
+
+
+def _has(calibration: xr.Dataset, *names: str) -> bool:
+    return all(name in calibration.variables for name in names)
+
+
+def _plane(calibration: xr.Dataset, name: str, prefix: str = "") -> Floats:
+    rows = [f"{prefix}{dim}" for dim in PLANE]
+    return np.asarray(calibration[name].transpose(*rows, ...).values, dtype=np.float64)
+
+
+def _status(
+    calibration: xr.Dataset, distance: Floats
+) -> tuple[npt.NDArray[np.int64], dict[str, str]]:
+    """Return the reason of every cell, 0 where it is sound, and what the reasons mean."""
+    status = np.zeros(distance.shape, dtype=np.int64)
+    if "status" in calibration:
+        status = np.nan_to_num(_plane(calibration, "status")).astype(np.int64)
+    status[(status == 0) & ~np.isfinite(distance)] = NOT_COMPUTED
+    return status, {str(code): _cause(int(code)) for code in np.unique(status) if code}
+
+
+def _cause(status: int) -> str:
+    words = [words for bit, (words, _) in CAUSES.items() if status & bit]
+    return ", ".join(words) or UNKNOWN_CAUSE[0]
+
+
+def _lowest(
+    calibration: xr.Dataset, distance: Floats, status: npt.NDArray[np.int64]
+) -> dict[str, float] | None:
+    """Return the lowest cell of the map."""
+    sound = np.where(status == 0, distance, np.nan)
+    if not np.isfinite(sound).any():
+        return None
+    row, column = np.unravel_index(int(np.nanargmin(sound)), sound.shape)
+    return {
+        "x": float(calibration["force_std"].values[column]),
+        "y": float(calibration["drag_coefficient"].values[row]),
+        "value": float(sound[row, column]),
+    }
+
+
+def _found(calibration: xr.Dataset) -> dict[str, Any] | None:
+    x, y = (value_of(calibration, name) for name in ("force_std_N", "drag_coefficient"))
+    return None if x is None or y is None else {"x": x, "y": y}
+
+
+def _refined(calibration: xr.Dataset) -> dict[str, Any] | None:
+    if not _has(calibration, "refined_ks_distance", *(f"refined_{name}" for name in PLANE)):
+        return None
+    return {
+        "x": plain_list(calibration["refined_force_std"].values),
+        "y": plain_list(calibration["refined_drag_coefficient"].values),
+        "value": encode_array(_plane(calibration, "refined_ks_distance", "refined_")),
+    }
+
+
+def _cells(calibration: xr.Dataset) -> dict[str, Any] | None:
+    """Return what is kept of every setting, None where nothing is."""
+    kept: dict[str, Any] = dict.fromkeys(
+        ("excerpt_time", "excerpt_x", "excerpt_y", "density", "ks_step_length", "ks_turning_angle")
+    )
+    if _has(calibration, "excerpt_x", "excerpt_y", "excerpt_time"):
+        x, y = (_plane(calibration, f"excerpt_{name}") for name in "xy")
+        step = _excerpt_step(x, y)
+        kept["excerpt_x"] = encode_array(x, dtype="i2", resolution=step, delta=True)
+        kept["excerpt_y"] = encode_array(y, dtype="i2", resolution=step, delta=True)
+        kept["excerpt_time"] = plain_list(calibration["excerpt_time"].values)
+    if "step_density" in calibration:
+        density = _plane(calibration, "step_density")
+        kept["density"] = encode_array(
+            density, dtype="i2", resolution=nice_step(float(np.nanmax(density)), DENSITY_PARTS)
+        )
+    for name in ("ks_step_length", "ks_turning_angle"):
+        if name in calibration:
+            kept[name] = encode_array(_typical(calibration, name))
+    return kept if any(value is not None for value in kept.values()) else None
+
+
+def _excerpt_step(x: Floats, y: Floats) -> float:
+    extents = [float(np.nanmax(v) - np.nanmin(v)) for v in (x, y) if np.isfinite(v).any()]
+    return nice_step(max(extents, default=0.0), EXCERPT_PARTS)
+
+
+def _typical(calibration: xr.Dataset, name: str) -> Floats:
+    """Return a variable of the replicate whose distance is nearest to the mean of its setting."""
+    values = _plane(calibration, name)
+    if values.ndim == 2:
+        return values
+    if "ks_distance_replicate" not in calibration:
+        return values[..., 0]
+    distance = _plane(calibration, "ks_distance_replicate")
+    away = np.abs(distance - _plane(calibration, "ks_distance")[..., None])
+    nearest = np.argmin(np.where(np.isfinite(away), away, np.inf), axis=2)
+    return np.take_along_axis(values, nearest[..., None], axis=2)[..., 0]
+
+
+def _recording(calibration: xr.Dataset, recording: xr.Dataset | None) -> dict[str, Any] | None:
+    """Return what stands beside a cell: the recording's density and its first seconds."""
+    if not _has(calibration, "recording_step_density", "step_length_edge", "turning_angle_edge"):
+        return None
+    part: dict[str, Any] = {
+        "density": encode_array(calibration["recording_step_density"].values),
+        "step_length_edges": plain_list(calibration["step_length_edge"].values),
+        "turning_angle_edges": plain_list(calibration["turning_angle_edge"].values),
+        "excerpt_x": None,
+        "excerpt_y": None,
+    }
+    if recording is not None and "excerpt_time" in calibration:
+        track = body_track(recording)
+        until = track.time[0] + float(calibration["excerpt_time"].values.max())
+        beginning = track.time <= until + 1e-9
+        part["excerpt_x"] = numbers(track.x[beginning])
+        part["excerpt_y"] = numbers(track.y[beginning])
+    return part
+
+
+def _note(calibration: xr.Dataset, cells: dict[str, Any] | None) -> str:
+    words = [
+        "D is the KS distance between the steps of the recording and those of a simulation with "
+        "these parameters; 1 − D is shown."
+    ]
+    floor = value_of(calibration, "noise_floor")
+    if floor is not None:
+        words.append(f"Two runs of one and the same model are {floor:.3g} apart (noise floor).")
+    region = region_part(calibration)
+    if region is not None and region["confidence"] is not None:
+        words.append(f"The line encloses the joint {percent(region['confidence'])} region.")
+    if cells is not None and cells["excerpt_x"] is not None:
+        step = quantity(cells["excerpt_x"]["scale"], "m")
+        words.append(f"A click shows what is kept of a setting (positions to {step}).")
+    return " ".join(words)

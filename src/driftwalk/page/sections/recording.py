@@ -1,0 +1,275 @@
+"""The part of a page on a recording: where the block was, how fast, gaps and noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+from driftwalk.page.arrays import encode_array, nice_step, number, plain_list
+from driftwalk.page.parts import (
+    SIMULATED,
+    Section,
+    arena_part,
+    attempt,
+    figure,
+    is_simulated,
+    section,
+)
+from driftwalk.page.words import count, percent, quantity
+from driftwalk.plot.path import GAP_INTERVALS
+from driftwalk.schema import Track, body_names, body_track, check_trajectory
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Floats = npt.NDArray[np.float64]
+
+MOST_SAMPLES: Final = 20_000
+MOST_GAPS: Final = 1000
+"""Gaps that a page lists, the longest ones."""
+MOST_BODIES: Final = 8
+SPEED_BINS: Final = 40
+FAR_SPEED: Final = 2.0
+"""How many times the 99th percentile a speed may be and still be in the histogram."""
+POSITION_PARTS: Final = 20_000
+"""The extent of a path in steps of its resolution, at least."""
+ANGLE_STEP: Final = 1e-3
+TIME_STEP: Final = 1e-4
+
+
+class Noise(NamedTuple):
+    """What is known of the noise of the tracking."""
+
+    position: float
+    """[m]"""
+    low: float | None
+    high: float | None
+    source: str
+    """Who says so, such as "estimated by the fit"."""
+
+
+def recording_sections(
+    trajectory: xr.Dataset,
+    *,
+    body: str | None = None,
+    noise: Noise | Mapping[str, Noise | None] | None = None,
+) -> list[Section]:
+    """Return a section for each body of a recording, or for the one that was used.
+
+    Parameters
+    ----------
+    trajectory : xarray.Dataset
+        A `trajectory`.
+    body : str, optional
+        The body that was used; all, at most 8, without it.
+    noise : Noise or mapping, optional
+        The noise of its tracking where one body is shown, or that of each body by its name.
+    """
+    names = body_names(check_trajectory(trajectory))
+    chosen = names[:MOST_BODIES] if body is None else [body]
+    noises = _by_body(noise, chosen)
+    made: list[Section] = []
+    for number_of, name in enumerate(chosen, start=1):
+        made += attempt(
+            f"recording-{number_of}",
+            "The recording" if len(names) == 1 else f"The recording, body {name}",
+            lambda name=name, number_of=number_of: trajectory_section(  # type: ignore[misc]
+                trajectory,
+                body=name,
+                noise=noises.get(name),
+                id=f"recording-{number_of}",
+            ),
+        )
+    if body is None and len(names) > MOST_BODIES:
+        made[-1]["note"] = f"{made[-1]['note'] or ''} {len(names) - MOST_BODIES} more bodies."
+    return made
+
+
+def trajectory_section(
+    trajectory: xr.Dataset,
+    *,
+    body: str | None = None,
+    noise: Noise | None = None,
+    id: str = "recording-1",
+) -> Section:
+    """Return the section on one body of a recording: path, speeds, gaps and facts.
+
+    Parameters
+    ----------
+    trajectory : xarray.Dataset
+        A `trajectory`.
+    body : str, optional
+        Which body; may be left out when there is only one.
+    noise : Noise, optional
+        The noise of its tracking.
+    id : str
+        Name of the section in its page.
+
+    Returns
+    -------
+    dict
+        A section of kind "trajectory": at most some 20,000 samples, a sample of NaN in each gap.
+
+    Raises
+    ------
+    InputError
+        When there is no such body, or it has fewer than two positions.
+
+    Examples
+    --------
+    >>> from driftwalk.schema import build_trajectory
+    >>> moving = build_trajectory([0.0, 0.1, 0.2], [0.0, 0.01, 0.02], [0.0, 0.0, 0.0])
+    >>> trajectory_section(moving)["kind"]
+    'trajectory'
+    """
+    check_trajectory(trajectory)
+    track = body_track(trajectory, body)
+    if track.time.size < 2:
+        raise InputError(f"the recording has {count(track.time.size, 'position')}: nothing to show")
+    interval = np.diff(track.time)
+    gap = interval > GAP_INTERVALS * np.median(interval)
+    shown, every = _shown(track, interval, gap)
+    step = nice_step(max(float(np.ptp(track.x)), float(np.ptp(track.y))), POSITION_PARTS)
+    path: dict[str, Any] = {
+        "time": encode_array(shown.time, dtype="i4", resolution=TIME_STEP, delta=True),
+        "x": encode_array(shown.x, dtype="i2", resolution=step, delta=True),
+        "y": encode_array(shown.y, dtype="i2", resolution=step, delta=True),
+        "theta": encode_array(shown.theta, dtype="i2", resolution=ANGLE_STEP, delta=True)
+        if track.has_orientation
+        else None,
+    }
+    speed = np.hypot(np.diff(track.x), np.diff(track.y))[~gap] / interval[~gap]
+    notes = [SIMULATED] if is_simulated(trajectory) else []
+    if every > 1:
+        notes.append(f"One position in {every} is shown.")
+    notes.append(f"Positions are shown to {quantity(step, 'm')}.")
+    top = _top_speed(speed)
+    beyond = speed[speed > top]
+    if beyond.size:
+        notes.append(
+            f"{percent(beyond.size / speed.size)} of the speeds are beyond the histogram, up to "
+            f"{quantity(float(beyond.max()), 'm/s', digits=3)}."
+        )
+    names = body_names(trajectory)
+    title = "The recording" if len(names) == 1 else f"The recording, body {body}"
+    return section(
+        id, "trajectory", title, " ".join(notes),
+        arena=arena_part(trajectory),
+        **path,
+        gaps=_gaps(track, interval, gap),
+        speed=_speed_density(speed, top),
+        facts=[*_facts(track, interval, gap, speed, noise), *_ambiguity(trajectory, body)],
+    )  # fmt: skip
+
+
+def noise_of(described: Mapping[str, Any], body: str) -> Noise | None:
+    """Return the noise that a description of a recording states, None when it has none.
+
+    Parameters
+    ----------
+    described : mapping
+        What `driftwalk.describe` returns.
+    body : str
+        Name of the body.
+    """
+    facts = described.get("bodies", {}).get(body, {})
+    value = number(facts.get("position_noise_m"))
+    if value is None:
+        return None
+    error = number(facts.get("position_noise_standard_error_m"))
+    if error is None:
+        return Noise(value, None, None, "estimated from the recording")
+    if value == 0.0:
+        words = "standard error of an estimate of zero: too small for the recording to tell"
+        return Noise(error, None, None, words)
+    words = "estimated from the recording, ± standard error"
+    return Noise(value, max(value - error, 0.0), value + error, words)
+
+
+def _by_body(
+    noise: Noise | Mapping[str, Noise | None] | None, chosen: list[str]
+) -> Mapping[str, Noise | None]:
+    if isinstance(noise, Mapping):
+        return noise
+    # Of several bodies nobody knows which one's it is.
+    return {chosen[0]: noise} if len(chosen) == 1 else {}
+
+
+def _shown(track: Track, interval: Floats, gap: npt.NDArray[np.bool_]) -> tuple[Track, int]:
+    """Return what is shown of a track, broken by NaN at gaps, and every how manyth sample it is."""
+    size = track.time.size
+    ends = np.flatnonzero(gap)
+    longest = ends[np.argsort(-interval[ends], kind="stable")[:MOST_GAPS]]
+    room = max(MOST_SAMPLES - 3 * longest.size - 1, 1)
+    every = max(1, -(-size // room))
+    kept = np.unique(np.concatenate([np.arange(0, size, every), longest, longest + 1, [size - 1]]))
+    columns = [column[kept] for column in track]
+    after = np.searchsorted(kept, longest) + 1
+    middle = 0.5 * (track.time[longest] + track.time[longest + 1])
+    filled = [middle, *(np.full(longest.size, np.nan) for _ in columns[1:])]
+    time, x, y, theta = (
+        np.insert(column, after, values) for column, values in zip(columns, filled, strict=True)
+    )
+    return Track(time, x, y, theta), every
+
+
+def _gaps(track: Track, interval: Floats, gap: npt.NDArray[np.bool_]) -> list[list[float]]:
+    ends = np.flatnonzero(gap)
+    longest = np.sort(ends[np.argsort(-interval[ends], kind="stable")[:MOST_GAPS]])
+    return [[float(track.time[i]), float(track.time[i + 1])] for i in longest]
+
+
+def _top_speed(speed: Floats) -> float:
+    """Return where the histogram ends: a few jumps must not squeeze all else into one bin."""
+    top = float(speed.max(initial=0.0)) or 1.0
+    usual = FAR_SPEED * float(np.percentile(speed, 99.0)) if speed.size else top
+    return usual if 0.0 < usual < top else top
+
+
+def _speed_density(speed: Floats, top: float) -> dict[str, Any]:
+    """Return the density of all speeds, as far as it is shown."""
+    number_of, edges = np.histogram(speed, bins=SPEED_BINS, range=(0.0, top))
+    density = number_of / (max(speed.size, 1) * np.diff(edges))
+    return {"edges": plain_list(edges), "density": plain_list(density)}
+
+
+def _facts(
+    track: Track,
+    interval: Floats,
+    gap: npt.NDArray[np.bool_],
+    speed: Floats,
+    noise: Noise | None,
+) -> list[dict[str, Any]]:
+    usual = float(np.median(interval))
+    duration = float(track.time[-1] - track.time[0])
+    facts = [
+        figure("positions", track.time.size),
+        figure("duration", duration, "s"),
+        figure("rate", 1.0 / usual, "Hz"),
+        figure("gaps", int(gap.sum())),
+        figure("time in gaps", 100.0 * float((interval[gap] - usual).sum()) / duration, "%"),
+        figure("mean speed", speed.mean() if speed.size else None, "m/s"),
+        figure(
+            "99 % of speeds are below", np.percentile(speed, 99.0) if speed.size else None, "m/s"
+        ),
+    ]
+    if noise is not None:
+        facts.append(
+            figure("tracking noise", noise.position, "m", note=noise.source)
+            | {"low": noise.low, "high": noise.high}
+        )
+    return facts
+
+
+def _ambiguity(trajectory: xr.Dataset, body: str | None) -> list[dict[str, Any]]:
+    """Return the share of a tracked recording in which the body could be another one."""
+    if "ambiguous" not in trajectory:
+        return []
+    scores = trajectory["ambiguous"].transpose("time", "body").values
+    which = 0 if body is None else body_names(trajectory).index(body)
+    share = 100.0 * float((scores[:, which] > 0.0).mean())
+    return [figure("identity ambiguous", share, "%", note="share of the time")]

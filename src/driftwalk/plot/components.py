@@ -1,0 +1,298 @@
+"""The settings of a sweep on two principal components, with the classes as arrows (Fig. 10)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+from driftwalk.plot.parts.assembly_labels import check_kind, class_names
+from driftwalk.plot.parts.polyomino_sketch import (
+    LETTER_PT,
+    NAME_SIZE_PT,
+    axes_points,
+    class_cells,
+    name_text,
+    settle_layout,
+    sketch_box,
+    sketch_size,
+)
+from driftwalk.plot.parts.style import (
+    BLUE,
+    INK,
+    MUTED,
+    SCORE_COLORMAP,
+    STYLE,
+    add_colorbar,
+    axes_or_new,
+)
+from driftwalk.plot.sensitivity_maps import DISTANCE_COLORMAP, DISTANCE_LABEL
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+Array = npt.NDArray[np.float64]
+# The longest arrow, as a share of the distance of the farthest setting.
+LONGEST_ARROW: Final = 0.9
+# Arrows shorter than this share of the longest carry no label; nor do those after the longest 14.
+SHORTEST_LABELLED: Final = 0.06
+MOST_LABELS: Final = 14
+SKETCH_CELL_PT: Final = 3.0
+LABEL_GAP_PT: Final = 2.0
+MARGIN: Final = 0.16
+ROUNDS: Final = 400
+# Points of an arrow that a label had better not cover, as shares of its length.
+ALONG: Final = np.linspace(0.1, 1.0, 19)
+# Free space between tip and label [pt], and what is bad about a place.
+DISTANCES_PT: Final = (2.0, 8.0, 16.0, 26.0, 38.0)
+COST_LABEL, COST_LINE, COST_DOT, MOST_DOTS, COST_PT, COST_BEHIND = 1000.0, 8.0, 1.5, 10, 0.5, 4.0
+TITLE_PT: Final = STYLE["axes.titlesize"]
+COLORS: Final = {
+    "complete": ("share of runs with one assembly", SCORE_COLORMAP),
+    "l1_distance": (DISTANCE_LABEL, DISTANCE_COLORMAP),
+}
+
+
+def plot_biplot(
+    components: xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    sensitivity: xr.Dataset | None = None,
+    color: Literal["complete", "l1_distance"] = "complete",
+) -> Axes:
+    """Draw the settings of a sweep on its first two components, and the classes as arrows.
+
+    Both axes have one scale. An arrow is the loading of a class, all lengthened by the factor in
+    the title; classes with almost no loading carry no label, and of many classes the 14 with the
+    longest arrows do.
+
+    Parameters
+    ----------
+    components : xarray.Dataset
+        A `components` with at least two components.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+    sensitivity : xarray.Dataset, optional
+        The `sensitivity` from which the components were made; colours the settings.
+    color : {"complete", "l1_distance"}
+        Which of its variables is the colour.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When a dataset is of another kind, there is one component only, or the axes of the two
+        datasets differ.
+
+    Examples
+    --------
+    ``plot_biplot(components, sensitivity=sensitivity, color="l1_distance")``
+    """
+    check_kind(components, "components", "score", "loading", "explained_variance_ratio")
+    if components.sizes["component"] < 2:
+        raise InputError("a biplot needs two components, the dataset has one")
+    if color not in COLORS:
+        raise InputError(f"color='{color}': choose one of {', '.join(COLORS)}")
+    ax = axes_or_new(ax, height_mm=80.0)
+    score = components["score"].isel(component=slice(0, 2)).transpose(..., "component")
+    points = np.asarray(score.values, dtype=np.float64).reshape(-1, 2)
+    loading = np.asarray(
+        components["loading"].transpose("class", "component").values[:, :2], dtype=np.float64
+    )
+    if sensitivity is None:
+        ax.plot(*points.T, "o", ms=3.0, mew=0.0, color=BLUE, alpha=0.6, label="settings")
+    else:
+        text, colormap = COLORS[color]
+        dots = ax.scatter(
+            points[:, 0], points[:, 1], c=_colour_values(sensitivity, color, score), s=10.0,
+            lw=0, cmap=colormap, label="settings",
+        )  # fmt: skip
+        add_colorbar(dots, ax, text)
+    share = 100.0 * np.asarray(components["explained_variance_ratio"].values, dtype=np.float64)
+    factor = _arrow_factor(points, loading)
+    ax.set_xlabel(f"component 1 ({share[0]:.3g} % of the variance)")
+    ax.set_ylabel(f"component 2 ({share[1]:.3g} % of the variance)")
+    ax.set_title(f"dots: settings; arrows: loadings × {factor:.2g}", loc="left", size=TITLE_PT)
+    tips = factor * loading
+    _set_limits(ax, np.vstack([points, tips, np.zeros((1, 2))]))
+    _draw_arrows(ax, tips, class_names(components), points)
+    return ax
+
+
+def _colour_values(sensitivity: xr.Dataset, color: str, score: xr.DataArray) -> Array:
+    """Return the colour of every setting, in the order of the scores."""
+    check_kind(sensitivity, "sensitivity", color)
+    dims = [dim for dim in score.dims if dim != "component"]
+    values = sensitivity[color]
+    if set(values.dims) != set(dims) or any(values.sizes[dim] != score.sizes[dim] for dim in dims):
+        raise InputError(
+            "the components were made from another study: their axes are "
+            f"{', '.join(map(str, dims))}, those of '{color}' {', '.join(map(str, values.dims))}"
+        )
+    return np.asarray(values.transpose(*dims).values, dtype=np.float64).ravel()
+
+
+def _arrow_factor(points: Array, loading: Array) -> float:
+    """Return by what the loadings are lengthened, rounded to two digits."""
+    longest = float(np.nanmax(np.hypot(*loading.T)))
+    reach = float(np.nanmax(np.hypot(*points.T), initial=0.0))
+    if longest == 0.0 or reach == 0.0:
+        return 1.0
+    return float(f"{LONGEST_ARROW * reach / longest:.2g}")
+
+
+def _set_limits(ax: Axes, drawn: Array) -> None:
+    """Set limits with room for labels around all that is drawn, one scale for both axes."""
+    low, high = np.nanmin(drawn, axis=0), np.nanmax(drawn, axis=0)
+    middle, span = (low + high) / 2.0, (high - low) * (1.0 + 2.0 * MARGIN)
+    settle_layout(ax)
+    size = axes_points(ax)
+    per_point = float((span / size).max()) or 1.0
+    for axis, center, length in zip("xy", middle, per_point * size, strict=True):
+        getattr(ax, f"set_{axis}lim")(center - length / 2.0, center + length / 2.0)
+    ax.set_box_aspect(size[1] / size[0])
+
+
+def _draw_arrows(ax: Axes, tips: Array, names: list[str], points: Array) -> None:
+    length = np.hypot(*tips.T)
+    order = np.argsort(-length, kind="stable")[:MOST_LABELS]
+    labelled = [i for i in order if length[i] > SHORTEST_LABELLED * length.max()]
+    for index, (name, tip) in enumerate(zip(names, tips, strict=True)):
+        if length[index] == 0.0:
+            continue
+        ax.annotate(
+            "", tuple(tip), xytext=(0.0, 0.0), gid=name,
+            arrowprops={
+                "arrowstyle": "-|>,head_length=0.3,head_width=0.15", "zorder": 4, "shrinkA": 0.0,
+                "shrinkB": 0.0, "color": INK if index in labelled else MUTED,
+                "lw": 0.9 if index in labelled else 0.4,
+            },
+        )  # fmt: skip
+    boxes = np.array([_label_size(names[index]) for index in labelled]).reshape(-1, 2)
+    low = np.array([ax.get_xlim()[0], ax.get_ylim()[0]])
+    high = np.array([ax.get_xlim()[1], ax.get_ylim()[1]])
+    per_point = (high - low) / axes_points(ax)
+    places = place_labels(
+        (tips[labelled] - low) / per_point, boxes, origin=-low / per_point, room=axes_points(ax),
+        dots=(points[np.isfinite(points).all(axis=1)] - low) / per_point,
+    )  # fmt: skip
+    for index, place in zip(labelled, places, strict=True):
+        _draw_label(ax, names[index], tips[index], low + place * per_point)
+
+
+def _label_size(name: str) -> Array:
+    """Return width and height of the label of a class [pt]."""
+    size = sketch_size(class_cells(name)) * SKETCH_CELL_PT
+    if name_text(name):
+        size = np.array([max(size[0], len(name) * LETTER_PT), size[1] + NAME_SIZE_PT + 3.0])
+    return size
+
+
+def _draw_label(ax: Axes, name: str, tip: Array, place: Array) -> None:
+    from matplotlib.offsetbox import AnnotationBbox, TextArea, VPacker
+
+    parts: list[Any] = [sketch_box(name, cell_pt=SKETCH_CELL_PT, color=INK)]
+    if name_text(name):
+        parts.append(TextArea(name, textprops={"size": NAME_SIZE_PT, "color": INK}))
+    ax.add_artist(
+        AnnotationBbox(
+            VPacker(children=parts, align="center", pad=0.0, sep=1.0), tuple(tip),
+            xybox=tuple(place), boxcoords="data", pad=0.1, annotation_clip=False,
+            gid=f"label {name}", bboxprops={"facecolor": "white", "alpha": 0.7, "lw": 0},
+            arrowprops={"arrowstyle": "-", "lw": 0.4, "color": MUTED},
+        )
+    )  # fmt: skip
+
+
+def place_labels(
+    tips: Array, boxes: Array, *, origin: Array, room: Array, dots: Array | None = None
+) -> Array:
+    """Place one label near the tip of every arrow so that labels do not overlap.
+
+    One after the other, every label takes the best of many places around its tip: free of other
+    labels first, then of arrows and dots, near its tip, and beyond it. Labels that still overlap
+    push each other apart.
+
+    Parameters
+    ----------
+    tips : array, shape (n, 2)
+        Tips of the arrows [pt].
+    boxes : array, shape (n, 2)
+        Width and height of the labels [pt].
+    origin : array, shape (2,)
+        Where the arrows start [pt].
+    room : array, shape (2,)
+        Upper right corner of the frame [pt], whose lower left one is (0, 0).
+    dots : array, shape (m, 2), optional
+        Points better not covered [pt].
+
+    Returns
+    -------
+    array, shape (n, 2)
+        Middles of the labels [pt].
+
+    Examples
+    --------
+    >>> tips = np.array([[50.0, 20.0], [52.0, 20.0]])
+    >>> boxes = np.full((2, 2), 10.0)
+    >>> places = place_labels(tips, boxes, origin=np.zeros(2), room=np.full(2, 100.0))
+    >>> bool((abs(places[0] - places[1]) >= 10.0).any())
+    True
+    """
+    half = boxes / 2.0 + LABEL_GAP_PT / 2.0
+    lines = (origin + ALONG[:, None, None] * (tips - origin)).reshape(-1, 2)
+    seen = np.empty((0, 2)) if dots is None else dots
+    place = np.empty_like(tips, dtype=np.float64)
+    for i, tip in enumerate(tips):
+        tried = _places_around(tip, half[i])
+        beyond = (tip - origin) / max(float(np.hypot(*(tip - origin))), 1e-9)
+        away = tried - tip
+        cost = COST_PT * np.hypot(*away.T) - COST_BEHIND * (away @ beyond) / np.hypot(*away.T)
+        cost += COST_LINE * _covered(tried, half[i], lines)
+        cost += COST_DOT * np.minimum(_covered(tried, half[i], seen), MOST_DOTS)
+        for j in range(i):
+            cost += COST_LABEL * (np.abs(tried - place[j]) < half[i] + half[j]).all(axis=1)
+        cost += COST_LABEL * ((tried < half[i]) | (tried > room - half[i])).any(axis=1)
+        place[i] = tried[int(np.argmin(cost))]
+    for _ in range(ROUNDS):
+        np.clip(place, half, np.maximum(room - half, half), out=place)
+        pairs = [(i, j) for i in range(len(place)) for j in range(i)]
+        if not [pair for pair in pairs if _push_apart(place, half, *pair)]:
+            break
+    return place
+
+
+def _places_around(tip: Array, half: Array) -> Array:
+    """Return places for the middle of a label whose edge is some distances from a tip."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    direction = np.column_stack([np.cos(angle), np.sin(angle)])
+    # Distance from the middle of a box to its edge in that direction.
+    reach = (half / np.maximum(np.abs(direction), 1e-9)).min(axis=1)
+    away = np.concatenate([direction * (reach + more)[:, None] for more in DISTANCES_PT])
+    places: Array = tip + away
+    return places
+
+
+def _covered(places: Array, half: Array, points: Array) -> Array:
+    """Return how many points a label covers at each of these places."""
+    inside = (np.abs(places[:, None] - points[None]) < half).all(axis=2)
+    return np.asarray(inside.sum(axis=1), dtype=np.float64)
+
+
+def _push_apart(place: Array, half: Array, i: int, j: int) -> bool:
+    gap = place[i] - place[j]
+    depth = half[i] + half[j] - np.abs(gap)
+    if (depth <= 1e-6).any():
+        return False
+    axis = int(np.argmin(depth))
+    shift = 0.5 * depth[axis] * (1.0 if gap[axis] >= 0.0 else -1.0)
+    place[i, axis] += shift
+    place[j, axis] -= shift
+    return True

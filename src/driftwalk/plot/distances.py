@@ -1,0 +1,291 @@
+"""The score 1 − D over drag coefficient and stochastic force, and its optimum (Fig. 6)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.plot.parts.labels import (
+    DRAG_LABEL,
+    MN_PER_N,
+    force_label,
+    in_unit,
+    interval_of,
+    number_attribute,
+    require_variables,
+    required_attribute,
+)
+from driftwalk.plot.parts.style import INK, SCORE_COLORMAP, add_colorbar, axes_or_new
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.collections import QuadMesh
+    from matplotlib.colorbar import Colorbar
+
+Array = npt.NDArray[np.float64]
+# CF flag of `status` -> what the legend says, and the hatch of its cells.
+CAUSES: dict[int, tuple[str, str]] = {
+    1: ("no motion (D = 1)", "//////"),
+    2: ("not finite", "xxxxxx"),
+    4: ("too few steps", "------"),
+}
+UNKNOWN_CAUSE = ("not computed", "\\\\\\\\\\\\")
+OPTIMUM_LABEL, REGION_LABEL = "optimum and interval", "90 % region"
+LEGEND_ORDER = [
+    OPTIMUM_LABEL,
+    REGION_LABEL,
+    *(name for name, _ in (*CAUSES.values(), UNKNOWN_CAUSE)),
+]
+
+
+def plot_ks_map(
+    calibration: xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    colorbar: Literal["beside", "none"] = "beside",
+) -> Axes:
+    """Draw the score 1 − D over the whole box that was searched.
+
+    The optimum carries bars of its interval and the outline of its 90 % region. A setting that
+    gave no distance is hatched by its cause, never left out; one in which nothing moves is as far
+    from the recording as can be (D = 1). The line in the colour bar is the score that two runs of
+    one and the same model reach (noise floor).
+
+    Parameters
+    ----------
+    calibration : xarray.Dataset
+        What `driftwalk.calibration.calibrate` returns.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+    colorbar : {"beside", "none"}
+        Whether to add a colour bar.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset lacks the map, the optimum or the force interval.
+
+    Examples
+    --------
+    ``plot_ks_map(calibration).figure.savefig("ks_map.png")``
+    """
+    require_variables(calibration, "ks_distance", "status", "drag_coefficient", "force_std")
+    drag, force = axes_of(calibration, prefix="")
+    dims = ("force_std", "drag_coefficient")
+    score = 1.0 - calibration["ks_distance"].transpose(*dims).values
+    status = _status(calibration, "status", dims)
+    ax = axes_or_new(ax)
+    mesh = _score_mesh(ax, drag, force, score, bottom=0.0, top=1.0)
+    _hatch_causes(ax, drag, force, status, np.isfinite(score))
+    _draw_region(ax, calibration)
+    draw_optimum(ax, calibration)
+    _finish(ax, calibration, mesh, colorbar)
+    return ax
+
+
+def plot_refined_map(
+    calibration: xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    colorbar: Literal["beside", "none"] = "beside",
+) -> Axes:
+    """Draw the score 1 − D of the refined map near the optimum, with its fitted surface.
+
+    White contour lines, repeated in the colour bar, are those of the smooth surface fitted to the
+    map.
+
+    Parameters
+    ----------
+    calibration : xarray.Dataset
+        What `driftwalk.calibration.calibrate` returns.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+    colorbar : {"beside", "none"}
+        Whether to add a colour bar.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset lacks the refined map.
+
+    Examples
+    --------
+    ``plot_refined_map(calibration).figure.savefig("refined.png")``
+    """
+    require_variables(calibration, "refined_ks_distance", "refined_surface")
+    drag, force = axes_of(calibration, prefix="refined_")
+    dims = ("refined_force_std", "refined_drag_coefficient")
+    score, surface = (
+        1.0 - calibration[name].transpose(*dims).values
+        for name in ("refined_ks_distance", "refined_surface")
+    )
+    ax = axes_or_new(ax)
+    mesh = _score_mesh(ax, drag, force, score, bottom=None, top=None)
+    if np.isfinite(score).any():
+        low, high = np.nanquantile(score, [0.02, 1.0])
+        floor = 1.0 - number_attribute(calibration, "noise_floor")
+        high = np.nanmax([high, floor])
+        mesh.set_clim(low, high + 0.06 * (high - low))
+    status = _status(calibration, "refined_status", dims)
+    _hatch_causes(ax, drag, force, status, np.isfinite(score))
+    lines = None
+    if min(surface.shape) >= 2 and np.isfinite(surface).any():
+        lines = ax.contour(drag, force, surface, levels=6, colors="white", linewidths=0.6)
+    _draw_region(ax, calibration)
+    draw_optimum(ax, calibration)
+    ax.set_xlim(*cell_edges(drag)[[0, -1]])
+    ax.set_ylim(*cell_edges(force)[[0, -1]])
+    bar = _finish(ax, calibration, mesh, colorbar)
+    if bar is not None and lines is not None:
+        bar.add_lines(lines)
+    return ax
+
+
+def axes_of(calibration: xr.Dataset, *, prefix: str) -> tuple[Array, Array]:
+    """Return the drag coefficients [1] and the forces [mN] of the coarse or refined map."""
+    drag = np.asarray(calibration[f"{prefix}drag_coefficient"].values, dtype=np.float64)
+    return drag, in_unit(calibration[f"{prefix}force_std"], "mN", stored="N")
+
+
+def cell_edges(center: Array) -> Array:
+    """Return the edges of the cells around grid points: midpoints, and as far out at the ends.
+
+    Examples
+    --------
+    >>> cell_edges(np.array([0.0, 1.0, 3.0])).tolist()
+    [-0.5, 0.5, 2.0, 4.0]
+    """
+    if center.size < 2:
+        half = 0.5 * abs(center) + 0.05 * (center == 0.0)
+        return np.concatenate([center - half, center + half])
+    middle = (center[1:] + center[:-1]) / 2.0
+    first, last = 2.0 * center[0] - middle[0], 2.0 * center[-1] - middle[-1]
+    return np.concatenate([[first], middle, [last]])
+
+
+def draw_optimum(ax: Axes, calibration: xr.Dataset, *, color: str = "white") -> None:
+    """Mark the estimate with bars of its intervals in a plane of C_d and σ_F [mN]."""
+    from matplotlib.patheffects import Normal, Stroke
+
+    drag = float(required_attribute(calibration, "drag_coefficient"))
+    force = MN_PER_N * float(required_attribute(calibration, "force_std_N"))
+    bars = []
+    for best, name, factor in (
+        (drag, "drag_coefficient_interval", 1.0),
+        (force, "force_std_N_interval", MN_PER_N),
+    ):
+        ends = interval_of(calibration, name)
+        # An estimate may lie on the end of its interval: rounding must not make a bar negative.
+        bars.append(
+            None
+            if ends is None
+            else [[max(best - factor * ends[0], 0.0)], [max(factor * ends[1] - best, 0.0)]]
+        )
+    outline = [Stroke(linewidth=2.2, foreground=INK if color == "white" else "white"), Normal()]
+    ax.errorbar(
+        [drag], [force], xerr=bars[0], yerr=bars[1], fmt="o", ms=3.5, color=color, elinewidth=1.0,
+        capsize=0.0, zorder=6, label=OPTIMUM_LABEL, path_effects=outline,
+    )  # fmt: skip
+
+
+def _draw_region(ax: Axes, calibration: xr.Dataset) -> None:
+    """Outline the 90 % region of the estimate."""
+    from matplotlib.patches import Polygon
+    from matplotlib.patheffects import Normal, Stroke
+
+    outline = region_of(calibration)
+    if outline is None:
+        return
+    ax.add_patch(
+        Polygon(
+            outline, closed=True, facecolor="none", edgecolor=INK, linewidth=0.9, zorder=5,
+            label=REGION_LABEL, path_effects=[Stroke(linewidth=2.0, foreground="white"), Normal()],
+        )
+    )  # fmt: skip
+
+
+def region_of(calibration: xr.Dataset) -> Array | None:
+    """Return the vertices (C_d, σ_F [mN]) of the 90 % region, None when there is none."""
+    if "region_force_std" not in calibration or "region_drag_coefficient" not in calibration:
+        return None
+    vertices = np.column_stack(
+        [
+            calibration["region_drag_coefficient"].values,
+            in_unit(calibration["region_force_std"], "mN", stored="N"),
+        ]
+    )
+    vertices = vertices[np.isfinite(vertices).all(axis=1)]
+    return vertices if len(vertices) >= 3 else None
+
+
+def _status(calibration: xr.Dataset, name: str, dims: tuple[str, str]) -> npt.NDArray[np.int64]:
+    """Return the status bits as whole numbers, 0 throughout when the map has none."""
+    if name not in calibration:
+        return np.zeros([calibration.sizes[dim] for dim in dims], dtype=np.int64)
+    stored = calibration[name].transpose(*dims).values
+    return np.asarray(np.nan_to_num(stored), dtype=np.int64)
+
+
+def _score_mesh(
+    ax: Axes, drag: Array, force: Array, score: Array, *, bottom: float | None, top: float | None
+) -> QuadMesh:
+    mesh = ax.pcolormesh(
+        cell_edges(drag), cell_edges(force), np.ma.masked_invalid(score),
+        cmap=SCORE_COLORMAP, vmin=bottom, vmax=top,
+    )  # fmt: skip
+    mesh.set_rasterized(True)
+    return mesh
+
+
+def _hatch_causes(
+    ax: Axes,
+    drag: Array,
+    force: Array,
+    status: npt.NDArray[np.int64],
+    known: npt.NDArray[np.bool_],
+) -> None:
+    """Cover every cell that has a cause, or no distance, by a hatched rectangle."""
+    from matplotlib.patches import Rectangle
+
+    drag_edge, force_edge = cell_edges(drag), cell_edges(force)
+    named: set[str] = set()
+    for row, column in zip(*np.nonzero((status != 0) | ~known), strict=True):
+        causes = [cause for bit, cause in CAUSES.items() if status[row, column] & bit]
+        name, hatch = causes[0] if causes else UNKNOWN_CAUSE
+        ax.add_patch(
+            Rectangle(
+                (drag_edge[column], force_edge[row]),
+                drag_edge[column + 1] - drag_edge[column],
+                force_edge[row + 1] - force_edge[row],
+                facecolor="white", edgecolor=INK, linewidth=0.0, hatch=hatch,
+                label="" if name in named else name, gid=name,
+            )
+        )  # fmt: skip
+        named.add(name)
+
+
+def _finish(ax: Axes, calibration: xr.Dataset, mesh: QuadMesh, colorbar: str) -> Colorbar | None:
+    """Label the axes and add the colour bar with the line of the noise floor."""
+    ax.set_xlabel(DRAG_LABEL)
+    ax.set_ylabel(force_label(calibration))
+    if colorbar == "none":
+        return None
+    floor = number_attribute(calibration, "noise_floor")
+    bar = add_colorbar(mesh, ax, "score 1 − D")
+    if np.isfinite(floor):
+        bar.ax.axhline(1.0 - floor, color=INK, lw=1.4)
+        bar.set_label("score 1 − D (line: noise floor)")
+    return bar

@@ -1,0 +1,170 @@
+"""The velocity field in the tank: the block's own, or the water's after correction (Fig. 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+from driftwalk.plot.parts.arena import arena_of, draw_arena, label_position
+from driftwalk.plot.parts.labels import in_unit
+from driftwalk.plot.parts.style import INK, MUTED, add_colorbar, axes_or_new, speed_colormap
+from driftwalk.schema import FLAGS, check_flow_field
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+
+Field = Literal["water", "block"]
+Array = npt.NDArray[np.float64]
+COMPONENTS: dict[str, tuple[str, str]] = {"water": ("u", "v"), "block": ("u_block", "v_block")}
+ARROWS_ACROSS = 17
+SPEED_LABEL = "speed (cm/s)"
+
+
+def plot_flow(
+    flow: xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    field: Field = "water",
+    arena: Mapping[str, Any] | str | None = None,
+    speed_limit: float | None = None,
+    colorbar: Literal["beside", "none"] = "beside",
+) -> Axes:
+    """Draw a velocity field: speed as colour, direction as arrows, in cm and cm/s.
+
+    Nodes that were measured are plain, nodes that were filled are hatched with grey arrows, nodes
+    outside the tank are blank. A field that changes in time is drawn as its mean over time.
+
+    Parameters
+    ----------
+    flow : xarray.Dataset
+        A `flow_field`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+    field : {"water", "block"}
+        The water's velocity, or the mean velocity of the block in each cell before the correction
+        for its inertia.
+    arena : mapping or str, optional
+        Outline of the tank; default: the dataset's own.
+    speed_limit : float, optional
+        Top of the colour scale [m/s], so that two fields can share it; default: the largest speed.
+    colorbar : {"beside", "none"}
+        Whether to add a colour bar.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When `field` is not one of the two, or the dataset has no block velocity.
+
+    Examples
+    --------
+    >>> from driftwalk.schema import build_flow_field
+    >>> ones = [[1.0, 1.0], [1.0, 1.0]]
+    >>> flow = build_flow_field([0.0, 0.1], [0.0, 0.1], u=ones, v=ones, flag=ones)
+    >>> plot_flow(flow).get_xlabel()
+    'x (cm)'
+    """
+    u, v, flag = velocity_of(flow, field)
+    x, y = (in_unit(flow[axis], "cm", stored="m") for axis in ("x", "y"))
+    ax = axes_or_new(ax, layout="compressed")
+    speed = np.hypot(u, v)
+    top = float(np.nanmax(speed, initial=0.0)) if speed_limit is None else 100.0 * speed_limit
+    mesh = ax.pcolormesh(
+        x, y, speed, cmap=speed_colormap(), vmin=0.0, vmax=top or 1.0, shading="nearest"
+    )
+    mesh.set_rasterized(True)
+    filled = (flag == FLAGS["filled"]) & np.isfinite(speed)
+    drawn = [mesh, *_hatch_cells(ax, x, y, filled), *_draw_arrows(ax, x, y, u, v, filled)]
+    outline = draw_arena(ax, arena_of(flow, arena))
+    if outline is not None:
+        # Cells at the wall reach over it by up to a cell; what is drawn ends at the wall.
+        for artist in drawn:
+            artist.set_clip_path(outline)
+    label_position(ax)
+    if colorbar == "beside":
+        add_colorbar(mesh, ax, SPEED_LABEL)
+    return ax
+
+
+def velocity_of(flow: xr.Dataset, field: Field) -> tuple[Array, Array, npt.NDArray[np.int8]]:
+    """Return u, v [cm/s], NaN where nothing is to be drawn, and the flag, shapes (ny, nx)."""
+    check_flow_field(flow)
+    if field not in COMPONENTS:
+        raise InputError(f"field='{field}' is not a field: choose one of {', '.join(COMPONENTS)}")
+    absent = [name for name in COMPONENTS[field] if name not in flow]
+    if absent:
+        raise InputError(
+            f"the flow field has no {' and '.join(absent)}: it was not made from a recording; "
+            "draw field='water'"
+        )
+    components = [flow[name] for name in COMPONENTS[field]]
+    flag = flow.get("flag")
+    if "time" in flow.dims:
+        components = [component.mean("time", keep_attrs=True) for component in components]
+        flag = flag.max("time") if flag is not None else None
+    u, v = (in_unit(component, "cm/s", stored="m s-1") for component in components)
+    flags = np.full(u.shape, FLAGS["measured"], np.int8) if flag is None else flag.values
+    outside = flags == FLAGS["outside"]
+    return np.where(outside, np.nan, u), np.where(outside, np.nan, v), flags
+
+
+def _hatch_cells(ax: Axes, x: Array, y: Array, chosen: npt.NDArray[np.bool_]) -> list[Artist]:
+    """Hatch the chosen cells as one patch, so that the pattern runs on across cells."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    if not chosen.any():
+        return []
+    half_x, half_y = (x[1] - x[0]) / 2.0, (y[1] - y[0]) / 2.0
+    rows, columns = np.nonzero(chosen)
+    cell = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]) * (half_x, half_y)
+    corners = cell[None] + np.column_stack([x[columns], y[rows]])[:, None]
+    codes = np.tile([Path.MOVETO, *[Path.LINETO] * 3, Path.CLOSEPOLY], rows.size)
+    patch = PathPatch(
+        Path(corners.reshape(-1, 2), codes),
+        facecolor="none",
+        edgecolor=MUTED,
+        linewidth=0.0,
+        hatch="/////",
+        label="filled, not measured",
+        zorder=2,
+    )
+    return [ax.add_patch(patch)]
+
+
+def _draw_arrows(
+    ax: Axes, x: Array, y: Array, u: Array, v: Array, filled: npt.NDArray[np.bool_]
+) -> list[Artist]:
+    """Draw every n-th arrow, the longest about one and a half arrow spacings."""
+    stride = max(1, round(max(x.size, y.size) / ARROWS_ACROSS))
+    thin = (slice(stride // 2, None, stride), slice(stride // 2, None, stride))
+    speed = np.hypot(u[thin], v[thin])
+    # An arrow too short to show its direction would be drawn as a dot.
+    shown = speed > 0.03 * np.nanmax(speed, initial=0.0)
+    if not shown.any():
+        return []
+    scale = np.percentile(speed[shown], 98.0) / (1.5 * stride * (x[1] - x[0]))
+    grid = (*np.meshgrid(x, y), u, v)
+    drawn: list[Artist] = []
+    for chosen, color, label in ((~filled[thin], INK, "measured"), (filled[thin], MUTED, "filled")):
+        here = shown & chosen
+        if here.any():
+            drawn.append(
+                ax.quiver(
+                    *(part[thin][here] for part in grid),
+                    color=color, angles="xy", scale_units="xy", scale=scale, pivot="middle",
+                    width=0.0042, headwidth=3.6, headlength=4.2, headaxislength=3.8,
+                    label=f"{label} velocity", zorder=3,
+                )
+            )  # fmt: skip
+    return drawn

@@ -1,0 +1,311 @@
+"""Pictures of a model check: whiteness, residuals in the tank and over time, predicted steps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+from driftwalk.plot.parts.arena import arena_of, draw_arena, label_position
+from driftwalk.plot.parts.labels import ANGLE_LABEL, LENGTH_LABEL, in_unit
+from driftwalk.plot.parts.style import (
+    BLUE,
+    INK,
+    MUTED,
+    ORANGE,
+    PALE,
+    add_colorbar,
+    axes_or_new,
+    speed_colormap,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+Array = npt.NDArray[np.float64]
+
+BAND_STDS = 1.96
+"""95 % of a normal."""
+LEAST_TOP = 4.0
+"""Least upper end of the colours of the residual map [sd], so that chance looks pale."""
+COLORS = (BLUE, ORANGE, INK)
+MARKERS = ("o", "s", "^")
+
+
+def plot_innovations(check: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw the autocorrelation of the errors of prediction, with the band of 95 %.
+
+    Parameters
+    ----------
+    check : xarray.Dataset
+        A `model_check`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset is no model check.
+
+    Examples
+    --------
+    >>> plot_innovations(check)  # doctest: +SKIP
+    """
+    from matplotlib.ticker import MaxNLocator
+
+    _require(check)
+    ax = axes_or_new(ax)
+    lag = check["lag"].values
+    expected = check["autocorrelation_expected"].values.mean(axis=0)
+    reach = BAND_STDS * check["autocorrelation_std"].values.mean(axis=0)
+    ax.fill_between(
+        lag,
+        expected - reach,
+        expected + reach,
+        color=PALE,
+        lw=0,
+        label="95 % if the model is right",
+    )
+    ax.axhline(0.0, color=MUTED, lw=0.6)
+    names = [str(name) for name in check["component"].values]
+    aside = np.linspace(-0.15, 0.15, len(names)) if len(names) > 1 else np.zeros(1)
+    for k, name in enumerate(names):
+        shown = "θ" if name == "theta" else name
+        ax.plot(
+            lag + aside[k],
+            check["autocorrelation"].values[k],
+            MARKERS[k],
+            color=COLORS[k],
+            ms=3.0,
+            label=f"error in {shown}",
+        )
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.set_xlabel("lag (samples)")
+    ax.set_ylabel("autocorrelation")
+    ax.margins(x=0.03)
+    return ax
+
+
+def plot_residual_map(
+    check: xr.Dataset, ax: Axes | None = None, *, show: Literal["mean", "noise"] = "mean"
+) -> Axes:
+    """Draw where in the tank the errors of prediction are not what the model says.
+
+    Parameters
+    ----------
+    check : xarray.Dataset
+        A `model_check`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+    show : {"mean", "noise"}
+        The mean error: its distance from zero in standard deviations as colour, its direction as
+        arrows, cells beyond what chance gives framed. Or the mean square relative to that of all.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset is no model check.
+
+    Examples
+    --------
+    >>> plot_residual_map(check)  # doctest: +SKIP
+    """
+    _require(check)
+    ax = axes_or_new(ax, layout="compressed")
+    if show == "mean":
+        _draw_means(ax, check)
+    else:
+        _draw_noise(ax, check)
+    draw_arena(ax, arena_of(check, None))
+    label_position(ax)
+    return ax
+
+
+def plot_residual_time(
+    check: xr.Dataset, ax: Axes | None = None, *, show: Literal["flow", "noise"] = "flow"
+) -> Axes:
+    """Draw how the strength of the flow, or the noise, seems to change during the recording.
+
+    Parameters
+    ----------
+    check : xarray.Dataset
+        A `model_check`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+    show : {"flow", "noise"}
+        The flow's strength against its mean, or the mean square of the errors against that of all.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset is no model check.
+
+    Examples
+    --------
+    >>> plot_residual_time(check)  # doctest: +SKIP
+    """
+    _require(check)
+    ax = axes_or_new(ax)
+    start, end = _running_time(check)
+    middle, half = 0.5 * (start + end) / 60.0, 0.5 * (end - start) / 60.0
+    name, shift = ("flow_change", 0.0) if show == "flow" else ("part_noise_ratio", 1.0)
+    value = 100.0 * (check[name].values - shift)
+    reach = 100.0 * BAND_STDS * check[f"{name}_std"].values
+    ax.axhline(0.0, color=MUTED, lw=0.6)
+    ax.errorbar(middle, value, xerr=half, yerr=reach, fmt="o", ms=3.0, lw=0.9, color=BLUE)
+    for edge in start[1:][np.diff(check["part_recording"].values) > 0] / 60.0:
+        ax.axvline(edge, color=MUTED, lw=0.6, ls=":")
+    ax.set_xlabel("time (min)")
+    ax.set_ylabel(
+        "strength of the flow,\noff its mean (%)" if show == "flow" else "squared errors, off (%)"
+    )
+    return ax
+
+
+def plot_predicted_steps(
+    check: xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    show: Literal["step_length", "turning_angle"] = "step_length",
+) -> Axes:
+    """Draw the density of the recording's steps over the band that the fitted model makes likely.
+
+    Parameters
+    ----------
+    check : xarray.Dataset
+        A `model_check` with simulated recordings.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+    show : {"step_length", "turning_angle"}
+        Which of the two.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset is no model check, or no recordings were simulated for it.
+
+    Examples
+    --------
+    >>> plot_predicted_steps(check)  # doctest: +SKIP
+    """
+    _require(check)
+    if f"{show}_edge" not in check:
+        raise InputError(
+            f"the check holds no simulated steps: {check.attrs.get('ks_left_out', 'left out')}"
+        )
+    ax = axes_or_new(ax)
+    unit, stored, label, each = (
+        ("mm", "m", LENGTH_LABEL, "% per mm")
+        if show == "step_length"
+        else ("°", "rad", ANGLE_LABEL, "% per degree")
+    )
+    edge = in_unit(check[f"{show}_edge"], unit, stored=stored)
+    scale = 100.0 * float(np.ptp(check[f"{show}_edge"].values) / np.ptp(edge))
+    low, median, high, real = (
+        scale * check[f"{show}_density_{part}"].values
+        for part in ("low", "median", "high", "recording")
+    )
+    band = f"{check.attrs['band']:.0%} of simulated recordings".replace("%", " %")
+    ax.stairs(high, edge, baseline=low, fill=True, color=BLUE, alpha=0.3, lw=0, label=band)
+    ax.stairs(median, edge, color=BLUE, lw=0.9, label="their median", baseline=None)
+    ax.stairs(real, edge, color=ORANGE, lw=1.1, label="recording", baseline=None)
+    ax.set_xlim(*_shown(real + median, edge))
+    ax.set_ylim(bottom=0.0)
+    ax.set_xlabel(label)
+    ax.set_ylabel(f"density ({each})")
+    return ax
+
+
+def _require(check: xr.Dataset) -> None:
+    if check.attrs.get("kind") != "model_check":
+        raise InputError(
+            f"not a model check: its kind is {check.attrs.get('kind')!r}; check_model makes one"
+        )
+
+
+def _draw_means(ax: Axes, check: xr.Dataset) -> None:
+    from matplotlib.patches import Rectangle
+
+    x, y = (in_unit(check[axis], "cm", stored="m") for axis in ("x", "y"))
+    size = 100.0 * float(check.attrs["cell_size_m"])
+    distance = check["residual_distance"].values
+    limit = float(check["residual_distance"].attrs["limit"])
+    top = max(LEAST_TOP, float(np.nanmax(distance, initial=0.0)))
+    mesh = ax.pcolormesh(
+        x, y, distance, cmap=speed_colormap(), vmin=0.0, vmax=top, shading="nearest"
+    )
+    mesh.set_rasterized(True)
+    u, v = check["residual"].values[:2]
+    known = np.isfinite(distance)
+    # As long as the error is far from zero: a mean of few samples is large by chance.
+    longer = distance / np.where(known, np.hypot(u, v), 1.0)
+    u, v = u * longer, v * longer
+    at_x, at_y = np.meshgrid(x, y)
+    ax.quiver(
+        at_x[known], at_y[known], u[known], v[known], color=INK, angles="xy", scale_units="xy",
+        scale=top / (1.3 * size), pivot="middle", width=0.004, zorder=3,
+    )  # fmt: skip
+    for row, column in np.argwhere(known & (distance > limit)):
+        corner = (x[column] - 0.5 * size, y[row] - 0.5 * size)
+        ax.add_patch(Rectangle(corner, size, size, fill=False, edgecolor=ORANGE, lw=1.4, zorder=5))
+    add_colorbar(mesh, ax, f"distance from zero (sd)\nframed: above {limit:.1f}")
+
+
+def _draw_noise(ax: Axes, check: xr.Dataset) -> None:
+    from matplotlib.colors import CenteredNorm
+
+    x, y = (in_unit(check[axis], "cm", stored="m") for axis in ("x", "y"))
+    off = (check["noise_ratio"].values - 1.0) / check["noise_ratio_std"].values
+    top = max(LEAST_TOP, float(np.nanmax(np.abs(off), initial=0.0)))
+    # Purple and orange: apart for colour-blind readers, white where all is well.
+    mesh = ax.pcolormesh(
+        x, y, off, cmap="PuOr_r", norm=CenteredNorm(0.0, halfrange=top), shading="nearest"
+    )
+    mesh.set_rasterized(True)
+    add_colorbar(mesh, ax, "mean square of the errors,\nagainst that of all (sd)")
+
+
+def _running_time(check: xr.Dataset) -> tuple[Array, Array]:
+    """Return start and end of the parts [s], recordings one after the other."""
+    recording = check["part_recording"].values
+    start, end = check["part_start"].values, check["part_end"].values
+    lengths = [float(end[recording == k].max(initial=0.0)) for k in range(int(recording.max()) + 1)]
+    before = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])[recording]
+    return start + before, end + before
+
+
+def _shown(density: Array, edge: Array) -> tuple[float, float]:
+    """Return the range that holds nearly all."""
+    share = np.cumsum(density * np.diff(edge))
+    share = share / share[-1]
+    first, last = np.searchsorted(share, [0.001, 0.999])
+    return float(edge[max(first - 1, 0)]), float(edge[min(last + 1, edge.size - 1)])
+
+
+def legend_of(ax: Axes) -> dict[str, Any]:
+    """Return handles and labels, for a legend of the whole figure."""
+    handles, labels = ax.get_legend_handles_labels()
+    return {"handles": handles, "labels": labels}

@@ -1,0 +1,230 @@
+"""How often each outcome class occurs, with simultaneous intervals (Fig. 9)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+from driftwalk.plot.parts.assembly_labels import (
+    OTHER,
+    check_kind,
+    class_names,
+    classes_to_show,
+    is_complete,
+    percent,
+    runs_text,
+)
+from driftwalk.plot.parts.polyomino_sketch import axes_points, draw_sketches_below, settle_layout
+from driftwalk.plot.parts.style import (
+    BLUE,
+    DOUBLE_COLUMN_MM,
+    INK,
+    MUTED,
+    ORANGE,
+    SINGLE_COLUMN_MM,
+    STYLE,
+    new_figure,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+Array = npt.NDArray[np.float64]
+BAR_WIDTH = 0.76
+# So many classes have room in one column of a page; a legend needs so much for two columns [pt].
+NARROW_CLASSES = 12
+WIDE_LEGEND_PT = 380.0
+
+
+class Bars(NamedTuple):
+    """One distribution on the classes that are drawn, shapes (shown,)."""
+
+    proportion: Array
+    low: Array
+    high: Array
+
+
+def plot_outcomes(
+    distribution: xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    beside: xr.Dataset | None = None,
+    labels: tuple[str, str] = ("", ""),
+    realisations: xr.Dataset | None = None,
+) -> Axes:
+    """Draw the proportion of every outcome class as a bar over the sketch of the class.
+
+    Thin lines are simultaneous intervals: with the stated confidence all of them hold at once.
+    Diamonds are mean ± standard deviation over realisations. Up to 16 classes are all shown; of
+    more, those of at least 1 %, at most 20, and the sum of the rest as "other", without interval.
+
+    Parameters
+    ----------
+    distribution : xarray.Dataset
+        An `outcome_distribution`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out, two columns wide for two distributions or more
+        than 12 classes.
+    beside : xarray.Dataset, optional
+        A second `outcome_distribution`, drawn beside the first. Classes are matched by name.
+    labels : tuple of str
+        What the first and the second are, for the legend.
+    realisations : xarray.Dataset, optional
+        Repetitions of the first distribution: ``proportion`` on (realisation, class), at least 2.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When a dataset is of another kind or lacks what is drawn, the two count mirror images
+        differently, or there are fewer than 2 realisations.
+
+    Examples
+    --------
+    ``plot_outcomes(distribution, beside=other, labels=("fixed", "drawn"))``
+    """
+    both = [distribution] if beside is None else [distribution, beside]
+    for dataset in both:
+        check_kind(
+            dataset, "outcome_distribution", "proportion", "interval_low", "interval_high", "class"
+        )
+    if len({dataset.attrs.get("chirality") for dataset in both}) > 1:
+        raise InputError(
+            "the distributions count mirror images differently: classify both in the same way"
+        )
+    names = list(dict.fromkeys(name for dataset in both for name in class_names(dataset)))
+    full = np.array([_on_classes(dataset["proportion"], names) for dataset in both])
+    shown = classes_to_show(names, full.max(axis=0))
+    drawn = [names[index] for index in shown]
+    if len(shown) < len(names):
+        drawn.append(OTHER)
+    ax = _new_axes(wide=len(both) > 1 or len(drawn) > NARROW_CLASSES) if ax is None else ax
+    place = np.arange(len(drawn), dtype=np.float64)
+    width = BAR_WIDTH / len(both)
+    for index, dataset in enumerate(both):
+        at = place + (index - (len(both) - 1) / 2.0) * width
+        _draw_bars(
+            ax, at, _bars(dataset, names, shown), width=width, color=(BLUE, ORANGE)[index],
+            label=_legend_text(dataset, labels[index]),
+        )  # fmt: skip
+    if realisations is not None:
+        at = place - (len(both) - 1) / 2.0 * width
+        _draw_realisations(ax, at + 0.22 * width, realisations, names, shown)
+    ax.set_xlim(-0.6, len(drawn) - 0.4)
+    ax.set_ylim(bottom=0.0)
+    rest = f" (other: {len(names) - len(shown)} rarer classes)" if OTHER in drawn else ""
+    ax.set_ylabel("proportion of runs")
+    ax.spines[["top", "right"]].set_visible(False)
+    _divide(ax, drawn)
+    _legend(ax, both)
+    settle_layout(ax)
+    ax.set_xlabel(f"outcome class{rest}", labelpad=draw_sketches_below(ax, list(place), drawn))
+    return ax
+
+
+def _new_axes(*, wide: bool) -> Axes:
+    figure = new_figure(width_mm=DOUBLE_COLUMN_MM if wide else SINGLE_COLUMN_MM, height_mm=76.0)
+    return figure.add_subplot()
+
+
+def _on_classes(proportion: xr.DataArray, names: list[str]) -> Array:
+    """Return proportions in the order of `names`, zero for a class that the dataset lacks."""
+    aligned = proportion.reindex({"class": np.array(names, dtype=object)}, fill_value=0.0)
+    return np.asarray(aligned.values, dtype=np.float64)
+
+
+def _bars(dataset: xr.Dataset, names: list[str], shown: list[int]) -> Bars:
+    proportion = _on_classes(dataset["proportion"], names)
+    values = [proportion, *(_on_classes(dataset[f"interval_{end}"], names) for end in _ENDS)]
+    # A class that the dataset does not list has a proportion of 0, and no interval.
+    listed = np.isin(names, class_names(dataset))
+    values[1:] = [np.where(listed, end, np.nan) for end in values[1:]]
+    kept = [array[shown] for array in values]
+    if len(shown) < len(names):
+        rest = float(np.delete(proportion, shown).sum())
+        kept = [
+            np.append(array, value)
+            for array, value in zip(kept, (rest, np.nan, np.nan), strict=True)
+        ]
+    return Bars(*kept)
+
+
+_ENDS = ("low", "high")
+
+
+def _draw_bars(ax: Axes, at: Array, bars: Bars, *, width: float, color: str, label: str) -> None:
+    ax.bar(at, bars.proportion, width=0.94 * width, color=color, alpha=0.75, label=label)
+    known = np.isfinite(bars.low) & np.isfinite(bars.high)
+    # A proportion lies within its interval; rounding must not make a length negative.
+    below = np.maximum(bars.proportion - bars.low, 0.0)[known]
+    above = np.maximum(bars.high - bars.proportion, 0.0)[known]
+    ax.errorbar(
+        at[known], bars.proportion[known], yerr=[below, above], fmt="none", ecolor=INK,
+        elinewidth=0.8, capsize=1.6, capthick=0.8,
+    )  # fmt: skip
+
+
+def _draw_realisations(
+    ax: Axes, at: Array, realisations: xr.Dataset, names: list[str], shown: list[int]
+) -> None:
+    """Draw mean ± standard deviation over the realisations, "other" among them."""
+    if "proportion" not in realisations or set(realisations["proportion"].dims) != {
+        "realisation",
+        "class",
+    }:
+        raise InputError("realisations need 'proportion' with dimensions (realisation, class)")
+    table = realisations["proportion"].transpose("realisation", "class")
+    if table.sizes["realisation"] < 2:
+        raise InputError("one realisation has no spread: give at least 2")
+    every = np.array([_on_classes(row, names) for row in table])
+    kept = every[:, shown]
+    if len(shown) < len(names):
+        kept = np.column_stack([kept, np.delete(every, shown, axis=1).sum(axis=1)])
+    ax.errorbar(
+        at, kept.mean(axis=0), yerr=kept.std(axis=0, ddof=1), fmt="D", ms=2.6, mfc="white",
+        mec=INK, mew=0.7, ecolor=INK, elinewidth=1.6, capsize=0.0,
+        label=f"mean ± s.d. of {len(every)} realisations",
+    )  # fmt: skip
+
+
+def _divide(ax: Axes, drawn: list[str]) -> None:
+    """Draw a line between the classes of one assembly and those of several."""
+    complete = [is_complete(name) for name in drawn]
+    if any(complete) and not all(complete[: drawn.index(OTHER) if OTHER in drawn else None]):
+        ax.axvline(complete.index(False) - 0.5, color=MUTED, lw=0.6, dashes=(3, 3), zorder=0)
+
+
+def _legend_text(dataset: xr.Dataset, label: str) -> str:
+    """Return what is drawn, of how many runs, and how many of them ended as one assembly."""
+    text = ": ".join(part for part in (label, runs_text(dataset)) if part)
+    if "complete" in dataset.attrs:
+        ends = [dataset.attrs.get(f"complete_{end}") for end in _ENDS]
+        known = None not in ends
+        between = f" ({percent(ends[0]).removesuffix(' %')}–{percent(ends[1])})" if known else ""
+        text += f"\none assembly in {percent(dataset.attrs['complete'])}{between}"
+    return text
+
+
+def _legend(ax: Axes, both: list[xr.Dataset]) -> None:
+    from matplotlib.lines import Line2D
+
+    handles, texts = ax.get_legend_handles_labels()
+    confidence = both[0].attrs.get("confidence")
+    # The first words of the method are its name, the rest explains.
+    method = str(both[0].attrs.get("method", "")).partition(",")[0].partition(";")[0]
+    name = "simultaneous intervals" + (f", {method}" if method else "")
+    handles.append(Line2D([], [], color=INK, lw=0.8, marker="_", ms=4.0))
+    texts.append(f"{percent(confidence)} {name}" if confidence is not None else name)
+    ax.legend(
+        handles, texts, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2,
+        fontsize=STYLE["legend.fontsize"], frameon=False,
+        ncols=2 if len(handles) > 2 and axes_points(ax)[0] > WIDE_LEGEND_PT else 1,
+    )  # fmt: skip

@@ -1,0 +1,1 @@
+"""What the figures share: style, labels in readable units, the tank's outline, shapes of blocks."""

@@ -1,0 +1,200 @@
+"""What the figures of self-assembly share: classes to show, their colours, axes of a sweep."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+from driftwalk.plot.parts.labels import DRAG_LABEL, force_interval_text, in_unit
+from driftwalk.plot.parts.style import BLUE, ORANGE
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = npt.NDArray[np.float64]
+
+# Okabe and Ito's palette for colour-blind readers, without black and the pale yellow.
+PALETTE: Final = (BLUE, ORANGE, "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A4B9A")
+GREYS: Final = ("#9a9a9a", "#6b6b6b", "#bdbdbd", "#4d4d4d", "#848484")
+OTHER: Final = "other"
+OTHER_COLOR: Final = "#ececec"
+# Up to this many classes all are shown, zeros too; of more, only those that matter somewhere.
+SHOW_ALL: Final = 16
+SHOW_MOST: Final = 20
+SHOW_FROM: Final = 0.01
+
+
+class SweepAxis(NamedTuple):
+    """An axis of a sensitivity study as a figure shows it."""
+
+    name: str
+    """Dimension of the dataset."""
+    label: str
+    """Label with unit."""
+    values: Array
+    """Places along the axis, in the unit of the label; 0, 1, ... for words."""
+    words: list[str]
+    """The words of a categorical axis; empty for numbers."""
+
+
+# dimension -> label, unit in the figure, unit in the dataset
+_NUMBERS: Final[dict[str, tuple[str, str, str]]] = {
+    "drag_coefficient": (DRAG_LABEL, "", ""),
+    "force_std": (r"stochastic force $\sigma_F$ (mN)", "mN", "N"),
+    "tank_diameter": ("tank diameter (cm)", "cm", "m"),
+    "blocks": ("number of blocks", "", ""),
+}
+_WORDS: Final[dict[str, str]] = {
+    "flow": "flow",
+    "latching": "latching",
+    "hidden_face_drag": "drag on hidden faces",
+}
+
+
+def check_kind(dataset: xr.Dataset, kind: str, *variables: str) -> None:
+    """Raise `InputError` unless the dataset is of this kind and has these variables."""
+    found = dataset.attrs.get("kind", "a dataset of no kind")
+    if found != kind:
+        raise InputError(f"expected a dataset of kind '{kind}', got '{found}'")
+    missing = [name for name in variables if name not in dataset.variables]
+    if missing:
+        raise InputError(f"the dataset '{kind}' lacks {', '.join(missing)}: nothing to draw")
+
+
+def class_names(dataset: xr.Dataset) -> list[str]:
+    """Return the names of the outcome classes, in the order of the dataset."""
+    return [str(name) for name in dataset["class"].values]
+
+
+def is_complete(name: str) -> bool:
+    """Return whether all blocks of a class are in one assembly.
+
+    Examples
+    --------
+    >>> is_complete("T"), is_complete("2+2")
+    (True, False)
+    """
+    return "+" not in name and name not in ("", OTHER)
+
+
+def classes_to_show(names: list[str], largest: Array) -> list[int]:
+    """Choose the classes that a figure shows one by one; the rest is summed as "other".
+
+    Up to 16 classes are all shown. Of more, those that reach 1 % somewhere, and of these at most
+    the 20 largest.
+
+    Parameters
+    ----------
+    names : list of str
+        Names of the classes.
+    largest : array, shape (classes,)
+        Largest proportion of each class in what is drawn.
+
+    Returns
+    -------
+    list of int
+        Indices of the classes to show, in their order.
+
+    Examples
+    --------
+    >>> classes_to_show(["I", "O"], np.array([1.0, 0.0]))
+    [0, 1]
+    """
+    if len(names) <= SHOW_ALL:
+        return list(range(len(names)))
+    ranked = np.argsort(-largest, kind="stable")[:SHOW_MOST]
+    return sorted(int(index) for index in ranked if largest[index] >= SHOW_FROM)
+
+
+def class_colors(names: list[str]) -> dict[str, str]:
+    """Return a colour for every class: hues for one assembly, greys for several.
+
+    Examples
+    --------
+    >>> class_colors(["2", "1+1"])
+    {'2': '#0072B2', '1+1': '#9a9a9a'}
+    """
+    colors: dict[str, str] = {}
+    hues = greys = 0
+    for name in names:
+        if name == OTHER:
+            colors[name] = OTHER_COLOR
+        elif is_complete(name):
+            colors[name] = PALETTE[hues % len(PALETTE)]
+            hues += 1
+        else:
+            colors[name] = GREYS[greys % len(GREYS)]
+            greys += 1
+    return colors
+
+
+def sweep_axes(variable: xr.DataArray, dataset: xr.Dataset) -> list[SweepAxis]:
+    """Return the axes of a study over which a variable is given, drag before force.
+
+    Parameters
+    ----------
+    variable : xarray.DataArray
+        A variable of the study whose dimensions are those of the sweep and perhaps ``class`` or
+        ``component``.
+    dataset : xarray.Dataset
+        The study, for its coordinates and the interval of the force.
+    """
+    names = [str(dim) for dim in variable.dims if dim not in ("class", "component")]
+    order = [*_NUMBERS, *_WORDS]
+    known = sorted((name for name in names if name in order), key=order.index)
+    return [_sweep_axis(name, dataset) for name in [*known, *(n for n in names if n not in order)]]
+
+
+def reference_value(dataset: xr.Dataset, axis: SweepAxis) -> float:
+    """Return where the reference lies on an axis, NaN when the dataset does not say."""
+    for suffix, factor in (("", 1.0), ("_N", 1e3), ("_m", 1e2)):
+        found = dataset.attrs.get(f"reference_{axis.name}{suffix}")
+        if found is None:
+            continue
+        if axis.words:
+            word = _word(found)
+            return float(axis.words.index(word)) if word in axis.words else np.nan
+        return factor * float(found)
+    return np.nan
+
+
+def runs_text(dataset: xr.Dataset) -> str:
+    """Return "4 blocks, 1000 runs" as far as the dataset says."""
+    parts = []
+    for name, word in (("blocks", "block"), ("runs", "run")):
+        if name in dataset.attrs:
+            number = int(dataset.attrs[name])
+            parts.append(f"{number} {word}{'' if number == 1 else 's'}")
+    return ", ".join(parts)
+
+
+def percent(value: Any) -> str:
+    """Return "95 %" for 0.95.
+
+    Examples
+    --------
+    >>> percent(0.954), percent(0.95)
+    ('95.4 %', '95 %')
+    """
+    return f"{100.0 * float(value):.3g} %"
+
+
+def _word(value: Any) -> str:
+    return str(value).replace("_", " ")
+
+
+def _sweep_axis(name: str, dataset: xr.Dataset) -> SweepAxis:
+    coordinate = dataset[name]
+    if coordinate.dtype.kind not in "iuf":
+        words = [_word(value) for value in coordinate.values]
+        label = _WORDS.get(name, name.replace("_", " "))
+        return SweepAxis(name, label, np.arange(len(words), dtype=np.float64), words)
+    label, unit, stored = _NUMBERS.get(name, (name.replace("_", " "), "", ""))
+    if name == "force_std" and "force_interval_s" in dataset.attrs:
+        label += f",\n{force_interval_text(dataset)}"
+    if unit:
+        return SweepAxis(name, label, in_unit(coordinate, unit, stored=stored), [])
+    return SweepAxis(name, label, np.asarray(coordinate.values, dtype=np.float64), [])

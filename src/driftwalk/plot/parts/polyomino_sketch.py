@@ -1,0 +1,428 @@
+"""Sketches of outcome classes: the shapes of a class as small squares, from its name alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+from driftwalk.plot.parts.style import BLUE, INK
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.offsetbox import AnnotationBbox, DrawingArea
+
+Array = npt.NDArray[np.float64]
+Orientation = Literal["wide", "tall"]
+
+# Rows from top to bottom, as seen from above with y upwards; larger shapes are named by theirs.
+NAMED_SHAPES: Final[dict[str, str]] = {
+    "1": "x",
+    "2": "xx",
+    "I3": "xxx",
+    "L3": "x./xx",
+    "I": "xxxx",
+    "O": "xx/xx",
+    "T": "xxx/.x.",
+    "S": ".xx/xx.",
+    "Z": "xx./.xx",
+    "L": "x./x./xx",
+    "J": ".x/.x/xx",
+}
+# Empty space between the shapes of a class, in sides of a block.
+GAP: Final = 0.6
+# Font size of the names under sketches, and how wide its letters are [pt].
+NAME_SIZE_PT: Final = 5.5
+LETTER_PT: Final = 0.74 * NAME_SIZE_PT
+# Space between a sketch and its name [pt].
+NAME_GAP_PT: Final = 2.0
+MAX_CELL_PT: Final = 6.0
+
+
+def shape_cells(shape: str) -> npt.NDArray[np.int64]:
+    """Return the cells of a shape from its name.
+
+    Parameters
+    ----------
+    shape : str
+        ``1``, ``2``, ``I3``, ``L3``, a letter of a tetromino, or a code: rows from top to bottom,
+        ``x`` for a cell and ``.`` for none, joined by ``/``.
+
+    Returns
+    -------
+    numpy.ndarray of int, shape (cells, 2)
+        Column and row of every cell, y upwards, both from 0.
+
+    Raises
+    ------
+    InputError
+        When the name is neither known nor a code.
+
+    Examples
+    --------
+    >>> shape_cells("L3").tolist()
+    [[0, 1], [0, 0], [1, 0]]
+    """
+    rows = NAMED_SHAPES.get(shape, shape).split("/")
+    filled = [[letter == "x" for letter in row] for row in rows]
+    readable = set(shape) <= set("x./") or shape in NAMED_SHAPES
+    if not readable or len({len(row) for row in rows}) != 1 or not any(map(any, filled)):
+        raise InputError(
+            f"'{shape}' is no shape: expected one of {', '.join(NAMED_SHAPES)}, or rows such as "
+            "xxx/.x. with x for a cell"
+        )
+    row, column = np.nonzero(np.array(filled))
+    return np.column_stack([column, len(rows) - 1 - row]).astype(np.int64)
+
+
+def class_cells(name: str, *, orientation: Orientation = "wide") -> Array:
+    """Return where the squares of the sketch of an outcome class lie, in sides of a block.
+
+    The shapes keep the order of the name and are packed into a compact picture, 0.6 sides apart.
+
+    Parameters
+    ----------
+    name : str
+        Shapes joined by ``+``, such as ``"I3+1"``.
+    orientation : {"wide", "tall"}
+        Turn every shape so that its longer side lies or stands. Shapes are turned, never
+        mirrored.
+
+    Returns
+    -------
+    numpy.ndarray, shape (cells, 2)
+        Lower left corners of the squares, y upwards; the picture starts at (0, 0).
+
+    Raises
+    ------
+    InputError
+        When a shape of the name is not known.
+
+    Examples
+    --------
+    >>> class_cells("2+1").tolist()
+    [[0.0, 1.6], [1.0, 1.6], [0.0, 0.0]]
+    """
+    shapes = [_turned(shape_cells(shape), orientation) for shape in name.split("+")]
+    sizes = np.array([cells.max(axis=0) + 1 for cells in shapes], dtype=np.float64)
+    # Shelves that stand are the same packing with the axes exchanged.
+    along = slice(None, None, -1 if orientation == "tall" else 1)
+    offsets = _packed(sizes[:, along])[:, along]
+    height = float((offsets + sizes)[:, 1].max())
+    placed = []
+    for cells, (left, top), (_, tall) in zip(shapes, offsets, sizes, strict=True):
+        placed.append(cells + np.array([left, height - top - tall]))
+    # Rounded, so that the same square has the same place whatever was packed before it.
+    return np.round(np.concatenate(placed), 9) + 0.0
+
+
+def sketch_size(cells: Array) -> Array:
+    """Return width and height of a sketch, in sides of a block."""
+    size: Array = cells.max(axis=0) + 1.0
+    return size
+
+
+def sketch_box(
+    name: str,
+    *,
+    cell_pt: float,
+    color: Any = BLUE,
+    orientation: Orientation = "wide",
+    height_pt: float | None = None,
+) -> DrawingArea:
+    """Return the sketch of a class as a box of fixed size, to be placed by an offset box.
+
+    Parameters
+    ----------
+    name : str
+        Name of the outcome class.
+    cell_pt : float
+        Side of a square [pt].
+    color : color
+        Colour of the squares.
+    orientation : {"wide", "tall"}
+        See `class_cells`.
+    height_pt : float, optional
+        Height of the box [pt], the sketch at its top; default: that of the sketch.
+
+    Returns
+    -------
+    matplotlib.offsetbox.DrawingArea
+        The box; its artists are one square per block.
+
+    Examples
+    --------
+    >>> len(sketch_box("L3+1", cell_pt=4.0).get_children())
+    4
+    """
+    from matplotlib.offsetbox import DrawingArea
+    from matplotlib.patches import Rectangle
+
+    cells = class_cells(name, orientation=orientation)
+    width, height = sketch_size(cells) * cell_pt
+    total = height if height_pt is None else height_pt
+    box = DrawingArea(width, total, clip=False)
+    for x, y in cells * cell_pt:
+        box.add_artist(
+            Rectangle(
+                (x, y + total - height), cell_pt, cell_pt, facecolor=color, edgecolor="white",
+                linewidth=min(0.5, 0.12 * cell_pt),
+            )
+        )  # fmt: skip
+    return box
+
+
+def place_sketch(
+    ax: Axes,
+    name: str,
+    xy: tuple[float, float],
+    *,
+    transform: Any = "data",
+    alignment: tuple[float, float] = (0.5, 0.5),
+    cell_pt: float = 3.0,
+    color: Any = BLUE,
+    orientation: Orientation = "wide",
+) -> AnnotationBbox:
+    """Put the sketch of a class on axes, also outside of their frame.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+        Where to draw.
+    name : str
+        Name of the outcome class.
+    xy : tuple of float
+        Place, in the coordinates of `transform`.
+    transform : transform or str
+        Coordinates of `xy`, as matplotlib's ``xycoords``.
+    alignment : tuple of float
+        Which point of the sketch lies at `xy`: (0, 0) is its lower left corner.
+    cell_pt : float
+        Side of a square [pt].
+    color : color
+        Colour of the squares.
+    orientation : {"wide", "tall"}
+        See `class_cells`.
+
+    Returns
+    -------
+    matplotlib.offsetbox.AnnotationBbox
+        The artist.
+
+    Examples
+    --------
+    ``place_sketch(ax, "T", (0.5, 1.05), transform="axes fraction")``
+    """
+    box = sketch_box(name, cell_pt=cell_pt, color=color, orientation=orientation)
+    return _pinned(ax, box, xy, transform=transform, alignment=alignment)
+
+
+def draw_sketches_below(
+    ax: Axes,
+    positions: Sequence[float],
+    names: Sequence[str],
+    *,
+    color: Any = INK,
+    cell_pt: float | None = None,
+    pad_pt: float = 4.0,
+) -> float:
+    """Draw the sketches of classes below the x axis in place of tick labels, with their names.
+
+    All have squares of one size. A name that holds no known shape ("other") is written out.
+    Codes of shapes are not written: the sketch says the same and can be read.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+        Where to draw; its ticks are set to `positions`.
+    positions : sequence of float
+        Places along the x axis, equally spaced; the limits of the axis must be set already.
+    names : sequence of str
+        Names of the classes.
+    color : color
+        Colour of the squares.
+    cell_pt : float, optional
+        Side of a square [pt]; default: as large as the space between two ticks allows.
+    pad_pt : float
+        Space above and below the sketches [pt].
+
+    Returns
+    -------
+    float
+        Height of all below the axis [pt]: pass it to ``ax.set_xlabel`` as ``labelpad``.
+
+    Raises
+    ------
+    InputError
+        When the numbers of positions and names differ.
+
+    Examples
+    --------
+    ``ax.set_xlabel("outcome", labelpad=draw_sketches_below(ax, range(2), ["2", "1+1"]))``
+    """
+    if len(positions) != len(names):
+        raise InputError(f"{len(positions)} positions for {len(names)} classes")
+    slot_pt = _slot_points(ax, positions)
+    sizes = {
+        name: sketch_size(class_cells(name, orientation="tall")) for name in names if is_class(name)
+    }
+    largest = np.max([*sizes.values(), np.ones(2)], axis=0)
+    side = min(MAX_CELL_PT, 0.72 * slot_pt / largest[0]) if cell_pt is None else cell_pt
+    ax.set_xticks(list(positions), labels=[""] * len(positions))
+    ax.tick_params(axis="x", length=0.0)
+    deepest = 0.0
+    for position, name in zip(positions, names, strict=True):
+        text = name_text(name)
+        upright = len(text) * LETTER_PT > slot_pt
+        parts: list[Any] = []
+        depth = 0.0
+        if name in sizes:
+            depth = side * float(largest[1])
+            parts.append(
+                sketch_box(name, cell_pt=side, color=color, orientation="tall", height_pt=depth)
+            )
+        if text:
+            depth += NAME_GAP_PT + (len(text) * LETTER_PT if upright else NAME_SIZE_PT)
+            parts.append(_name_box(text, upright=upright))
+        _pinned(
+            ax, _stacked(parts), (position, 0.0), transform=ax.get_xaxis_transform(),
+            alignment=(0.5, 1.0), below_pt=pad_pt,
+        )  # fmt: skip
+        deepest = max(deepest, depth)
+    return deepest + 2.0 * pad_pt
+
+
+def name_text(name: str) -> str:
+    """Return the name of a class as a figure writes it: empty for a code, which nobody can read.
+
+    Examples
+    --------
+    >>> name_text("L3+1"), name_text("xxx/x.x")
+    ('L3+1', '')
+    """
+    return "" if "x" in name else name
+
+
+def is_class(name: str) -> bool:
+    """Return whether a sketch of this name can be drawn.
+
+    Examples
+    --------
+    >>> is_class("I3+1"), is_class("other")
+    (True, False)
+    """
+    try:
+        for shape in name.split("+"):
+            shape_cells(shape)
+    except InputError:
+        return False
+    return True
+
+
+def _turned(cells: npt.NDArray[np.int64], orientation: Orientation) -> npt.NDArray[np.int64]:
+    """Turn a shape by a quarter when its longer side does not lie as asked."""
+    width, height = cells.max(axis=0) + 1
+    if (width >= height) if orientation == "wide" else (height >= width):
+        return cells
+    return np.column_stack([cells[:, 1].max() - cells[:, 1], cells[:, 0]])
+
+
+def _packed(sizes: Array) -> Array:
+    """Return left and top of every box, packed on shelves into the most compact picture.
+
+    Every sensible width of the shelves is tried; the picture with the smallest longer side is
+    taken, then the smallest area, then the flattest.
+    """
+    widths = sizes[:, 0]
+    limits = {
+        float(widths[first:last].sum() + GAP * (last - first - 1))
+        for first in range(len(widths))
+        for last in range(first + 1, len(widths) + 1)
+    }
+    tried = [_shelves(sizes, limit) for limit in sorted(limits) if limit >= widths.max() - 1e-9]
+
+    def badness(offsets: Array) -> tuple[float, float, float]:
+        width, height = np.round((offsets + sizes).max(axis=0), 9)
+        return max(width, height), width * height, height
+
+    return min(tried, key=badness)
+
+
+def _shelves(sizes: Array, limit: float) -> Array:
+    """Return left and top of boxes put one after the other on shelves no wider than `limit`."""
+    offsets = np.zeros_like(sizes)
+    left = top = deepest = 0.0
+    for index, (width, height) in enumerate(sizes):
+        if left > 0.0 and left + width > limit + 1e-9:
+            left, top, deepest = 0.0, top + deepest + GAP, 0.0
+        offsets[index] = left, top
+        left += width + GAP
+        deepest = max(deepest, height)
+    return offsets
+
+
+def figure_of(ax: Axes) -> Figure:
+    """Return the whole figure that axes lie in."""
+    figure = ax.get_figure(root=True)
+    if figure is None:
+        raise InputError("the axes were removed from their figure")
+    return figure
+
+
+def axes_points(ax: Axes) -> Array:
+    """Return width and height of axes as they lie now [pt]."""
+    size: Array = np.array([ax.bbox.width, ax.bbox.height]) / figure_of(ax).dpi * 72.0
+    return size
+
+
+def settle_layout(ax: Axes) -> None:
+    """Give axes the size that they will have, so that sizes and places in points stay true."""
+    figure = figure_of(ax)
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+
+
+def _slot_points(ax: Axes, positions: Sequence[float]) -> float:
+    """Return the distance between neighbouring positions [pt] as the axes lie now."""
+    low, high = ax.get_xlim()
+    step = float(np.min(np.diff(positions))) if len(positions) > 1 else high - low
+    return float(axes_points(ax)[0] * step / (high - low))
+
+
+def _name_box(name: str, *, upright: bool) -> Any:
+    from matplotlib.offsetbox import TextArea
+
+    return TextArea(
+        name,
+        textprops={"size": NAME_SIZE_PT, "color": INK, "rotation": 90.0 if upright else 0.0},
+    )
+
+
+def _stacked(parts: list[Any]) -> Any:
+    from matplotlib.offsetbox import VPacker
+
+    return VPacker(children=parts, align="center", pad=0.0, sep=NAME_GAP_PT)
+
+
+def _pinned(
+    ax: Axes,
+    box: Any,
+    xy: tuple[float, float],
+    *,
+    transform: Any,
+    alignment: tuple[float, float],
+    below_pt: float = 0.0,
+) -> AnnotationBbox:
+    from matplotlib.offsetbox import AnnotationBbox
+
+    artist = AnnotationBbox(
+        box, xy, xybox=(0.0, -below_pt), xycoords=transform, boxcoords="offset points",
+        box_alignment=alignment, frameon=False, pad=0.0, annotation_clip=False,
+    )  # fmt: skip
+    ax.add_artist(artist)
+    return artist

@@ -1,0 +1,437 @@
+"""How far the outcomes of a sweep lie from those of the reference (Fig. 11), and class by class."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+from driftwalk.plot.distances import cell_edges
+from driftwalk.plot.parts.assembly_labels import (
+    PALETTE,
+    SweepAxis,
+    check_kind,
+    class_names,
+    classes_to_show,
+    reference_value,
+    sweep_axes,
+)
+from driftwalk.plot.parts.labels import number_attribute
+from driftwalk.plot.parts.polyomino_sketch import (
+    LETTER_PT,
+    MAX_CELL_PT,
+    NAME_GAP_PT,
+    NAME_SIZE_PT,
+    axes_points,
+    class_cells,
+    figure_of,
+    name_text,
+    place_sketch,
+    sketch_size,
+)
+from driftwalk.plot.parts.style import (
+    BLUE,
+    DOUBLE_COLUMN_MM,
+    INK,
+    MM_PER_INCH,
+    MUTED,
+    ORANGE,
+    PALE,
+    SINGLE_COLUMN_MM,
+    STYLE,
+    add_colorbar,
+    axes_or_new,
+    new_figure,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.collections import QuadMesh
+
+Array = npt.NDArray[np.float64]
+# Bright is close to the reference, as bright is a good score in the map of the calibration.
+DISTANCE_COLORMAP: Final = "viridis_r"
+PROPORTION_COLORMAP: Final = "viridis"
+DISTANCE_LABEL: Final = r"$\ell_1$ distance to the reference"
+FLOOR_LABEL: Final = "95 % noise floor"
+REFERENCE_LABEL: Final = "reference"
+# Least width of a sketch in the key [pt].
+KEY_SLOT_PT: Final = 32.0
+KEY_ROW_MM: Final = 11.0
+MM_PER_PT: Final = MM_PER_INCH / 72.0
+# Letters of a legend that fit abreast in one column of a page.
+LEGEND_LETTERS: Final = 50
+MARKERS: Final = "osD^v<>"
+
+
+def plot_l1_map(
+    sensitivity: xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    colorbar: Literal["beside", "none"] = "beside",
+) -> Axes:
+    """Draw the l1 distance to the reference over the axes of a sensitivity study.
+
+    Two axes of numbers give a map: the star is the reference, the black line the distance that 95
+    in 100 repetitions of the reference itself stay below (95 % noise floor), and hatched cells have
+    no distance. One axis, or one of words, gives points over a band below the noise floor.
+
+    Parameters
+    ----------
+    sensitivity : xarray.Dataset
+        A `sensitivity` of one or two axes; select along the others first.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+    colorbar : {"beside", "none"}
+        Whether a map gets a colour bar.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind, lacks the distance, or has more than two axes.
+
+    Examples
+    --------
+    ``plot_l1_map(sensitivity).figure.savefig("l1_map.png")``
+    """
+    check_kind(sensitivity, "sensitivity", "l1_distance")
+    sweep = _one_or_two(sensitivity, sensitivity["l1_distance"])
+    distance = _values(sensitivity["l1_distance"], sweep)
+    if len(sweep) == 1 or any(axis.words for axis in sweep):
+        ax = axes_or_new(ax, height_mm=65.0)
+        _draw_floor_band(ax, sensitivity)
+        _draw_lines(ax, sweep, distance, color=INK)
+        _mark_on_line(ax, sensitivity, sweep)
+        ax.set_ylabel(DISTANCE_LABEL)
+        ax.set_ylim(bottom=0.0)
+        _legend_above(ax)
+        return ax
+    ax = axes_or_new(ax)
+    mesh = _draw_map(ax, sweep, distance, colormap=DISTANCE_COLORMAP)
+    mesh.set_clim(0.0, float(np.nanmax(distance)) if np.isfinite(distance).any() else 2.0)
+    floor = number_attribute(sensitivity, "noise_floor_95")
+    drawn = _draw_floor_contour(ax, sweep, distance, floor)
+    _mark_on_map(ax, sensitivity, sweep)
+    if colorbar == "beside":
+        bar = add_colorbar(mesh, ax, DISTANCE_LABEL)
+        if np.isfinite(floor):
+            bar.ax.axhline(floor, color=INK, lw=1.4)
+            if not drawn:
+                bar.set_label(rf"$\ell_1$ distance (line: {FLOOR_LABEL})")
+    _legend_above(ax)
+    return ax
+
+
+def plot_class_panels(
+    sensitivity: xr.Dataset,
+    axes: Any = None,
+    *,
+    classes: Sequence[str] | None = None,
+    columns: int = 5,
+) -> list[Axes]:
+    """Draw the proportion of every outcome class over the axes of a sensitivity study.
+
+    One panel per class, all with one scale. Two axes of numbers give maps, other axes points.
+
+    Parameters
+    ----------
+    sensitivity : xarray.Dataset
+        A `sensitivity` of one or two axes.
+    axes : sequence of matplotlib.axes.Axes, optional
+        Where to draw, one per class; a new figure when left out.
+    classes : sequence of str, optional
+        Names of the classes. Default: all up to 16, else those that reach 1 % in some setting, at
+        most 20.
+    columns : int
+        Panels per row of a new figure.
+
+    Returns
+    -------
+    list of matplotlib.axes.Axes
+        The axes, one per class.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind, has more than two axes or no such class, or the
+        number of axes is not that of the classes.
+
+    Examples
+    --------
+    ``plot_class_panels(sensitivity, classes=["I", "T"])``
+    """
+    check_kind(sensitivity, "sensitivity", "proportion", "class")
+    sweep = _one_or_two(sensitivity, sensitivity["proportion"])
+    shown = shown_classes(sensitivity) if classes is None else list(classes)
+    unknown = [name for name in shown if name not in class_names(sensitivity)]
+    if unknown or not shown:
+        raise InputError(f"the study has no class {', '.join(unknown) or '(none was asked for)'}")
+    panels, edge = _panel_grid(axes, len(shown), columns)
+    mapped = len(sweep) == 2 and not any(axis.words for axis in sweep)
+    row = {name: index for index, name in enumerate(class_names(sensitivity))}
+    every = [_values(sensitivity["proportion"].isel({"class": row[name]}), sweep) for name in shown]
+    top = max((float(np.nanmax(p)) for p in every if np.isfinite(p).any()), default=1.0) or 1.0
+    for ax, name, proportion in zip(panels, shown, every, strict=True):
+        if mapped:
+            mesh = _draw_map(ax, sweep, proportion, colormap=PROPORTION_COLORMAP)
+            mesh.set_clim(0.0, top)
+            _mark_on_map(ax, sensitivity, sweep, size=6.0)
+        else:
+            _draw_lines(ax, sweep, proportion, color=BLUE)
+            _mark_on_line(ax, sensitivity, sweep)
+            ax.set_ylim(0.0, 1.05 * top)
+            ax.set_ylabel("proportion")
+            _turn_words(ax, sweep)
+        _title_panel(ax, name)
+    if edge is not None:
+        _label_outside(panels, edge)
+        _legend_of_figure(panels[0])
+    if mapped:
+        add_colorbar(panels[0].collections[0], panels, "proportion of runs")
+    return panels
+
+
+def plot_class_key(
+    names: Sequence[str], ax: Axes | None = None, *, rows: int | None = None
+) -> Axes:
+    """Draw the sketches of classes with their names, in rows: the key below a map (Fig. 11).
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the classes.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; its frame is taken away. A new figure when left out.
+    rows : int, optional
+        Number of rows; default: as the width of the axes asks.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Examples
+    --------
+    >>> len(plot_class_key(["2", "1+1"]).artists)
+    2
+    """
+    if rows is None:
+        width_mm = SINGLE_COLUMN_MM if ax is None else float(axes_points(ax)[0]) * MM_PER_PT
+        rows = key_rows(names, width_mm)
+    ax = axes_or_new(ax, height_mm=KEY_ROW_MM * rows)
+    ax.set_axis_off()
+    ax.set_xlim(0.0, 1.0)
+    ax.set_ylim(0.0, 1.0)
+    columns = -(-len(names) // rows)
+    sizes = np.array([sketch_size(class_cells(name)) for name in names])
+    written = any(name_text(name) for name in names)
+    free = axes_points(ax) / np.array([columns, rows])
+    free -= np.array([0.0, NAME_SIZE_PT + 4.0 if written else 2.0])
+    side = max(1.0, min(MAX_CELL_PT, *(0.85 * free / sizes.max(axis=0))))
+    for index, name in enumerate(names):
+        row, column = divmod(index, columns)
+        x = (column + 0.5) / columns
+        place_sketch(ax, name, (x, 1.0 - row / rows), alignment=(0.5, 1.0), cell_pt=side, color=INK)
+        ax.annotate(
+            name_text(name), (x, 1.0 - row / rows), size=NAME_SIZE_PT, ha="center", va="top",
+            xytext=(0.0, -side * float(sizes[:, 1].max()) - NAME_GAP_PT),
+            textcoords="offset points",
+        )  # fmt: skip
+    return ax
+
+
+def key_rows(names: Sequence[str], width_mm: float) -> int:
+    """Return in how many rows `plot_class_key` draws the classes on axes of that width."""
+    longest = max((len(name_text(name)) for name in names), default=0)
+    slot = max(KEY_SLOT_PT, (longest + 1.0) * LETTER_PT)
+    columns = max(1, int(width_mm / MM_PER_PT / slot))
+    return max(1, -(-len(names) // columns))
+
+
+def shown_classes(sensitivity: xr.Dataset) -> list[str]:
+    """Return the classes of a study that figures show."""
+    names = class_names(sensitivity)
+    proportion = sensitivity["proportion"].transpose(..., "class").values.reshape(-1, len(names))
+    largest = np.nan_to_num(np.where(np.isfinite(proportion), proportion, 0.0)).max(axis=0)
+    return [names[index] for index in classes_to_show(names, largest)]
+
+
+def _one_or_two(sensitivity: xr.Dataset, variable: xr.DataArray) -> list[SweepAxis]:
+    sweep = sweep_axes(variable, sensitivity)
+    if not 1 <= len(sweep) <= 2:
+        raise InputError(
+            f"the study has {len(sweep)} axes ({', '.join(axis.name for axis in sweep)}): select "
+            "values along all but two, such as study.sel(latching='collision')"
+        )
+    return sweep
+
+
+def _values(variable: xr.DataArray, sweep: list[SweepAxis]) -> Array:
+    """Return the values with the first axis of the figure first."""
+    return np.asarray(variable.transpose(*(axis.name for axis in sweep)).values, dtype=np.float64)
+
+
+def _draw_map(ax: Axes, sweep: list[SweepAxis], values: Array, *, colormap: str) -> QuadMesh:
+    """Draw values (x, y) as a map, and hatch the cells that have none."""
+    from matplotlib.patches import Rectangle
+
+    x_edge, y_edge = (cell_edges(axis.values) for axis in sweep)
+    mesh = ax.pcolormesh(x_edge, y_edge, np.ma.masked_invalid(values.T), cmap=colormap)
+    mesh.set_rasterized(True)
+    named = False
+    for i, j in zip(*np.nonzero(~np.isfinite(values)), strict=True):
+        ax.add_patch(
+            Rectangle(
+                (x_edge[i], y_edge[j]), x_edge[i + 1] - x_edge[i], y_edge[j + 1] - y_edge[j],
+                facecolor="white", edgecolor=INK, linewidth=0.0, hatch="//////",
+                label="" if named else "not computed",
+            )
+        )  # fmt: skip
+        named = True
+    ax.set_xlim(*x_edge[[0, -1]])
+    ax.set_ylim(*y_edge[[0, -1]])
+    ax.set_xlabel(sweep[0].label)
+    ax.set_ylabel(sweep[1].label)
+    return mesh
+
+
+def _draw_floor_contour(ax: Axes, sweep: list[SweepAxis], values: Array, floor: float) -> bool:
+    """Draw the line of the noise floor; False when the map does not cross it."""
+    from matplotlib.patheffects import Normal, Stroke
+
+    known = values[np.isfinite(values)]
+    crossed = known.size and known.min() < floor < known.max()
+    if min(values.shape) < 2 or not crossed:
+        return False
+    lines = ax.contour(
+        sweep[0].values, sweep[1].values, np.ma.masked_invalid(values.T), levels=[floor],
+        colors=INK, linewidths=1.2,
+    )  # fmt: skip
+    outline = [Stroke(linewidth=2.6, foreground="white"), Normal()]
+    lines.set_path_effects(outline)
+    ax.plot([], [], color=INK, lw=1.2, label=f"{FLOOR_LABEL} ({floor:.3g})")
+    return True
+
+
+def _mark_on_map(
+    ax: Axes, sensitivity: xr.Dataset, sweep: list[SweepAxis], *, size: float = 10.0
+) -> None:
+    x, y = (reference_value(sensitivity, axis) for axis in sweep)
+    if np.isfinite([x, y]).all():
+        ax.plot(
+            [x], [y], "*", ms=size, mfc=ORANGE, mec="white", mew=0.7, zorder=6, clip_on=False,
+            ls="none", label=REFERENCE_LABEL,
+        )  # fmt: skip
+
+
+def _draw_floor_band(ax: Axes, sensitivity: xr.Dataset) -> None:
+    high = number_attribute(sensitivity, "noise_floor_95")
+    mean = number_attribute(sensitivity, "noise_floor_mean")
+    if np.isfinite(high):
+        ax.axhspan(0.0, high, color=PALE, lw=0, label=f"below the {FLOOR_LABEL}")
+    if np.isfinite(mean):
+        ax.axhline(mean, color=INK, lw=0.8, dashes=(4, 2.5), label="mean noise floor")
+
+
+def _draw_lines(ax: Axes, sweep: list[SweepAxis], values: Array, *, color: str) -> None:
+    """Draw values over one axis, one line per value of the other; words are not joined."""
+    along, *others = sweep
+    if others and along.words and not others[0].words:
+        along, others, values = others[0], [along], values.T
+    style = "none" if along.words else "-"
+    if not others:
+        ax.plot(along.values, values, marker="o", ms=3.5, ls=style, color=color)
+    else:
+        other = others[0]
+        texts = other.words or [f"{value:.4g}" for value in other.values]
+        name = other.label.split(",\n")[0]
+        spread = 0.12 * (np.arange(len(texts)) - (len(texts) - 1) / 2.0)
+        for index, text in enumerate(texts):
+            ax.plot(
+                along.values + (spread[index] if along.words else 0.0), values[:, index],
+                marker=MARKERS[index % len(MARKERS)], ms=3.5, ls=style,
+                color=PALETTE[index % len(PALETTE)], label=f"{name}: {text}",
+            )  # fmt: skip
+    if along.words:
+        ax.set_xticks(along.values, labels=along.words)
+        ax.set_xlim(-0.5, len(along.words) - 0.5)
+    ax.set_xlabel(along.label)
+    ax.spines[["top", "right"]].set_visible(False)
+
+
+def _mark_on_line(ax: Axes, sensitivity: xr.Dataset, sweep: list[SweepAxis]) -> None:
+    along = next((axis for axis in sweep if not axis.words), sweep[0])
+    at = reference_value(sensitivity, along)
+    if np.isfinite(at):
+        ax.axvline(at, color=ORANGE, lw=0.9, zorder=1, label=REFERENCE_LABEL)
+
+
+def _panel_grid(axes: Any, count: int, columns: int) -> tuple[list[Axes], int | None]:
+    """Return the axes of the panels, and the columns of a new figure (None for axes given)."""
+    if axes is not None:
+        given: list[Axes] = list(np.ravel(np.asarray(axes, dtype=object)))
+        if len(given) != count:
+            raise InputError(f"got {len(given)} axes, expected {count}: pass them as axes=[...]")
+        return given, None
+    columns = min(columns, count)
+    rows = -(-count // columns)
+    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=20.0 + 40.0 * rows)
+    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    for spare in grid.ravel()[count:]:
+        spare.remove()
+    return list(grid.ravel()[:count]), columns
+
+
+def _label_outside(panels: list[Axes], columns: int) -> None:
+    """Keep the labels of the leftmost and of the lowest panel of every column only."""
+    for index, ax in enumerate(panels):
+        lowest = index + columns >= len(panels)
+        ax.tick_params(labelbottom=lowest)
+        if not lowest:
+            ax.set_xlabel("")
+        if index % columns:
+            ax.set_ylabel("")
+
+
+def _title_panel(ax: Axes, name: str) -> None:
+    """Write the name of a class above the left edge and draw its sketch above the right one."""
+    cells = class_cells(name)
+    side = min(4.0, 10.0 / float(sketch_size(cells)[1]))
+    ax.set_title(name_text(name), loc="left", color=MUTED)
+    place_sketch(
+        ax, name, (1.0, 1.03), transform="axes fraction", alignment=(1.0, 0.0), cell_pt=side,
+        color=INK,
+    )  # fmt: skip
+
+
+def _turn_words(ax: Axes, sweep: list[SweepAxis]) -> None:
+    """Turn the tick labels of a small panel when they are words, which would not fit abreast."""
+    if all(axis.words for axis in sweep):
+        ax.tick_params(axis="x", labelrotation=90.0)
+
+
+def _legend_of_figure(ax: Axes) -> None:
+    """Put the legend of one panel, which holds for all, above the figure."""
+    handles, labels = ax.get_legend_handles_labels()
+    if labels:
+        figure_of(ax).legend(handles, labels, loc="outside upper center", ncols=4)
+
+
+def _legend_above(ax: Axes) -> None:
+    handles, labels = ax.get_legend_handles_labels()
+    if labels:
+        narrow = 2 * max(map(len, labels)) <= LEGEND_LETTERS
+        ax.legend(
+            handles, labels, loc="lower left", bbox_to_anchor=(0.0, 1.0),
+            ncols=2 if narrow else 1, borderaxespad=0.2,
+            fontsize=STYLE["legend.fontsize"], frameon=False,
+        )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Two-colour markers: two discs of different hue on each block."""

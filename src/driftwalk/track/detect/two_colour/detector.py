@@ -1,0 +1,199 @@
+"""Two-colour markers: two discs of different hue on each block give position and orientation."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from driftwalk.core.opencv import require_opencv
+from driftwalk.track.detect.chroma import ChromaTables
+from driftwalk.track.detect.markers import TwoColourMarker
+from driftwalk.track.detect.two_colour.discs import Disc, find_regions, join_pieces, sort_out
+from driftwalk.track.detect.two_colour.outline import outlined_centres
+from driftwalk.track.detect.two_colour.pairs import Pair, pair_discs
+from driftwalk.track.detect.two_colour.pose import SMOOTHING_PX, Measured, weighted_centres
+from driftwalk.track.types import Array, Detection, Image, PixelToWorld, Rejected
+
+_COARSE_DIAMETER_PX: Final = 6.0
+_FINE_DIAMETER_PX: Final = 12.0
+_MOST_FACTOR: Final = 4
+_WHOLE: Final = 0.93
+_LEAST_VISIBLE: Final = 0.35
+_MOST_OFF: Final = 0.06
+_MOST_UNEVEN: Final = 0.015
+
+
+class TwoColourDetector:
+    """Finds two-colour markers.
+
+    The image is first searched at reduced size for regions of either colour. Regions of the right
+    area are paired by the marker's spacing, and each pair is measured at full size.
+
+    Parameters
+    ----------
+    marker : TwoColourMarker
+        Colours, size and spacing.
+    camera : PixelToWorld
+        The scale; there is no default one.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> marker = TwoColourMarker(
+    ...     spacing_m=0.014, size_m=0.010,
+    ...     colour_1={"a_star": 60, "b_star": 14}, colour_2={"a_star": -44, "b_star": 24},
+    ... )
+    >>> camera = dw.Camera.from_scale(640, 480, px_per_m=1500.0)
+    >>> track = dw.tank30_recording("without_noise").isel(time=slice(0, 1))
+    >>> _, image = next(dw.render_video(track))
+    >>> found, _ = TwoColourDetector(marker, camera).detect(image)
+    >>> bool(abs(found[0].x - track["x"].values[0, 0]) < 1e-4)
+    True
+    """
+
+    def __init__(self, marker: TwoColourMarker, camera: PixelToWorld) -> None:
+        self._cv2: Any = require_opencv()
+        self.marker = marker
+        self.camera = camera
+        self._tables = ChromaTables(marker)
+        self._factor = 0
+
+    def detect(self, image: Image) -> tuple[list[Detection], list[Rejected]]:
+        """Find the markers in one image.
+
+        Parameters
+        ----------
+        image : array, shape (rows, columns, 3)
+            Blue, green, red, uint8.
+
+        Returns
+        -------
+        tuple
+            Detections, and rejected candidates with the reason.
+        """
+        discs, rejected = self._discs(image)
+        pairs, alone = pair_discs(
+            discs[0], discs[1], spacing_per_diameter=self.marker.spacing_m / self.marker.size_m
+        )
+        rejected += alone
+        measured: list[tuple[Pair, Measured]] = []
+        for pair in pairs:
+            result = self._measure(image, pair)
+            if result.visible >= _LEAST_VISIBLE:
+                measured.append((pair, result))
+            else:
+                column, row = result.centres.mean(axis=0)
+                area = pair.first.area + pair.second.area
+                reason = f"only {result.visible:.0%} of the marker can be seen"
+                rejected.append(Rejected(float(column), float(row), area, reason, "hidden"))
+        return self._place(measured), rejected
+
+    def _discs(self, image: Image) -> tuple[tuple[list[Disc], list[Disc]], list[Rejected]]:
+        """Return the candidates of both colours, and the regions that are none."""
+        cv2 = self._cv2
+        rows, columns = image.shape[:2]
+        if not self._factor:
+            self._factor = self._choose_factor(columns, rows)
+        factor = self._factor
+        small = image
+        if factor > 1:
+            size = (columns // factor, rows // factor)
+            cut = image[: size[1] * factor, : size[0] * factor]
+            small = cv2.resize(cut, size, interpolation=cv2.INTER_AREA)
+        label = self._tables.label.take(self._tables.codes(cv2, small))
+        both, rejected = [], []
+        for colour in (1, 2):
+            regions = find_regions(cv2, label, colour, factor, diameter_at=self._diameter)
+            kept, wrong = sort_out(join_pieces(regions), colour=colour)
+            both.append(kept)
+            rejected += wrong
+        return (both[0], both[1]), rejected
+
+    def _choose_factor(self, columns: int, rows: int) -> int:
+        """Return by how much an image can be reduced with the discs still found."""
+        middle = np.array([[(columns - 1) / 2, (rows - 1) / 2]])
+        return int(np.clip(self._diameter(middle)[0] / _COARSE_DIAMETER_PX, 1, _MOST_FACTOR))
+
+    def _diameter(self, points: Array) -> Array:
+        """Return the diameter of a whole disc at points of the image [px]."""
+        return self.marker.size_m * self._px_per_m(points)
+
+    def _px_per_m(self, points: Array) -> Array:
+        jacobian = self.camera.jacobian(points)
+        return np.asarray(1.0 / np.sqrt(np.abs(np.linalg.det(jacobian))))
+
+    def _measure(self, image: Image, pair: Pair) -> Measured:
+        """Return the centres of a pair of discs in the image at full size."""
+        first, second = pair.first, pair.second
+        diameter = (first.diameter + second.diameter) / 2
+        spacing = diameter * self.marker.spacing_m / self.marker.size_m
+        centre = np.array([first.column + second.column, first.row + second.row]) / 2
+        partly = min(first.share, second.share) < _WHOLE or abs(pair.distance - 1.0) > _MOST_OFF
+        reach = (spacing + diameter) / 2 * (1.6 if partly else 1.25) + 3.0
+        rows, columns = image.shape[:2]
+        left, top = (max(int(value - reach), 0) for value in centre)
+        right, bottom = (
+            min(int(centre[0] + reach) + 2, columns),
+            min(int(centre[1] + reach) + 2, rows),
+        )
+        patch, factor = self._reduce(image[top:bottom, left:right], diameter)
+        codes = self._tables.codes(self._cv2, patch)
+        weights = [table.take(codes) for table in self._tables.soft]
+        corner = np.array([left, top]) + (factor - 1) / 2
+        start = np.array([[first.column, first.row], [second.column, second.row]]) - corner
+        start, diameter, spacing = start / factor, diameter / factor, spacing / factor
+        result = weighted_centres(self._cv2, weights, start, diameter=diameter)
+        apart = float(np.hypot(*(result.centres[1] - result.centres[0]))) / spacing
+        whole = result.shares.min() >= _WHOLE and result.uneven < _MOST_UNEVEN
+        if not whole or abs(apart - 1.0) > _MOST_OFF:
+            outlined = outlined_centres(weights, result.centres, diameter=diameter, spacing=spacing)
+            result = outlined if outlined is not None else result
+        return Measured(
+            result.centres * factor + corner, result.covariance * factor**2, result.shares
+        )
+
+    def _reduce(self, patch: Image, diameter: float) -> tuple[Any, int]:
+        """Return a patch with less noise, reduced where its discs are large, and by how much."""
+        cv2 = self._cv2
+        factor = int(np.clip(diameter / _FINE_DIAMETER_PX, 1, _MOST_FACTOR))
+        if factor > 1:
+            size = (patch.shape[1] // factor, patch.shape[0] // factor)
+            cut = patch[: size[1] * factor, : size[0] * factor]
+            patch = cv2.resize(cut, size, interpolation=cv2.INTER_AREA)
+        return cv2.GaussianBlur(patch, (3, 3), SMOOTHING_PX), factor
+
+    def _place(self, measured: list[tuple[Pair, Measured]]) -> list[Detection]:
+        """Return the detections in the world."""
+        if not measured:
+            return []
+        centres = np.concatenate([result.centres for _, result in measured])
+        world = self.camera.to_world(centres).reshape(-1, 2, 2)
+        jacobians = self.camera.jacobian(centres).reshape(-1, 2, 2, 2)
+        found = []
+        for (pair, result), ends, slopes in zip(measured, world, jacobians, strict=True):
+            along = ends[1] - ends[0]
+            theta = math.atan2(along[1], along[0]) - self.marker.angle_offset_rad
+            to_world = np.zeros((4, 4))
+            to_world[:2, :2], to_world[2:, 2:] = slopes
+            turn = np.array([-along[1], along[0]]) / float(along @ along)
+            to_pose = np.zeros((3, 4))
+            to_pose[:2, :2] = to_pose[:2, 2:] = np.eye(2) / 2
+            to_pose[2, :2], to_pose[2, 2:] = -turn, turn
+            lever = to_pose @ to_world
+            x, y = ends.mean(axis=0)
+            column, row = result.centres.mean(axis=0)
+            found.append(
+                Detection(
+                    x=float(x),
+                    y=float(y),
+                    column=float(column),
+                    row=float(row),
+                    theta=math.remainder(theta, 2 * math.pi),
+                    covariance=lever @ result.covariance @ lever.T,
+                    area_px=pair.first.area + pair.second.area,
+                    score=pair.score * result.visible,
+                )
+            )
+        return found

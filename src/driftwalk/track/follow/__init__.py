@@ -1,0 +1,1 @@
+"""From detections to tracks: which detection is which body."""

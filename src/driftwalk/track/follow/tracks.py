@@ -1,0 +1,165 @@
+"""What the tracker keeps of each body that it follows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+from driftwalk.track.follow.gate import Measured
+from driftwalk.track.follow.rivals import Rival
+from driftwalk.track.types import Detection
+
+Floats = npt.NDArray[np.float64]
+
+COVARIANCE: Final = ("xx", "xy", "yy", "xtheta", "ytheta", "thetatheta")
+"""The parts of the covariance of a measurement, in the order in which they are kept."""
+_ROWS, _COLUMNS = np.array([0, 0, 1, 0, 1, 2]), np.array([0, 1, 1, 2, 2, 2])
+# Smallest variance of a measurement, so that a perfect one has a likelihood too.
+_LEAST_VARIANCE: Final = np.diag([1e-14, 1e-14, 1e-12])
+_FIRST_ROOM: Final = 8
+
+
+class TrackState(NamedTuple):
+    """Where the tracker believes a body to be."""
+
+    id: str
+    """Name of the body."""
+    x: float
+    """Position x [m]: the filter's."""
+    y: float
+    """Position y [m]."""
+    theta: float
+    """Orientation [rad]; NaN when it was never measured."""
+    vx: float
+    """Velocity in x [m/s]."""
+    vy: float
+    """Velocity in y [m/s]."""
+    omega: float
+    """Turn rate [rad/s]."""
+    measured: Detection | None
+    """The detection of this frame; None when the body was not seen."""
+    ambiguous: float
+    """Score of the best other assignment, 0 to 1."""
+
+
+class Samples:
+    """Measurements of a track: frame numbers, and x, y, theta with the parts of the covariance.
+
+    They lie in arrays that grow by doubling, so that long recordings stay small and quick to read.
+    """
+
+    def __init__(self) -> None:
+        self._frames = np.empty(_FIRST_ROOM, dtype=np.int64)
+        self._values = np.empty((_FIRST_ROOM, 3 + len(COVARIANCE)))
+        self._count = 0
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return self._count
+
+    @property
+    def frames(self) -> npt.NDArray[np.int64]:
+        """Their frames, shape (n,)."""
+        return self._frames[: self._count]
+
+    @property
+    def values(self) -> Floats:
+        """x, y, theta and the covariance in the order of `COVARIANCE`, shape (n, 9)."""
+        return self._values[: self._count]
+
+    @property
+    def first_frame(self) -> int:
+        """Frame of the first one."""
+        return int(self._frames[0])
+
+    @property
+    def last_frame(self) -> int:
+        """Frame of the last one."""
+        return int(self._frames[self._count - 1])
+
+    def append(self, frame: int, pose: Floats, covariance: Floats) -> None:
+        """Add one."""
+        if self._count == len(self._frames):
+            self._frames = np.concatenate([self._frames, np.empty_like(self._frames)])
+            self._values = np.concatenate([self._values, np.empty_like(self._values)])
+        self._frames[self._count] = frame
+        self._values[self._count, :3] = pose
+        self._values[self._count, 3:] = covariance[_ROWS, _COLUMNS]
+        self._count += 1
+
+    def keep_first(self, count: int) -> None:
+        """Take back those after the first ones."""
+        self._count = count
+
+    def leave_out_first(self, count: int) -> None:
+        """Take back the first ones."""
+        self._frames = self._frames[count:].copy()
+        self._values = self._values[count:].copy()
+        self._count -= count
+
+
+@dataclass(eq=False)
+class Track:
+    """A body that is followed, or what may become one."""
+
+    mean: Floats
+    """The filter's x, y [m], theta [rad] and their rates [m/s, rad/s], shape (6,)."""
+    covariance: Floats
+    """Its covariance, shape (6, 6)."""
+    time: float
+    """Of mean and covariance [s]."""
+    seen_at: Floats
+    """Position last measured [m], shape (2,)."""
+    seen: float
+    """When that was [s]."""
+    began: int
+    """Frame of the first sample."""
+    key: str | None = None
+    body: int | None = None
+    oriented: bool = False
+    score: float = 0.0
+    measured: Detection | None = None
+    samples: Samples = field(default_factory=Samples)
+    doubt: float = 0.0
+    """Score of the last assignment that was in doubt, 0 to 1."""
+    settles_in: int = 0
+    """Measurements after which an assignment that was in doubt has settled."""
+    company: dict[Track, int] = field(default_factory=dict)
+    """Tracks that are near now, each with the frame since when."""
+    lost_beside: dict[Track, int] = field(default_factory=dict)
+    """Tracks that were near when it was seen last."""
+    rival: Rival | None = None
+    """What it was before a measurement that is in doubt."""
+
+
+def stacked(tracks: Sequence[Track | Rival]) -> tuple[Floats, Floats]:
+    """Return means (n, 6) and covariances (n, 6, 6)."""
+    return (
+        np.array([track.mean for track in tracks]),
+        np.array([track.covariance for track in tracks]),
+    )
+
+
+def measured_of(found: Sequence[Detection]) -> Measured:
+    """Return detections as arrays.
+
+    Raises
+    ------
+    InputError
+        When one has no position in metres.
+    """
+    pose, covariance = np.empty((len(found), 3)), np.empty((len(found), 3, 3))
+    for place, one in enumerate(found):
+        if one.x is None or one.y is None:
+            raise InputError(
+                "a detection has no position in metres: state the scale (tank diameter or a "
+                "calibrated camera)"
+            )
+        pose[place] = one.x, one.y, one.theta
+        covariance[place] = one.covariance
+    return Measured(pose, covariance + _LEAST_VARIANCE)

@@ -1,0 +1,127 @@
+"""Which outcome classes are possible while some blocks are hidden.
+
+What is seen holds: blocks that are joined are one shape, and two shapes of seen blocks that do not
+fit on a common lattice are not one. Hidden blocks may be anywhere: alone, joined to each other, on
+any free cell beside a shape, or between two shapes that do fit. The set holds every class that can
+be, so the true one is always in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
+from typing import Final
+
+from driftwalk.assembly import class_name, outcome_classes
+from driftwalk.assembly.lattice.polyomino import Cell, Chirality, moved_to_origin, name_of
+
+Lattice = dict[Cell, int]
+"""From a cell to the assembly whose block stands there."""
+_STEPS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
+MOST_HIDDEN: Final = 3
+"""With more hidden blocks than that, no class is excluded."""
+MOST_LISTED: Final = 8
+
+
+def possible_classes(
+    lattices: Sequence[Lattice], hidden: int, *, chirality: Chirality
+) -> frozenset[str]:
+    """Return the outcome classes that are possible.
+
+    Parameters
+    ----------
+    lattices : sequence of dict
+        For each set of assemblies that fit on a common lattice, their cells there.
+    hidden : int
+        Number of blocks that are not seen.
+    chirality : {"merged", "distinct"}
+        Whether mirror images are one shape or two.
+
+    Returns
+    -------
+    frozenset of str
+        Names of the classes. Empty: nothing is known, which is said of more than eight blocks with
+        more than three hidden.
+
+    Examples
+    --------
+    >>> pair = {(0, 0): 0, (1, 0): 0}
+    >>> sorted(possible_classes([pair], 1, chirality="merged"))
+    ['2+1', 'I3', 'L3']
+    """
+    blocks = hidden + sum(len(lattice) for lattice in lattices)
+    if hidden > MOST_HIDDEN:
+        listed = blocks <= MOST_LISTED
+        return frozenset(outcome_classes(blocks, chirality=chirality) if listed else ())
+    frozen = tuple(tuple(sorted(lattice.items())) for lattice in lattices)
+    return _enumerated(frozen, hidden, chirality)
+
+
+@lru_cache(maxsize=256)
+def _enumerated(
+    frozen: tuple[tuple[tuple[Cell, int], ...], ...], hidden: int, chirality: Chirality
+) -> frozenset[str]:
+    lattices = [dict(items) for items in frozen]
+    found = set()
+    for placed in range(hidden + 1):
+        apart = hidden - placed
+        others = outcome_classes(apart, chirality=chirality) if apart else ("",)
+        for cells in _placements(lattices, placed):
+            shapes = list(_shapes(lattices, cells, chirality))
+            for other in others:
+                found.add(class_name([*shapes, *filter(None, other.split("+"))]))
+    return frozenset(found)
+
+
+def _placements(lattices: Sequence[Lattice], number: int) -> Iterable[frozenset[tuple[int, Cell]]]:
+    """Return all sets of free cells that hidden blocks may stand on, each beside another block."""
+    found: set[frozenset[tuple[int, Cell]]] = {frozenset()}
+    for _ in range(number):
+        found = {cells | {new} for cells in found for new in _free_cells(lattices, cells)}
+    return found
+
+
+def _free_cells(
+    lattices: Sequence[Lattice], cells: frozenset[tuple[int, Cell]]
+) -> set[tuple[int, Cell]]:
+    return {
+        (place, next_to)
+        for place, lattice in enumerate(lattices)
+        for cell in [*lattice, *(cell for at, cell in cells if at == place)]
+        for next_to in _beside(cell)
+        if next_to not in lattice and (place, next_to) not in cells
+    }
+
+
+def _shapes(
+    lattices: Sequence[Lattice], cells: Iterable[tuple[int, Cell]], chirality: Chirality
+) -> Iterator[str]:
+    """Give the shape of each assembly, hidden blocks at the cells given."""
+    hidden = set(cells)
+    for place, lattice in enumerate(lattices):
+        own: dict[Cell, int] = {cell: -1 for at, cell in hidden if at == place}
+        left = {**lattice, **own}
+        while left:
+            yield name_of(moved_to_origin(tuple(_connected(left))), chirality)
+
+
+def _connected(left: Lattice) -> list[Cell]:
+    """Take one connected assembly out of the cells that are left."""
+    first = next(iter(left))
+    waiting, found = [(first, left.pop(first))], [first]
+    while waiting:
+        cell, assembly = waiting.pop()
+        for other in [cell for cell, label in left.items() if label == assembly >= 0]:
+            waiting.append((other, left.pop(other)))
+            found.append(other)
+        for other in _beside(cell):
+            # Seen blocks of two assemblies side by side are not joined: that would have been seen.
+            if other in left and -1 in (assembly, left[other]):
+                waiting.append((other, left.pop(other)))
+                found.append(other)
+    return found
+
+
+def _beside(cell: Cell) -> Iterator[Cell]:
+    for dx, dy in _STEPS:
+        yield cell[0] + dx, cell[1] + dy

@@ -1,0 +1,383 @@
+"""Frames with the times at which they were taken: from a video, from images, from a camera.
+
+A frame's time is the stream's presentation time, never its number over a nominal rate. What the
+times tell is counted: frames that are missing, that come twice, that show nothing new.
+"""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import math
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Protocol
+
+import numpy as np
+
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.opencv import read_image, require_opencv
+from driftwalk.track.source.gaps import FrameGaps
+from driftwalk.track.types import Frame, Image
+
+_STALE_STRIDE: Final = 16
+_IMAGES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
+_TIMES: Final = "times.csv"
+_LATEST_S: Final = 1e12
+"""30 000 years: beyond any clock, and its gaps can still be counted in frames."""
+# A file whose pictures end so long before its stated end was cut off; sound may go on a little.
+_CUT_OFF_S: Final = 0.5
+_FFMPEG_LOG: Final = "OPENCV_FFMPEG_LOGLEVEL"
+
+
+@dataclass
+class FrameCounts:
+    """What became of a source's frames.
+
+    Parameters
+    ----------
+    frames : int
+        Frames that were handed on.
+    dropped : int
+        Frames that are missing between those there are: from gaps in the times, or taken by a
+        camera while the frame before was still being worked on. While a file is read it is counted
+        by the usual gap up to then, which the first few frames teach; it is final at the end.
+    duplicates : int
+        Frames with the time of the one before, or an earlier one; left out.
+    stale : int
+        Frames with a new time and exactly the old image, as a camera or a converter makes them to
+        keep its rate; left out.
+
+    Examples
+    --------
+    >>> FrameCounts(frames=10).to_dict()
+    {'frames': 10, 'dropped': 0, 'duplicates': 0, 'stale': 0}
+    """
+
+    frames: int = 0
+    dropped: int = 0
+    duplicates: int = 0
+    stale: int = 0
+
+    def to_dict(self) -> dict[str, int]:
+        """Return the counts by name."""
+        return dataclasses.asdict(self)
+
+
+class FrameSource(Protocol):
+    """Where frames come from; iterated once."""
+
+    name: str
+    counts: FrameCounts
+    interrupted: str | None
+    waited_s: float
+    """How long the last frame lay there before it was handed on [s]; 0 for files."""
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Yield the frames in the order of their times."""
+
+    def close(self) -> None:
+        """Let go of the file or the camera."""
+
+
+class FrameFilter:
+    """Leaves out frames that come twice or show nothing new, and checks the size.
+
+    Parameters
+    ----------
+    name : str
+        The source, for messages.
+    counts : FrameCounts
+        What is counted in.
+    keep_stale : bool
+        Whether frames with exactly the image before are handed on, as a drawn video needs it in
+        which nothing moves.
+    gaps : FrameGaps, optional
+        What the times between frames are counted by. Left out for a camera, whose frames are
+        counted where they are lost.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        counts: FrameCounts,
+        *,
+        keep_stale: bool = False,
+        gaps: FrameGaps | None = None,
+    ) -> None:
+        self._name, self._counts, self._keep_stale = name, counts, keep_stale
+        self._last: Image | None = None
+        self._time = -np.inf
+        self._gaps = gaps
+
+    def accept(self, index: int, time: float, image: Any) -> Frame | None:
+        """Return the frame, None when it is left out."""
+        picture = _three_channels(image)
+        if self._last is not None and picture.shape != self._last.shape:
+            was, now = self._last.shape, picture.shape
+            raise FormatError(
+                f"frame {index} is {now[1]} x {now[0]} pixels, the frames before are "
+                f"{was[1]} x {was[0]}: a recording has one size",
+                path=self._name,
+            )
+        if not time > self._time:
+            self._counts.duplicates += 1
+            return None
+        stale = self._last is not None and _same(picture, self._last)
+        if self._last is not None and self._gaps is not None:
+            self._gaps.add(time - self._time)
+            self._counts.dropped = self._gaps.missing
+        self._last, self._time = picture, time
+        if stale:
+            self._counts.stale += 1
+            if not self._keep_stale:
+                return None
+        self._counts.frames += 1
+        return Frame(index, time, picture)
+
+    def settle(self) -> None:
+        """Count the frames that are missing by all gaps, when no more will come."""
+        if self._gaps is not None:
+            self._gaps.settle()
+            self._counts.dropped = self._gaps.missing
+
+
+class VideoFile:
+    """A video file, read once from its start.
+
+    Parameters
+    ----------
+    path : path-like
+        Anything that OpenCV reads.
+    keep_stale : bool
+        See `FrameCounts`.
+
+    Raises
+    ------
+    FormatError
+        When there is no such file, or it is no video.
+    """
+
+    def __init__(self, path: str | Path, *, keep_stale: bool = False) -> None:
+        cv2 = require_opencv()
+        self.name = str(path)
+        self.counts = FrameCounts()
+        self.interrupted: str | None = None
+        self.waited_s = 0.0
+        self._keep_stale = keep_stale
+        if not Path(path).exists():
+            raise FormatError("no such video", path=path)
+        if Path(path).is_dir() or Path(path).stat().st_size == 0:
+            raise FormatError("is not a video: nothing to read in it", path=path)
+        self._position = cv2.CAP_PROP_POS_MSEC
+        self._capture = open_capture(str(path))
+        if not self._capture.isOpened():
+            raise FormatError("is not a video that OpenCV can read", path=path)
+        self._rate = float(self._capture.get(cv2.CAP_PROP_FPS))
+        self._promised = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Yield the frames.
+
+        Raises
+        ------
+        FormatError
+            When there is no frame, the size changes, or the stream has no times.
+        """
+        gaps = FrameGaps()
+        keep = FrameFilter(self.name, self.counts, keep_stale=self._keep_stale, gaps=gaps)
+        index, time = 0, 0.0
+        try:
+            while self._capture.grab():
+                time = float(self._capture.get(self._position)) / 1000.0
+                read, image = self._capture.retrieve()
+                if read:
+                    frame = keep.accept(index, time, image)
+                    if frame is not None:
+                        yield frame
+                index += 1
+        finally:
+            keep.settle()
+            self.close()
+        if index == 0:
+            raise FormatError("holds no frame", path=self.name)
+        if index > 1 and self.counts.duplicates == index - 1:
+            raise FormatError(
+                "has no presentation times: write it again with another program", path=self.name
+            )
+        self.interrupted = self._cut_off(index, time + gaps.usual)
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._capture.release()
+
+    def _cut_off(self, frames: int, end: float) -> str | None:
+        """Return that the file ends early, None when it does not.
+
+        Where the rate varies, the number of frames that a file states is often its duration times
+        a rate: only the duration tells.
+        """
+        if frames >= self._promised - 1 or not self._rate > 0:
+            return None
+        duration = self._promised / self._rate
+        if duration - end < max(_CUT_OFF_S, 2 / self._rate):
+            return None
+        return f"{self.name} ends after {frames} frames, at {end:.1f} s of {duration:.1f} s"
+
+
+class ImageSequence:
+    """Images in a folder, in the order of their names.
+
+    Parameters
+    ----------
+    folder : path-like
+        With a file ``times.csv`` of columns ``file``, ``time_s``, or with a stated rate.
+    rate : float, optional
+        Images per second [Hz]; not used when there is a ``times.csv``.
+    keep_stale : bool
+        See `FrameCounts`.
+
+    Raises
+    ------
+    InputError
+        When there are no images, no times and no rate, or the times cannot be read.
+    """
+
+    def __init__(
+        self, folder: str | Path, *, rate: float | None = None, keep_stale: bool = False
+    ) -> None:
+        require_opencv()
+        self.name = str(folder)
+        self.counts = FrameCounts()
+        self.interrupted: str | None = None
+        self.waited_s = 0.0
+        self._keep_stale = keep_stale
+        self._files = _timed_images(Path(folder), rate)
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Yield the frames."""
+        keep = FrameFilter(self.name, self.counts, keep_stale=self._keep_stale, gaps=FrameGaps())
+        try:
+            for index, (file, time) in enumerate(self._files):
+                image = read_image(file)
+                frame = keep.accept(index, time, image)
+                if frame is not None:
+                    yield frame
+        finally:
+            keep.settle()
+
+    def close(self) -> None:
+        """Do nothing: no file stays open."""
+
+
+def open_source(
+    source: str | Path, *, rate: float | None = None, keep_stale: bool = False
+) -> FrameSource:
+    """Open a video, a folder of images, or a camera.
+
+    Parameters
+    ----------
+    source : str or path-like
+        A video file; a folder of images; ``camera:0`` for the first camera.
+    rate : float, optional
+        Images per second of a folder without a ``times.csv`` [Hz].
+    keep_stale : bool
+        Whether frames with exactly the image before are handed on.
+
+    Returns
+    -------
+    FrameSource
+        Iterate over it for `Frame` objects; then its ``counts`` and ``interrupted`` (None, or why
+        it ended early) are final.
+
+    Raises
+    ------
+    InputError
+        When it cannot be opened.
+
+    Examples
+    --------
+    >>> open_source("no/such/video.mp4")
+    Traceback (most recent call last):
+    driftwalk.core.errors.FormatError: no/such/video.mp4: no such video
+    """
+    text = str(source)
+    if text.startswith("camera:"):
+        from driftwalk.track.source.live_camera import LiveCamera
+
+        return LiveCamera.open(text)
+    if Path(source).is_dir():
+        return ImageSequence(source, rate=rate, keep_stale=keep_stale)
+    return VideoFile(source, keep_stale=keep_stale)
+
+
+def open_capture(source: str | int) -> Any:
+    """Return OpenCV's reader; what its libraries would print on failure, our own error says."""
+    cv2 = require_opencv()
+    log = cv2.utils.logging
+    level = log.setLogLevel(log.LOG_LEVEL_SILENT)
+    # Read by OpenCV when it opens the first video; who has set it wants to see more.
+    quiet = _FFMPEG_LOG not in os.environ
+    if quiet:
+        os.environ[_FFMPEG_LOG] = "-8"
+    try:
+        return cv2.VideoCapture(source)
+    finally:
+        if quiet:
+            del os.environ[_FFMPEG_LOG]
+        log.setLogLevel(level)
+
+
+def _timed_images(folder: Path, rate: float | None) -> list[tuple[Path, float]]:
+    if (folder / _TIMES).exists():
+        return _listed_images(folder)
+    files = images_in(folder)
+    if not files:
+        raise InputError(f"{folder}: no images ({', '.join(_IMAGES)}) in this folder")
+    if rate is None:
+        raise InputError(
+            f"{folder}: images have no times: state their rate in Hz (--image-rate), or put a "
+            f"{_TIMES} with the columns file, time_s beside them"
+        )
+    if not (math.isfinite(rate) and rate > 0):
+        raise InputError(f"the rate of images must be above zero, got {rate:g} Hz")
+    return [(file, index / rate) for index, file in enumerate(files)]
+
+
+def images_in(folder: Path) -> list[Path]:
+    """Return the images in a folder, in the order of their names."""
+    return sorted(file for file in folder.iterdir() if file.suffix.lower() in _IMAGES)
+
+
+def _listed_images(folder: Path) -> list[tuple[Path, float]]:
+    path = folder / _TIMES
+    with path.open(newline="", encoding="utf-8-sig") as stream:
+        rows = csv.DictReader(stream)
+        try:
+            found = [(folder / row["file"], float(row["time_s"])) for row in rows]
+        except (KeyError, TypeError, ValueError, csv.Error):
+            raise FormatError(
+                "needs the columns file and time_s, a time in each row",
+                path=path,
+                line=rows.line_num,
+            ) from None
+    if not found:
+        raise FormatError("lists no image", path=path)
+    for number, (_, time) in enumerate(found, start=2):
+        if not abs(time) <= _LATEST_S:
+            raise FormatError(
+                f"has a time of {time:g} s, which no clock shows", path=path, line=number
+            )
+    return found
+
+
+def _three_channels(image: Any) -> Image:
+    picture = np.asarray(image, dtype=np.uint8)
+    return picture if picture.ndim == 3 else np.repeat(picture[..., None], 3, axis=2)
+
+
+def _same(first: Image, second: Image) -> bool:
+    coarse = np.s_[::_STALE_STRIDE, ::_STALE_STRIDE]
+    return np.array_equal(first[coarse], second[coarse]) and np.array_equal(first, second)

@@ -1,0 +1,115 @@
+"""A few images of a source, spread over it: to find the rim, the background, the colours."""
+
+from __future__ import annotations
+
+import contextlib
+from itertools import islice
+from pathlib import Path
+from typing import Final
+
+from driftwalk.core.errors import InputError
+from driftwalk.core.opencv import require_opencv
+from driftwalk.track.source.frames import images_in, open_capture, open_source
+from driftwalk.track.types import Image
+
+_CAMERA_STRIDE: Final = 5
+# Frames between two samples from which on seeking is quicker than reading what lies between.
+_SEEK_BEYOND: Final = 50
+
+
+def sample_images(
+    source: str | Path, number: int = 25, *, rate: float | None = None
+) -> list[Image]:
+    """Return images spread evenly over a source.
+
+    Parameters
+    ----------
+    source : str or path-like
+        As `open_source` takes it. Of a camera, the images of the next seconds.
+    number : int
+        How many, at most.
+    rate : float, optional
+        Images per second of a folder without times [Hz].
+
+    Returns
+    -------
+    list of array, shape (rows, columns, 3)
+        The images, at least one.
+
+    Raises
+    ------
+    InputError
+        When the source cannot be read or holds no frame.
+
+    Examples
+    --------
+    >>> sample_images("no/such/video.mp4")
+    Traceback (most recent call last):
+    driftwalk.core.errors.FormatError: no/such/video.mp4: no such video
+    """
+    total = frame_count(source)
+    if str(source).startswith("camera:"):
+        stride = _CAMERA_STRIDE
+    elif total is None or total <= number:
+        stride = 1
+    elif Path(source).is_file() and total > _SEEK_BEYOND * number:
+        found = _by_seeking(source, total, number)
+        if found:
+            return found
+        stride = total // number
+    else:
+        stride = total // number
+    opened = open_source(source, rate=rate)
+    with contextlib.closing(opened):
+        images = [frame.image for frame in islice(iter(opened), 0, stride * number, stride)]
+    if not images:
+        raise InputError(f"{source}: holds no frame")
+    return images
+
+
+def frame_count(source: str | Path) -> int | None:
+    """Return how many frames a source says it has; None when it does not say.
+
+    Parameters
+    ----------
+    source : str or path-like
+        As `open_source` takes it.
+
+    Returns
+    -------
+    int or None
+        The number; a video may be wrong about itself.
+
+    Examples
+    --------
+    >>> frame_count("camera:0") is None
+    True
+    """
+    path = Path(source)
+    if path.is_dir():
+        listed = path / "times.csv"
+        if listed.exists():
+            with listed.open("rb") as file:
+                return sum(1 for _ in file) - 1
+        return len(images_in(path))
+    if not path.is_file():
+        return None
+    cv2 = require_opencv()
+    open_source(source).close()
+    capture = open_capture(str(path))
+    count = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
+    capture.release()
+    return count if count > 0 else None
+
+
+def _by_seeking(source: str | Path, total: int, number: int) -> list[Image]:
+    cv2 = require_opencv()
+    capture = open_capture(str(source))
+    images = []
+    for place in range(number):
+        capture.set(cv2.CAP_PROP_POS_FRAMES, place * total // number)
+        read, image = capture.read()
+        if read:
+            images.append(image)
+    capture.release()
+    return images

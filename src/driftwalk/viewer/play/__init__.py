@@ -1,0 +1,1 @@
+"""The playground: a simulated tank behind sliders."""

@@ -1,0 +1,158 @@
+"""The knobs of the playground: what they are called, how far they go, and what they stand at."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal, Self
+
+from driftwalk.assembly import LiveTank
+from driftwalk.assembly.runs.start import tank_area
+from driftwalk.core.errors import InputError
+
+SLOWEST: Final = 0.25
+FASTEST: Final = 60.0
+MOST_BLOCKS: Final = 256
+FILLED: Final = 0.4
+"""Share of the tank that blocks may cover; squares placed at random jam at about half."""
+MOST_DRAG: Final = 1.5
+MOST_FORCE_N: Final = 1.5e-3
+MOST_FLOW: Final = 3.0
+LATCHING: Final = ("collision", "connector", "none")
+HIDDEN_FACES: Final = ("none", "full")
+
+Kind = Literal["range", "choice"]
+
+
+@dataclass(frozen=True)
+class Knob:
+    """One setting that can be changed while the tank moves.
+
+    Attributes
+    ----------
+    name, label, unit : str
+        What it is called, for programs and for people; SI.
+    least, most, step : float
+        Ends and steps of a range.
+    whole : bool
+        Whether a range has whole numbers only.
+    log : bool
+        Whether a range is drawn with a logarithmic scale.
+    choices : tuple of str
+        What a choice is made from; empty for a range.
+    """
+
+    name: str
+    label: str
+    unit: str = "1"
+    least: float = 0.0
+    most: float = 0.0
+    step: float = 0.0
+    whole: bool = False
+    log: bool = False
+    choices: tuple[str, ...] = ()
+
+    def read(self, value: Any) -> Any:
+        """Return a value of a browser in the setting's own type.
+
+        Raises
+        ------
+        InputError
+            When it is none that the setting can have.
+        """
+        if self.choices:
+            if value not in self.choices:
+                raise InputError(f"{self.label}: expected one of {', '.join(self.choices)}")
+            return value
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise InputError(f"{self.label}: expected a number")
+        # A comparison, not isfinite: a whole number may be too large for any float.
+        if not self.least <= value <= self.most:
+            raise InputError(
+                f"{self.label}: expected a number from {self.least:g} to {self.most:g}"
+            )
+        if self.whole and value != int(value):
+            raise InputError(f"{self.label}: expected a whole number")
+        return int(value) if self.whole else float(value)
+
+    def item(self, value: Any) -> dict[str, Any]:
+        """Return the setting as a page has it."""
+        ranged = not self.choices
+        return {
+            "name": self.name,
+            "label": self.label,
+            "unit": self.unit,
+            "kind": "range" if ranged else "choice",
+            "min": self.least if ranged else None,
+            "max": self.most if ranged else None,
+            "step": self.step if ranged else None,
+            "value": value,
+            "log": self.log,
+            "choices": list(self.choices),
+        }
+
+    def reaching(self, value: Any) -> Self:
+        """Return the setting with a range that holds a value, which a study may have beyond it."""
+        if self.choices or value <= self.most:
+            return self
+        return replace(self, most=float(value))
+
+
+SPEED: Final = Knob("speed", "speed", "×", SLOWEST, FASTEST, 0.01, log=True)
+KNOBS: Final = (
+    Knob("drag_coefficient", "drag coefficient C_d", "1", 0.0, MOST_DRAG, 0.01),
+    Knob("force_std", "stochastic force σ_F", "N", 0.0, MOST_FORCE_N, 1e-5),
+    Knob("blocks", "blocks", "1", 1, MOST_BLOCKS, 1, whole=True),
+    Knob("flow_scale", "strength of the flow", "×", 0.0, MOST_FLOW, 0.05),
+    Knob("latching", "latching", choices=LATCHING),
+    Knob("hidden_face_drag", "drag on joined faces", choices=HIDDEN_FACES),
+    SPEED,
+)
+
+
+def knobs_for(tank: LiveTank, *, most_blocks: int) -> dict[str, Knob]:
+    """Return the settings of a tank by name.
+
+    Parameters
+    ----------
+    tank : LiveTank
+        Whose values every range has to hold.
+    most_blocks : int
+        Blocks that the tank has room for.
+    """
+    values = values_of(tank, speed=1.0)
+    knobs = {knob.name: knob.reaching(values[knob.name]) for knob in KNOBS}
+    return knobs | {"blocks": replace(knobs["blocks"], most=most_blocks)}
+
+
+def values_of(tank: LiveTank, *, speed: float) -> dict[str, Any]:
+    """Return what every setting stands at."""
+    forces, rules = tank.study.forces, tank.study.assembly
+    return {
+        "drag_coefficient": forces.drag_coefficient,
+        "force_std": forces.force_std_N,
+        "blocks": rules.blocks,
+        "flow_scale": tank.flow_scale,
+        "latching": rules.latching,
+        "hidden_face_drag": rules.hidden_face_drag,
+        "speed": speed,
+    }
+
+
+def controls_section(knobs: Mapping[str, Knob], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the section with the knobs."""
+    return {
+        "id": "controls",
+        "kind": "controls",
+        "title": "Settings",
+        "note": "A change holds from the next draw of the stochastic force on. Without latching, "
+        "what is joined parts too.",
+        "items": [knob.item(values[name]) for name, knob in knobs.items()],
+    }
+
+
+def most_blocks_in(tank: LiveTank) -> int:
+    """Return how many blocks the playground offers: those that still have room to move."""
+    study = tank.study
+    room = FILLED * tank_area(study.tank) / study.block.side_m**2
+    return max(min(int(room), MOST_BLOCKS), study.assembly.blocks)

@@ -1,0 +1,1 @@
+"""Runs under way: what their finished work units show so far."""

@@ -1,0 +1,119 @@
+"""A study of self-assembly under way: the proportions of the classes, as runs end."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from driftwalk.assembly import class_cells, outcome_distribution, world_class
+from driftwalk.assembly.runs.dataset import BROKEN
+from driftwalk.viewer.watch.running import NO_CELL, Section
+from driftwalk.viewer.watch.shards import FinishedUnit, RunReader
+
+if TYPE_CHECKING:
+    from driftwalk.model import Study
+
+NAMES: Final = {"fixed": "parameters found", "drawn": "parameters drawn"}
+"""The sweeps of such a run, and what their bars are called."""
+
+
+class RunningAssembly:
+    """A study of self-assembly under way.
+
+    Parameters
+    ----------
+    folder : Path
+        The run directory.
+    specification : mapping
+        What determines its numbers.
+    """
+
+    title = "Self-assembly under way"
+
+    def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
+        from driftwalk.model import Study
+
+        self._study: Study = Study(**specification["study"])
+        both = specification.get("calibration_sha256") is not None
+        self._names = dict(NAMES) if both else {"fixed": "all runs"}
+        self._reader = RunReader(folder)
+        self._count: dict[str, Counter[str]] = {name: Counter() for name in self._names}
+        self._runs = dict.fromkeys(self._names, 0)
+        self._class_of: dict[bytes, str] = {}
+
+    def look(self) -> list[Section]:
+        """Read the new shards; return the proportions if there are any."""
+        units = list(self._reader.new_units(self._names))
+        for name, unit in units:
+            self._take(name, unit)
+        return self.sections() if units else []
+
+    def sections(self) -> list[Section]:
+        """Return the proportions of the classes up to now."""
+        confidence = self._study.assembly.confidence
+        return [
+            {
+                "id": "classes",
+                "kind": "classes",
+                "title": "What the blocks have built so far",
+                "note": f"Of the runs that have ended; the bars hold together with "
+                f"{100.0 * confidence:g} % confidence.",
+                "confidence": confidence,
+                "runs": self._runs["fixed"],
+                "series": [
+                    {"name": self._names[name], "items": _items(count, confidence)}
+                    for name, count in self._count.items()
+                    if count
+                ],
+            }
+        ]
+
+    def state(self) -> tuple[float | None, str]:
+        """Return the share of the runs that have ended."""
+        total = self._study.assembly.runs
+        done = sum(self._runs.values())
+        share = done / max(total * len(self._names), 1)
+        return 0.95 * share, f"{done} of {total * len(self._names)} runs"
+
+    def cell(self, row: int, column: int) -> dict[str, Any]:  # noqa: ARG002
+        """Return nothing: there is no map."""
+        return dict(NO_CELL)
+
+    def _take(self, name: str, unit: FinishedUnit) -> None:
+        sound = (unit.arrays["status"].astype(np.int64) & BROKEN) == 0
+        self._runs[name] += unit.stop - unit.start
+        chirality = self._study.assembly.chirality
+        for cell, assembly in zip(
+            unit.arrays["cell"][sound], unit.arrays["assembly"][sound], strict=True
+        ):
+            # Few ways of lying on the lattice come again and again.
+            key = cell.tobytes() + assembly.tobytes()
+            if key not in self._class_of:
+                self._class_of[key] = world_class(cell, assembly, chirality=chirality)
+            self._count[name][self._class_of[key]] += 1
+
+
+def _items(count: Mapping[str, int], confidence: float) -> list[dict[str, Any]]:
+    """Return the classes that have come, the most frequent first."""
+    found = outcome_distribution(dict(count), confidence=confidence)
+    columns = ("count", "proportion", "interval_low", "interval_high")
+    rows = zip(
+        found["class"].values.tolist(), *(found[name].values.tolist() for name in columns),
+        strict=True,
+    )  # fmt: skip
+    items = [
+        {
+            "class": name,
+            "cells": [cells.tolist() for cells in class_cells(name)],
+            "count": number,
+            "share": share,
+            "low": low,
+            "high": high,
+        }
+        for name, number, share, low, high in rows
+    ]
+    return sorted(items, key=lambda item: -int(item["count"]))

@@ -1,0 +1,273 @@
+"""A calibration under way: the map that fills, the refined map in it, the bootstrap."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import DriftwalkError
+from driftwalk.page import encode_array, map_section
+from driftwalk.viewer.watch.running import NO_CELL, Section
+from driftwalk.viewer.watch.shards import FinishedUnit, RunReader
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+    from driftwalk.viewer.watch.recording_steps import RecordedSteps
+
+STAGES: Final[dict[str, tuple[str, float, float]]] = {
+    "coarse": ("map", 0.0, 0.4),
+    "refined": ("refined map", 0.4, 0.65),
+    "bootstrap": ("bootstrap", 0.65, 0.93),
+}
+"""What each stage is called, and its share of the time: from, to."""
+DETAILS: Final = ("excerpt_x", "excerpt_y", "step_density", "ks_step_length", "ks_turning_angle")
+GRID: Final = ("drag_coefficient", "force_std")
+NO_DISTANCE: Final = 1.0
+"""A setting that lost its numbers is as far as can be, as in the finished map."""
+
+
+class SettingsMap:
+    """Distances over a grid of settings, NaN where they are still to come.
+
+    Parameters
+    ----------
+    axes : sequence of sequence of float
+        Drag coefficients, standard deviations of the force [N].
+    """
+
+    def __init__(self, axes: Any) -> None:
+        drag, force = (np.asarray(values, dtype=np.float64) for values in axes)
+        self.axes = (drag, force)
+        self.shape = (drag.size, force.size)
+        self.distance = np.full(self.shape, np.nan)
+        self.error = np.full(self.shape, np.nan)
+        self.details: dict[int, dict[str, npt.NDArray[Any]]] = {}
+        """What is kept of each setting, by its number."""
+
+    @property
+    def done(self) -> float:
+        """Share of the settings that are there."""
+        return float(np.isfinite(self.distance).mean())
+
+    def add(self, unit: FinishedUnit) -> None:
+        """Take the settings of a work unit."""
+        values = np.nan_to_num(unit.arrays["ks_distance"], nan=NO_DISTANCE)
+        count = values.shape[1]
+        settings = slice(unit.start, unit.stop)
+        self.distance.reshape(-1)[settings] = values.mean(axis=1)
+        if count > 1:
+            self.error.reshape(-1)[settings] = values.std(axis=1, ddof=1) / np.sqrt(count)
+        kept: dict[str, npt.NDArray[Any]] = {
+            name: unit.arrays[name] for name in DETAILS if name in unit.arrays
+        }
+        kept["away"] = np.abs(unit.arrays["ks_distance"] - values.mean(axis=1)[:, None])
+        for row in range(unit.stop - unit.start):
+            self.details[unit.start + row] = {name: kept[name][row] for name in kept}
+
+
+class RunningCalibration:
+    """A calibration under way.
+
+    Parameters
+    ----------
+    folder : Path
+        The run directory.
+    specification : mapping
+        What determines its numbers.
+    """
+
+    title = "A calibration under way"
+
+    def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
+        from driftwalk.model import Study
+
+        self._folder = folder
+        self._study: Study = Study(**specification["study"])
+        self._body: str | None = specification.get("body")
+        self._reader = RunReader(folder)
+        self._maps: dict[str, SettingsMap] = {}
+        self._bootstrap: list[FinishedUnit] = []
+        self._loaded: xr.Dataset | None = None
+        self._steps: RecordedSteps | None = None
+        self._still: dict[str, Section] = {}
+        self._stage = "coarse"
+        self._refined = ""
+
+    def look(self) -> list[Section]:
+        """Read the new shards, and return the sections that they changed."""
+        self._reader.look()
+        changed = set()
+        for name, reader in self._reader.sweeps.items():
+            stage = name.partition("-")[0]
+            if stage not in STAGES:
+                continue
+            self._stage = stage
+            if stage != "bootstrap" and name not in self._maps:
+                self._maps[name] = SettingsMap(reader.sweep["axes"])
+                changed.add("map")
+            if stage == "refined":
+                self._refined = name
+            for unit in reader.new_units():
+                changed.add("bootstrap" if stage == "bootstrap" else "map")
+                self._take(name, stage, unit)
+        made = {"map": self._map_section, "bootstrap": self._bootstrap_section}
+        return [made[name]() for name in sorted(changed, reverse=True)]
+
+    def sections(self) -> list[Section]:
+        """Return the map, the bootstrap when it has begun, and what it is all made from."""
+        bootstrap = [self._bootstrap_section()] if self._bootstrap else []
+        return [self._map_section(), *bootstrap, *self._made_from]
+
+    def state(self) -> tuple[float | None, str]:
+        """Return the progress and the stage."""
+        words, begin, end = STAGES[self._stage]
+        share = self._share()
+        how_far = f"{100.0 * share:.0f} %" if share < 1.0 else "done, the next step is under way"
+        return begin + share * (end - begin), f"{words}: {how_far}"
+
+    def cell(self, row: int, column: int) -> dict[str, Any]:
+        """Return the kept excerpt and step density of a setting."""
+        found = self._coarse
+        if found is None or not (0 <= row < found.shape[0] and 0 <= column < found.shape[1]):
+            return dict(NO_CELL)
+        kept = found.details.get(row * found.shape[1] + column)
+        if not kept or "excerpt_x" not in kept:
+            return dict(NO_CELL)
+        time = None if self._recorded is None else self._recorded.excerpt_time
+        nearest = int(np.nanargmin(kept["away"])) if np.isfinite(kept["away"]).any() else 0
+        return {
+            "excerpt_time": None
+            if time is None or time.size != kept["excerpt_x"].size
+            else encode_array(time),
+            "excerpt_x": encode_array(kept["excerpt_x"]),
+            "excerpt_y": encode_array(kept["excerpt_y"]),
+            "density": encode_array(kept["step_density"]),
+            # Of the replicate nearest to the mean, as in the finished map.
+            "ks_step_length": float(kept["ks_step_length"][nearest]),
+            "ks_turning_angle": float(kept["ks_turning_angle"][nearest]),
+        }
+
+    def _take(self, name: str, stage: str, unit: FinishedUnit) -> None:
+        if stage == "bootstrap":
+            self._bootstrap.append(unit)
+        else:
+            self._maps[name].add(unit)
+
+    def _share(self) -> float:
+        if self._stage == "bootstrap":
+            done = sum(unit.stop - unit.start for unit in self._bootstrap)
+            return done / max(self._study.calibration.bootstrap, 1)
+        found = self._coarse if self._stage == "coarse" else self._maps.get(self._refined)
+        return 0.0 if found is None else found.done
+
+    @property
+    def _coarse(self) -> SettingsMap | None:
+        names = [name for name in self._maps if name.startswith("coarse-")]
+        return self._maps[names[0]] if names else None
+
+    @property
+    def _recording(self) -> xr.Dataset | None:
+        """The recording; None where the run holds none that can be read, or not yet."""
+        from driftwalk.record import load
+
+        if self._loaded is None:
+            with contextlib.suppress(DriftwalkError, OSError):
+                self._loaded = load(self._folder / "recording.nc")
+        return self._loaded
+
+    @property
+    def _recorded(self) -> RecordedSteps | None:
+        """The steps of the recording, once it is there."""
+        from driftwalk.viewer.watch.recording_steps import recorded_steps
+
+        if self._steps is None and self._recording is not None:
+            with contextlib.suppress(DriftwalkError):
+                self._steps = recorded_steps(self._recording, self._study, body=self._body)
+        return self._steps
+
+    @property
+    def _made_from(self) -> list[Section]:
+        """The sections on the recording and on the flow, once they are there."""
+        from driftwalk.flow import load_flow
+        from driftwalk.page import flow_section, trajectory_section
+
+        if "recording" not in self._still and self._recording is not None:
+            self._still["recording"] = trajectory_section(self._recording, body=self._body)
+        if "flow" not in self._still:
+            with contextlib.suppress(DriftwalkError, OSError):
+                flow = load_flow(self._folder / "flow.nc", own_flags="keep")
+                self._still["flow"] = flow_section(flow)
+        return list(self._still.values())
+
+    def _map_section(self) -> Section:
+        section = map_section(self._dataset(), self._one_body())
+        waiting = "Settings appear as they are simulated; nothing is final before the run is."
+        return {**section, "note": f"{section['note']} {waiting}"}
+
+    def _one_body(self) -> xr.Dataset | None:
+        found = self._recording
+        if found is None or self._body is None:
+            return found
+        return found.sel(body=[self._body])
+
+    def _dataset(self) -> xr.Dataset:
+        """Return what is there of the calibration that is being made, in its own form."""
+        import xarray as xr
+
+        search = self._study.calibration
+        coarse = self._coarse or SettingsMap((search.drag_coefficients, search.force_stds_N))
+        variables: dict[str, Any] = {
+            "ks_distance": (GRID, coarse.distance),
+            "ks_distance_standard_error": (GRID, coarse.error),
+        }
+        coordinates: dict[str, Any] = dict(zip(GRID, coarse.axes, strict=True))
+        refined = self._maps.get(self._refined)
+        if refined is not None:
+            names = [f"refined_{name}" for name in GRID]
+            variables["refined_ks_distance"] = (names, refined.distance)
+            coordinates |= dict(zip(names, refined.axes, strict=True))
+        if self._recorded is not None:
+            bins = ("density_step_length", "density_turning_angle")
+            variables["recording_step_density"] = (bins, self._recorded.density())
+            variables["excerpt_time"] = ("excerpt_sample", self._recorded.excerpt_time)
+            coordinates["step_length_edge"] = self._recorded.length_edge
+            coordinates["turning_angle_edge"] = self._recorded.angle_edge
+        facts = {
+            "kind": "calibration",
+            "force_interval_s": self._study.forces.force_interval_s,
+        }
+        return xr.Dataset(variables, coordinates, facts)
+
+    def _bootstrap_section(self) -> Section:
+        units = sorted(self._bootstrap, key=lambda unit: unit.start)
+        drag, force = (
+            np.concatenate([unit.arrays[name] for unit in units] or [np.empty(0)])
+            for name in ("drag_coefficient", "force_std")
+        )
+        points = {
+            "name": "estimates",
+            "x": force.tolist(),
+            "y": drag.tolist(),
+            "low": None,
+            "high": None,
+            "style": "points",
+        }
+        return {
+            "id": "bootstrap",
+            "kind": "lines",
+            "title": "Bootstrap",
+            "note": "Estimates from recordings that were simulated at the optimum: how far they "
+            "scatter is how well the parameters are known.",
+            "x": {"label": "stochastic force σ_F", "unit": "N"},
+            "y": {"label": "drag coefficient C_d", "unit": "1"},
+            "series": [points],
+            "marks": [],
+            "after": "map",
+        }

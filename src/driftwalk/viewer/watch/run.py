@@ -1,0 +1,322 @@
+"""The page of a run directory: what a finished run found, or what one under way has so far."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from driftwalk.core.errors import DriftwalkError, InputError, RunDirectoryError
+from driftwalk.core.file_names import text_of_name
+from driftwalk.core.provenance import read_manifest, refuse_other_version
+from driftwalk.core.run_layout import MANIFEST_FILE, RECORD_FILE, state_of
+from driftwalk.core.shards import read_specification
+from driftwalk.viewer.hub import Content, Publish, Source
+from driftwalk.viewer.shell import page_frame
+from driftwalk.viewer.watch.running import NO_CELL, RunningOther
+from driftwalk.viewer.watch.shards import quiet_time
+
+if TYPE_CHECKING:
+    from driftwalk.viewer.watch.running import Running
+
+LOOK_EVERY_S: Final = 0.25
+"""Time between two looks at the run directory [s]."""
+MOST_NAMED: Final = 3
+QUIET_S: Final = 60.0
+"""Time without a result [s] after which the page says how long it has been."""
+SPANS: Final = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))
+"""Units in which that is said, each from two of it on; the last from one."""
+
+
+class RunSource(Source):
+    """Shows a run directory: a finished run, or one under way until and after it finishes.
+
+    Parameters
+    ----------
+    folder : path-like
+        The run directory.
+
+    Raises
+    ------
+    InputError
+        When there is no such directory, it holds no run, or one of another version of driftwalk.
+
+    Examples
+    --------
+    >>> RunSource("no/such/run")
+    Traceback (most recent call last):
+    driftwalk.core.errors.InputError: no/such/run: there is no such directory
+    """
+
+    view = "run"
+
+    def __init__(self, folder: str | Path) -> None:
+        self._folder = Path(folder)
+        require_run(self._folder)
+        self.title = text_of_name(self._folder.resolve().name)
+        self._page = page_frame(self.view, self.title)
+        self._running: Running | None = None
+        self._shown: tuple[Any, ...] = ()
+        self._refused: tuple[Any, ...] = ()
+        self.look()
+
+    def greeting(self) -> Sequence[Content]:
+        """Return the page as it is now."""
+        return [{"type": "page", "page": self._page}]
+
+    async def run(self, publish: Publish) -> None:
+        """Look at the run directory now and then, and publish what has changed."""
+        while True:
+            await asyncio.sleep(LOOK_EVERY_S)
+            for content in await asyncio.to_thread(self.look):
+                publish(content)
+
+    async def receive(self, content: Content, reply: Publish) -> None:
+        """Answer what is asked of a setting of the map."""
+        if content.get("type") != "cell":
+            return
+        row, column = content.get("row"), content.get("column")
+        found = dict(NO_CELL)
+        if self._running is not None and isinstance(row, int) and isinstance(column, int):
+            found = self._running.cell(row, column)
+        # Only what can be a setting goes back: whatever else a browser sends may not be writable.
+        named = {"id": str, "row": int, "column": int}
+        asked = {
+            key: value if isinstance(value := content.get(key), kind) else None
+            for key, kind in named.items()
+        }
+        reply({"type": "cell", **asked, **found})
+
+    def file(self, name: str) -> Path | None:
+        """Return a file of the run."""
+        return file_in(self._folder, name)
+
+    def report(self) -> str | None:
+        """Return the page of a finished run as a file that works alone."""
+        from driftwalk.page import report_html
+
+        if self._running is not None:
+            return None
+        return report_html({**self._page, "view": "report"})
+
+    def look(self) -> list[Content]:
+        """Look once; return what is to be published."""
+        try:
+            state, stamp = state_of(self._folder), _stamp(self._folder)
+            if state == "finished":
+                stamp = _stamp(self._folder, (MANIFEST_FILE, *_results(self._folder)))
+                return [] if stamp in (self._shown, self._refused) else self._show_finished(stamp)
+            if state == "unfinished":
+                return self._look_at_running(stamp)
+        except (DriftwalkError, OSError) as error:
+            # What was there when the page was opened has become unreadable; it may come back.
+            return self._say(f"the run cannot be read: {error}")
+        return self._say("the run is no longer there; the page waits for it")
+
+    def _show_finished(self, stamp: tuple[Any, ...]) -> list[Content]:
+        from driftwalk.page import report_page
+
+        # Should it fail, then not again before something has changed.
+        self._refused = stamp
+        self._page = {**report_page(self._folder), "view": self.view}
+        self._running, self._shown, self._refused = None, stamp, ()
+        return [{"type": "page", "page": self._page}]
+
+    def _look_at_running(self, stamp: tuple[Any, ...]) -> list[Content]:
+        running = self._running
+        if running is None or stamp != self._shown:
+            self._running = running = running_view(self._folder)
+            self._shown = stamp
+            running.look()
+            self._page = self._page_of(running)
+            return [{"type": "page", "page": self._page}]
+        changed = running.look()
+        page = self._page_of(running)
+        before, self._page = self._page, page
+        if _ids(page) != _ids(before):
+            return [{"type": "page", "page": page}]
+        same = page["state"] == before["state"]
+        sections: list[Content] = [{"type": "section", "section": one} for one in changed]
+        return sections + ([] if same else [{"type": "state", "state": page["state"]}])
+
+    def _page_of(self, running: Running) -> dict[str, Any]:
+        progress, words = running.state()
+        words += quiet_words(quiet_time(self._folder))
+        return page_frame(
+            self.view,
+            running.title,
+            subtitle=self.title,
+            state={"finished": False, "progress": progress, "words": words},
+            sections=running.sections(),
+        )
+
+    def _say(self, words: str) -> list[Content]:
+        state = {"finished": False, "progress": None, "words": words}
+        if self._page["state"] == state:
+            return []
+        self._page = {**self._page, "state": state}
+        self._shown = ()
+        return [{"type": "state", "state": state}]
+
+
+def quiet_words(duration_s: float) -> str:
+    """Return what there is to say about a run that has given nothing new for some time.
+
+    Examples
+    --------
+    >>> quiet_words(200.0)
+    '; the last result came 3 min ago (if it was stopped, the same command continues it)'
+    """
+    if duration_s < QUIET_S:
+        return ""
+    length, unit = next((s for s in SPANS if duration_s >= 2.0 * s[0]), SPANS[-1])
+    ago = f"{duration_s // length:.0f} {unit}"
+    return f"; the last result came {ago} ago (if it was stopped, the same command continues it)"
+
+
+def running_view(folder: Path) -> Running:
+    """Return the view of a run under way, by what its specification holds.
+
+    Raises
+    ------
+    InputError
+        When that is of another version, or no specification that driftwalk writes.
+    """
+    specification = unfinished_specification(folder)
+    try:
+        return _view_of(folder, specification)
+    except (AttributeError, LookupError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{folder / RECORD_FILE} does not say what the run is about: it has been changed or "
+            "damaged; run the same command again, or move the directory away"
+        ) from error
+
+
+def _view_of(folder: Path, specification: Mapping[str, Any]) -> Running:
+    if "flows_sha256" in specification:
+        from driftwalk.viewer.watch.sensitivity import RunningSensitivity
+
+        return RunningSensitivity(folder, specification)
+    if "calibration_sha256" in specification:
+        from driftwalk.viewer.watch.assembly import RunningAssembly
+
+        return RunningAssembly(folder, specification)
+    if "recording_sha256" in specification:
+        from driftwalk.viewer.watch.calibration import RunningCalibration
+
+        return RunningCalibration(folder, specification)
+    return RunningOther(folder, specification)
+
+
+def require_run(folder: Path) -> None:
+    """Refuse a folder that holds no run, or a run of another version.
+
+    Raises
+    ------
+    InputError
+        Says what is there instead.
+    """
+    if not folder.is_dir():
+        if folder.exists():
+            raise InputError(
+                f"{folder}: is a file, expected a run directory; the page of a recording is "
+                f"written by 'driftwalk report {folder.name}'"
+            )
+        raise InputError(f"{folder}: there is no such directory")
+    state = state_of(folder)
+    if state == "finished":
+        refuse_other_version(folder, read_manifest(folder / MANIFEST_FILE))
+    elif state == "unfinished":
+        unfinished_specification(folder)
+    else:
+        _require_whole_manifest(folder / MANIFEST_FILE)
+        inside = [path.name for path in sorted(folder.iterdir()) if _holds_run(path)]
+        hint = f"; there are runs in it: {', '.join(inside[:MOST_NAMED])}" if inside else ""
+        raise InputError(f"{folder}: this directory holds no run of driftwalk{hint}")
+
+
+def _require_whole_manifest(path: Path) -> None:
+    """Refuse a manifest that is there and cannot be read: it says more than that none is there."""
+    if path.is_file():
+        try:
+            read_manifest(path)
+        except DriftwalkError as error:
+            raise InputError(f"the manifest of the run is damaged: {error}") from error
+
+
+def unfinished_specification(folder: Path) -> dict[str, Any]:
+    """Return what determines the numbers of a run that is under way.
+
+    Raises
+    ------
+    InputError
+        When another version of driftwalk works on it, or it is damaged.
+    """
+    from driftwalk import __version__
+
+    try:
+        found: dict[str, Any] = read_specification(folder / RECORD_FILE)["specification"]
+    except RunDirectoryError as error:
+        raise InputError(str(error)) from error
+    version = found.get("driftwalk_version")
+    if version != __version__:
+        raise InputError(
+            f"{folder}: this unfinished run is one of driftwalk {version}, this is {__version__}; "
+            "look at it with that version, or when it is finished"
+        )
+    return found
+
+
+def file_in(folder: Path, name: str) -> Path | None:
+    """Return a visible file inside a folder, None when the name leads elsewhere or nowhere.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    name : str
+        Path in it, parts joined by "/"; from a browser, so it may be anything.
+
+    Examples
+    --------
+    >>> file_in(Path("."), "../secret") is None
+    True
+    """
+    parts = name.split("/")
+    if any(part in ("", "..") or part[0] == "." or "\\" in part for part in parts):
+        return None
+    try:
+        root = folder.resolve(strict=True)
+        path = root.joinpath(*parts).resolve(strict=True)
+        inside = path.is_relative_to(root) and path.is_file()
+    except (OSError, ValueError, RuntimeError):
+        return None
+    if not inside or any(part[0] == "." for part in path.relative_to(root).parts):
+        return None
+    return path
+
+
+def _ids(page: Mapping[str, Any]) -> list[str]:
+    return [section["id"] for section in page["sections"]]
+
+
+def _holds_run(path: Path) -> bool:
+    return path.is_dir() and state_of(path) != "new"
+
+
+def _results(folder: Path) -> list[str]:
+    """Return the names of the datasets of a run, which may be replaced under the same manifest."""
+    return sorted(path.name for path in folder.glob("*.nc"))
+
+
+def _stamp(folder: Path, names: Sequence[str] = (MANIFEST_FILE, RECORD_FILE)) -> tuple[Any, ...]:
+    """Return what changes when files of a folder do: those that say which run it is, or others."""
+    stamps = []
+    for name in names:
+        try:
+            stat = (folder / name).stat()
+            stamps.append((name, stat.st_mtime_ns, stat.st_ino, stat.st_size))
+        except OSError:
+            stamps.append((name, 0, 0, 0))
+    return tuple(stamps)

@@ -1,0 +1,197 @@
+"""A sensitivity analysis under way: the map of distances to the reference that fills."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.assembly import l1_distance, sort_classes
+from driftwalk.assembly.sensitivity.times import (
+    Courses,
+    added,
+    course_table,
+    courses_from_text,
+    kept_times,
+)
+from driftwalk.page import encode_array
+from driftwalk.page.sections.classes import cells_of
+from driftwalk.page.sections.sensitivity_times import over_time_part
+from driftwalk.plot.parts.assembly_labels import classes_to_show
+from driftwalk.viewer.watch.running import NO_CELL, Section
+from driftwalk.viewer.watch.shards import RunReader
+
+if TYPE_CHECKING:
+    from driftwalk.model import Study
+
+LABELS: Final[dict[str, tuple[str, str]]] = {
+    "tank_diameter": ("tank diameter", "m"),
+    "blocks": ("blocks", "1"),
+    "flow": ("flow", "1"),
+    "latching": ("latching", "1"),
+    "hidden_face_drag": ("drag on joined faces", "1"),
+    "drag_coefficient": ("drag coefficient C_d", "1"),
+    "force_std": ("stochastic force σ_F", "N"),
+}
+
+
+class RunningSensitivity:
+    """A sensitivity analysis under way.
+
+    Parameters
+    ----------
+    folder : Path
+        The run directory.
+    specification : mapping
+        What determines its numbers.
+    """
+
+    title = "A sensitivity analysis under way"
+
+    def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
+        from driftwalk.model import Study
+
+        self._study: Study = Study(**specification["study"])
+        self._axes = dict(self._study.sensitivity.axes)
+        self._shape = tuple(len(values) for values in self._axes.values())
+        self._reader = RunReader(folder)
+        self._count: dict[str, dict[int, Counter[str]]] = {"reference": {}, "map": {}}
+        # As text: few of the settings are ever asked for.
+        self._courses: dict[str, dict[int, bytes]] = {"reference": {}, "map": {}}
+
+    def look(self) -> list[Section]:
+        """Read the new shards; return the map if it has changed."""
+        changed = False
+        for name, unit in self._reader.new_units(self._count):
+            changed = True
+            for row, text in enumerate(unit.arrays["count"]):
+                self._count[name][unit.start + row] = Counter(json.loads(text))
+            # A run that an earlier version began keeps none.
+            for row, text in enumerate(unit.arrays.get("courses", ())):
+                self._courses[name][unit.start + row] = text
+        return self.sections() if changed else []
+
+    def sections(self) -> list[Section]:
+        """Return the map up to now: of the last two axes, the others at their first value."""
+        names = list(self._axes)
+        fixed = names[: max(len(names) - 2, 0)]
+        shape = ([1, 1, *self._shape])[-2:]
+        value = self._distances().reshape(-1, *shape)[0]
+        at = ", ".join(f"{LABELS[name][0]} {self._axes[name][0]}" for name in fixed)
+        rows = _axis(names[-2], self._axes[names[-2]]) if len(names) > 1 else _axis("", (0,))
+        return [
+            {
+                "id": "l1",
+                "kind": "l1_map",
+                "title": "Distance of the outcomes to the reference",
+                "note": f"Settings appear as they are simulated{f'; here {at}' if at else ''}.",
+                "x": _axis(names[-1], self._axes[names[-1]]),
+                "y": rows,
+                "value": encode_array(value),
+                "reference": None,
+                "noise": None,
+                "label": "l1 distance",
+                **self._outcomes(tuple(shape)),
+            }
+        ]
+
+    def state(self) -> tuple[float | None, str]:
+        """Return the share of the settings that are done; Sobol' indices come on top."""
+        done = sum(len(counts) for counts in self._count.values())
+        wanted = int(np.prod(self._shape)) + self._study.sensitivity.reference_realisations
+        words = f"{done} of {wanted} settings"
+        if "sobol" in self._reader.sweeps:
+            return None, f"{words}; Sobol' indices under way"
+        return 0.95 * done / wanted, words
+
+    def cell(self, row: int, column: int) -> dict[str, Any]:
+        """Return the classes of a setting over time, beside those of the reference so far."""
+        rows, columns = ([1, 1, *self._shape])[-2:]
+        if not (0 <= row < rows and 0 <= column < columns):
+            return dict(NO_CELL)
+        text = self._courses["map"].get(row * columns + column)
+        known = added(map(courses_from_text, self._courses["reference"].values()))
+        if text is None:
+            return dict(NO_CELL)
+        return NO_CELL | {"over_time": self._over_time(courses_from_text(text), known)}
+
+    def _over_time(self, courses: Courses, known: Courses) -> dict[str, Any] | None:
+        """Return the courses of one setting as a page has those of a map of one cell."""
+        import xarray as xr
+
+        names = sort_classes({*courses, *known})
+        if not names:
+            return None
+        count = course_table(courses, names)[None, None]
+        one = xr.Dataset(
+            {
+                "count_over_time": (("y", "x", "time", "class_over_time"), count),
+                "runs": (("y", "x"), count[:, :, 0].sum(axis=-1)),
+            },
+            coords={"time": kept_times(self._study), "class_over_time": list(names)},
+        )
+        if known:
+            table = course_table(known, names)
+            share = table / table.sum(axis=1, keepdims=True)
+            one["reference_over_time"] = (("time", "class_over_time"), share)
+        return over_time_part(one, "x", "y")
+
+    def _outcomes(self, shape: tuple[int, ...]) -> dict[str, Any]:
+        """Return the classes of the first settings, as many as a map of a shape has."""
+        found = {k: count for k, count in self._count["map"].items() if k < np.prod(shape)}
+        names = sort_classes(name for count in found.values() for name in count)
+        share = np.full((int(np.prod(shape)), len(names)), np.nan)
+        for setting, count in found.items():
+            if count:
+                share[setting] = [count[name] / count.total() for name in names]
+        largest = np.nan_to_num(share).max(axis=0, initial=0.0)
+        shown = classes_to_show(list(names), largest)
+        return {
+            "classes": [names[index] for index in shown],
+            "cells": [cells_of(names[index]) for index in shown],
+            "shares": encode_array(share[:, shown].reshape(*shape, len(shown))) if shown else None,
+        }
+
+    def _distances(self) -> npt.NDArray[np.float64]:
+        """Return the l1 distance of every setting to the pooled reference, NaN where unknown."""
+        distance = np.full(int(np.prod(self._shape)), np.nan)
+        pooled: Counter[str] = Counter()
+        for count in self._count["reference"].values():
+            pooled.update(count)
+        blocks = _blocks(pooled)
+        for setting, count in self._count["map"].items():
+            # Outcomes of another number of blocks have nothing in common with the reference.
+            if pooled and count and _blocks(count) == blocks:
+                distance[setting] = l1_distance(_shares(count), _shares(pooled))
+        return distance
+
+
+def _shares(count: Mapping[str, int]) -> dict[str, float]:
+    total = sum(count.values())
+    return {name: number / total for name, number in count.items()}
+
+
+def _blocks(count: Mapping[str, int]) -> int:
+    """Return the number of blocks of the classes that were counted."""
+    from driftwalk.assembly import class_cells
+
+    return sum(len(cells) for cells in class_cells(next(iter(count)))) if count else 0
+
+
+def _axis(name: str, values: tuple[Any, ...]) -> dict[str, Any]:
+    """Return an axis; words stand as their numbers, and in the label."""
+    label, unit = LABELS.get(name, ("", "1"))
+    if any(isinstance(value, str) for value in values):
+        words = ", ".join(f"{number}: {value}" for number, value in enumerate(values))
+        return {
+            "name": name,
+            "label": f"{label} ({words})",
+            "unit": unit,
+            "values": list(range(len(values))),
+        }
+    return {"name": name, "label": label, "unit": unit, "values": [float(v) for v in values]}
