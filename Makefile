@@ -40,7 +40,7 @@ fuzz: $(TEST_TOOLS)
 	$(BIN)/python tests/fuzz/fuzz_run.py $(FUZZ) --seed $(FUZZ_SEED) --cases $(FUZZ_CASES)
 
 doctest: $(TEST_TOOLS)
-	$(BIN)/python -m pytest -n 2 --doctest-modules src/driftwalk
+	$(BIN)/python -m pytest -n 2 --doctest-modules src/driftwalk tests/reference/twin
 
 docs: doctest
 	$(BIN)/python -m pytest tests/architecture/test_docs_links.py

@@ -29,9 +29,9 @@ import numpy as np
 import numpy.typing as npt
 from cases import STEP_S, STEPS, Case, contact_heavy, share_near_wall
 from timing import Times, interleaved, machine, spread
+from twin.block import simulate_reference
 
 from driftwalk import _core
-from driftwalk.simulation.reference import simulate_reference
 
 Floats = npt.NDArray[np.float64]
 

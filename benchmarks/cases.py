@@ -9,17 +9,21 @@ Poses are sampled at 10 Hz.
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "reference"))
+from twin.block import TwinModel
 
 from driftwalk import _core
 from driftwalk.core.seeds import world_keys
 from driftwalk.model import Study
 from driftwalk.schema import build_flow_field
 from driftwalk.simulation.backend import Camera, native_model, world_table
-from driftwalk.simulation.reference import TwinModel
 
 Floats = npt.NDArray[np.float64]
 

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 import xarray as xr
 from single_block import wrapped
+from twin.assembly import assemble_reference
 from twin_assembly import SIDE, Floats, study, swirl
 
 import driftwalk as dw
 from driftwalk import _core
-from driftwalk.assembly.reference import assemble_reference
 from driftwalk.core.seeds import world_keys
 from driftwalk.simulation.backend import Camera, native_model
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from single_block import model, one_world, random_worlds, run, swirl, twin, wrapped
+from twin.block import drag, simulate_reference
 
 from driftwalk import _core
 from driftwalk.core.seeds import world_keys
-from driftwalk.simulation.reference import drag, simulate_reference
 
 
 @pytest.mark.parametrize("friction", [pytest.param(0.0, marks=pytest.mark.slow), 0.4])

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from twin.block import TwinModel
 
 import driftwalk as dw
 from driftwalk import _core
 from driftwalk.core.seeds import world_keys
-from driftwalk.simulation.reference import TwinModel
 
 Floats = npt.NDArray[np.float64]
 Velocity = Callable[[Floats, Floats], tuple[Any, Any]]

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
+from twin.assembly import Rules, World, make_rules, start_world
+from twin.body import Assembly, Square
+from twin.latch import Latch
 
 import driftwalk as dw
-from driftwalk.assembly.reference import Rules, World, make_rules, start_world
-from driftwalk.assembly.reference_body import Assembly, Square
-from driftwalk.assembly.reference_latch import Latch
 
 Floats = npt.NDArray[np.float64]
 

@@ -25,6 +25,7 @@ from driftwalk.model.sensitivity import Sensitivity
 from driftwalk.model.simulation import Pose, Simulation, resolve_time_step
 from driftwalk.model.steps import Steps
 from driftwalk.model.tank import Tank
+from driftwalk.model.toml import write_toml
 from driftwalk.model.water import Water
 
 
@@ -144,9 +145,7 @@ class Study(Section):
 
     def to_toml(self) -> str:
         """Return the study as the text of a study file; `load_study` reads the same study back."""
-        from driftwalk.model.template import write_toml
-
-        return write_toml(self)
+        return write_toml({name: getattr(self, name) for name in type(self).model_fields})
 
 
 def block_corners(pose: Pose, *, side_m: float) -> list[tuple[float, float]]:

@@ -1,11 +1,9 @@
-"""Study files as text: a plain one, the commented template, and the table of the reference page."""
+"""Study files with comments: the template, and the table of the reference page."""
 
 from __future__ import annotations
 
-import json
 import textwrap
 from collections.abc import Iterator
-from typing import Any
 
 from driftwalk.model.section import (
     Quantity,
@@ -17,6 +15,7 @@ from driftwalk.model.section import (
     words_of,
 )
 from driftwalk.model.study import Study
+from driftwalk.model.toml import toml_text
 
 _WIDTH = 96
 _HEAD = """\
@@ -25,16 +24,6 @@ _HEAD = """\
 # as "0.55mN", "16ms" or "30cm". A key that you leave out has its default; an unknown key is an
 # error.
 """
-
-
-def write_toml(study: Study) -> str:
-    """Return a study as TOML without comments."""
-    parts = []
-    for name in Study.model_fields:
-        section = getattr(study, name)
-        lines = [f"{key} = {_toml(value)}" for key, value in _set_values(section)]
-        parts.append("\n".join([f"[{name}]", *lines]))
-    return "\n\n".join(parts) + "\n"
 
 
 def study_template(study: Study | None = None) -> str:
@@ -78,7 +67,7 @@ def parameter_table(name: str) -> str:
     rows = ["| key | default | values | meaning |", "|---|---|---|---|"]
     for key, field in type(section).model_fields.items():
         value = getattr(section, key)
-        default = f"`{_toml(value)}`" if value is not None else "not set"
+        default = f"`{toml_text(value)}`" if value is not None else "not set"
         accepted = _accepted(type(section), key).replace("|", "\\|")
         rows.append(f"| `{key}` | {default} | {accepted} | {field.description} |")
     return "\n".join(rows)
@@ -91,13 +80,13 @@ def _commented_parameter(section: Section, key: str) -> Iterator[str]:
     description = kind.model_fields[key].description or ""
     yield ""
     yield from _comment(f"{description} [{accepted}]" if accepted else description)
-    yield f"{key} = {_toml(value)}" if value is not None else f"# {key} = {_example(kind, key)}"
+    yield f"{key} = {toml_text(value)}" if value is not None else f"# {key} = {_example(kind, key)}"
 
 
 def _example(kind: type[Section], key: str) -> str:
     """Return a value to stand in the place of one that is not set."""
     example = (kind.model_fields[key].examples or [""])[0]
-    return example if isinstance(example, str) and example[:1] in "{[" else _toml(example)
+    return example if isinstance(example, str) and example[:1] in "{[" else toml_text(example)
 
 
 def _accepted(kind: type[Section], key: str) -> str:
@@ -121,22 +110,3 @@ def _comment(text: str) -> list[str]:
     return textwrap.wrap(
         text, _WIDTH, initial_indent="# ", subsequent_indent="# ", break_long_words=False
     )
-
-
-def _set_values(section: Section) -> Iterator[tuple[str, Any]]:
-    for key in type(section).model_fields:
-        value = getattr(section, key)
-        if value is not None:
-            yield key, value
-
-
-def _toml(value: Any) -> str:
-    """Return a value as TOML; its strings are JSON's, but for the delete character."""
-    if isinstance(value, Section):
-        inner = ", ".join(f"{key} = {_toml(item)}" for key, item in _set_values(value))
-        return f"{{ {inner} }}" if inner else "{}"
-    if isinstance(value, (tuple, list)):
-        return "[" + ", ".join(_toml(item) for item in value) + "]"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return repr(value)

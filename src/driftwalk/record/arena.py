@@ -180,7 +180,8 @@ def _outside(outside: int, x: Array) -> list[str]:
 
 def _polygon(path: Path) -> PlacedArena:
     from driftwalk.record.head import read_header
-    from driftwalk.record.text import TableLayout, read_table
+    from driftwalk.record.layout import TableLayout
+    from driftwalk.record.text import read_table
 
     names, delimiter, skip, has_header = read_header(path)
     if len(names) != 2 or (has_header and names != ["x_m", "y_m"]):

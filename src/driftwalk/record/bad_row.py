@@ -8,15 +8,9 @@ from __future__ import annotations
 import csv
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from driftwalk.core.errors import FormatError
-
-if TYPE_CHECKING:
-    from driftwalk.record.text import TableLayout
-
-MISSING = frozenset({"", "NaN", "nan", "NAN", "NA", "N/A", "null", "NULL", "None", "none", "-nan"})
-"""What a tracker writes for a number that it does not have."""
+from driftwalk.record.layout import MISSING, TableLayout
 
 DELIMITER_NAMES = {",": "a comma", "\t": "a tab", ";": "a semicolon", " ": "blanks"}
 _COMMA_DECIMAL = re.compile(r"[+-]?\d+,\d+")

@@ -12,9 +12,10 @@ import numpy.typing as npt
 
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.column_names import ColumnMap, column_meaning
+from driftwalk.record.layout import TableLayout
 from driftwalk.record.raw import Array
 from driftwalk.record.several_bodies import LARGEST_SHARE
-from driftwalk.record.text import Table, TableLayout, read_table
+from driftwalk.record.text import Table, read_table
 
 MOST_SHOWN = 3
 

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from driftwalk.record.bad_row import MISSING, is_number
+from driftwalk.record.bad_row import is_number
 from driftwalk.record.column_names import ColumnMap
-from driftwalk.record.text import TableLayout, read_table
+from driftwalk.record.layout import MISSING, TableLayout
+from driftwalk.record.text import read_table
 
 _EVEN = 0.1
 """A camera's intervals differ from their median by less than this share, but for missing rows."""

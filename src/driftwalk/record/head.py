@@ -6,7 +6,8 @@ import re
 from pathlib import Path
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.bad_row import MISSING, is_number, split_fields
+from driftwalk.record.bad_row import is_number, split_fields
+from driftwalk.record.layout import MISSING
 from driftwalk.record.text import read_head
 
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f]")

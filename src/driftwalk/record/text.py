@@ -21,7 +21,8 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.bad_row import MISSING, check_lines
+from driftwalk.record.bad_row import check_lines
+from driftwalk.record.layout import MISSING, TableLayout
 from driftwalk.record.raw import Array
 
 BLOCK_BYTES = 4 << 20
@@ -36,24 +37,6 @@ GZIP_ALLOWANCE = 16 << 20
 GZIP_RATIO = 50
 """A gzip file may unpack to this many times its size, and 16 MiB more. Tables of numbers shrink to
 a third, of mostly missing ones to a twentieth."""
-
-
-@dataclass(frozen=True)
-class TableLayout:
-    """Where the numbers stand in a text file."""
-
-    delimiter: str
-    """One character, or ``" "`` for any run of blanks."""
-    names: list[str]
-    """Names of all columns, in order (for error messages)."""
-    skip_lines: int = 0
-    """Lines before the first row of data."""
-    numbers: tuple[int, ...] = ()
-    """Columns (from 0) to read as numbers."""
-    texts: tuple[int, ...] = ()
-    """Columns (from 0) to read as text."""
-    clock: int | None = None
-    """The one of the numbers whose whole values may be beyond those that float64 holds exactly."""
 
 
 @dataclass

@@ -21,8 +21,9 @@ from driftwalk.track.follow.tracker import Tracker, TrackState
 from driftwalk.track.live import LiveServer, Particle, nmea_frame
 from driftwalk.track.observe.observer import AssemblyObserver, AssemblySeen, SeenEvent, observe
 from driftwalk.track.overlay import OverlayWriter, draw_states, save_picture
-from driftwalk.track.source.frames import FrameCounts, FrameSource, open_source
+from driftwalk.track.source.frames import FrameCounts, FrameSource
 from driftwalk.track.source.live_camera import LiveCamera
+from driftwalk.track.source.open import open_source
 from driftwalk.track.source.sampled import frame_count, sample_images
 from driftwalk.track.types import Detection, Detector, Frame, FrameResult, PixelToWorld, Rejected
 

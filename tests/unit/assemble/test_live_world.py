@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from twin.assembly import advance, block_normals, make_rules, start_world
+from twin.latch import Latch
 from twin_assembly import study as tank_study
 from twin_assembly import swirl
 
 import driftwalk as dw
-from driftwalk.assembly.reference import advance, block_normals, make_rules, start_world
-from driftwalk.assembly.reference_latch import Latch
 from driftwalk.assembly.runs.address import stream_keys
 from driftwalk.core.errors import InputError
 

@@ -8,6 +8,20 @@ import numpy as np
 import pytest
 import single_block
 from scipy.spatial import ConvexHull
+from twin.assembly import (
+    World,
+    advance,
+    assemble_reference,
+    block_normals,
+    drag_sums,
+    integrate,
+)
+from twin.block import TwinModel, flow_at, simulate_reference
+from twin.body import Assembly
+from twin.body import single_block as one_block
+from twin.contacts import Pair, collide, contact_points, overlap, separate
+from twin.latch import Latch, candidates, latch_once, merged
+from twin.wall import meet_wall
 from twin_assembly import (
     MASS,
     SIDE,
@@ -24,21 +38,7 @@ from twin_assembly import (
 
 import driftwalk as dw
 from driftwalk import _core
-from driftwalk.assembly.reference import (
-    World,
-    advance,
-    assemble_reference,
-    block_normals,
-    drag_sums,
-    integrate,
-)
-from driftwalk.assembly.reference_body import Assembly
-from driftwalk.assembly.reference_body import single_block as one_block
-from driftwalk.assembly.reference_contacts import Pair, collide, contact_points, overlap, separate
-from driftwalk.assembly.reference_latch import Latch, candidates, latch_once, merged
-from driftwalk.assembly.reference_wall import meet_wall
 from driftwalk.core.errors import InputError
-from driftwalk.simulation.reference import TwinModel, flow_at, simulate_reference
 
 HALF = SIDE / 2
 DIMER, LINE, CORNER = [[0, 0], [1, 0]], [[0, 0], [1, 0], [2, 0]], [[0, 0], [1, 0], [0, 1]]

@@ -12,9 +12,10 @@ from driftwalk.record.body_columns import body_columns
 from driftwalk.record.clock_columns import uneven_clock
 from driftwalk.record.column_names import ColumnMap, map_columns, unit_of_name
 from driftwalk.record.head import first_lines, read_header
+from driftwalk.record.layout import TableLayout
 from driftwalk.record.raw import ANGLE_UNITS, Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.stacked import split_bodies
-from driftwalk.record.text import Table, TableLayout, read_table
+from driftwalk.record.text import Table, read_table
 
 NO_CLOCK = "the table has no column of times or frames: every row counts as a frame"
 NAME_THE_CLOCK = (

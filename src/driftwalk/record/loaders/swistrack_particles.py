@@ -13,9 +13,10 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.head import first_lines
+from driftwalk.record.layout import TableLayout
 from driftwalk.record.raw import Array, RawRecording, ReadOptions
 from driftwalk.record.stacked import order_in_frame, split_bodies
-from driftwalk.record.text import Table, TableLayout, read_table
+from driftwalk.record.text import Table, read_table
 
 NAMES = ["frame", "time", "x (image)", "y (image)", "x (world)", "y (world)"]
 NAMES = [*NAMES, "area", "orientation", "compactness"]

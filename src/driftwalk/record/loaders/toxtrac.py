@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from driftwalk.record.head import first_lines, is_numeric_row
+from driftwalk.record.layout import TableLayout
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.stacked import split_bodies
-from driftwalk.record.text import TableLayout, read_table
+from driftwalk.record.text import read_table
 
 NAMES = ["frame", "arena", "track", "x", "y", "label"]
 

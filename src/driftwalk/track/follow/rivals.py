@@ -12,45 +12,16 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.track.follow.gate import Measured, Predicted, edge_costs
+from driftwalk.track.follow.marks import Marks
 from driftwalk.track.follow.settings import TrackerSettings
-
-if TYPE_CHECKING:
-    from driftwalk.track.follow.marks import Marks
-    from driftwalk.track.follow.tracks import Track
+from driftwalk.track.follow.tracks import Rival, Track
 
 Floats = npt.NDArray[np.float64]
-
-
-@dataclass
-class Rival:
-    """What a track would be without its last measurements."""
-
-    mean: Floats
-    covariance: Floats
-    time: float
-    """Of mean and covariance."""
-    seen_at: Floats
-    seen: float
-    oriented: bool
-    lost_beside: dict[Track, int]
-    samples: int
-    """How many samples of the track are its own."""
-    since: int
-    """Frame of the first measurement that is in doubt."""
-    lead: float
-    """Logarithm of how much likelier the track is."""
-
-    @property
-    def score(self) -> float:
-        """Likelihood relative to the track's, 0 to 1."""
-        return math.exp(-max(self.lead, 0.0))
 
 
 class Rivals:

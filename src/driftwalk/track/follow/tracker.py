@@ -21,9 +21,9 @@ from driftwalk.track.follow.gate import Measured, Predicted, edge_costs
 from driftwalk.track.follow.kalman import predict, start_state, update
 from driftwalk.track.follow.marks import Marks
 from driftwalk.track.follow.naming import Naming
-from driftwalk.track.follow.rivals import Rival, Rivals
+from driftwalk.track.follow.rivals import Rivals
 from driftwalk.track.follow.settings import TrackerSettings
-from driftwalk.track.follow.tracks import Track, TrackState, measured_of, stacked
+from driftwalk.track.follow.tracks import Rival, Track, TrackState, measured_of, stacked
 from driftwalk.track.recorded import recording_of
 from driftwalk.track.types import Detection
 

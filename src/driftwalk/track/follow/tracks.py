@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
@@ -11,7 +12,6 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
 from driftwalk.track.follow.gate import Measured
-from driftwalk.track.follow.rivals import Rival
 from driftwalk.track.types import Detection
 
 Floats = npt.NDArray[np.float64]
@@ -101,6 +101,31 @@ class Samples:
         self._frames = self._frames[count:].copy()
         self._values = self._values[count:].copy()
         self._count -= count
+
+
+@dataclass
+class Rival:
+    """What a track would be without its last measurements."""
+
+    mean: Floats
+    covariance: Floats
+    time: float
+    """Of mean and covariance."""
+    seen_at: Floats
+    seen: float
+    oriented: bool
+    lost_beside: dict[Track, int]
+    samples: int
+    """How many samples of the track are its own."""
+    since: int
+    """Frame of the first measurement that is in doubt."""
+    lead: float
+    """Logarithm of how much likelier the track is."""
+
+    @property
+    def score(self) -> float:
+        """Likelihood relative to the track's, 0 to 1."""
+        return math.exp(-max(self.lead, 0.0))
 
 
 @dataclass(eq=False)

@@ -9,7 +9,8 @@ from typing import Final
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.opencv import require_opencv
-from driftwalk.track.source.frames import images_in, open_capture, open_source
+from driftwalk.track.source.frames import images_in, open_capture
+from driftwalk.track.source.open import open_source
 from driftwalk.track.types import Image
 
 _CAMERA_STRIDE: Final = 5

@@ -8,9 +8,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from driftwalk.assembly.reference_body import NEIGHBOURS, Assembly, Floats, Ints, cross, turned
-from driftwalk.assembly.reference_contacts import Pair, close_pairs, overlap, overlapping_pairs
-from driftwalk.assembly.reference_wall import Wall, push_inside
+from twin.body import NEIGHBOURS, Assembly, Floats, Ints, cross, turned
+from twin.contacts import Pair, close_pairs, overlap, overlapping_pairs
+from twin.wall import Wall, push_inside
 
 Latching = Literal["none", "collision", "connector"]
 

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from driftwalk.assembly.reference_body import Assembly, Floats, cross
-from driftwalk.assembly.reference_wall import JAM_TOLERANCE, Wall, push_inside, take_back_outside
-from driftwalk.simulation.reference import resolve_contacts
+from twin.block import resolve_contacts
+from twin.body import Assembly, Floats, cross
+from twin.wall import JAM_TOLERANCE, Wall, push_inside, take_back_outside
 
 SHIFT_ROUNDS = 10
 SEPARATION_ROUNDS = 40

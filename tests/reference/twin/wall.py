@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from driftwalk.assembly.reference_body import Assembly, Floats, cross, turned
-from driftwalk.simulation.reference import resolve_contacts
+from twin.block import resolve_contacts
+from twin.body import Assembly, Floats, cross, turned
 
 INSIDE_TOLERANCE = 1e-6
 JAM_TOLERANCE = 1e-4

@@ -1,14 +1,14 @@
 """The NumPy twin of the self-assembly kernel: the same rules, written plainly, for tests.
 
 One world at a time, float64, the same random numbers as the native core. Drag, random numbers and
-the algebra of impulses are those of the one-block twin (`driftwalk.simulation.reference`). It is
+the algebra of impulses are those of the one-block twin (`twin.block`). It is
 slow and is no product: results come from the native core, which is held against these pages. The
 two agree to rounding until a collision amplifies it, and in distribution after.
 
-    reference_body      a rigid assembly of blocks on a lattice
-    reference_wall      assemblies against the wall
-    reference_contacts  blocks against blocks: overlap, impulses, shifts
-    reference_latch     which faces join, and the body that they make
+    body      a rigid assembly of blocks on a lattice
+    wall      assemblies against the wall
+    contacts  blocks against blocks: overlap, impulses, shifts
+    latch     which faces join, and the body that they make
 
 What the rules leave open is decided so:
 
@@ -42,13 +42,13 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.reference_body import Assembly, Floats, Square, cross, single_block, wrapped
-from driftwalk.assembly.reference_contacts import collide, overlapping_pairs, separate
-from driftwalk.assembly.reference_latch import Joined, Latch, Latching, candidates, latch_once
-from driftwalk.assembly.reference_wall import Wall, meet_wall
 from driftwalk.core.errors import InputError
 from driftwalk.simulation.backend import wall_edges
-from driftwalk.simulation.reference import TwinModel, drag, force_normals
+from twin.block import TwinModel, drag, force_normals
+from twin.body import Assembly, Floats, Square, cross, single_block, wrapped
+from twin.contacts import collide, overlapping_pairs, separate
+from twin.latch import Joined, Latch, Latching, candidates, latch_once
+from twin.wall import Wall, meet_wall
 
 if TYPE_CHECKING:
     import xarray as xr

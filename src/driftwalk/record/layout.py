@@ -1,0 +1,26 @@
+"""Where the numbers stand in a text table, and how a missing one is written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+MISSING = frozenset({"", "NaN", "nan", "NAN", "NA", "N/A", "null", "NULL", "None", "none", "-nan"})
+"""What a tracker writes for a number that it does not have."""
+
+
+@dataclass(frozen=True)
+class TableLayout:
+    """Where the numbers stand in a text file."""
+
+    delimiter: str
+    """One character, or ``" "`` for any run of blanks."""
+    names: list[str]
+    """Names of all columns, in order (for error messages)."""
+    skip_lines: int = 0
+    """Lines before the first row of data."""
+    numbers: tuple[int, ...] = ()
+    """Columns (from 0) to read as numbers."""
+    texts: tuple[int, ...] = ()
+    """Columns (from 0) to read as text."""
+    clock: int | None = None
+    """The one of the numbers whose whole values may be beyond those that float64 holds exactly."""
