@@ -26,7 +26,7 @@ from study_sets import WORLDS, Case, cases_of, keep_motion, load_motion, record
 import driftwalk as dw
 from driftwalk.core.errors import DriftwalkError
 from driftwalk.core.provenance import plain
-from driftwalk.likelihood.fit import AngleUse
+from driftwalk.likelihood.ready import AngleUse
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 INFER: Final = "cpp/include/driftwalk/infer"

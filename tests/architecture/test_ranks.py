@@ -178,3 +178,58 @@ def test_stages_do_not_import_the_command_line_or_each_other_in_a_ring() -> None
             ordered.append(name)
             del remaining[name]
     assert "cli" not in frozenset().union(*MAY_IMPORT.values())
+
+
+def test_no_module_imports_a_private_name_of_another() -> None:
+    wrong = [
+        f"{found}: {name}"
+        for found in ALL_IMPORTS
+        if found.module.startswith("driftwalk")
+        for name in (*found.names, *found.module.split("."))
+        if name.startswith("_") and name not in {"_core", "__version__"}
+    ]
+    assert not wrong
+
+
+def modules() -> dict[str, Path]:
+    """Return every module of the package by its full name."""
+    found = {}
+    for file in SOURCE.rglob("*.py"):
+        parts = ("driftwalk", *file.relative_to(SOURCE).with_suffix("").parts)
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = file
+    return found
+
+
+def rings(needs: dict[str, set[str]]) -> set[str]:
+    """Return the modules that are left when those that need no other are taken away, repeatedly."""
+    left = dict(needs)
+    while ready := [name for name, needed in left.items() if not needed & left.keys()]:
+        for name in ready:
+            del left[name]
+    return set(left)
+
+
+def test_no_ring_of_imports() -> None:
+    """Imports inside functions and for types count: whoever reads one file has to read the other."""
+    names = modules()
+    needs: dict[str, set[str]] = {}
+    for name, file in names.items():
+        inits = {name} if file.name == "__init__.py" else set()
+        reached = set()
+        for found in ALL_IMPORTS:
+            if found.file == file and found.module.startswith("driftwalk"):
+                submodules = {f"{found.module}.{each}" for each in found.names} & names.keys()
+                reached |= submodules or ({found.module} & names.keys())
+        needs[name] = reached - inits
+    assert rings({"a": {"b"}, "b": {"a"}, "c": {"a"}, "d": set()}) == {"a", "b", "c"}
+    assert not rings(needs)
+
+
+MOST_FILES = 25
+
+
+def test_no_folder_is_a_drawer() -> None:
+    """A folder of more files than a reader can take in holds several subjects."""
+    folders = {path.parent for path in SOURCE.rglob("*.py")}
+    sizes = {str(one.relative_to(SOURCE)): len(list(one.glob("*.py"))) for one in folders}
+    assert {name: size for name, size in sizes.items() if size > MOST_FILES} == {}

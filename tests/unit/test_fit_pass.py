@@ -11,8 +11,8 @@ from fit_worlds import coarse_study, recording
 
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.filter_pass import Passes, Point, Sums
-from driftwalk.likelihood.fit import _body, _series
 from driftwalk.likelihood.newton import Prior, Weights, inverse, limited, newton_step
+from driftwalk.likelihood.ready import body_of, series_of
 from driftwalk.likelihood.spline import lay_spline
 from driftwalk.schema import body_track
 
@@ -22,9 +22,9 @@ def passes(request: pytest.FixtureRequest) -> Passes:
     study = coarse_study()
     outline = outline_of(study.tank.to_arena())
     tracks = [body_track(recording(60.0, name)) for name in ("first", "second")]
-    series = _series(tracks, study, outline, request.param)
+    series = series_of(tracks, study, outline, request.param)
     spline = lay_spline(outline, side=0.03, spacing=0.03)
-    return Passes(series, _body(study, request.param), spline)
+    return Passes(series, body_of(study, request.param), spline)
 
 
 @pytest.fixture(scope="module")

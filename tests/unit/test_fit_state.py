@@ -10,7 +10,7 @@ import xarray as xr
 from fit_worlds import DRAG, FORCE_N, NOISE_M, coarse_study
 
 import driftwalk as dw
-from driftwalk.likelihood.fit import _use_angle
+from driftwalk.likelihood.ready import use_angle
 from driftwalk.model import apply_overrides
 from driftwalk.schema import body_track, build_trajectory
 
@@ -163,7 +163,7 @@ def test_half_of_the_angles_make_it_the_default(track: xr.Dataset) -> None:
         blind = theta.copy()
         blind[: int(share * theta.size)] = np.nan
         recording = turned(track, blind)
-        assert _use_angle([recording], [body_track(recording)], "auto") == used
+        assert use_angle([recording], [body_track(recording)], "auto") == used
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.3])

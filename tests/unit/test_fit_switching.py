@@ -26,10 +26,10 @@ from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.flow import bilinear
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.filter_pass import Passes, Point
-from driftwalk.likelihood.fit import _body, _prepare, _spline
 from driftwalk.likelihood.intervals import Intervals, cut_track, intervals_of, switched_frames
 from driftwalk.likelihood.length import in_words, length_advice, needed_duration
 from driftwalk.likelihood.newton import Prior, Weights
+from driftwalk.likelihood.ready import body_of, prepare, spline_of
 from driftwalk.likelihood.result import Whiteness
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema import Track, body_track, build_trajectory
@@ -117,10 +117,10 @@ def test_which_flow_must_be_said(fit: xr.Dataset) -> None:
 def prepared(**settings: object) -> tuple[Passes, Point]:
     """Return the filter over the recording and a point with different flows."""
     study = coarse_study(**settings)
-    ready = _prepare([two_flows()], study, None, None)
-    spline = _spline(study, outline_of(study.tank.to_arena()))
+    ready = prepare([two_flows()], study, None, None)
+    spline = spline_of(study, outline_of(study.tank.to_arena()))
     flows = len(ready.intervals.labels)
-    passes = Passes(ready.series, _body(study, ready.angle), spline, flows)
+    passes = Passes(ready.series, body_of(study, ready.angle), spline, flows)
     generator = np.random.default_rng(2)
     coefficients = 0.05 * generator.normal(size=(flows, 2, spline.rows, spline.columns))
     return passes, Point(coefficients, np.log(0.4), np.log(6e-7), np.log(3e-4))
@@ -407,7 +407,7 @@ def test_a_region_never_visited_is_filled_and_warned_of() -> None:
 def test_two_recordings_are_cut_by_their_own_clocks() -> None:
     track = two_flows()
     later = track.assign_coords(time=track["time"] + 20.0)
-    ready = _prepare([track, later], coarse_study(**SWITCHED), None, None)
+    ready = prepare([track, later], coarse_study(**SWITCHED), None, None)
     assert [(one.flow, one.recording) for one in ready.series] == [(0, 0), (1, 0), (0, 1), (1, 1)]
     assert [one.time.size for one in ready.series] == [2000, 2001, 1800, 2201]
     assert [one.time[0] for one in ready.series] == pytest.approx([0.0, 200.0, 0.0, 180.0])

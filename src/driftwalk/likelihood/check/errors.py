@@ -19,8 +19,8 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.filter_pass import Passes, Place, Point, Series, Sums
-from driftwalk.likelihood.fit import _body, _prepare
 from driftwalk.likelihood.newton import Prior, Weights
+from driftwalk.likelihood.ready import body_of, prepare
 from driftwalk.likelihood.spline import DEGREE, Floats, Spline, basis
 from driftwalk.schema import Track
 
@@ -61,7 +61,7 @@ def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str 
     if fit.attrs.get("kind") != "fit":
         raise InputError(f"not a fit: its kind is {fit.attrs.get('kind')!r}; fit_motion makes one")
     study = parse_study(fit.attrs["study"])
-    ready = _prepare(recordings, study, fit.attrs["angle"], body)
+    ready = prepare(recordings, study, fit.attrs["angle"], body)
     samples = sum(one.time.size for one in ready.series)
     if samples != int(fit.attrs["samples"]):
         raise InputError(
@@ -87,7 +87,7 @@ def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str 
             log_angle_noise=math.log(fit.attrs["orientation_noise_rad"]),
         )
     weights = Weights(float(fit.attrs["roughness_weight"]), float(fit.attrs["size_weight"]))
-    passes = Passes(ready.series, _body(study, ready.angle), spline, len(ready.intervals.labels))
+    passes = Passes(ready.series, body_of(study, ready.angle), spline, len(ready.intervals.labels))
     return Estimate(study, passes, point, weights, ready.parts)
 
 

@@ -25,7 +25,7 @@ from driftwalk.likelihood.check.worlds import (
     replicates_at_estimate,
     replicates_drawn,
 )
-from driftwalk.likelihood.fit import _as_list
+from driftwalk.likelihood.ready import as_list
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -94,7 +94,7 @@ def check_model(
 
     if replicates < FEWEST_REPLICATES:
         raise InputError(f"replicates must be at least {FEWEST_REPLICATES}, got {replicates}")
-    many = _as_list(recordings)
+    many = as_list(recordings)
     estimate = estimate_of(fit, many, body=body)
     errors = errors_of(estimate)
     _require_used(errors)

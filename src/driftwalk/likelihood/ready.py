@@ -1,0 +1,233 @@
+"""Recordings made ready for the filter of the likelihood fit, or refused."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import numpy as np
+
+from driftwalk.core.errors import InputError
+from driftwalk.flow.arena import Outline, outline_of, read_arena
+from driftwalk.likelihood.angle import no_angle, smooth_angle
+from driftwalk.likelihood.filter_pass import LONGEST_GAP_S, Body, Series
+from driftwalk.likelihood.intervals import Intervals, cut_track, intervals_of
+from driftwalk.likelihood.refuse import (
+    FEWEST_SAMPLES,
+    require_length,
+    require_motion,
+    require_own_arena,
+    require_size,
+    require_usable,
+)
+from driftwalk.likelihood.spline import Spline, lay_spline
+from driftwalk.likelihood.wall import wall_intervals
+from driftwalk.schema import Track, body_track
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+ORIENTED_SHARE = 0.5
+"""Share of samples with an orientation from which on "auto" uses it."""
+
+AngleUse = Literal["auto", "state", "given", "none"]
+
+
+def as_list(recordings: xr.Dataset | Sequence[xr.Dataset]) -> list[xr.Dataset]:
+    """Return the recordings as a list, whether one or several were given; refuse none."""
+    import xarray as xr
+
+    many = [recordings] if isinstance(recordings, xr.Dataset) else list(recordings)
+    if not many:
+        raise InputError("no recording given: fit_motion needs one at least")
+    return many
+
+
+class Ready(NamedTuple):
+    """Recordings, ready for the filter."""
+
+    tracks: list[Track]
+    """One for each recording."""
+    parts: list[Track]
+    """The same, cut at the switching times."""
+    places: list[tuple[int, int]]
+    """Of each part: its flow and its recording."""
+    intervals: Intervals
+    series: list[Series]
+    """The parts as the filter takes them."""
+    angle: str
+    """How orientations are used."""
+    wall_share: float
+
+
+def prepare(
+    many: Sequence[xr.Dataset], study: Study, angle: AngleUse | None, body: str | None
+) -> Ready:
+    """Return recordings ready for the filter; refuse what cannot be fitted."""
+    intervals = intervals_of(study)
+    outline = outline_of(study.tank.to_arena())
+    require_size(len(intervals.labels), 2 * spline_of(study, outline).size)
+    tracks, parts, places = [], [], []
+    for index, recording in enumerate(many):
+        track, where = body_track(recording, body), _name_of(recording)
+        require_length(track, study, where=where)
+        require_motion(track, study, where=where)
+        cut = cut_track(track, intervals, fewest=FEWEST_SAMPLES, where=where)
+        for number, part in enumerate(cut):
+            if len(cut) > 1:
+                require_motion(part, study, where=f"{where}{intervals.describe(number)}: ")
+        tracks.append(track)
+        parts += cut
+        places += [(flow, index) for flow in intervals.flows]
+    used_angle = use_angle(many, tracks, study.fit.angle if angle is None else angle)
+    series = series_of(parts, study, outline, used_angle, places)
+    count, near_wall = (
+        sum(one.time.size - 1 for one in series),
+        sum(one.near_wall for one in series),
+    )
+    if _is_fitted_arena(many[0], study):
+        require_own_arena(study, intervals=count, near_wall=near_wall, where=_name_of(many[0]))
+    _require_usable(series, study)
+    for flow in range(0 if intervals.steady else len(intervals.labels)):
+        _require_usable(
+            [one for one in series if one.flow == flow],
+            study,
+            where=f"{intervals.describe_flow(flow)}: ",
+        )
+    return Ready(tracks, parts, places, intervals, series, used_angle, near_wall / count)
+
+
+def _name_of(recording: xr.Dataset) -> str:
+    """Return what a message on a recording begins with."""
+    name = recording.attrs.get("source", "")
+    return f"{name}: " if name else ""
+
+
+def _is_fitted_arena(recording: xr.Dataset, study: Study) -> bool:
+    """Whether the tank is the circle that was fitted to the positions (``arena="fit"``)."""
+    arena, found = (
+        read_arena(str(recording.attrs.get(key, "{}"))) for key in ("arena", "arena_found")
+    )
+    # Where the size is given and only the centre is fitted, no radius is found.
+    return "radius_is" in found and arena.get("diameter_m") == study.tank.diameter_m
+
+
+def is_simulated(recording: xr.Dataset) -> bool:
+    """Return whether a recording says of itself that it was simulated."""
+    return str(recording.attrs.get("simulated", "no")) == "yes"
+
+
+def use_angle(many: Sequence[xr.Dataset], tracks: Sequence[Track], wanted: str) -> str:
+    """Return how orientations are used: "state", "given" or "none"."""
+    if wanted not in ("auto", "state", "given", "none"):
+        raise InputError(f"angle must be 'auto', 'state', 'given' or 'none', got {wanted!r}")
+    shares = [_oriented_share(track) for track in tracks]
+    seen = min(shares)
+    if wanted in ("state", "given") and seen == 0.0:
+        where = _name_of(many[shares.index(seen)])
+        raise InputError(
+            f"{where}the recording has no orientations, or the same in every row: leave out "
+            f"angle = {wanted!r} (--angle), or read the column that holds them"
+        )
+    if wanted == "auto":
+        return "state" if seen >= ORIENTED_SHARE else "none"
+    return wanted
+
+
+def _oriented_share(track: Track) -> float:
+    """Return the share of samples with an orientation; 0 where a tracker only fills its column."""
+    seen = np.isfinite(track.theta)
+    if not seen.any() or np.ptp(track.theta[seen]) == 0.0:
+        return 0.0
+    return float(seen.mean())
+
+
+def series_of(
+    tracks: Sequence[Track],
+    study: Study,
+    outline: Outline,
+    used_angle: str,
+    places: Sequence[tuple[int, int]] | None = None,
+) -> list[Series]:
+    """Return the tracks as the filter takes them.
+
+    `places` are the flow and the recording of each, by default one flow and recording after
+    recording. Times begin with the recording's first sample.
+    """
+    found: list[Series] = []
+    first = 0.0
+    for number, track in enumerate(tracks):
+        flow, recording = (0, number) if places is None else places[number]
+        if not found or found[-1].recording != recording:
+            first = float(track.time[0])
+        time = track.time - first
+        smooth = no_angle(time.size)
+        corners = None
+        if used_angle != "none":
+            smooth = smooth_angle(time, track.theta, longest_gap=LONGEST_GAP_S)
+            corners = np.where(np.isfinite(track.theta), track.theta, smooth.theta)
+        wall = wall_intervals(
+            time,
+            track.x,
+            track.y,
+            corners,
+            outline=outline,
+            side=study.block.side_m,
+            longest_gap=LONGEST_GAP_S,
+        )
+        found.append(
+            Series(
+                time,
+                np.ascontiguousarray(track.x),
+                np.ascontiguousarray(track.y),
+                np.ascontiguousarray(track.theta) if used_angle == "state" else smooth.theta,
+                smooth.omega,
+                (wall | ~smooth.known).astype(np.uint8),
+                flow,
+                recording,
+                int(wall.sum()),
+            )
+        )
+    return found
+
+
+def _require_usable(series: Sequence[Series], study: Study, *, where: str = "") -> None:
+    require_usable(
+        usable_intervals(series),
+        intervals=sum(one.time.size - 1 for one in series),
+        near_wall=sum(one.near_wall for one in series),
+        tank=study.tank.describe(),
+        longest_gap=LONGEST_GAP_S,
+        where=where,
+    )
+
+
+def usable_intervals(series: Sequence[Series]) -> int:
+    """Return the number of intervals that are not left out and not longer than a gap."""
+    return sum(
+        int(np.count_nonzero((one.excluded[1:] == 0) & (np.diff(one.time) <= LONGEST_GAP_S)))
+        for one in series
+    )
+
+
+def spline_of(study: Study, outline: Outline) -> Spline:
+    """Return the spline of the flow over the tank of a study."""
+    return lay_spline(
+        outline,
+        side=study.block.side_m,
+        spacing=study.fit.spacing_m(side_m=study.block.side_m, widest_m=max(study.tank.extent_m)),
+    )
+
+
+def body_of(study: Study, used_angle: str) -> Body:
+    """Return the block of a study as the filter takes it."""
+    return Body(
+        side=study.block.side_m,
+        mass=study.block.mass_kg,
+        depth=study.wetted_depth_m,
+        strips=study.block.strips_per_face,
+        water_density=study.water.density_kg_m3,
+        orientation=used_angle,
+    )
