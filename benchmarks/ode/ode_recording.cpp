@@ -2,7 +2,7 @@
 //
 //     ode_recording CASE SEED STEPS_PER_FORCE SKIPPED SAMPLES
 //
-// The stochastic force is drawn anew every STEPS_PER_FORCE steps and held in between. After SKIPPED
+// The stochastic force is redrawn every STEPS_PER_FORCE steps and held in between. After SKIPPED
 // samples, SAMPLES lines of x, y, theta [m, m, rad] are printed, in as many digits as a double has.
 #include "tank.hpp"
 

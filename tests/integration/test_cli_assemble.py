@@ -152,7 +152,7 @@ def test_from_a_flow_field(tmp_path: Path) -> None:
         words = [*given, *tank, *SIZE, "--threads", threads, "-o", folder]
         done = here("assemble", *words)
         assert done.code == 0, done.err
-        assert "60 runs of 30 s; C_d = 0.45, σ_F = 0.55 mN drawn anew every 10 ms" in done.out
+        assert "60 runs of 30 s; C_d = 0.45, σ_F = 0.55 mN redrawn every 10 ms" in done.out
         assert "l1 distance" not in done.out
         assert not any((folder / name).exists() for name in DRAWN)
         found.append(dataset(folder / "assembly.nc"))

@@ -96,7 +96,7 @@ def test_people_read_the_answer(tmp_path: Path) -> None:
     done = here("fit", RECORDING, *SHORT, "-o", tmp_path / "run", "--angle", "none")
     assert done.code == 0, done.err
     assert "drag coefficient C_d" in done.out
-    assert "drawn anew every 16 ms" in done.out
+    assert "redrawn every 16 ms" in done.out
     assert "no orientation was used" in done.err
 
 

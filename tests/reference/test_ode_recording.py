@@ -98,7 +98,7 @@ def test_the_force_is_held_and_of_the_stated_size(simulate: Simulate) -> None:
     """Without drag, velocities change only every 20 steps, by N(0, (sigma_F 20 dt/m)^2).
 
     800 draws (2 axes, 400): their sample variance has a relative sd of 5 %; 4 sd, a false alarm
-    in 16,000. A force held for another time, or drawn anew each step, is off by a factor.
+    in 16,000. A force held for another time, or redrawn each step, is off by a factor.
     """
     step, hold, force = 0.5e-3, 20, 1e-4
     start = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, force]

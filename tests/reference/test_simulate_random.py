@@ -61,7 +61,7 @@ def test_a_counter_has_four_words() -> None:
 
 
 def test_normals_are_normal_and_independent() -> None:
-    # Fixed seed; were it drawn anew, each check would fail falsely once in 1e6 runs or less.
+    # Fixed seed; were it redrawn, each check would fail falsely once in 1e6 runs or less.
     keys = world_keys(7, trial=0, replicate=np.arange(40_000))
     first, second = force_normals(keys, 0)
     third, fourth = force_normals(keys, 1)

@@ -1,4 +1,4 @@
-"""Distributions in self-assembly. Seeds are fixed, so a failure repeats; were they drawn anew, each
+"""Distributions in self-assembly. Seeds are fixed, so a failure repeats; were they redrawn, each
 check would fail falsely at most once in 1e5 runs."""
 
 from __future__ import annotations

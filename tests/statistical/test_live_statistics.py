@@ -1,6 +1,6 @@
 """The steps of a live tank against those of `simulate`, with fixed seeds.
 
-Were the seeds drawn anew, the comparison would fail falsely in about one of 200 runs.
+Were the seeds redrawn, the comparison would fail falsely in about one of 200 runs.
 """
 
 from __future__ import annotations

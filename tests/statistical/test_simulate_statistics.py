@@ -1,4 +1,4 @@
-"""Distributions. Seeds are fixed, so a failure repeats; were they drawn anew, each check would fail
+"""Distributions. Seeds are fixed, so a failure repeats; were they redrawn, each check would fail
 falsely at most once in 1e5 runs, unless it says otherwise."""
 
 from __future__ import annotations

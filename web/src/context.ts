@@ -17,7 +17,7 @@ export interface CellExcerpt {
 }
 
 export interface Context {
-  /** What the reader has chosen, by section; it stays when the section is drawn anew. */
+  /** What the reader has chosen, by section; it stays when the section is redrawn. */
   readonly memory: Map<string, unknown>;
   /** Asks the server for a cell that the page does not hold; null in a report. */
   readonly fetchCell: ((id: string, row: number, column: number) => Promise<CellExcerpt>) | null;

@@ -16,7 +16,7 @@ export function isDark(): boolean {
   return currentTheme() === "dark";
 }
 
-/** Calls back whenever colours that are not styled by CSS have to be drawn anew. */
+/** Calls back whenever colours that are not styled by CSS have to be redrawn. */
 export function onThemeChange(listener: () => void): () => void {
   listeners.add(listener);
   return () => listeners.delete(listener);

@@ -75,9 +75,9 @@ test("outlines of tanks have their size and place", () => {
 
 test("a label that is too long is broken where it can be read", () => {
   assert.deepEqual(twoLines("short", 100), ["short"]);
-  assert.deepEqual(twoLines("force (mN), drawn anew every 16 ms", 100), [
+  assert.deepEqual(twoLines("force (mN), redrawn every 16 ms", 100), [
     "force (mN),",
-    "drawn anew every 16 ms",
+    "redrawn every 16 ms",
   ]);
   assert.deepEqual(twoLines("component 2 (11 % of the variance)", 100), [
     "component 2",

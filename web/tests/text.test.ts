@@ -22,7 +22,7 @@ test("symbols with an index are found, names with underscores are not", () => {
     "a C b",
   );
   assert.equal(spoken("sigma_F"), "σ F");
-  assert.equal(shortName("stochastic force σ_F, drawn anew"), "σ_F");
+  assert.equal(shortName("stochastic force σ_F, redrawn"), "σ_F");
   assert.equal(shortName("time, in a tank"), "time");
 });
 

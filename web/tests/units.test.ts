@@ -66,8 +66,8 @@ test("an interval decides how many decimals a value has", () => {
 test("the unit of a label stands before what a comma adds", () => {
   const display = displayOf("N", 0.001);
   assert.equal(
-    labelled("force σ_F, drawn anew every 16 ms", display),
-    "force σ_F (mN), drawn anew every 16 ms",
+    labelled("force σ_F, redrawn every 16 ms", display),
+    "force σ_F (mN), redrawn every 16 ms",
   );
   assert.equal(labelled("drag", displayOf("1", 1)), "drag");
 });

@@ -233,7 +233,7 @@ def print_answer(study: Study, result: AssemblyResult, folder: Path) -> None:
     settings, forces, facts = study.assembly, study.forces, result.distribution.attrs
     print(
         f"{settings.blocks} blocks, {facts['runs']} runs of {settings.duration_s:g} s; "
-        f"C_d = {forces.drag_coefficient:.4g}, σ_F = {1e3 * forces.force_std_N:.4g} mN drawn anew "
+        f"C_d = {forces.drag_coefficient:.4g}, σ_F = {1e3 * forces.force_std_N:.4g} mN redrawn "
         f"every {1e3 * forces.force_interval_s:g} ms"
     )
     columns = [result.distribution, *([] if result.drawn is None else [result.drawn])]

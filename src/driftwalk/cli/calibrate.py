@@ -182,7 +182,7 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
     force = 1e3 * facts["force_std_N"]
     print(f"drag coefficient C_d   {drag:.4f}{_interval(facts, 'drag_coefficient', 1, percent)}")
     print(
-        f"stochastic force σ_F   {force:.4f} mN, drawn anew every {1e3 * interval:g} ms"
+        f"stochastic force σ_F   {force:.4f} mN, redrawn every {1e3 * interval:g} ms"
         f"{_interval(facts, 'force_std_N', 1e3, percent)}"
     )
     print(f"noise intensity σ_F²·τ {facts['force_noise_intensity_N2_s']:.4g} N² s")

@@ -218,7 +218,7 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
     facts = found.attrs
     if facts["simulated_recording"] == "yes":
         print("This recording was simulated by another engine (ODE).")
-    every = f", drawn anew every {1e3 * facts['force_interval_s']:g} ms"
+    every = f", redrawn every {1e3 * facts['force_interval_s']:g} ms"
     rows = (
         ("drag coefficient C_d   ", "drag_coefficient", 1.0, "", ""),
         ("stochastic force σ_F   ", "force_std_N", 1e3, " mN", every),

@@ -125,7 +125,7 @@ def simulate(
         return
     print_note(
         f"wrote {out}: {facts['replicates']} x {facts['samples']} samples over "
-        f"{facts['duration_s']:g} s; σ_F = {1e3 * facts['force_std_N']:g} mN drawn anew every "
+        f"{facts['duration_s']:g} s; σ_F = {1e3 * facts['force_std_N']:g} mN redrawn every "
         f"{1e3 * facts['force_interval_s']:g} ms"
     )
     for name, count in facts["status"].items():

@@ -10,7 +10,7 @@ from driftwalk.model.section import Quantity, Section
 
 
 class Forces(Section):
-    """Drag coefficient C_d and stochastic force F ~ N(0, σ_F² I₂), drawn anew every interval.
+    """Drag coefficient C_d and stochastic force F ~ N(0, σ_F² I₂), redrawn every interval.
 
     Examples
     --------

@@ -44,7 +44,7 @@ def axis_of(part: xr.Dataset, name: str) -> dict[str, Any]:
     words, unit, _ = AXES.get(name, (axis_words(name), "1", ""))
     every = value_of(part, "force_interval_s")
     if name == "force_std" and every is not None:
-        words += f", drawn anew every {quantity(every, 's')}"
+        words += f", redrawn every {quantity(every, 's')}"
     return axis(name, words, unit, part[name].values)
 
 

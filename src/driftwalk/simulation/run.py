@@ -35,7 +35,7 @@ def simulate(
     """Simulate one block in a stirred tank.
 
     Drag on vertical strips of the four side faces (Eq. 2 of the paper, windward strips), a
-    stochastic force N(0, sigma_F^2 I) on the centre of mass drawn anew every force interval, and
+    stochastic force N(0, sigma_F^2 I) on the centre of mass redrawn every force interval, and
     impacts on the wall. Second order in time.
 
     Parameters

@@ -112,7 +112,7 @@ def test_the_words_have_the_numbers_and_their_uncertainty(sections: list[dict[st
     part = part_of(sections, "summary")
     text, facts = " ".join(part["paragraphs"]), distribution().attrs
     assert "4 blocks were simulated in 1000 runs of 5 min" in text
-    assert "C_d = 0.45 and σ_F = 0.55 mN drawn anew every 16 ms" in text
+    assert "C_d = 0.45 and σ_F = 0.55 mN redrawn every 16 ms" in text
     share = f"{100 * facts['complete']:.3g} % ({100 * facts['complete_low']:.3g} % to "
     assert share in text
     assert "no recording has settled" in text
@@ -227,7 +227,7 @@ def test_the_map_of_distances_and_the_shares_of_each_setting() -> None:
     part = part_of(made, "l1")
     assert (part["x"]["name"], part["y"]["name"]) == ("force_std", "drag_coefficient")
     assert part["x"]["values"] == study["force_std"].values.tolist()
-    assert "drawn anew every 16 ms" in part["x"]["label"]
+    assert "redrawn every 16 ms" in part["x"]["label"]
     np.testing.assert_allclose(values(part["value"]), study["l1_distance"].values, rtol=1e-6)
     np.testing.assert_allclose(values(part["shares"]), study["proportion"].values, rtol=1e-6)
     assert part["classes"] == study["class"].values.tolist()

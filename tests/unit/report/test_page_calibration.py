@@ -47,7 +47,7 @@ def test_the_map_is_that_of_the_dataset(
     assert part["x"]["values"] == calibration["force_std"].values.tolist()
     assert part["y"]["values"] == calibration["drag_coefficient"].values.tolist()
     assert part["x"]["unit"] == "N"
-    assert "drawn anew every 16 ms" in part["x"]["label"]
+    assert "redrawn every 16 ms" in part["x"]["label"]
     distance = calibration["ks_distance"].values
     # Bit for bit.
     np.testing.assert_array_equal(values(part["value"]), distance)
@@ -148,13 +148,13 @@ def test_the_summary_has_the_answer_with_its_uncertainty(
     assert (drag["value"], drag["low"], drag["high"]) == (0.39, 0.34, 0.44)
     assert (force["value"], force["low"], force["high"]) == (0.61e-3, 0.53e-3, 0.70e-3)
     assert drag["confidence"] == 0.9
-    assert force["note"] == "drawn anew every 16 ms"
+    assert force["note"] == "redrawn every 16 ms"
     assert shown["noise intensity"]["value"] == pytest.approx(0.61e-3**2 * 0.016)
     text = " ".join(part["paragraphs"])
     assert text.startswith("The recording was simulated: it is no measurement.")
     for words in (
         "C_d = 0.39 (90 % interval 0.34 to 0.44)",
-        "σ_F = 0.61 mN (90 % interval 0.53 mN to 0.7 mN), drawn anew every 16 ms",
+        "σ_F = 0.61 mN (90 % interval 0.53 mN to 0.7 mN), redrawn every 16 ms",
         "289 settings",
         "4 runs each",
         "17999 pairs of steps of 100 ms",

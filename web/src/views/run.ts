@@ -1,4 +1,4 @@
-/** A run that is watched: the sections of a report, drawn anew as they change. */
+/** A run that is watched: the sections of a report, redrawn as they change. */
 
 import { numbers } from "../arrays";
 import { nullable, number, object } from "../check";

@@ -148,7 +148,7 @@ def sobol_indices(
 
     Notes
     -----
-    Y = f(X) + noise, with variance V = V_f + V_noise and s = V_noise / V. The noise is drawn anew
+    Y = f(X) + noise, with variance V = V_f + V_noise and s = V_noise / V. The noise is redrawn
     at every setting, so it does not favour any input, but two settings that differ in one input
     differ by their noise too. The expected indices are ``S (1 - s)`` and ``T (1 - s) + s``: an
     input without any influence shows a total index of s, in pure noise of 1. The corrected indices

@@ -85,7 +85,7 @@ def print_fit(fit: xr.Dataset) -> None:
     _print_estimates("likelihood fit", fit_summary(fit))
     # Through a pipe the answer would wait in the buffer for the check and the map.
     print(
-        f"Intervals of 90 %; σ_F drawn anew every {every:g} ms. {STEP_REMARK}",
+        f"Intervals of 90 %; σ_F redrawn every {every:g} ms. {STEP_REMARK}",
         flush=True,
     )
 

@@ -1,4 +1,4 @@
-"""Recordings simulated from a fit: at the estimate, or with what the fit leaves open drawn anew."""
+"""Recordings simulated from a fit: at the estimate, or with what the fit leaves open redrawn."""
 
 from __future__ import annotations
 

@@ -148,13 +148,13 @@ def drawn_section(assembly: xr.Dataset) -> Section:
     force, drag = (assembly[name].values for name in ("force_std", "drag_coefficient"))
     what = str(assembly.attrs.get("drawn", "")).split()
     every = value_of(assembly, "force_interval_s")
-    anew = "" if every is None else f", drawn anew every {quantity(every, 's')}"
+    redrawn = "" if every is None else f", redrawn every {quantity(every, 's')}"
     note = f"{count(int(force.size), 'run')}, each with parameters of its own."
     if "flow" in what:
         note += " Each has a flow of its own, too, drawn within the errors of the field."
     return chart(
         "drawn", "The drawn parameters", note,
-        x=label(f"stochastic force σ_F{anew}", "N"), y=label("drag coefficient C_d"),
+        x=label(f"stochastic force σ_F{redrawn}", "N"), y=label("drag coefficient C_d"),
         series=[series("runs", force, drag, style="points")],
     )  # fmt: skip
 
@@ -166,9 +166,9 @@ def _parameters(distribution: xr.Dataset, assembly: xr.Dataset | None) -> str:
     if drag.size != 1 or force.size != 1:
         return ""
     every = value_of(distribution, "force_interval_s")
-    anew = "" if every is None else f" drawn anew every {quantity(every, 's')}"
+    redrawn = "" if every is None else f" redrawn every {quantity(every, 's')}"
     return (
-        f" with C_d = {quantity(float(drag[0]))} and σ_F = {quantity(float(force[0]), 'N')}{anew}"
+        f" with C_d = {quantity(float(drag[0]))} and σ_F = {quantity(float(force[0]), 'N')}{redrawn}"
     )
 
 

@@ -99,7 +99,7 @@ def calibration_summary(calibration: xr.Dataset) -> Section:
         estimate(calibration, "drag_coefficient", label="drag coefficient", symbol="C_d", unit="1"),
         estimate(
             calibration, "force_std_N", label="stochastic force", symbol="σ_F", unit="N",
-            note=f"drawn anew every {every}",
+            note=f"redrawn every {every}",
         ),
         figure("noise intensity", facts.get("force_noise_intensity_N2_s"), "N²·s", symbol="σ_F²·τ"),
         figure("KS distance at the optimum", facts.get("ks_distance"), symbol="D"),
@@ -198,7 +198,7 @@ def _what_was_found(calibration: xr.Dataset) -> str:
     intensity = quantity(required(calibration, "force_noise_intensity_N2_s"), "N² s")
     return (
         f"The best agreement is at a drag coefficient C_d = {drag} and a stochastic force "
-        f"σ_F = {force}, drawn anew every {every}. What the recording can tell is σ_F²·τ = "
+        f"σ_F = {force}, redrawn every {every}. What the recording can tell is σ_F²·τ = "
         f"{intensity}: σ_F means nothing "
         "without its interval."
     )

@@ -93,7 +93,7 @@ def fit_summary(fit: xr.Dataset, check: xr.Dataset | None = None) -> Section:
         estimate(fit, "drag_coefficient", label="drag coefficient", symbol="C_d", unit="1"),
         estimate(
             fit, "force_std_N", label="stochastic force", symbol="σ_F", unit="N",
-            note=f"drawn anew every {every}",
+            note=f"redrawn every {every}",
         ),
         estimate(
             fit, "force_noise_intensity_N2_s", label="noise intensity", symbol="σ_F²·τ",
@@ -146,7 +146,7 @@ def _what_was_found(fit: xr.Dataset) -> str:
     )
     every = quantity(required(fit, "force_interval_s"), "s")
     return (
-        f"The drag coefficient is C_d = {drag}, the stochastic force σ_F = {force}, drawn anew "
+        f"The drag coefficient is C_d = {drag}, the stochastic force σ_F = {force}, redrawn "
         f"every {every}, the tracking noise {noise}. The intervals hold if the drag law is right."
     )
 

@@ -101,7 +101,7 @@ def recovery_summary(recovery: xr.Dataset) -> Section:
         for key, unit, words in PARAMETERS.values()
     )
     every = quantity(float(required(recovery, "force_interval_s")), "s")
-    paragraphs = [done, f"The truth: {truth}; the force is drawn anew every {every}."]
+    paragraphs = [done, f"The truth: {truth}; the force is redrawn every {every}."]
     paragraphs += _found(recovery, confidence)
     shown = [
         figure(words, required(recovery, key), unit, note="truth")

@@ -54,16 +54,16 @@ def in_unit(variable: xr.DataArray, unit: str, *, stored: str) -> npt.NDArray[np
 def force_label(calibration: xr.Dataset) -> str:
     """Return the label of an axis of σ_F [mN], with the interval that gives it a meaning.
 
-    Only σ_F² times the interval at which the force is drawn anew is identifiable, so σ_F is never
+    Only σ_F² times the interval at which the force is redrawn is identifiable, so σ_F is never
     shown without it.
     """
     return r"stochastic force $\sigma_F$ (mN)," + f"\n{force_interval_text(calibration)}"
 
 
 def force_interval_text(calibration: xr.Dataset) -> str:
-    """Return "drawn anew every 16 ms" for the force interval of the calibration."""
+    """Return "redrawn every 16 ms" for the force interval of the calibration."""
     interval_s = required_attribute(calibration, "force_interval_s")
-    return f"drawn anew every {1e3 * float(interval_s):.4g} ms"
+    return f"redrawn every {1e3 * float(interval_s):.4g} ms"
 
 
 DRAG_LABEL = r"drag coefficient $C_d$"
