@@ -15,7 +15,7 @@ TEST_TOOLS := $(VENV)/.test-tools
 DEV_TOOLS := $(VENV)/.dev-tools
 CPP := $(shell find cpp -name '*.cpp' -o -name '*.hpp')
 
-.PHONY: demo test test-slow test-browser fuzz doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs web wheel clean
+.PHONY: demo test test-slow test-fresh test-browser fuzz doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs web wheel clean
 
 demo: $(PACKAGE)
 	$(BIN)/driftwalk demo
@@ -25,6 +25,14 @@ test: $(TEST_TOOLS)
 
 test-slow: $(TEST_TOOLS)
 	$(BIN)/python -m pytest -n 2 -m slow
+
+# The property and statistical tests, slow ones too, with new examples and new seeds: some minutes.
+# The seed is printed first; the same run again: make test-fresh SEED=123
+SEED := $(shell date +%s)
+
+test-fresh: $(TEST_TOOLS)
+	DRIFTWALK_TEST_SEED=$(SEED) $(BIN)/python -m pytest -n 2 -m "false_alarm or hypothesis" \
+	  --hypothesis-seed=$(SEED)
 
 # In Chromium, which has to be installed; without it the tests are skipped.
 test-browser: $(TEST_TOOLS)

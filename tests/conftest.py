@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
@@ -19,14 +20,27 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 # The same examples in every run, and no bar on their time: whether a test passes tells about the
-# code, not about the machine or the day. `--hypothesis-profile=default` searches anew.
+# code, not about the machine or the day.
 settings.register_profile(
     "repeatable",
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.too_slow],
 )
-settings.load_profile("repeatable")
+# `make test-fresh`: other examples in every run. They follow from the seed alone, not from a
+# database of earlier failures.
+settings.register_profile(
+    "fresh",
+    settings.get_profile("repeatable"),
+    derandomize=False,
+    database=None,
+    print_blob=True,
+)
+MORE_EXAMPLES = 5
+
+_text = os.environ.get("DRIFTWALK_TEST_SEED", "")
+BASE_SEED = int(_text) if _text else None
+settings.load_profile("repeatable" if BASE_SEED is None else "fresh")
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
@@ -42,3 +56,79 @@ def shared_data() -> Callable[[str], Path]:
         return path
 
     return folder
+
+
+@pytest.fixture(scope="session")
+def fresh_seed() -> Callable[[int], int]:
+    """Return a function that gives a test its seed: the given one, or one derived from the run's.
+
+    `make test` passes the given seed through. `make test-fresh` derives another one from it and
+    DRIFTWALK_TEST_SEED: equal seeds stay equal, different ones stay different. A test that uses
+    this states with `@pytest.mark.false_alarm(rate)` how often a new seed makes it fail although
+    the code is right; 0 where no seed may.
+    """
+
+    def seed(given: int) -> int:
+        if BASE_SEED is None:
+            return given
+        return int(np.random.SeedSequence([BASE_SEED, given]).generate_state(1)[0] >> 1)
+
+    return seed
+
+
+def _false_alarm(item: pytest.Item) -> float | None:
+    mark = item.get_closest_marker("false_alarm")
+    if mark is None:
+        return None
+    (rate,) = mark.args
+    return float(rate)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Hold tests with new seeds to their marker, and give Hypothesis more examples to try."""
+    enlarged = set()
+    for item in items:
+        rate = _false_alarm(item)
+        if (rate is None) == ("fresh_seed" in getattr(item, "fixturenames", ())):
+            raise pytest.UsageError(
+                f"{item.nodeid}: `fresh_seed` and `@pytest.mark.false_alarm(rate)` go together"
+            )
+        if BASE_SEED is None:
+            continue
+        if rate is not None:
+            item.user_properties.append(("false_alarm", rate))
+        function = getattr(item, "obj", None)
+        # Parametrized tests share one function.
+        if getattr(function, "is_hypothesis_test", False) and function not in enlarged:
+            enlarged.add(function)
+            # A test's own number of examples comes before the profile's, and Hypothesis has no
+            # public way to scale it.
+            own = function._hypothesis_internal_use_settings
+            function._hypothesis_internal_use_settings = settings(
+                own, max_examples=MORE_EXAMPLES * own.max_examples
+            )
+
+
+def pytest_report_header() -> list[str]:
+    if BASE_SEED is None:
+        return []
+    return [f"new seeds; this run again: make test-fresh SEED={BASE_SEED}"]
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say how many failures chance alone makes, beside those that there were."""
+    if BASE_SEED is None:
+        return
+    rates = [
+        float(rate)
+        for outcome in ("passed", "failed")
+        for report in terminalreporter.stats.get(outcome, [])
+        if report.when == "call"
+        for name, rate in report.user_properties
+        if name == "false_alarm"
+    ]
+    terminalreporter.write_sep("-", f"new seeds, SEED={BASE_SEED}")
+    terminalreporter.write_line(
+        f"{len(rates)} tests took seeds of this run: right code fails {sum(rates):.2g} of them by "
+        "chance. A test that fails under a second seed too is a finding."
+    )

@@ -1,18 +1,22 @@
-"""The steps of a live tank against those of `simulate`, with fixed seeds.
-
-Were the seeds redrawn, the comparison would fail falsely in about one of 200 runs.
-"""
+"""The steps of a live tank against those of `simulate`."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+import pytest
 import xarray as xr
 
 import driftwalk as dw
 from driftwalk.schema import build_trajectory
 
-RATE, DURATION = 10, 900
-LEVEL = 0.005
+# Sampling rate [1/s] and duration [s]. Steps of 0.1 s are mostly camera noise; steps of 1 s are
+# mostly motion, and an hour holds enough of it to tell a force from twice that force.
+CAMERA, MOTION = (10, 900), (1, 3600)
+PERMUTATIONS = 399
+LEVEL = 1 / (1 + PERMUTATIONS)
+"""The smallest p-value there is: no permutation is as far apart as the recordings are."""
 SETTLED = 30.0
 """Time after which neither motion remembers its start [s]."""
 
@@ -24,36 +28,61 @@ def study() -> dw.Study:
     )
 
 
-def live_recording(*, force_std: float | None = None, noise: bool = True) -> xr.Dataset:
+def live_recording(
+    sampling: tuple[int, int],
+    fresh_seed: Callable[[int], int],
+    *,
+    force_std: float | None = None,
+    noise: bool = True,
+) -> xr.Dataset:
     """Keep the poses of a live block, as a camera with the study's noise would see them."""
+    rate, duration = sampling
     model = study()
-    tank = dw.LiveTank(model, dw.tank30_flow(), blocks=1, seed=11)
+    tank = dw.LiveTank(model, dw.tank30_flow(), blocks=1, seed=fresh_seed(11))
     tank.set(force_std=force_std)
     tank.advance(SETTLED)
     poses = []
-    for _ in range(RATE * DURATION):
-        tank.advance(1 / RATE)
+    for _ in range(rate * duration):
+        tank.advance(1 / rate)
         poses.append([tank.x[0], tank.y[0]])
     blur = float(model.observation.position_noise_m) * noise
-    seen = np.array(poses) + blur * np.random.default_rng(5).standard_normal((len(poses), 2))
-    return build_trajectory(np.arange(len(seen)) / RATE, seen[:, :1], seen[:, 1:])
+    generator = np.random.default_rng(fresh_seed(5))
+    seen = np.array(poses) + blur * generator.standard_normal((len(poses), 2))
+    return build_trajectory(np.arange(len(seen)) / rate, seen[:, :1], seen[:, 1:])
 
 
-def simulated_recording() -> xr.Dataset:
-    time = SETTLED + np.arange(RATE * DURATION) / RATE
-    run = dw.simulate(study(), dw.tank30_flow(), sample_time=time, replicates=1, seed=12)
+def simulated_recording(sampling: tuple[int, int], fresh_seed: Callable[[int], int]) -> xr.Dataset:
+    rate, duration = sampling
+    time = SETTLED + np.arange(rate * duration) / rate
+    run = dw.simulate(
+        study(), dw.tank30_flow(), sample_time=time, replicates=1, seed=fresh_seed(12)
+    )
     x, y = (run[name].values[0] for name in "xy")
     return build_trajectory(time - SETTLED, x, y)
 
 
-def p_value(recording: xr.Dataset) -> float:
-    return float(dw.compare(recording, simulated_recording(), permutations=399, seed=3)["p_value"])
+def p_value(sampling: tuple[int, int], fresh_seed: Callable[[int], int], **changes: float) -> float:
+    live = live_recording(sampling, fresh_seed, **changes)
+    simulated = simulated_recording(sampling, fresh_seed)
+    found = dw.compare(live, simulated, permutations=PERMUTATIONS, seed=fresh_seed(3))
+    return float(found["p_value"])
 
 
-def test_a_live_block_makes_the_steps_of_simulate() -> None:
-    assert p_value(live_recording()) > LEVEL
+@pytest.mark.false_alarm(LEVEL)
+@pytest.mark.parametrize("sampling", [CAMERA, MOTION], ids=["camera", "motion"])
+def test_a_live_block_makes_the_steps_of_simulate(
+    sampling: tuple[int, int], fresh_seed: Callable[[int], int]
+) -> None:
+    assert p_value(sampling, fresh_seed) > LEVEL
 
 
-def test_the_comparison_sees_another_force_and_a_camera_without_noise() -> None:
-    assert p_value(live_recording(force_std=1.1e-3)) <= LEVEL
-    assert p_value(live_recording(noise=False)) <= LEVEL
+@pytest.mark.false_alarm(0.01)
+def test_the_comparison_sees_another_force_and_a_camera_without_noise(
+    fresh_seed: Callable[[int], int],
+) -> None:
+    """The smallest p-value in all of 58 seeds (force) and 33 seeds (camera).
+
+    In steps of 0.1 s, 36 % of seeds hid the doubled force.
+    """
+    assert p_value(MOTION, fresh_seed, force_std=1.1e-3) == LEVEL
+    assert p_value(CAMERA, fresh_seed, noise=False) == LEVEL
