@@ -27,6 +27,7 @@ STAGES = (
     "plot",
     "figures",
     "page",
+    "runs",
     "viewer",
 )
 
@@ -35,8 +36,8 @@ def stage(name: str) -> ModuleType:
     return importlib.import_module(f"driftwalk.{name}")
 
 
-# Its names are general ones ("grid", "collect"): they are used with the stage's name in front.
-BY_STAGE_ONLY = {"sweep"}
+# Their names are used with the stage's name in front: `sweep.grid`, `runs.run_fit`.
+BY_STAGE_ONLY = {"sweep", "runs"}
 PUBLIC = [(name, public) for name in STAGES for public in stage(name).__all__]
 FUNCTIONS = [
     (name, public) for name, public in PUBLIC if inspect.isfunction(getattr(stage(name), public))

@@ -260,7 +260,7 @@ def test_an_unfinished_run_whose_units_keep_less_is_refused(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("driftwalk.cli.sensitivity_run.SHARD_FORM", 1)
+        patch.setattr("driftwalk.runs.sensitivity.SHARD_FORM", 1)
         patch.setattr("driftwalk.assembly.sensitivity_map", stop)
         assert here(*words).code == 130
     line = refusal(here(*words))

@@ -44,13 +44,14 @@ from driftwalk.cli.options.shared import (
     study_overrides,
 )
 from driftwalk.cli.terminal.output import print_json, print_note, print_table, report_command
+from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.cli.assembly_run import AssemblyResult
     from driftwalk.model import Study
+    from driftwalk.runs import AssemblyResult
 
 MOST_ROWS = 16
 """Classes in the printed table: all 12 of four blocks, and the frequent ones of more."""
@@ -104,7 +105,7 @@ def assemble(
     calibration leaves open. Or with the parameters of a study and a flow field (--flow). Killed and
     started again, it continues.
     """
-    from driftwalk.cli.assembly_run import AssemblyWork, run_assembly
+    from driftwalk.runs import AssemblyWork, run_assembly
 
     _check_film(film)
     overrides = study_overrides(
@@ -144,7 +145,8 @@ def assemble(
             "found are simulated"
         )
     work = AssemblyWork(source.study, source.flow, source.region, source.inputs, threads)
-    result = run_assembly(work, out, film=film, overwrite=overwrite)
+    with reported("assemble") as told:
+        result = run_assembly(work, out, film=film, overwrite=overwrite, **told)
     warnings = [*warnings, *_left_out(result)]
     if json:
         print_json({**summary(work.study, result), "warnings": warnings})

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from driftwalk.cli.inputs.require_motion import require_motion
-from driftwalk.cli.inputs.study_recording import load_for_run
+from driftwalk.cli.inputs.study_recording import default_tank_note, load_for_run
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import (
     CALIBRATION_KEYS,
@@ -33,6 +33,7 @@ from driftwalk.cli.options.shared import (
     study_overrides,
 )
 from driftwalk.cli.terminal.output import print_json, print_note, report_command
+from driftwalk.cli.terminal.progress import reported
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -86,9 +87,9 @@ def calibrate(
     angles, refines around the minimum, and says how well the parameters are known and whether the
     model explains the motion. Killed and started again, it continues.
     """
-    from driftwalk.cli.calibration_run import Work, run_calibration
     from driftwalk.cli.inputs.tank import require_inside, study_in_arena
     from driftwalk.flow import load_flow
+    from driftwalk.runs import CalibrationWork, run_calibration
 
     overrides = study_overrides(
         keys=CALIBRATION_KEYS,
@@ -120,11 +121,10 @@ def calibrate(
     given = None
     if flow is not None:
         given = load_flow(flow, arena=chosen.tank.to_arena(), own_flags="keep")
-    remark = None
-    if not loaded.has_tank:
-        remark = f"the tank is the default study's, a {chosen.tank.describe()}"
-    work = Work(trajectory, chosen, given, how.body, inputs, threads, remark)
-    found = run_calibration(work, out, overwrite=overwrite)
+    remark = None if loaded.has_tank else default_tank_note(chosen)
+    work = CalibrationWork(trajectory, chosen, given, how.body, inputs, threads)
+    with reported("calibrate") as told:
+        found = run_calibration(work, out, overwrite=overwrite, begun=remark, **told)
     if json:
         print_json(summary(found))
     else:

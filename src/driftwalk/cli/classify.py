@@ -260,8 +260,8 @@ def _print(summary: dict[str, Any]) -> None:
 
 
 def _save(found: xr.Dataset, path: Path) -> None:
-    from driftwalk.cli.calibration_run import netcdf_bytes
     from driftwalk.core.atomic import write_atomic
+    from driftwalk.runs import netcdf_bytes
 
     # In memory first: HDF5 does not survive a disk that fills while it writes.
     write_atomic(path, netcdf_bytes(found))

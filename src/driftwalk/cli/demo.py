@@ -21,6 +21,7 @@ from driftwalk.cli.terminal.demo_answer import (
     print_places,
 )
 from driftwalk.cli.terminal.output import print_json, print_note
+from driftwalk.cli.terminal.progress import reported
 from driftwalk.schema.netcdf import open_netcdf
 
 if TYPE_CHECKING:
@@ -114,13 +115,14 @@ def _fit(
     tell: Callable[[xr.Dataset], None],
 ) -> tuple[xr.Dataset, xr.Dataset]:
     """Fit and check, or read what a finished run found; the fit is told before it is checked."""
-    from driftwalk.cli.fit_run import FitWork, run_fit
+    from driftwalk.runs import FitWork, run_fit
 
     if _finished(folder, overwrite):
         tell(open_netcdf(folder / "fit.nc"))
     else:
         work = FitWork([recording], study, None, {"recording": path})
-        run_fit(work, folder, overwrite=overwrite, fitted=tell)
+        with reported("fit") as told:
+            run_fit(work, folder, overwrite=overwrite, fitted=tell, **told)
     return open_netcdf(folder / "fit.nc"), open_netcdf(folder / "check.nc")
 
 
@@ -134,15 +136,17 @@ def _calibrate(
     threads: int | None,
 ) -> xr.Dataset:
     """Calibrate on the fitted flow, or read what a finished run found."""
-    from driftwalk.cli.calibration_run import Work, run_calibration
     from driftwalk.flow import load_flow
+    from driftwalk.runs import CalibrationWork, run_calibration
 
     folder, flow = out / CALIBRATION, out / FIT / "flow.nc"
     if _finished(folder, overwrite):
         return open_netcdf(folder / "calibration.nc")
     given = load_flow(flow, arena=study.tank.to_arena(), own_flags="keep")
-    work = Work(recording, study, given, None, {"recording": path, "flow": flow}, threads)
-    return run_calibration(work, folder, overwrite=overwrite)
+    inputs = {"recording": path, "flow": flow}
+    work = CalibrationWork(recording, study, given, None, inputs, threads)
+    with reported("calibrate") as told:
+        return run_calibration(work, folder, overwrite=overwrite, **told)
 
 
 def _write_page(out: Path, *runs: str) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from driftwalk.cli.inputs.require_motion import require_motion
-from driftwalk.cli.inputs.study_recording import load_for_run
+from driftwalk.cli.inputs.study_recording import default_tank_note, load_for_run
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import (
     PANEL,
@@ -27,6 +27,7 @@ from driftwalk.cli.options.shared import (
     study_overrides,
 )
 from driftwalk.cli.terminal.output import print_json, print_note, report_command
+from driftwalk.cli.terminal.progress import reported
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -119,8 +120,8 @@ def fit(
     the flow (flow.nc) for every command that takes one, the recording, the check of the model
     (check.nc), figures and manifest.json.
     """
-    from driftwalk.cli.fit_run import FitWork, run_fit
     from driftwalk.cli.inputs.tank import require_inside, study_in_arena
+    from driftwalk.runs import FitWork, run_fit
 
     overrides = study_overrides(
         keys=FIT_KEYS,
@@ -146,13 +147,12 @@ def fit(
     chosen = study_in_arena(chosen, trajectories[0])
     for one in trajectories:
         require_inside(chosen, one, how.body)
-    remark = None
-    if not loaded[0].has_tank:
-        remark = f"the tank is the default study's, a {chosen.tank.describe()}"
+    remark = None if loaded[0].has_tank else default_tank_note(chosen)
     inputs = {"recording" if n == 0 else f"recording-{n + 1}": p for n, p in enumerate(recordings)}
     inputs.update({"study": study} if study is not None else {})
-    work = FitWork(trajectories, chosen, how.body, inputs, remark, check=not no_check)
-    found = run_fit(work, out, overwrite=overwrite)
+    work = FitWork(trajectories, chosen, how.body, inputs, check=not no_check)
+    with reported("fit") as told:
+        found = run_fit(work, out, overwrite=overwrite, begun=remark, **told)
     if json:
         print_json(answer(found.fit, found.check))
     else:

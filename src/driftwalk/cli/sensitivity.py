@@ -50,11 +50,12 @@ from driftwalk.cli.options.shared import (
 )
 from driftwalk.cli.options.vary import VARY_KEYS, vary_overrides
 from driftwalk.cli.terminal.output import print_json, print_note
+from driftwalk.cli.terminal.progress import reported
 from driftwalk.cli.terminal.sensitivity_answer import print_answer, summary
 
 if TYPE_CHECKING:
-    from driftwalk.cli.sensitivity_run import SensitivityResult
     from driftwalk.model import Study
+    from driftwalk.runs import SensitivityResult
 
 KEYS: Final = {**SENSITIVITY_KEYS, **VARY_KEYS}
 
@@ -116,7 +117,7 @@ def sensitivity(
     reference: what a calibration RUN has found, or a study's parameters (--flow). Killed and
     started again, it continues.
     """
-    from driftwalk.cli.sensitivity_run import SensitivityWork, run_sensitivity
+    from driftwalk.runs import SensitivityWork, run_sensitivity
 
     overrides = study_overrides(
         keys=SENSITIVITY_KEYS,
@@ -159,7 +160,8 @@ def sensitivity(
         inputs={**source.inputs, **{f"flow {name}": path for name, path in paths.items()}},
         threads=threads,
     )
-    result = run_sensitivity(work, out, overwrite=overwrite)
+    with reported("sensitivity") as told:
+        result = run_sensitivity(work, out, overwrite=overwrite, **told)
     warnings = [*source.warnings, *_warnings(source, result)]
     if json:
         print_json({**summary(work.study, result), "warnings": warnings})

@@ -116,7 +116,7 @@ def simulate(
     else:
         recording = RecordingOptions(body=body).load(like)
         result = simulate_like(chosen, field, recording)
-    from driftwalk.cli.calibration_run import netcdf_bytes
+    from driftwalk.runs import netcdf_bytes
 
     write_atomic(out, netcdf_bytes(result))
     facts = summary(result)

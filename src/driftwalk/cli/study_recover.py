@@ -16,6 +16,7 @@ from driftwalk.cli.options.shared import (
     study_overrides,
 )
 from driftwalk.cli.terminal.output import print_json
+from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -86,8 +87,8 @@ def recover(
     flow tell? The directory holds recovery.nc, figures and manifest.json. Killed and started again,
     it continues.
     """
-    from driftwalk.cli.recover_run import RecoverWork, run_recovery
     from driftwalk.cli.terminal.recover_answer import print_answer, summary
+    from driftwalk.runs import RecoveryWork, run_recovery
 
     read = quantity_parser("s")
     overrides = study_overrides(
@@ -102,7 +103,9 @@ def recover(
     _require_stated(truth)
     field, flow_file = _flow(chosen, truth, flow)
     inputs = {"truth": truth, **({} if flow_file is None else {"flow": flow_file})}
-    found = run_recovery(RecoverWork(chosen, field, inputs, threads), out, overwrite=overwrite)
+    work = RecoveryWork(chosen, field, inputs, threads)
+    with reported("recover") as told:
+        found = run_recovery(work, out, overwrite=overwrite, **told)
     if json:
         print_json(summary(found))
     else:

@@ -126,7 +126,7 @@ def source_from_calibration(
         When the calibration cannot be used, the study file says another model, or a file or option
         is wrong.
     """
-    from driftwalk.cli.inputs.calibrated import read_calibrated
+    from driftwalk.runs import read_calibrated
 
     found = read_calibrated(folder)
     base, study, inputs = f"the study of {folder}", found.study, dict(found.files)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from driftwalk.cli.options.recording import RecordingOptions
+from driftwalk.cli.terminal.output import print_note
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -71,6 +73,12 @@ def load_for_run(
         if "arena" in own.attrs:
             return RunRecording(own, has_tank=True)
     return RunRecording(load_with_study(path, study, how), has_tank=tank == "stated")
+
+
+def default_tank_note(study: Study) -> Callable[[], None]:
+    """Return what says, when a run begins, that nobody stated its tank."""
+    text = f"the tank is the default study's, a {study.tank.describe()}"
+    return lambda: print_note(text)
 
 
 def completed(how: RecordingOptions, study: Study) -> RecordingOptions:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Self, TextIO
 
@@ -100,6 +102,19 @@ class ProgressReporter:
         )
         self._task = self._bar.add_task(self._title, total=None)
         self._bar.start()
+
+
+@contextmanager
+def reported(title: str) -> Iterator[dict[str, Any]]:
+    """Give what a run of `driftwalk.runs` is told by a command: whom to report to, and its name.
+
+    Parameters
+    ----------
+    title : str
+        What is being done.
+    """
+    with ProgressReporter(title) as progress:
+        yield {"progress": progress.update, "command": ["driftwalk", *sys.argv[1:]]}
 
 
 def duration_text(seconds: float) -> str:

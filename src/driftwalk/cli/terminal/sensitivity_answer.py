@@ -14,8 +14,8 @@ from driftwalk.core.errors import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.cli.sensitivity_run import SensitivityResult
     from driftwalk.model import Study
+    from driftwalk.runs import SensitivityResult
 
 UNITS: Final = {"force_std": "_N", "tank_diameter": "_m"}
 """What the names of axes lack as keys of JSON."""

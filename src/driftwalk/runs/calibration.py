@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from driftwalk.cli.run_folder import open_run
-from driftwalk.cli.terminal.output import print_note
-from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.errors import InputError
+from driftwalk.runs.folder import Progress, open_run, silent
+from driftwalk.runs.stored import dataset_hash, netcdf_bytes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,7 +28,7 @@ WORDS = {
 
 
 @dataclass(frozen=True)
-class Work:
+class CalibrationWork:
     """Everything that a calibration run needs.
 
     Attributes
@@ -47,8 +45,6 @@ class Work:
         The files that were read, by their role.
     threads : int or None
         Threads; the result does not depend on them.
-    remark : str or None
-        What the user should know when the run begins.
     """
 
     recording: xr.Dataset
@@ -57,10 +53,17 @@ class Work:
     body: str | None
     inputs: Mapping[str, Path]
     threads: int | None = None
-    remark: str | None = None
 
 
-def run_calibration(work: Work, folder: Path, *, overwrite: bool) -> xr.Dataset:
+def run_calibration(
+    work: CalibrationWork,
+    folder: Path,
+    *,
+    overwrite: bool = False,
+    begun: Callable[[], None] | None = None,
+    progress: Progress = silent,
+    command: str | Sequence[str] = "driftwalk.runs.run_calibration(...)",
+) -> xr.Dataset:
     """Calibrate in a run directory and return the calibration.
 
     Writes ``calibration.nc``, ``flow.nc``, ``recording.nc``, ``figures/`` and, last,
@@ -68,12 +71,23 @@ def run_calibration(work: Work, folder: Path, *, overwrite: bool) -> xr.Dataset:
 
     Parameters
     ----------
-    work : Work
+    work : CalibrationWork
         What to do.
     folder : Path
         The run directory.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
+    begun : callable, optional
+        Called when everything is checked and the work begins.
+    progress : callable, optional
+        Told how much is done: ``progress(done, total, text)``.
+    command : str, optional
+        The command line or the call, for the manifest.
+
+    Returns
+    -------
+    xarray.Dataset
+        A `calibration`.
 
     Raises
     ------
@@ -81,6 +95,12 @@ def run_calibration(work: Work, folder: Path, *, overwrite: bool) -> xr.Dataset:
         When the recording cannot be calibrated on; nothing is written then.
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> work = CalibrationWork(dw.tank30_recording(), dw.Study(), dw.tank30_flow(), None, {})
+    >>> found = run_calibration(work, Path("run"))  # doctest: +SKIP
     """
     from driftwalk.calibration import calibrate
     from driftwalk.figures import write_figures
@@ -93,36 +113,34 @@ def run_calibration(work: Work, folder: Path, *, overwrite: bool) -> xr.Dataset:
         seeds={"calibration": work.study.calibration.seed},
         inputs=work.inputs,
         overwrite=overwrite,
+        command=command,
     ) as run:
-        if work.remark is not None:
-            print_note(work.remark)
+        if begun is not None:
+            begun()
         run.write("flow.nc", netcdf_bytes(flow))
         run.write("recording.nc", netcdf_bytes(work.recording))
-        with ProgressReporter("calibrate") as progress:
-            found = calibrate(
-                work.recording,
-                work.study,
-                flow=work.flow,
-                body=work.body,
-                threads=work.threads,
-                stores=_stores(run),
-                tell=lambda stage, done, total: progress.update(
-                    *_overall(stage, done, total), WORDS[stage]
-                ),
-            )
-            run.write("calibration.nc", netcdf_bytes(found))
-            progress.update(100, 100, "figures")
-            write_figures(
-                found,
-                flow=flow,
-                trajectory=work.recording,
-                folder=run.folder("figures"),
-                body=work.body,
-            )
+        found = calibrate(
+            work.recording,
+            work.study,
+            flow=work.flow,
+            body=work.body,
+            threads=work.threads,
+            stores=_stores(run),
+            tell=lambda stage, done, total: progress(*_overall(stage, done, total), WORDS[stage]),
+        )
+        run.write("calibration.nc", netcdf_bytes(found))
+        progress(100, 100, "figures")
+        write_figures(
+            found,
+            flow=flow,
+            trajectory=work.recording,
+            folder=run.folder("figures"),
+            body=work.body,
+        )
     return found
 
 
-def _checked_flow(work: Work) -> xr.Dataset:
+def _checked_flow(work: CalibrationWork) -> xr.Dataset:
     """Return the flow field of a run; refuse a recording before anything is written for it."""
     from driftwalk.calibration import check_recording, recording_flow
 
@@ -136,17 +154,7 @@ def _checked_flow(work: Work) -> xr.Dataset:
     return flow
 
 
-def netcdf_bytes(dataset: xr.Dataset) -> bytes:
-    """Return a dataset as the bytes of a NetCDF-4 file, numbers compressed."""
-    packed = {
-        name: {"zlib": True, "complevel": 4, "shuffle": True}
-        for name, variable in dataset.data_vars.items()
-        if variable.dtype.kind in "fiu" and variable.size > 1000
-    }
-    return bytes(dataset.to_netcdf(engine="h5netcdf", encoding=packed))
-
-
-def _specification(work: Work) -> dict[str, Any]:
+def _specification(work: CalibrationWork) -> dict[str, Any]:
     """Return what determines the numbers of a run."""
     return {
         "study": work.study.to_dict(),
@@ -154,17 +162,6 @@ def _specification(work: Work) -> dict[str, Any]:
         "recording_sha256": dataset_hash(work.recording, ("x", "y", "theta")),
         "flow_sha256": None if work.flow is None else dataset_hash(work.flow, ("u", "v")),
     }
-
-
-def dataset_hash(dataset: xr.Dataset, names: tuple[str, ...]) -> str:
-    """Return a hash of the coordinates and the named variables of a dataset."""
-    digest = hashlib.sha256()
-    for name in (*sorted(str(name) for name in dataset.indexes), *names):
-        values = dataset[name].values
-        digest.update(
-            repr(values.tolist()).encode() if values.dtype == object else values.tobytes()
-        )
-    return digest.hexdigest()
 
 
 def _stores(run: RunDirectory) -> Any:

@@ -1,16 +1,26 @@
-"""The run directory of a command: made or continued, and finished with its manifest."""
+"""The run directory: made or continued, and finished with its manifest."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
     from driftwalk.core.rundir import RunDirectory
     from driftwalk.model import Study
+
+
+class Progress(Protocol):
+    """Is told how much of a run is done."""
+
+    def __call__(self, done: int, total: int, text: str = "") -> None:
+        """Take note that `done` of `total` parts are complete, and what is under way."""
+
+
+def silent(done: int, total: int, text: str = "") -> None:
+    """Tell nobody how much of a run is done."""
 
 
 @contextmanager
@@ -22,6 +32,7 @@ def open_run(
     seeds: Mapping[str, int],
     inputs: Mapping[str, Path],
     overwrite: bool,
+    command: str | Sequence[str],
 ) -> Iterator[RunDirectory]:
     """Open a run directory; when the work in it is done, write its manifest.
 
@@ -39,6 +50,8 @@ def open_run(
         The files that were read, by their role; hashed before the work begins.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
+    command : str or sequence of str
+        The command line, or the function that was called, for the manifest.
 
     Raises
     ------
@@ -53,7 +66,7 @@ def open_run(
         folder, specification=specification, on_existing="overwrite" if overwrite else "resume"
     ) as run:
         about = manifest(
-            command=["driftwalk", *sys.argv[1:]],
+            command=command,
             study=study.to_dict(),
             seeds=dict(seeds),
             inputs=dict(inputs),

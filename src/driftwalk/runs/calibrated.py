@@ -54,10 +54,20 @@ def read_calibrated(folder: Path) -> Calibrated:
     folder : Path
         As `driftwalk calibrate --out` made it.
 
+    Returns
+    -------
+    Calibrated
+        Study, flow and calibration of the run.
+
     Raises
     ------
     InputError
         When it is no run, the calibration has not come to its end, or it is a run of another kind.
+
+    Examples
+    --------
+    >>> read_calibrated(Path("run")).study.forces.drag_coefficient  # doctest: +SKIP
+    0.39
     """
     from driftwalk.flow import load_flow
     from driftwalk.model import apply_overrides, parse_study

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from driftwalk.cli.calibration_run import dataset_hash, netcdf_bytes
-from driftwalk.cli.run_folder import open_run
-from driftwalk.cli.terminal.output import print_note
-from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.errors import InputError
+from driftwalk.runs.folder import Progress, open_run, silent
+from driftwalk.runs.stored import dataset_hash, netcdf_bytes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,8 +31,6 @@ class FitWork:
         The body.
     inputs : mapping of str to Path
         The files that were read, by their role.
-    remark : str or None
-        What the user should know when the run begins.
     check : bool
         Whether the model is checked.
     """
@@ -43,7 +39,6 @@ class FitWork:
     study: Study
     body: str | None
     inputs: Mapping[str, Path]
-    remark: str | None = None
     check: bool = True
 
 
@@ -59,8 +54,11 @@ def run_fit(
     work: FitWork,
     folder: Path,
     *,
-    overwrite: bool,
+    overwrite: bool = False,
+    begun: Callable[[], None] | None = None,
     fitted: Callable[[xr.Dataset], None] | None = None,
+    progress: Progress = silent,
+    command: str | Sequence[str] = "driftwalk.runs.run_fit(...)",
 ) -> Fitted:
     """Fit in a run directory, check the model, and return both.
 
@@ -75,8 +73,19 @@ def run_fit(
         The run directory.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
+    begun : callable, optional
+        Called when everything is checked and the work begins.
     fitted : callable, optional
         Told the fit as soon as it is stored, before the figures and the check.
+    progress : callable, optional
+        Told how much is done: ``progress(done, total, text)``.
+    command : str, optional
+        The command line or the call, for the manifest.
+
+    Returns
+    -------
+    Fitted
+        The `fit` and its `model_check`.
 
     Raises
     ------
@@ -84,6 +93,12 @@ def run_fit(
         When a recording cannot be fitted; nothing is written then.
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> work = FitWork([dw.tank30_recording()], dw.Study(), None, {})
+    >>> found = run_fit(work, Path("fit"))  # doctest: +SKIP
     """
     from driftwalk.figures import write_check_figures, write_fit_figures
     from driftwalk.likelihood import check_fit, check_model, fit_motion, fitted_flow
@@ -96,38 +111,38 @@ def run_fit(
         seeds={},
         inputs=work.inputs,
         overwrite=overwrite,
+        command=command,
     ) as run:
-        if work.remark is not None:
-            print_note(work.remark)
-        with ProgressReporter("fit") as progress:
-            found = fit_motion(work.recordings, work.study, body=work.body, tell=progress.update)
-            flow = fitted_flow(found)
-            run.write("fit.nc", netcdf_bytes(found))
-            run.write("flow.nc", netcdf_bytes(flow))
-            for number, recording in enumerate(work.recordings, start=1):
-                name = "recording.nc" if number == 1 else f"recording-{number}.nc"
-                run.write(name, netcdf_bytes(recording))
-            if fitted is not None:
-                fitted(found)
-            write_fit_figures(
-                run.folder("figures"),
-                flow=steady_flows(found),
-                trajectory=work.recordings[0],
-                body=work.body,
-                simulated=found.attrs["simulated_recording"] == "yes",
-            )
-            check = None
-            if work.check:
-                progress.update(found.attrs["iterations"], found.attrs["iterations"], "check")
-                try:
-                    check = check_model(found, work.recordings, body=work.body)
-                except InputError as error:
-                    # The fit is kept, and says why nothing stands beside it.
-                    found.attrs["check_left_out"] = str(error)
-                    run.write("fit.nc", netcdf_bytes(found))
-                else:
-                    run.write("check.nc", netcdf_bytes(check))
-                    write_check_figures(run.folder("figures"), check=check)
+        if begun is not None:
+            begun()
+        found = fit_motion(work.recordings, work.study, body=work.body, tell=progress)
+        flow = fitted_flow(found)
+        run.write("fit.nc", netcdf_bytes(found))
+        run.write("flow.nc", netcdf_bytes(flow))
+        for number, recording in enumerate(work.recordings, start=1):
+            name = "recording.nc" if number == 1 else f"recording-{number}.nc"
+            run.write(name, netcdf_bytes(recording))
+        if fitted is not None:
+            fitted(found)
+        write_fit_figures(
+            run.folder("figures"),
+            flow=steady_flows(found),
+            trajectory=work.recordings[0],
+            body=work.body,
+            simulated=found.attrs["simulated_recording"] == "yes",
+        )
+        check = None
+        if work.check:
+            progress(found.attrs["iterations"], found.attrs["iterations"], "check")
+            try:
+                check = check_model(found, work.recordings, body=work.body)
+            except InputError as error:
+                # The fit is kept, and says why nothing stands beside it.
+                found.attrs["check_left_out"] = str(error)
+                run.write("fit.nc", netcdf_bytes(found))
+            else:
+                run.write("check.nc", netcdf_bytes(check))
+                write_check_figures(run.folder("figures"), check=check)
     return Fitted(found, check)
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from driftwalk.cli.calibration_run import dataset_hash, netcdf_bytes
-from driftwalk.cli.run_folder import open_run
-from driftwalk.cli.terminal.progress import ProgressReporter
+from driftwalk.runs.folder import Progress, open_run, silent
+from driftwalk.runs.stored import dataset_hash, netcdf_bytes
 from driftwalk.schema.netcdf import open_netcdf
 
 if TYPE_CHECKING:
@@ -73,7 +72,13 @@ class AssemblyResult:
 
 
 def run_assembly(
-    work: AssemblyWork, folder: Path, *, film: str = "none", overwrite: bool
+    work: AssemblyWork,
+    folder: Path,
+    *,
+    film: str = "none",
+    overwrite: bool = False,
+    progress: Progress = silent,
+    command: str | Sequence[str] = "driftwalk.runs.run_assembly(...)",
 ) -> AssemblyResult:
     """Simulate self-assembly in a run directory and return the distributions of outcomes.
 
@@ -91,6 +96,15 @@ def run_assembly(
         Whether the first run is filmed too.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
+    progress : callable, optional
+        Told how much is done: ``progress(done, total, text)``.
+    command : str, optional
+        The command line or the call, for the manifest.
+
+    Returns
+    -------
+    AssemblyResult
+        Distributions of outcomes and times.
 
     Raises
     ------
@@ -98,19 +112,23 @@ def run_assembly(
         When the blocks do not fit or the flow does not cover the tank; nothing is written then.
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> work = AssemblyWork(dw.Study(), dw.tank30_flow(), None, {})
+    >>> result = run_assembly(work, Path("four"))  # doctest: +SKIP
     """
     _check(work)
-    with (
-        open_run(
-            folder,
-            specification=_specification(work),
-            study=work.study,
-            seeds={"assembly": work.study.assembly.seed},
-            inputs=work.inputs,
-            overwrite=overwrite,
-        ) as run,
-        ProgressReporter("assemble") as progress,
-    ):
+    with open_run(
+        folder,
+        specification=_specification(work),
+        study=work.study,
+        seeds={"assembly": work.study.assembly.seed},
+        inputs=work.inputs,
+        overwrite=overwrite,
+        command=command,
+    ) as run:
         result = _simulate(work, run, progress)
         if film != "none":
             _write_film(run, film, progress)
@@ -126,7 +144,7 @@ def _check(work: AssemblyWork) -> None:
         check_assembly(work.study, work.flow, trial=trial, threads=work.threads)
 
 
-def _simulate(work: AssemblyWork, run: RunDirectory, progress: ProgressReporter) -> AssemblyResult:
+def _simulate(work: AssemblyWork, run: RunDirectory, progress: Progress) -> AssemblyResult:
     from driftwalk.assembly import (
         assemble,
         assemble_drawn,
@@ -143,7 +161,7 @@ def _simulate(work: AssemblyWork, run: RunDirectory, progress: ProgressReporter)
         work.flow,
         trial=FIXED_TRIAL,
         store=run.store("fixed"),
-        progress=lambda done, total: progress.update(done, total, "runs"),
+        progress=lambda done, total: progress(done, total, "runs"),
         threads=work.threads,
     )
     run.write("assembly.nc", netcdf_bytes(assembly))
@@ -158,7 +176,7 @@ def _simulate(work: AssemblyWork, run: RunDirectory, progress: ProgressReporter)
             work.calibration,
             trial=DRAWN_TRIAL,
             store=run.store("drawn"),
-            progress=lambda done, total: progress.update(done, total, "runs, drawn parameters"),
+            progress=lambda done, total: progress(done, total, "runs, drawn parameters"),
             threads=work.threads,
         )
         run.write("assembly_drawn.nc", netcdf_bytes(assembly_drawn))
@@ -174,7 +192,7 @@ def _simulate(work: AssemblyWork, run: RunDirectory, progress: ProgressReporter)
         threads=work.threads,
     )
     run.write("path.nc", netcdf_bytes(path))
-    progress.update(1, 1, "figures")
+    progress(1, 1, "figures")
     write_assembly_figures(
         run.folder("figures"),
         distribution=distribution,
@@ -186,11 +204,11 @@ def _simulate(work: AssemblyWork, run: RunDirectory, progress: ProgressReporter)
     return AssemblyResult(distribution, times, drawn)
 
 
-def _write_film(run: RunDirectory, film: str, progress: ProgressReporter) -> None:
+def _write_film(run: RunDirectory, film: str, progress: Progress) -> None:
     """Film the first run from what is stored of it."""
     from driftwalk.plot import write_animation
 
-    progress.update(1, 1, "film")
+    progress(1, 1, "film")
     write_animation(open_netcdf(run.path / "path.nc"), run.folder("figures") / f"run.{film}")
 
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from driftwalk.cli.calibration_run import dataset_hash, netcdf_bytes
-from driftwalk.cli.run_folder import open_run
-from driftwalk.cli.terminal.progress import ProgressReporter
+from driftwalk.runs.folder import Progress, open_run, silent
+from driftwalk.runs.stored import dataset_hash, netcdf_bytes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class RecoverWork:
+class RecoveryWork:
     """Everything that a recovery study needs.
 
     Attributes
@@ -40,7 +39,14 @@ class RecoverWork:
     threads: int | None = None
 
 
-def run_recovery(work: RecoverWork, folder: Path, *, overwrite: bool) -> xr.Dataset:
+def run_recovery(
+    work: RecoveryWork,
+    folder: Path,
+    *,
+    overwrite: bool = False,
+    progress: Progress = silent,
+    command: str | Sequence[str] = "driftwalk.runs.run_recovery(...)",
+) -> xr.Dataset:
     """Do a recovery study in a run directory.
 
     Writes ``recovery.nc``, ``figures/`` and, last, ``manifest.json``. Killed at any moment and
@@ -48,12 +54,21 @@ def run_recovery(work: RecoverWork, folder: Path, *, overwrite: bool) -> xr.Data
 
     Parameters
     ----------
-    work : RecoverWork
+    work : RecoveryWork
         What to do.
     folder : Path
         The run directory.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
+    progress : callable, optional
+        Told how much is done: ``progress(done, total, text)``.
+    command : str, optional
+        The command line or the call, for the manifest.
+
+    Returns
+    -------
+    xarray.Dataset
+        A `recovery`.
 
     Raises
     ------
@@ -61,6 +76,12 @@ def run_recovery(work: RecoverWork, folder: Path, *, overwrite: bool) -> xr.Data
         When the truth is not whole or cannot be fitted; nothing is written then.
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> work = RecoveryWork(dw.Study(), dw.tank30_flow(), {})
+    >>> found = run_recovery(work, Path("recovery"))  # doctest: +SKIP
     """
     from driftwalk.figures import write_recovery_figures
     from driftwalk.likelihood import check_recovery, recovery_study
@@ -73,15 +94,15 @@ def run_recovery(work: RecoverWork, folder: Path, *, overwrite: bool) -> xr.Data
         seeds={"recovery": work.study.recover.seed},
         inputs=work.inputs,
         overwrite=overwrite,
+        command=command,
     ) as run:
-        with ProgressReporter("recover") as progress:
-            found = recovery_study(
-                work.study,
-                work.flow,
-                store=run.store("recordings"),
-                threads=work.threads or _processors(),
-                tell=lambda done, total: progress.update(done, total, "fits"),
-            )
+        found = recovery_study(
+            work.study,
+            work.flow,
+            store=run.store("recordings"),
+            threads=work.threads or _processors(),
+            tell=lambda done, total: progress(done, total, "fits"),
+        )
         run.write("recovery.nc", netcdf_bytes(found))
         write_recovery_figures(run.folder("figures"), recovery=found)
     return found
@@ -92,7 +113,7 @@ def _processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _specification(work: RecoverWork) -> dict[str, Any]:
+def _specification(work: RecoveryWork) -> dict[str, Any]:
     """Return what determines the numbers of a run."""
     flow = work.flow
     return {

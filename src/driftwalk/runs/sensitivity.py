@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from driftwalk.cli.calibration_run import dataset_hash, netcdf_bytes
-from driftwalk.cli.run_folder import open_run
-from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.errors import InputError
+from driftwalk.runs.folder import Progress, open_run, silent
+from driftwalk.runs.stored import dataset_hash, netcdf_bytes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -82,7 +81,14 @@ class SensitivityResult:
     indices: xr.Dataset | None
 
 
-def run_sensitivity(work: SensitivityWork, folder: Path, *, overwrite: bool) -> SensitivityResult:
+def run_sensitivity(
+    work: SensitivityWork,
+    folder: Path,
+    *,
+    overwrite: bool = False,
+    progress: Progress = silent,
+    command: str | Sequence[str] = "driftwalk.runs.run_sensitivity(...)",
+) -> SensitivityResult:
     """Analyse the sensitivity of self-assembly in a run directory.
 
     Writes ``reference.nc``, ``sensitivity.nc``, ``components.nc``, with Sobol' indices
@@ -97,6 +103,15 @@ def run_sensitivity(work: SensitivityWork, folder: Path, *, overwrite: bool) -> 
         The run directory.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
+    progress : callable, optional
+        Told how much is done: ``progress(done, total, text)``.
+    command : str, optional
+        The command line or the call, for the manifest.
+
+    Returns
+    -------
+    SensitivityResult
+        Reference, map, components and indices.
 
     Raises
     ------
@@ -104,21 +119,25 @@ def run_sensitivity(work: SensitivityWork, folder: Path, *, overwrite: bool) -> 
         When blocks do not fit or a flow does not cover a tank; nothing is written then.
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> work = SensitivityWork(dw.Study(), dw.tank30_flow(), {}, None, {})
+    >>> result = run_sensitivity(work, Path("sensitivity"))  # doctest: +SKIP
     """
     sizes = _checked_sizes(work)
-    with (
-        open_run(
-            folder,
-            specification=_specification(work),
-            study=work.study,
-            seeds={"sensitivity": work.study.sensitivity.seed},
-            inputs=work.inputs,
-            overwrite=overwrite,
-        ) as run,
-        ProgressReporter("sensitivity") as progress,
-    ):
+    with open_run(
+        folder,
+        specification=_specification(work),
+        study=work.study,
+        seeds={"sensitivity": work.study.sensitivity.seed},
+        inputs=work.inputs,
+        overwrite=overwrite,
+        command=command,
+    ) as run:
         result = _simulate(work, run, _Overall(progress, sizes))
-        progress.update(1, 1, "figures")
+        progress(1, 1, "figures")
         _draw(result, run)
     return result
 
@@ -126,8 +145,8 @@ def run_sensitivity(work: SensitivityWork, folder: Path, *, overwrite: bool) -> 
 class _Overall:
     """Tells the progress of all stages as one: a setting costs the same in each."""
 
-    def __init__(self, reporter: ProgressReporter, sizes: dict[str, int]) -> None:
-        self._reporter = reporter
+    def __init__(self, progress: Progress, sizes: dict[str, int]) -> None:
+        self._progress = progress
         self._total = sum(sizes.values())
         names = list(sizes)
         self._before = {
@@ -137,7 +156,7 @@ class _Overall:
 
     def stage(self, name: str) -> Any:
         """Return what a stage takes as ``progress``."""
-        return lambda done, _: self._reporter.update(
+        return lambda done, _: self._progress(
             self._before[name] + done, self._total, f"settings, {name}"
         )
 

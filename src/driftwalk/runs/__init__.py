@@ -1,0 +1,30 @@
+"""Run directories: long work that resumes, with its figures and its manifest."""
+
+from driftwalk.runs.assembly import AssemblyResult, AssemblyWork, run_assembly
+from driftwalk.runs.calibrated import Calibrated, read_calibrated
+from driftwalk.runs.calibration import CalibrationWork, run_calibration
+from driftwalk.runs.fit import Fitted, FitWork, run_fit
+from driftwalk.runs.folder import Progress
+from driftwalk.runs.recovery import RecoveryWork, run_recovery
+from driftwalk.runs.sensitivity import SensitivityResult, SensitivityWork, run_sensitivity
+from driftwalk.runs.stored import netcdf_bytes
+
+__all__ = [
+    "AssemblyResult",
+    "AssemblyWork",
+    "Calibrated",
+    "CalibrationWork",
+    "FitWork",
+    "Fitted",
+    "Progress",
+    "RecoveryWork",
+    "SensitivityResult",
+    "SensitivityWork",
+    "netcdf_bytes",
+    "read_calibrated",
+    "run_assembly",
+    "run_calibration",
+    "run_fit",
+    "run_recovery",
+    "run_sensitivity",
+]
