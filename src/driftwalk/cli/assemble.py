@@ -98,12 +98,12 @@ def assemble(
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
-    """Simulate what many blocks build, and say how often each structure comes.
+    """Simulate self-assembly of many blocks, and report how often each structure forms.
 
-    From a calibration RUN with its parameters and its flow field: once with the parameters that it
-    found, and once with parameters drawn from its joint region, so that the difference is what the
-    calibration leaves open. Or with the parameters of a study and a flow field (--flow). Killed and
-    started again, it continues.
+    With a calibration RUN, uses its flow field and simulates twice: with the parameters that it
+    found, and with parameters drawn from its joint region. The difference shows the remaining
+    uncertainty of the calibration. Without RUN, uses the parameters of a study and a flow field
+    (--flow). After a kill, the same command continues.
     """
     from driftwalk.runs import AssemblyWork, run_assembly
 

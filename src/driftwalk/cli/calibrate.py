@@ -41,11 +41,11 @@ if TYPE_CHECKING:
 Threads = Annotated[
     int | None,
     typer.Option(
-        "--threads", min=1, help="Threads; all processors without it.", show_default=False
+        "--threads", min=1, help="Worker threads (default: all cores).", show_default=False
     ),
 ]
 Overwrite = Annotated[
-    bool, typer.Option("--overwrite", help="Move a finished run aside and start anew.")
+    bool, typer.Option("--overwrite", help="Move a finished run aside and start a new one.")
 ]
 
 
@@ -83,9 +83,9 @@ def calibrate(
 ) -> None:
     """Find the drag coefficient and the stochastic force that explain a recording.
 
-    Simulates every setting of a grid as long as the recording, compares step lengths and turning
-    angles, refines around the minimum, and says how well the parameters are known and whether the
-    model explains the motion. Killed and started again, it continues.
+    Simulates every setting of a grid for the length of the recording, compares step lengths and
+    turning angles, and refines the grid around the minimum. Reports how well the parameters are
+    known and whether the model explains the motion. After a kill, the same command continues.
     """
     from driftwalk.cli.inputs.tank import require_inside, study_in_arena
     from driftwalk.flow import load_flow

@@ -26,12 +26,15 @@ def calibrate(
         list[Path],
         typer.Argument(
             metavar="BOARD_IMAGES...",
-            help="Images of the board; in the first it lies where the markers will float.",
+            help="Images of the board; in the first, the board lies at the height of the markers.",
         ),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.toml", help="File to write.")],
     squares: Annotated[
-        str, typer.Option("--squares", metavar="COLUMNSxROWS", help="Squares of the board: 9x7.")
+        str,
+        typer.Option(
+            "--squares", metavar="COLUMNSxROWS", help="Squares of the board, such as 9x7."
+        ),
     ],
     square: Annotated[float, quantity_option("--square", "m", "Side of a square.")],
     board: Annotated[
@@ -45,7 +48,9 @@ def calibrate(
     ] = "DICT_4X4_50",
     no_lens: Annotated[
         bool,
-        typer.Option("--no-lens", help="Only the plane: one image is enough, lines stay straight."),
+        typer.Option(
+            "--no-lens", help="Find only the plane; one image is enough, and lines stay straight."
+        ),
     ] = False,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a file that exists.")
@@ -54,8 +59,8 @@ def calibrate(
 ) -> None:
     """Find the lens and the plane of the water from images of a board.
 
-    The first image gives the plane: the board lies in it at the height of the markers. The lens
-    takes three images or more, with the board tilted in each and in all parts of the picture.
+    The first image defines the plane: in it, the board must lie at the height of the markers. The
+    lens needs three images or more, with the board tilted in each and in all parts of the picture.
     """
     from driftwalk.core.atomic import require_target
     from driftwalk.track import Board, save_camera

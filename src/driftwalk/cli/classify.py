@@ -40,7 +40,7 @@ def classify(
     side: Side = None,
     chirality: Annotated[
         Literal["merged", "distinct"],
-        typer.Option("--chirality", help="Mirror images: one shape, or two."),
+        typer.Option("--chirality", help="Mirror images as one shape or two."),
     ] = "merged",
     join_distance: Annotated[
         float | None,
@@ -70,7 +70,7 @@ def classify(
     ] = None,
     hold: Annotated[
         float | None,
-        _tolerance("--hold", "s", "How long an unseen block keeps its joins (default: 1s)."),
+        _tolerance("--hold", "s", "Time for which an unseen block keeps its joins (default: 1s)."),
     ] = None,
     run: Annotated[
         int | None,
@@ -84,7 +84,7 @@ def classify(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", metavar="FILE.nc", help="Write the result.", show_default=False
+            "--out", "-o", metavar="FILE.nc", help="File for the result.", show_default=False
         ),
     ] = None,
     overwrite: Annotated[
@@ -94,9 +94,9 @@ def classify(
 ) -> None:
     """Say what the blocks of a recording assembled into, and when.
 
-    Blocks are joined where two faces stay close to each other and look at each other; the outcome
-    class is the multiset of the shapes that they make up. The side of the blocks is that of the
-    study, by default 3 cm.
+    Blocks are joined if two faces stay close to each other and face each other. The outcome class
+    is the multiset of the shapes that they form. The side of the blocks is that of the study, by
+    default 3 cm.
     """
     from driftwalk.assembly import classify as classify_recording
     from driftwalk.core.atomic import require_target

@@ -44,28 +44,37 @@ _BY_MOTION = {
 
 @with_recording_options
 def compare(
-    a: Annotated[Path, typer.Argument(metavar="A", help="Recording, or sim.nc.")],
-    b: Annotated[Path, typer.Argument(metavar="B", help="Recording, or sim.nc.")],
+    a: Annotated[
+        Path, typer.Argument(metavar="A", help="Recording, or output of driftwalk simulate.")
+    ],
+    b: Annotated[
+        Path, typer.Argument(metavar="B", help="Recording, or output of driftwalk simulate.")
+    ],
     how: RecordingOptions,
     body_b: Annotated[
         str | None,
-        typer.Option("--body-b", help="Body of B, where it is not that of A.", show_default=False),
+        typer.Option("--body-b", help="Body in B (default: same as A).", show_default=False),
     ] = None,
     replicate: Annotated[
-        int, typer.Option("--replicate", min=0, help="Which replicate of a simulation.")
+        int, typer.Option("--replicate", min=0, help="Replicate of a simulation.")
     ] = 0,
     step_interval: StepInterval = None,
     ties: Annotated[
         Literal["strict", "limits"],
-        typer.Option("--ties", help="Points that tie with an origin: in no quadrant, or in each."),
+        typer.Option(
+            "--ties",
+            help="Treatment of points that tie with an origin: in no quadrant, or in each.",
+        ),
     ] = "strict",
     permutations: Annotated[
-        int, typer.Option("--permutations", min=0, help="Permutations of the test; 0 is no test.")
+        int, typer.Option("--permutations", min=0, help="Permutations of the test; 0 for no test.")
     ] = 999,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the permutations.")] = 1,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FILE.nc", help="Write the comparison.", show_default=False),
+        typer.Option(
+            "--out", metavar="FILE.nc", help="File for the comparison.", show_default=False
+        ),
     ] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a file that exists.")
@@ -74,9 +83,9 @@ def compare(
 ) -> None:
     """Measure how far apart two motions are.
 
-    Both are turned into step lengths and turning angles at the same step interval; their distance
-    is the two-sample Kolmogorov-Smirnov statistic of Fasano and Franceschini. How to read the
-    recording applies to both files.
+    Turns both into step lengths and turning angles at the same step interval. Their distance is the
+    two-sample Kolmogorov-Smirnov statistic of Fasano and Franceschini. The options on reading apply
+    to both files.
     """
     from driftwalk.comparison import compare as compare_motions
 

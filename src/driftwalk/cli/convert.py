@@ -27,8 +27,8 @@ def convert(
 ) -> None:
     """Turn a recording into driftwalk's NetCDF (.nc) or plain CSV (.csv).
 
-    Positions are in metres with y up, times in seconds, angles in radians. NetCDF keeps the arena
-    and everything else that is known; CSV has the columns t_s, x_m, y_m, theta_rad and body.
+    Positions are in metres with y up, times in seconds, angles in radians. NetCDF also keeps the
+    arena and all other information; CSV has the columns t_s, x_m, y_m, theta_rad and body.
     """
     from driftwalk.record import save_trajectory
 

@@ -51,7 +51,7 @@ def demo(
         Path, typer.Option("--out", "-o", metavar="DIR", help="Directory of both runs.")
     ] = Path("demo"),
     quick: Annotated[
-        bool, typer.Option("--quick", help="A small part of the search: seconds, not minutes.")
+        bool, typer.Option("--quick", help="Search only a small part; takes seconds, not minutes.")
     ] = False,
     threads: Threads = None,
     overwrite: Overwrite = False,
@@ -59,10 +59,10 @@ def demo(
 ) -> None:
     """Fit a bundled recording, check the model, and calibrate on the fitted flow.
 
-    The recording was simulated by another engine (ODE), so that the truth is known. First comes
-    the likelihood fit of flow, drag, force and tracking noise (DIR/fit), then the paper's map of KS
-    distances in the fitted flow (DIR/calibrate). Each is printed beside the truth as soon as it is
-    there; DIR/report.html shows both.
+    Another engine (ODE) simulated the recording, so the truth is known. First comes the likelihood
+    fit of flow, drag, force and tracking noise (DIR/fit), then the paper's map of KS distances in
+    the fitted flow (DIR/calibrate). Each is printed next to the truth as soon as it is finished;
+    DIR/report.html shows both.
     """
     from driftwalk.datasets import tank30_recording
 

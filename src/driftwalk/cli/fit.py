@@ -48,7 +48,10 @@ SMALLEST_FIXED: Final = 1e-3
 """Smaller numbers are printed with an exponent."""
 RecordingFiles = Annotated[
     list[Path],
-    typer.Argument(metavar="RECORDING...", help="Recordings of one block in one tank, read alike."),
+    typer.Argument(
+        metavar="RECORDING...",
+        help="Recordings of one block in one tank, read with the same options.",
+    ),
 ]
 
 
@@ -68,7 +71,7 @@ def fit(
         typer.Option(
             "--angle",
             metavar="auto|state|given|none",
-            help="Whether the recorded orientation is used.",
+            help="Use of the recorded orientation (default: auto).",
             rich_help_panel=PANEL,
             show_default=False,
         ),
@@ -85,7 +88,8 @@ def fit(
         typer.Option(
             "--switching-times",
             metavar="<s,s,...>",
-            help="When the pumps were switched, on each recording's clock: a flow between each.",
+            help="Times at which the pumps were switched, on each recording's clock; "
+            "each interval has its own flow.",
             rich_help_panel=PANEL,
             show_default=False,
         ),
@@ -95,30 +99,33 @@ def fit(
         typer.Option(
             "--flow-labels",
             metavar="A,B,...",
-            help="Names of the flows between switching times; the same where one comes back.",
+            help="Names of the flows between switching times; repeat a name for a "
+            "flow that comes back.",
             rich_help_panel=PANEL,
             show_default=False,
         ),
     ] = None,
     precision: Annotated[
         float | None,
-        quantity_option("--precision", "1", "Relative standard error of C_d that is wanted."),
+        quantity_option(
+            "--precision", "1", "Wanted relative standard error of C_d (default: 0.1)."
+        ),
     ] = None,
     no_check: Annotated[
         bool,
-        typer.Option("--no-check", help="Do not ask whether the model explains the recording."),
+        typer.Option("--no-check", help="Skip the check whether the model explains the recording."),
     ] = False,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Move a finished run aside and start anew.")
+        bool, typer.Option("--overwrite", help="Move a finished run aside and start a new one.")
     ] = False,
     json: Json = False,
 ) -> None:
     """Fit flow, drag, stochastic force and tracking noise to recordings, together.
 
-    A filter predicts each position from the earlier ones; the parameters are those that make its
-    errors likely. Gaps and uneven clocks are no matter. The run directory holds the fit (fit.nc),
-    the flow (flow.nc) for every command that takes one, the recording, the check of the model
-    (check.nc), figures and manifest.json.
+    A filter predicts each position from the earlier ones; the fit chooses the parameters that make
+    its errors most likely. Gaps and uneven sampling are handled. The run directory holds the fit
+    (fit.nc), the flow (flow.nc) for every command that takes one, the recording, the check of the
+    model (check.nc), figures and manifest.json.
     """
     from driftwalk.cli.inputs.tank import require_inside, study_in_arena
     from driftwalk.runs import FitWork, run_fit

@@ -78,7 +78,7 @@ def flow(
         typer.Option(
             "--inertia",
             metavar="corrected|none",
-            help="Whether to correct for the body's inertia.",
+            help="Correction for the body's inertia (default: corrected).",
             rich_help_panel=_PANEL,
             show_default=False,
         ),
@@ -103,9 +103,9 @@ def flow(
 ) -> None:
     """Take the flow field from a recording.
 
-    The velocity of the body is averaged in each cell and corrected for the body's inertia; cells
-    that it never visited are filled in and flagged. Mass and side are those of the study, by
-    default of the 11.6-g, 3-cm block of the paper.
+    Averages the velocity of the body in each cell and corrects it for the body's inertia. Cells
+    that the body never visited are filled in and flagged. Mass and side come from the study; the
+    default is the 11.6-g, 3-cm block of the paper.
     """
     from driftwalk.flow import save_flow
 

@@ -75,10 +75,10 @@ def info(
     side: Side = None,
     json: Json = False,
 ) -> None:
-    """Say what a recording holds and how it was understood.
+    """Say what a recording holds and how driftwalk reads it.
 
-    Bodies, clock and its jitter, gaps, extent, the circle that the centres stay in, speed, and the
-    tracking noise estimated from the recording itself.
+    Prints bodies, clock and its jitter, gaps, extent, the circle that the centres stay in, speed,
+    and the tracking noise estimated from the recording itself.
     """
     from driftwalk.record import describe
 

@@ -35,7 +35,7 @@ COMMANDS: Final[dict[str, Command]] = {
     "markers": Command("markers", "markers_app", "Learn what the markers look like."),
     "track": Command("track", "track", "Track blocks in a video or before a camera."),
     "watch": Command("watch", "watch", "Watch blocks assemble, live."),
-    "info": Command("info", "info", "Say what a recording holds and how it was understood."),
+    "info": Command("info", "info", "Say what a recording holds and how driftwalk reads it."),
     "convert": Command("convert", "convert", "Turn a recording into a trajectory file."),
     "flow": Command("flow", "flow", "Take the flow field from a recording."),
     "simulate": Command("simulate", "simulate", "Simulate the motion of the block."),
@@ -44,9 +44,9 @@ COMMANDS: Final[dict[str, Command]] = {
         "calibrate", "calibrate", "Find the drag coefficient and the stochastic force."
     ),
     "fit": Command("fit", "fit", "Fit flow, drag, stochastic force and tracking noise together."),
-    "assemble": Command("assemble", "assemble", "Simulate what many blocks build."),
+    "assemble": Command("assemble", "assemble", "Simulate self-assembly of many blocks."),
     "sensitivity": Command(
-        "sensitivity", "sensitivity", "Say how much what blocks build depends on the model."
+        "sensitivity", "sensitivity", "Measure how much self-assembly depends on the model."
     ),
     "classify": Command(
         "classify", "classify", "Say what the blocks of a recording assembled into."

@@ -34,7 +34,7 @@ def teach(
 ) -> None:
     """Propose the two colours and the size of the markers from a few frames.
 
-    A picture beside the file, of the same name with .png, shows what was found: look at it.
+    A picture with the same name and the suffix .png shows the detections: look at it.
     """
     from driftwalk.cli.tracking.parts import find_camera
     from driftwalk.core.atomic import require_free, require_target

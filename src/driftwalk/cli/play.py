@@ -41,7 +41,7 @@ def play(
         typer.Option(
             "--recording",
             metavar="FILE",
-            help="Recording whose steps the blocks' are compared with.",
+            help="Recording to compare the blocks' steps with.",
             show_default=False,
         ),
     ] = None,
@@ -57,7 +57,7 @@ def play(
         typer.Option(
             "--live",
             metavar="PORT",
-            help="Publish the tank as a tracker's stream; 0 takes a free port.",
+            help="Port that publishes the tank as a tracker's stream; 0 for a free port.",
             show_default=False,
         ),
     ] = None,
@@ -67,8 +67,8 @@ def play(
 ) -> None:
     """Turn the knobs of the model while the tank moves.
 
-    Without a study, a flow and a recording they are those of the bundled example. In a tank without
-    a flow field the water moves in a random one. Ctrl-C ends it.
+    Study, flow and recording default to those of the bundled example. In a tank without a flow
+    field the water moves in a random flow. Ctrl-C ends the server.
     """
     from driftwalk.viewer import PlaySource, hello_line, require_server
 

@@ -81,7 +81,7 @@ def sensitivity(
             "--sobol",
             min=8,
             metavar="N",
-            help="Sobol' indices too, from N base samples, a power of two.",
+            help="Base samples for Sobol' indices, a power of two.",
             show_default=False,
         ),
     ] = None,
@@ -110,12 +110,12 @@ def sensitivity(
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
-    """Say how much what blocks build depends on the model.
+    """Measure how much self-assembly depends on the model.
 
     Simulates self-assembly at every setting of a map over the drag coefficient and the stochastic
-    force, or over what --vary names, and measures how far the outcomes lie from those of a
-    reference: what a calibration RUN has found, or a study's parameters (--flow). Killed and
-    started again, it continues.
+    force, or over the axes that --vary names. Measures how far the outcomes lie from those of a
+    reference, which has the parameters of a calibration RUN or of a study (--flow). After a kill,
+    the same command continues.
     """
     from driftwalk.runs import SensitivityWork, run_sensitivity
 

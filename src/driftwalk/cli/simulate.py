@@ -66,7 +66,8 @@ def simulate(
         typer.Option(
             "--like",
             metavar="RECORDING",
-            help="Start, time stamps and gaps of this recording (driftwalk's NetCDF or plain CSV).",
+            help="Recording that gives start, time stamps and gaps (driftwalk's "
+            "NetCDF or plain CSV).",
             show_default=False,
         ),
     ] = None,
@@ -75,9 +76,16 @@ def simulate(
         typer.Option("--body", metavar="NAME", help="Body of --like.", show_default=False),
     ] = None,
     backend: Annotated[
-        str, typer.Option("--backend", metavar="cpu|reference", help="Single or double precision.")
+        str,
+        typer.Option(
+            "--backend",
+            metavar="cpu|reference",
+            help="Backend: cpu for single, reference for double precision.",
+        ),
     ] = "cpu",
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace a file that exists.")
+    ] = False,
     json: Json = False,
 ) -> None:
     """Simulate the motion of the block."""

@@ -26,13 +26,13 @@ def study(ctx: typer.Context) -> None:
 def new(
     path: Annotated[
         Path | None,
-        typer.Argument(metavar="[FILE]", help="File to write; stdout without it, or for -."),
+        typer.Argument(metavar="[FILE]", help="File to write (default: -, stdout)."),
     ] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a file that exists.")
     ] = False,
 ) -> None:
-    """Print a study file in which every parameter stands with its unit, default and meaning."""
+    """Print a study file that lists every parameter with its unit, default and meaning."""
     from driftwalk.core.atomic import write_atomic
     from driftwalk.model import study_template
 

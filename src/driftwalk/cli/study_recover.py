@@ -58,13 +58,13 @@ def recover(
         typer.Option(
             "--duration",
             metavar="<s>",
-            help="Length of the recordings; repeatable, to compare lengths.",
+            help="Length of the recordings; repeat it to compare lengths.",
             show_default=False,
         ),
     ] = None,
     precision: Annotated[
         float | None,
-        quantity_option("--precision", "1", "Relative error of C_d that is wanted (rms)."),
+        quantity_option("--precision", "1", "Wanted relative error of C_d (rms)."),
     ] = None,
     seed: Seed = None,
     threads: Annotated[
@@ -72,20 +72,20 @@ def recover(
         typer.Option(
             "--threads",
             min=1,
-            help="Recordings that are fitted at once; all processors without it.",
+            help="Recordings to fit at the same time (default: one per core).",
             show_default=False,
         ),
     ] = None,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Move a finished run aside and start anew.")
+        bool, typer.Option("--overwrite", help="Move a finished run aside and start a new one.")
     ] = False,
     json: Json = False,
 ) -> None:
-    """Simulate recordings of known truth, fit them, and say how well the truth comes back.
+    """Simulate recordings of known truth, fit them, and report how well the fit recovers the truth.
 
-    For designing an experiment: what would recordings of this length, with this camera, in this
-    flow tell? The directory holds recovery.nc, figures and manifest.json. Killed and started again,
-    it continues.
+    Use it to design an experiment: what would recordings of this length, with this camera, in this
+    flow reveal? The directory holds recovery.nc, figures and manifest.json. After a kill, the same
+    command continues.
     """
     from driftwalk.cli.terminal.recover_answer import print_answer, summary
     from driftwalk.runs import RecoveryWork, run_recovery

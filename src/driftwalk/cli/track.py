@@ -50,7 +50,8 @@ def track(
             "--explain",
             metavar="FRAME",
             min=0,
-            help="Only draw this frame with what is found, and why all else is not, as a PNG.",
+            help="Write a PNG of this frame that shows each candidate and why it was "
+            "rejected, then exit.",
             show_default=False,
         ),
     ] = None,
@@ -61,8 +62,8 @@ def track(
 ) -> None:
     """Track blocks in a video or before a camera.
 
-    The recording holds the poses as they were measured, each with its covariance, and marks where
-    identities could have been exchanged. Ctrl-C ends it; what was tracked up to then is kept.
+    The recording holds the measured poses, each with its covariance, and marks where identities
+    could have been exchanged. Ctrl-C ends tracking and keeps everything tracked up to then.
     """
     from driftwalk.cli.tracking.parts import build_parts
     from driftwalk.cli.tracking.run import TrackingRun, summary

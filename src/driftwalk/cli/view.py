@@ -15,19 +15,21 @@ from driftwalk.core.errors import InputError
 if TYPE_CHECKING:
     from driftwalk.viewer import Source
 
-Port = Annotated[int, typer.Option("--port", help="Port to serve on; 0 for any that is free.")]
+Port = Annotated[int, typer.Option("--port", help="Port to serve on; 0 for a free port.")]
 Host = Annotated[
     str,
     typer.Option(
         "--host",
         metavar="ADDRESS",
-        help="Address to serve on; away from this machine the page asks for a token.",
+        help="Address to serve on; other machines need the printed token.",
     ),
 ]
 Open = Annotated[
     bool | None,
     typer.Option(
-        "--open/--no-open", help="Open the browser; on a terminal it is opened.", show_default=False
+        "--open/--no-open",
+        help="Open the browser (default: only on a terminal).",
+        show_default=False,
     ),
 ]
 LAST_PORT = 65535
@@ -43,7 +45,7 @@ def view(
         typer.Option(
             "--live",
             metavar="ADDRESS:PORT",
-            help="Watch the stream of a tracker or of the playground.",
+            help="Stream of a tracker or of the playground to watch.",
             show_default=False,
         ),
     ] = None,
@@ -53,7 +55,7 @@ def view(
 ) -> None:
     """Explore a run in the browser, or watch a tracker's stream.
 
-    The page of a run that is under way fills as its results come in. Ctrl-C ends it.
+    The page of a run under way fills as results arrive. Ctrl-C ends the server.
     """
     from driftwalk.viewer import LiveSource, RunSource, require_server
 

@@ -37,7 +37,7 @@ def watch(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", metavar="FILE.nc", help="Keep a recording as well.", show_default=False
+            "--out", "-o", metavar="FILE.nc", help="Recording to write as well.", show_default=False
         ),
     ] = None,
     overwrite: Annotated[
@@ -46,8 +46,8 @@ def watch(
 ) -> None:
     """Watch blocks assemble: poses, joins and the outcome class, as they happen.
 
-    A line for each join or parting and each change of the class, and one a second with the poses.
-    While a block is hidden, the classes that are possible are named.
+    Prints a line for each join, parting or change of the class, and one line per second with the
+    poses. While a block is hidden, it names the classes that are possible.
     """
     from driftwalk.cli.tracking.parts import build_parts
     from driftwalk.cli.tracking.run import TrackingRun

@@ -33,7 +33,8 @@ class Forces(Section):
     force_interval_s: Annotated[float, Quantity("s", gt=0, le=10)] = Field(
         default=0.010,
         description=(
-            "How long one draw of the stochastic force lasts. Part of the model: a recording tells "
+            "Interval at which the stochastic force is redrawn. Part of the model: a "
+            "recording tells "
             "sigma_F^2 * force_interval only, so the two are always stated together."
         ),
     )

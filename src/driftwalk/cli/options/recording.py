@@ -46,7 +46,7 @@ class RecordingOptions:
     """How to read a recording; the fields are the options, with the words of `driftwalk.load`."""
 
     format: Annotated[
-        str | None, _option("--format", "Format of the file; recognised by content without it.")
+        str | None, _option("--format", "Format of the file (default: recognised by content).")
     ] = None
     body: Annotated[str | None, _option("--body", "Body to keep, or all.", metavar="NAME|all")] = (
         None
@@ -62,7 +62,8 @@ class RecordingOptions:
         ),
     ] = None
     frame_rate: Annotated[
-        float | None, _option("--frame-rate", "Frames per second, where frames count.", unit="Hz")
+        float | None,
+        _option("--frame-rate", "Frames per second, for files that count frames.", unit="Hz"),
     ] = None
     metres_per_pixel: Annotated[
         float | None, _option("--metres-per-pixel", "Scale of positions in pixels.", unit="m")
@@ -70,7 +71,7 @@ class RecordingOptions:
     length_unit: Annotated[
         str | None,
         _option(
-            "--length-unit", "Unit of positions, where none is named.", metavar="m|cm|mm|um|px"
+            "--length-unit", "Unit of positions, if the file names none.", metavar="m|cm|mm|um|px"
         ),
     ] = None
     y_axis: Annotated[
@@ -79,19 +80,27 @@ class RecordingOptions:
     ] = None
     max_speed: Annotated[
         float | None,
-        _option("--max-speed", "Samples beyond the reach of this speed are gaps.", unit="m/s"),
+        _option(
+            "--max-speed",
+            "Fastest plausible speed; samples that need a faster one become gaps.",
+            unit="m/s",
+        ),
     ] = None
-    sort: Annotated[bool, _option("--sort", "Sort times that go backwards.")] = False
+    sort: Annotated[
+        bool, _option("--sort", "Sort times that go backwards (default: refuse them).")
+    ] = False
     columns: Annotated[
         list[str] | None,
         _option(
             "--columns",
-            "Columns of a plain table by name or number from 1; :unit may follow. Repeatable.",
+            "Columns of a plain table by name or number from 1, with an optional "
+            ":unit. Repeatable.",
             metavar="t=NAME,x=NAME,y=NAME",
         ),
     ] = None
     delimiter: Annotated[
-        str | None, _option("--delimiter", "Character between fields; also: tab, space.")
+        str | None,
+        _option("--delimiter", "Character between fields, or tab or space (default: recognised)."),
     ] = None
     x: Annotated[
         Path | None, _option("--x", "Matrix of x: a row per frame, a column per body.")

@@ -94,7 +94,7 @@ ForceStd = Annotated[
 ]
 ForceInterval = Annotated[
     float | None,
-    quantity_option("--force-interval", "s", "How long one draw of the stochastic force lasts."),
+    quantity_option("--force-interval", "s", "Interval at which the stochastic force is redrawn."),
 ]
 WallFriction = Annotated[
     float | None, quantity_option("--wall-friction", "1", "Coulomb friction of the wall.")
@@ -164,7 +164,7 @@ BlockLatching = Annotated[
     typer.Option(
         "--latching",
         metavar="collision|connector|none",
-        help="When two blocks latch.",
+        help="Rule by which two blocks latch.",
         rich_help_panel=PANEL,
         show_default=False,
     ),
@@ -192,7 +192,7 @@ MirrorImages = Annotated[
     typer.Option(
         "--chirality",
         metavar="merged|distinct",
-        help="Whether mirror images are one class or two.",
+        help="Mirror images as one class or two.",
         rich_help_panel=PANEL,
         show_default=False,
     ),
@@ -214,7 +214,7 @@ Realisations = Annotated[
     typer.Option(
         "--realisations",
         min=2,
-        help="Realisations of the reference, each of as many runs.",
+        help="Realisations of the reference, each with the same number of runs.",
         rich_help_panel=PANEL,
         show_default=False,
     ),
@@ -224,7 +224,7 @@ Vary = Annotated[
     typer.Option(
         "--vary",
         metavar="NAME=VALUES",
-        help="Compare these values: blocks=2,3,4 or drag-coefficient=0:1.5:0.05. Repeatable.",
+        help="Values to compare: blocks=2,3,4 or drag-coefficient=0:1.5:0.05. Repeatable.",
         rich_help_panel=PANEL,
         show_default=False,
     ),

@@ -49,7 +49,12 @@ CameraFile = Annotated[
 ]
 Diameter = Annotated[
     float | None,
-    _option(_FINDING, "--tank-diameter", unit="m", help="Inner diameter: the rim gives the scale."),
+    _option(
+        _FINDING,
+        "--tank-diameter",
+        unit="m",
+        help="Inner diameter of the tank, whose rim gives the scale.",
+    ),
 ]
 PxPerM = Annotated[
     float | None,
@@ -57,7 +62,7 @@ PxPerM = Annotated[
         _FINDING,
         "--px-per-m",
         metavar="<number>",
-        help="Scale in pixels per metre, where no rim is seen.",
+        help="Scale in pixels per metre, if no rim is visible.",
     ),
 ]
 Polarity = Annotated[
@@ -66,16 +71,16 @@ Polarity = Annotated[
         _FINDING,
         "--polarity",
         metavar="dark|bright|both",
-        help="Of --markers blob: what they are like (default: looked up).",
+        help="Objects for --markers blob (default: detected).",
     ),
 ]
 LeastArea = Annotated[
     float | None,
-    _option(_FINDING, "--least-area-px", metavar="<px2>", help="Of --markers blob: smallest area."),
+    _option(_FINDING, "--least-area-px", metavar="<px2>", help="Smallest area for --markers blob."),
 ]
 MostArea = Annotated[
     float | None,
-    _option(_FINDING, "--most-area-px", metavar="<px2>", help="Of --markers blob: largest area."),
+    _option(_FINDING, "--most-area-px", metavar="<px2>", help="Largest area for --markers blob."),
 ]
 ImageRate = Annotated[
     float | None,
@@ -84,7 +89,7 @@ ImageRate = Annotated[
     ),
 ]
 Bodies = Annotated[
-    int | None, _option(_MOTION, "--bodies", metavar="<number>", help="How many there are at most.")
+    int | None, _option(_MOTION, "--bodies", metavar="<number>", help="Largest number of bodies.")
 ]
 MaxSpeed = Annotated[
     float | None,
@@ -92,41 +97,57 @@ MaxSpeed = Annotated[
         _MOTION,
         "--max-speed",
         unit="m/s",
-        help="What jumps faster is another one (default: tank width in 1 s).",
+        help="Fastest plausible speed; a faster jump starts a new track (default: "
+        "tank width in 1 s).",
     ),
 ]
 LostAfter = Annotated[
     float | None,
     _option(
-        _MOTION, "--lost-after", unit="s", help="Not seen for so long, a track ends (default: 1s)."
+        _MOTION,
+        "--lost-after",
+        unit="s",
+        help="End a track after this long without a detection (default: 1s).",
     ),
 ]
 BlockSide = Annotated[
     float | None,
     _option(
-        _MOTION, "--side", unit="m", help="Side of a block, to say who is joined (takes --bodies)."
+        _MOTION,
+        "--side",
+        unit="m",
+        help="Side of a block, to report which blocks are joined (needs --bodies).",
     ),
 ]
 TaughtSide = Annotated[
     float | None,
-    _option(_FINDING, "--side", unit="m", help="Side of a block: it is written into the file."),
+    _option(_FINDING, "--side", unit="m", help="Side of a block, to write into the file."),
 ]
 Live = Annotated[
-    int | None, _option(_LIVE, "--live", metavar="PORT", help="Send JSON lines to TCP clients.")
+    int | None,
+    _option(_LIVE, "--live", metavar="PORT", help="Port that sends JSON lines to TCP clients."),
 ]
 LiveNmea = Annotated[
     int | None,
-    _option(_LIVE, "--live-nmea", metavar="PORT", help="Send SwisTrack's NMEA to TCP clients."),
+    _option(
+        _LIVE,
+        "--live-nmea",
+        metavar="PORT",
+        help="Port that sends SwisTrack's NMEA to TCP clients.",
+    ),
 ]
 LiveHost = Annotated[
-    str, _option(_LIVE, "--live-host", metavar="ADDRESS", help="Listen there, not on loopback.")
+    str,
+    _option(
+        _LIVE, "--live-host", metavar="ADDRESS", help="Address to listen on (default: loopback)."
+    ),
 ]
 Overlay = Annotated[
     Path | None,
     typer.Option(
         "--overlay",
         metavar="OUT.mp4",
-        help="Write a video with the bodies drawn in.",
+        help="Video to write, with the bodies drawn in.",
         show_default=False,
     ),
 ]

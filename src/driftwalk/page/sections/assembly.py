@@ -167,10 +167,8 @@ def _parameters(distribution: xr.Dataset, assembly: xr.Dataset | None) -> str:
         return ""
     every = value_of(distribution, "force_interval_s")
     redrawn = "" if every is None else f" redrawn every {quantity(every, 's')}"
-    return (
-        f" with C_d = {quantity(float(drag[0]))} and σ_F = {quantity(float(force[0]), 'N')}"
-        f"{redrawn}"
-    )
+    values = f" with C_d = {quantity(float(drag[0]))} and σ_F = {quantity(float(force[0]), 'N')}"
+    return values + redrawn
 
 
 def _beside(distribution: xr.Dataset, drawn: xr.Dataset) -> str:
