@@ -70,7 +70,7 @@ def flow(
         ),
     ] = None,
     cell_size: Annotated[
-        float | None, _flow_option("--cell-size", "m", "Side of a cell, in place of --cells.")
+        float | None, _flow_option("--cell-size", "m", "Side of a cell, instead of --cells.")
     ] = None,
     window: Annotated[float | None, _flow_option("--window", "s", "Smoothing window.")] = None,
     inertia: Annotated[
@@ -91,7 +91,7 @@ def flow(
         int | None,
         typer.Option(
             "--min-count",
-            help="Samples that a cell needs to count as measured.",
+            help="Smallest number of samples in a measured cell.",
             rich_help_panel=_PANEL,
             show_default=False,
         ),

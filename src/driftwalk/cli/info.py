@@ -1,4 +1,4 @@
-"""`driftwalk info`: what a recording holds, and how it was understood."""
+"""`driftwalk info`: the contents of a recording, and how driftwalk reads them."""
 
 from __future__ import annotations
 

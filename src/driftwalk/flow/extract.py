@@ -98,7 +98,7 @@ def extract_flow(
     flow_drag_coefficient : float, optional
         Drag coefficient C_x of the whole body in Eq. 4.
     min_count : int, optional
-        Samples that a cell needs to count as measured.
+        Smallest number of samples in a measured cell.
 
     Returns
     -------

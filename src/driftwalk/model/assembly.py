@@ -43,8 +43,9 @@ class Assembly(Section):
     latching: Latching = Field(
         default="collision",
         description=(
-            'When two blocks latch: "collision", whenever they touch (the paper); "connector", '
-            'when two faces are within the tolerances of a connector; "none", never: hard bodies.'
+            'Latching rule: "collision", whenever two blocks touch (the paper); '
+            '"connector", when two faces are within the tolerances of a connector; '
+            '"none", never: hard bodies.'
         ),
     )
     connector_distance_m: Annotated[float, Quantity("m", ge=0, le=10)] = Field(
@@ -58,9 +59,9 @@ class Assembly(Section):
     connector_rotation_rad: Annotated[float, Quantity("rad", ge=0, le=3.15)] = Field(
         default=0.2,
         description=(
-            "Largest rotation of two connectors against each other about their axis. Blocks float "
-            "upright, so that this rotation is always 0 and the condition is always met; the key "
-            "is here so that a connector is stated whole."
+            "Largest rotation of two connectors against each other about their axis. "
+            "Blocks float upright, so this rotation is always 0 and the condition is "
+            "always met; the key only completes the description of a connector."
         ),
     )
     hidden_face_drag: HiddenFaceDrag = Field(
@@ -72,8 +73,7 @@ class Assembly(Section):
     chirality: Chirality = Field(
         default="merged",
         description=(
-            'Shapes that are mirror images of each other: "merged", one class (the paper), or '
-            '"distinct".'
+            'Treatment of mirror images: "merged" into one class (the paper), or "distinct".'
         ),
     )
     block_restitution: Annotated[float, Quantity("1", ge=0, le=1)] = Field(

@@ -31,13 +31,14 @@ class Block(Section):
         default=None,
         description=(
             'Wetted depth d of a side face: "immersed" is d = a (the default), "archimedes" is the '
-            "depth at which the block floats, d = m / (density a^2). The drag depends on the "
-            "product of drag_coefficient and depth alone, so the two are always stated together."
+            "depth at which the block floats, d = m / (density a^2). The drag "
+            "depends only on the product of drag_coefficient and depth, so always "
+            "state the two together."
         ),
     )
     depth_m: Annotated[float | None, Quantity("m", gt=0, le=10)] = Field(
         default=None,
-        description="Wetted depth d as a length, in place of `depth`.",
+        description="Wetted depth d as a length, instead of `depth`.",
         examples=[0.0129],
     )
     strips_per_face: Annotated[int, Quantity("1", ge=1, le=64, whole=True)] = Field(

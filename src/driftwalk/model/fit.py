@@ -34,20 +34,22 @@ class Fit(Section):
         default="auto",
         description=(
             'Distance between the knots of the flow. "auto" is two thirds of the side of the block '
-            "(2 cm for 3 cm), or a 24th of the tank where that is more."
+            "(2 cm for 3 cm), or a 24th of the tank if that is more."
         ),
     )
     angle: Literal["auto", "state", "given", "none"] = Field(
         default="auto",
         description=(
-            'How the recorded orientation is used: "state" predicts it like the position and '
-            'learns from its errors too, "given" takes it (smoothed) as it is, "none" averages the '
-            'drag over all orientations; "auto" is "state" where most samples have one, else '
-            '"none".'
+            'Use of the recorded orientation: "state" predicts it like the position '
+            'and learns from its errors too; "given" uses it, smoothed, as an input; '
+            '"none" averages the drag over all orientations; "auto" is "state" if '
+            'most samples have one, else "none".'
         ),
     )
     iterations: Annotated[int, Quantity("1", ge=4, le=1000, whole=True)] = Field(
-        default=25, description="Most steps of the search; it ends when they have become small."
+        default=25,
+        description="Largest number of steps of the search, which ends "
+        "when the steps become small.",
     )
     confidence: Annotated[float, Quantity("1", gt=0, lt=1)] = Field(
         default=0.9, description="Confidence of the intervals."
@@ -55,25 +57,27 @@ class Fit(Section):
     switching_times_s: tuple[Time, ...] | None = Field(
         default=None,
         description=(
-            "Times, on the clock of each recording, at which the pumps were switched: between "
-            "them each interval has a flow of its own, and all share drag and noises. Without "
-            "them the flow is steady."
+            "Times, on the clock of each recording, at which the pumps were "
+            "switched. Each interval between them has its own flow, and all share "
+            "drag and noises. Without them the flow is steady."
         ),
         examples=["[600.0, 1200.0]"],
     )
     flow_labels: tuple[str, ...] | None = Field(
         default=None,
         description=(
-            "Names of the flows in the intervals between the switching times, where one comes "
-            "back: intervals of the same name have the same flow. Without them all differ."
+            "Names of the flows in the intervals between the switching times: "
+            "intervals with the same name have the same flow. Without names all "
+            "flows differ."
         ),
         examples=['["A", "B", "A"]'],
     )
     drag_coefficient_precision: Annotated[float | None, Quantity("1", gt=0, lt=1)] = Field(
         default=None,
         description=(
-            "Relative standard error of C_d that is wanted: the fit says whether it is reached, "
-            "and if not how long a recording would have to be. Without it, 0.1 is warned of."
+            "Wanted relative standard error of C_d: the fit says whether it is "
+            "reached, and if not, how long a recording must be. Without it, a "
+            "warning appears above 0.1."
         ),
         examples=[0.05],
     )

@@ -18,7 +18,7 @@ class Flow(Section):
         default=50, description="Cells across the longer side of the tank."
     )
     cell_size_m: Annotated[float | None, Quantity("m", gt=0, le=10)] = Field(
-        default=None, description="Side of a cell, in place of `cells`.", examples=[0.006]
+        default=None, description="Side of a cell, instead of `cells`.", examples=[0.006]
     )
     smoothing_window_s: Annotated[float, Quantity("s", gt=0, le=1e3)] = Field(
         default=0.7,
@@ -28,7 +28,7 @@ class Flow(Section):
         default=1.05, description="Drag coefficient C_x of the inertia correction (Eq. 4)."
     )
     min_count: Annotated[int, Quantity("1", ge=1, le=1_000_000, whole=True)] = Field(
-        default=1, description="Samples that a cell needs to count as measured."
+        default=1, description="Smallest number of samples in a measured cell."
     )
     inertia: Literal["corrected", "none"] = Field(
         default="corrected",

@@ -33,9 +33,9 @@ class Forces(Section):
     force_interval_s: Annotated[float, Quantity("s", gt=0, le=10)] = Field(
         default=0.010,
         description=(
-            "Interval at which the stochastic force is redrawn. Part of the model: a "
-            "recording tells "
-            "sigma_F^2 * force_interval only, so the two are always stated together."
+            "Interval at which the stochastic force is redrawn. It is part of the "
+            "model: a recording determines only sigma_F^2 * force_interval, so "
+            "always state the two together."
         ),
     )
 

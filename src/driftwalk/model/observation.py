@@ -1,4 +1,4 @@
-"""What the camera does to the poses."""
+"""Effects of the camera on the poses."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ class Observation(Section):
     ] = Field(
         default="estimate",
         description=(
-            'Standard deviation of the position noise of the tracker, per axis; "estimate" takes '
-            "it from the recording, and none where there is no recording."
+            "Standard deviation of the position noise of the tracker, per axis; "
+            '"estimate" takes it from the recording; without a recording there is no '
+            "noise."
         ),
     )
     orientation_noise_rad: Annotated[
@@ -35,7 +36,7 @@ class Observation(Section):
         default="recording",
         description=(
             "Resolution to which simulated positions are rounded, 0 for none; "
-            '"recording" takes that of the recorded file.'
+            '"recording" uses the resolution of the recorded file.'
         ),
     )
     gaps: Literal["recording", "none"] = Field(
@@ -45,8 +46,8 @@ class Observation(Section):
     field_of_view: FieldOfView | None = Field(
         default=None,
         description=(
-            "What the camera sees, when that is less than the tank: the keys of [tank]'s form, and "
-            "center_m; samples outside are missing."
+            "Field of view of the camera, if smaller than the tank: the keys of "
+            "[tank] for a shape, and center_m; samples outside are missing."
         ),
         examples=['{ shape = "rectangle", width_m = 0.25, height_m = 0.2 }'],
     )

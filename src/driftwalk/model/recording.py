@@ -47,30 +47,33 @@ class Recording(Section):
         default="auto", description='Name of the file\'s format; "auto" looks at the file.'
     )
     body: str | None = Field(
-        default=None, description="Which body, where the recording holds several.", examples=["0"]
+        default=None, description="Body to use, if the recording holds several.", examples=["0"]
     )
     start_s: Annotated[float | None, Quantity("s")] = Field(
-        default=None, description="Use the samples from this time on.", examples=[0.0]
+        default=None, description="First time to use.", examples=[0.0]
     )
     stop_s: Annotated[float | None, Quantity("s")] = Field(
-        default=None, description="Use the samples up to this time.", examples=[1800.0]
+        default=None, description="Last time to use.", examples=[1800.0]
     )
     frame_rate_Hz: Annotated[float | None, Quantity("Hz", gt=0, le=1e6)] = Field(
         default=None,
-        description="Frames per second, where the file has frame numbers and no time.",
+        description="Frames per second, if the file has frame numbers but no times.",
         examples=[25.0],
     )
     metres_per_pixel: Annotated[float | None, Quantity("m", gt=0, le=10)] = Field(
         default=None,
-        description="Size of a pixel in m, where the file is in pixels.",
+        description="Size of a pixel in m, if the file is in pixels.",
         examples=[0.0005],
     )
     length_unit: Literal["auto", "m", "cm", "mm", "um", "km", "px"] = Field(
-        default="auto", description='Unit of the positions; "auto" is what the file says.'
+        default="auto", description='Unit of the positions; "auto" uses the unit of the file.'
     )
     y_axis: Literal["auto", "up", "down"] = Field(
         default="auto",
-        description='Sense of the file\'s y axis; "auto" is that of the format, down for pixels.',
+        description=(
+            'Direction of the file\'s y axis; "auto" uses the direction of the format, down for '
+            "pixels."
+        ),
     )
     columns: Columns | None = Field(
         default=None,
@@ -87,7 +90,7 @@ class Recording(Section):
     )
     x_file: str | None = Field(
         default=None,
-        description="File of the x matrix, where each coordinate has a file of its own.",
+        description="File of the x matrix, if each coordinate has its own file.",
         examples=["x.csv"],
     )
     y_file: str | None = Field(
@@ -97,27 +100,27 @@ class Recording(Section):
         default=None, description="File of the orientation matrix.", examples=["theta.csv"]
     )
     keypoint: str | None = Field(
-        default=None, description="Which keypoint of a pose file is the body.", examples=["centre"]
+        default=None, description="Keypoint of a pose file that is the body.", examples=["centre"]
     )
     sort: Literal["error", "sort"] = Field(
         default="error", description='Times that go back: "error" refuses them, "sort" sorts them.'
     )
     max_speed_m_s: Annotated[float | None, Quantity("m/s", gt=0, le=1e4)] = Field(
         default=None,
-        description="A jump faster than this is a mistake of the tracker: a gap.",
+        description="Fastest plausible speed; a faster jump becomes a gap.",
         examples=[1.0],
     )
     arena: Literal["tank", "fit", "file"] = Field(
         default="tank",
         description=(
-            'What holds the positions: "tank" is [tank], its centre at the file\'s origin where '
-            'that agrees with the positions and fitted to them otherwise; "fit" is a circle fitted '
-            'to the positions; "file" is what the file says, if anything.'
+            'Arena of the positions: "tank" is [tank], with its centre at the file\'s origin if '
+            'that agrees with the positions, and fitted to them otherwise; "fit" is a circle '
+            'fitted to the positions; "file" uses the arena of the file, if any.'
         ),
     )
     arena_center_m: tuple[float, float] | None = Field(
         default=None,
-        description="Centre [x, y] of the tank in the file's frame in m, y up, where it is known.",
+        description="Centre [x, y] of the tank in the file's frame in m, y up, if known.",
         examples=["[0.42, -0.31]"],
     )
 

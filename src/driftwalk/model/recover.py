@@ -1,4 +1,4 @@
-"""Which recordings of known truth a recovery study simulates and fits."""
+"""Recordings of known truth that a recovery study simulates and fits."""
 
 from __future__ import annotations
 
@@ -35,35 +35,35 @@ class Recover(Section):
     flow: str | None = Field(
         default=None,
         description=(
-            'File of the true flow field, found from where the study file is; "random" draws '
-            "another flow for every recording."
+            'File of the true flow field, relative to the study file; "random" draws '
+            "a different flow for every recording."
         ),
         examples=["fit/flow.nc"],
     )
     flow_family: Literal["swirl", "eddies"] = Field(
         default="swirl",
         description=(
-            'Random flows: "swirl" with jets and a sink, where a block goes round on regular '
-            'orbits, or "eddies".'
+            'Family of random flows: "swirl" with jets and a sink, in which a block '
+            'goes round on regular orbits, or "eddies".'
         ),
     )
     flow_speed_m_s: Annotated[float | None, Quantity("m/s", gt=0, le=100)] = Field(
         default=None,
-        description="Root mean square speed of random flows; as drawn without it.",
+        description="Root mean square speed of random flows; if not set, the speed as drawn.",
         examples=[0.05],
     )
     recordings: Annotated[int, Quantity("1", ge=2, le=100_000, whole=True)] = Field(
-        default=20, description="Recordings to simulate and fit, of each length."
+        default=20, description="Number of recordings to simulate and fit, for each length."
     )
     durations_s: tuple[Annotated[float, Quantity("s", gt=0, le=1e6)], ...] = Field(
         default=(1800.0,), description="Lengths of the recordings to compare."
     )
     sample_interval_s: Annotated[float, Quantity("s", gt=0, le=1)] = Field(
-        default=0.1, description="Time from one sample of the camera to the next."
+        default=0.1, description="Time between two samples of the camera."
     )
     recordings_per_fit: Annotated[int, Quantity("1", ge=1, le=1000, whole=True)] = Field(
         default=1,
-        description="Recordings of one flow, from different starts, that are fitted together.",
+        description="Number of recordings of one flow, from different starts, to fit together.",
     )
     missing_share: Annotated[float, Quantity("1", ge=0, le=0.9)] = Field(
         default=0.0, description="Share of the samples that the camera misses, at random."
@@ -74,14 +74,15 @@ class Recover(Section):
     )
     angle: tuple[str, ...] | None = Field(
         default=None,
-        description="Uses of the orientation to compare, words of [fit] angle; that one without.",
+        description="Uses of the orientation to compare, as in [fit] angle; if not "
+        "set, the one in [fit].",
         examples=['["given", "none"]'],
     )
     drag_coefficient_precision: Annotated[float | None, Quantity("1", gt=0, lt=1)] = Field(
         default=None,
         description=(
-            "Relative error of C_d that is wanted, root mean square: the study says how long to "
-            "record for it."
+            "Wanted relative error of C_d, root mean square: the study says how long "
+            "to record for it."
         ),
         examples=[0.05],
     )

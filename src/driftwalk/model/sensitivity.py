@@ -65,7 +65,7 @@ class Sensitivity(Section):
         description="Simulated runs per setting, and per realisation of the reference.",
     )
     reference_realisations: Annotated[int, Quantity("1", ge=2, le=100_000, whole=True)] = Field(
-        default=10, description="Realisations of the reference, which is their mean."
+        default=10, description="Number of realisations of the reference, which is their mean."
     )
     seed: Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)] = Field(
         default=1, description="Seed of the random numbers."
@@ -99,12 +99,12 @@ class Sensitivity(Section):
     )
     drag_coefficient: tuple[Annotated[float, Quantity("1", ge=0, le=100)], ...] | None = Field(
         default=None,
-        description="Drag coefficients to compare, an axis of the map, in place of the range.",
+        description="Drag coefficients to compare, an axis of the map, instead of the range.",
         examples=["[0.2, 0.45, 1.0]"],
     )
     force_std_N: tuple[Annotated[float, Quantity("N", ge=0, le=10)], ...] | None = Field(
         default=None,
-        description="Values of force_std to compare, an axis of the map, in place of the range.",
+        description="Values of force_std to compare, an axis of the map, instead of the range.",
         examples=['["0.2mN", "0.55mN"]'],
     )
 

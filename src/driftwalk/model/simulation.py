@@ -35,8 +35,9 @@ class Simulation(Section):
     ] = Field(
         default="auto",
         description=(
-            'Time step of the integrator; "auto" is the largest whole divisor of force_interval_s '
-            "not above 10 ms. A step that does not divide the interval is an error."
+            'Time step of the integrator; "auto" is the largest whole divisor of '
+            "force_interval_s up to 10 ms. A step that does not divide the interval "
+            "is an error."
         ),
     )
     duration_s: Annotated[float, Quantity("s", gt=0, le=1e7)] = Field(
@@ -44,7 +45,7 @@ class Simulation(Section):
     )
     sample_rate_Hz: Annotated[float, Quantity("Hz", gt=0, le=1e5)] = Field(
         default=10.0,
-        description="Sampling of a simulation that has no recording's time stamps to follow.",
+        description="Sampling rate of a simulation without a recording's time stamps.",
     )
     replicates: Annotated[int, Quantity("1", ge=1, le=10_000_000, whole=True)] = Field(
         default=1, description="Trajectories with the same parameters and different random numbers."

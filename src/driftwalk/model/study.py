@@ -51,34 +51,32 @@ class Study(Section):
     water: Water = Field(default_factory=Water, description="The liquid.")
     forces: Forces = Field(default_factory=Forces, description="Drag and stochastic force.")
     simulation: Simulation = Field(
-        default_factory=Simulation, description="How a simulation is run."
+        default_factory=Simulation, description="Settings of a simulation."
     )
     observation: Observation = Field(
-        default_factory=Observation, description="What the camera does to the poses."
+        default_factory=Observation, description="Effects of the camera on the poses."
     )
-    recording: Recording = Field(
-        default_factory=Recording, description="How the recording is read."
-    )
+    recording: Recording = Field(default_factory=Recording, description="Reading of the recording.")
     flow: Flow = Field(
-        default_factory=Flow, description="How the flow field is taken from the recording."
+        default_factory=Flow, description="Extraction of the flow field from the recording."
     )
-    steps: Steps = Field(default_factory=Steps, description="How steps are formed.")
+    steps: Steps = Field(default_factory=Steps, description="Formation of steps.")
     calibration: Calibration = Field(
-        default_factory=Calibration, description="What a calibration searches."
+        default_factory=Calibration, description="Search of a calibration."
     )
     fit: Fit = Field(
         default_factory=Fit,
-        description="How flow, drag, force and tracking noise are fitted together.",
+        description="Joint fit of flow, drag, force and tracking noise.",
     )
     recover: Recover = Field(
         default_factory=Recover,
-        description="Which recordings of known truth a recovery study simulates and fits.",
+        description="Recordings of known truth that a recovery study simulates and fits.",
     )
     assembly: Assembly = Field(
-        default_factory=Assembly, description="How blocks assemble, and how often it is simulated."
+        default_factory=Assembly, description="Rules of self-assembly, and the number of runs."
     )
     sensitivity: Sensitivity = Field(
-        default_factory=Sensitivity, description="What a sensitivity analysis varies."
+        default_factory=Sensitivity, description="Axes and size of a sensitivity analysis."
     )
 
     @model_validator(mode="after")

@@ -32,7 +32,7 @@ class Outline(Section):
     """
 
     shape: Literal["circle", "rectangle", "polygon"] = Field(
-        default="circle", description="Form; each form has keys of its own."
+        default="circle", description="Shape; each shape has its own keys."
     )
     diameter_m: Annotated[float | None, Quantity("m", gt=0, le=1e3)] = Field(
         default=None, description="Diameter of a circle (0.3 m when it is not given)."
@@ -191,7 +191,7 @@ class Tank(Outline):
         default=0.0, description="Coulomb friction of the wall; 0 for a wet wall."
     )
     bounce_speed_m_s: Annotated[float, Quantity("m/s", ge=0, le=1e3)] = Field(
-        default=0.01, description="Speed of approach below which there is no bounce."
+        default=0.01, description="Approach speed below which there is no bounce."
     )
 
     @classmethod

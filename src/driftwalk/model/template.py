@@ -27,7 +27,7 @@ _HEAD = """\
 
 
 def study_template(study: Study | None = None) -> str:
-    """Return a study file in which every parameter stands with its unit, range and meaning.
+    """Return a study file that lists every parameter with its unit, range and meaning.
 
     Parameters
     ----------

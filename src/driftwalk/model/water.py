@@ -19,5 +19,5 @@ class Water(Section):
     )
     viscosity_Pa_s: Annotated[float, Quantity("Pa s", gt=0, le=1e3)] = Field(
         default=8.9e-4,
-        description="Dynamic viscosity; it enters the Reynolds number that is reported.",
+        description="Dynamic viscosity; used only for the reported Reynolds number.",
     )

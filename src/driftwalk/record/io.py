@@ -92,7 +92,7 @@ def load(
     x, y, theta : path-like, optional
         One matrix per coordinate: a row per frame, a column per body.
     keypoint : str, optional
-        Which keypoint of a pose file is the body.
+        Keypoint of a pose file that is the body.
 
     Returns
     -------

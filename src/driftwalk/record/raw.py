@@ -125,4 +125,4 @@ class ReadOptions:
     theta: Path | None = None
     """File of the orientation matrix."""
     keypoint: str | None = None
-    """Which keypoint of a pose file is the body."""
+    """Keypoint of a pose file that is the body."""
