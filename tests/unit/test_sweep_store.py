@@ -121,7 +121,7 @@ def test_many_differing_keys_are_counted(store: ShardStore) -> None:
 
 def test_damaged_specification_is_refused(store: ShardStore) -> None:
     (store.folder / "specification.json").write_text("{")
-    with pytest.raises(RunDirectoryError, match="start anew"):
+    with pytest.raises(RunDirectoryError, match="start again"):
         reopened(store)
 
 

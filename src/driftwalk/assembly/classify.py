@@ -140,8 +140,9 @@ def _checked_poses(recording: xr.Dataset) -> Poses:
     blind = [name for index, name in enumerate(names) if not poses.seen[:, index].any()]
     if len(blind) == len(names):
         raise InputError(
-            "the recording has no orientation: without the angle of each block nobody can say "
-            "which faces are joined (--theta or --columns theta=NAME where the file has it)"
+            "the recording has no orientation: without the angle of each block the "
+            "joined faces cannot be found (--theta or --columns theta=NAME if the "
+            "file has it)"
         )
     if blind:
         raise InputError(

@@ -154,7 +154,7 @@ def _map_variables(
     cause[broken.any(axis=2)] |= CELL_STATUS["non_finite"]
     cause[found.arrays["pairs"] == 0] |= CELL_STATUS["too_few_steps"]
     flags = {
-        "long_name": "why a setting has no ordinary distance",
+        "long_name": "reason why a setting has no ordinary distance",
         "flag_masks": np.array(list(CELL_STATUS.values()), dtype=np.int8),
         "flag_meanings": " ".join(CELL_STATUS),
     }

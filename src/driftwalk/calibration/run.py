@@ -226,7 +226,7 @@ class _Calibration:
                 if abs(value - edge) <= 0.5 * spacing:
                     self.warnings.append(
                         f"the optimum lies at the edge of the grid: {name} = {value:g} with the "
-                        f"grid ending at {edge:g}; extend the grid, or doubt the model"
+                        f"grid ending at {edge:g}; extend the grid, or question the model"
                     )
 
     def _bootstrap(self, count: int) -> None:
@@ -262,7 +262,7 @@ class _Calibration:
             self.warnings.append(
                 f"the model does not explain the recording: D = {self.quality.distance:.3f} at the "
                 f"optimum is {self.quality.distance / self.quality.floor:.1f} times the noise "
-                f"floor {self.quality.floor:.3f}; the parameters are those of the best of bad fits"
+                f"floor {self.quality.floor:.3f}; the parameters are the best of bad fits"
             )
 
     def _check_window(self, drag: Any, force: Any) -> None:

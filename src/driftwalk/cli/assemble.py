@@ -239,7 +239,7 @@ def print_answer(study: Study, result: AssemblyResult, folder: Path) -> None:
         f"every {1e3 * forces.force_interval_s:g} ms"
     )
     columns = [result.distribution, *([] if result.drawn is None else [result.drawn])]
-    interval = f"{settings.confidence:.0%} intervals, all at once"
+    interval = f"{settings.confidence:.0%} simultaneous intervals"
     heads = ["class", "share", interval]
     if result.drawn is not None:
         heads += ["parameters drawn", interval]

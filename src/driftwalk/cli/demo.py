@@ -177,5 +177,7 @@ def _finished(folder: Path, overwrite: bool) -> bool:
 
     if overwrite or not folder.is_dir() or state_of(folder) != "finished":
         return False
-    print_note(f"{folder} holds a finished run (--overwrite starts anew); this is what it found")
+    print_note(
+        f"{folder} holds a finished run (--overwrite starts a new one); these are its results"
+    )
     return True

@@ -282,11 +282,11 @@ def print_verdict(check: xr.Dataset | None, fit: xr.Dataset) -> None:
         if more > 0:
             print(f"  and {more} more: see findings in check.nc, or --json")
     if found["ks_distance"] is None:
-        print(f"KS distance            not to be had: {check.attrs['ks_left_out']}")
+        print(f"KS distance            not available: {check.attrs['ks_left_out']}")
     else:
         far = found["ks_distance"] > FAR_ABOVE_FLOOR * found["ks_noise_floor"]
         print(
             f"KS distance            {found['ks_distance']:.3f}, "
             f"noise floor {found['ks_noise_floor']:.3f}"
-            + (": far, but within what the fit leaves open" if found["explained"] and far else "")
+            + (": far, but within the uncertainty of the fit" if found["explained"] and far else "")
         )

@@ -126,7 +126,7 @@ def _flow(path: Path | None, study: Study, *, bundled: bool) -> xr.Dataset:
         return load_flow(path, arena=arena, own_flags="keep")
     if bundled:
         return tank30_flow()
-    print_note("no flow field was given (--flow): the water moves in a random one")
+    print_note("no flow field was given (--flow): the water moves in a random flow")
     return random_tank_flow(FLOW_SEED, arena=arena)
 
 

@@ -189,13 +189,14 @@ def _warnings(source: Source, result: SensitivityResult) -> list[str]:
         (
             "tank_diameter" in axes
             and float(found["tank_diameter"].min()) < min(source.study.tank.extent_m),
-            "the flow field is the same for all tanks: the wall of a smaller one cuts it off, and "
-            "does not change it; give each tank a field of its own to have that too",
+            "all tanks use the same flow field: the wall of a smaller tank cuts it "
+            "off and does not change it; to include that effect, give each tank its "
+            "own field",
         ),
         (
             "blocks" in axes and bool(np.isnan(found["l1_distance"].values).any()),
-            "outcomes of another number of blocks than the reference's have no class in common "
-            "with it: they have no l1 distance",
+            "outcomes with another number of blocks share no class with the "
+            "reference: they have no l1 distance",
         ),
         (
             result.components is None,

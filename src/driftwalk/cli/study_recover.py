@@ -121,8 +121,8 @@ def _require_stated(path: Path) -> None:
         section, _, key = name.partition(".")
         if key not in getattr(study, section).model_fields_set:
             raise ConfigurationError(
-                f"{path}: the truth lacks [{section}] {key}: say the true value, that of a fit or "
-                "a guess"
+                f"{path}: the truth lacks [{section}] {key}: give the true value, a "
+                "fitted one or a guess"
             )
 
 

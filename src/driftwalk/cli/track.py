@@ -152,5 +152,5 @@ def _explain(options: TrackingOptions, number: int, out: Path | None, existing: 
     save_picture(picture, explain_frame(frame.image, found, rejected, camera=parts.camera))
     rows = [[one.column, one.row, "found" + (f" {one.key}" if one.key else "")] for one in found]
     rows += [[one.column, one.row, one.reason] for one in rejected]
-    print_table(rows, columns=["column [px]", "row [px]", "what became of it"])
+    print_table(rows, columns=["column [px]", "row [px]", "result"])
     print_note(f"wrote {picture}")

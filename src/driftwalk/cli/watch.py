@@ -77,8 +77,9 @@ def watch(
     parts = build_parts(options)
     if parts.observer is None:
         raise InputError(
-            "to say who is joined it takes markers with an orientation, the number of blocks "
-            "(--bodies) and their side (--side, or block_side_m in the markers file)"
+            "to report which blocks are joined, watch needs markers with an "
+            "orientation, the number of blocks (--bodies) and their side (--side, or "
+            "block_side_m in the markers file)"
         )
     run = TrackingRun(options, parts, out, _Printer())
     run.run()

@@ -73,7 +73,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     try:
         # Renaming over a device such as /dev/null would replace it.
         if target.exists() and not target.is_file():
-            raise RunDirectoryError(f"cannot write {target}: it exists and is no regular file")
+            raise RunDirectoryError(f"cannot write {target}: it exists and is not a regular file")
         yield temporary
         _flush(temporary)
         temporary.replace(target)

@@ -59,7 +59,7 @@ def parse_json(text: str | bytes, *, path: str | Path | None = None) -> Any:
         decoded = text if isinstance(text, str) else text.decode("utf-8-sig")
         values = json.loads(decoded, parse_int=_integer)
     except UnicodeDecodeError as error:
-        raise FormatError("expected JSON, got bytes that are no text", path=path) from error
+        raise FormatError("expected JSON, got bytes that are not text", path=path) from error
     except json.JSONDecodeError as error:
         raise FormatError(
             f"expected JSON: {error.msg}", path=path, line=error.lineno, column=error.colno

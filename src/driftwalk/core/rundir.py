@@ -249,7 +249,7 @@ class RunDirectory:
         for part in parts:
             checked_name(part, kind="result")
         if parts[0] == PREVIOUS_FOLDER or name == MANIFEST_FILE:
-            raise InputError(f"result name {name!r} has a meaning of its own in a run directory")
+            raise InputError(f"result name {name!r} is reserved in a run directory")
         if len(parts) > 1:
             make_folder(self.path.joinpath(*parts[:-1]))
         return self.path.joinpath(*parts)

@@ -113,8 +113,8 @@ class ShardStore:
         arrays = self._load(unit)
         if arrays is None:
             raise RunDirectoryError(
-                f"{self._path(unit)} is absent or damaged; run the same command again to "
-                "compute it anew"
+                f"{self._path(unit)} is absent or damaged; run the same command again "
+                "to recompute it"
             )
         return arrays
 
@@ -243,9 +243,9 @@ def read_specification(path: Path) -> dict[str, Any]:
     try:
         values = read_manifest(path)
     except DriftwalkError as error:
-        raise RunDirectoryError(f"{error}; move {path.parent} away and start anew") from error
+        raise RunDirectoryError(f"{error}; move {path.parent} away and start again") from error
     if not isinstance(values.get("specification"), dict) or "fingerprint" not in values:
-        raise RunDirectoryError(f"{path} is damaged; move {path.parent} away and start anew")
+        raise RunDirectoryError(f"{path} is damaged; move {path.parent} away and start again")
     return values
 
 

@@ -57,7 +57,7 @@ def bilinear(
         np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     )
     if not (np.isfinite(at_x).all() and np.isfinite(at_y).all()):
-        raise InputError("a place at which the flow is asked for is not finite")
+        raise InputError("a point at which the flow is requested is not finite")
     column, right = _bracket(flow["x"].values, at_x)
     row, up = _bracket(flow["y"].values, at_y)
     u, v = (
@@ -83,7 +83,7 @@ def _frame(flow: xr.Dataset, name: str, time: float | None) -> Array:
     if "time" not in flow[name].dims:
         return values
     if time is None:
-        raise InputError("this flow field changes in time: say at which time it is asked for")
+        raise InputError("this flow field changes in time: give a time")
     frames = flow["time"].values
     if frames.size == 1:
         return np.asarray(values[0])

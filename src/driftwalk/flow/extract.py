@@ -176,8 +176,8 @@ def _arena_of(trajectory: xr.Dataset, arena: Mapping[str, Any] | str | None) -> 
     described = trajectory.attrs.get("arena") if arena is None else arena
     if not described:
         raise InputError(
-            "the recording does not say how large the tank is: "
-            "give its outline with --arena, or --tank-diameter for a circle"
+            "the recording does not contain the size of the tank: give its outline "
+            "with --arena, or --tank-diameter for a circle"
         )
     return read_arena(described)
 

@@ -69,7 +69,7 @@ def fill_velocity(
     held = np.asarray(known, dtype=bool)
     field = np.where(held[..., None], np.asarray(velocity, dtype=np.float64), 0.0)
     if not held.any():
-        raise InputError("there is nothing to fill from: no node of the flow field is known")
+        raise InputError("the flow field has no known node to fill from")
     if outline is None:
         return _continue(field, held, np.ones_like(held), grid, None)
     x, y = (part.ravel() for part in grid.nodes())

@@ -83,7 +83,7 @@ def load_flow(
     dataset = open_netcdf(source)
     if str(dataset.attrs.get("kind")) == "flow_field" and "flag" in dataset:
         if arena is not None and own_flags == "refuse":
-            raise InputError(f"{source} has flags of its own: leave the arena out")
+            raise InputError(f"{source} has its own flags: leave the arena out")
         return _checked(check_contents(dataset, source), source)
     si = to_si(dataset, source)
     time = si["time"].values if "time" in si.dims else None

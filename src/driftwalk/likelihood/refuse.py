@@ -66,7 +66,7 @@ def require_motion(track: Track, study: Study, *, where: str) -> None:
         why = (
             f"less than a tenth of its side of {1e3 * study.block.side_m:g} mm"
             if at_rest
-            else f"no more than the tracking noise of {1e3 * noise:.2g} mm makes it seem to"
+            else f"no more than the tracking noise of {1e3 * noise:.2g} mm would show"
         )
         raise InputError(
             f"{where}the body never moves: it stays within {1e3 * width:.2g} mm around {place}, "
@@ -132,7 +132,7 @@ def require_usable(
     if usable >= FEWEST_SAMPLES:
         return
     advice = (
-        "check size and place of the tank, and record where the block keeps away from the wall"
+        "check size and place of the tank, and record where the block stays away from the wall"
         if near_wall > intervals / 2
         else "check the tank, or record for longer"
     )

@@ -70,7 +70,8 @@ def require_noise_below_motion(noise: float, tracks: Sequence[Track]) -> None:
     scatter = max(float(axis.std()) for track in tracks for axis in (track.x, track.y))
     if noise > scatter:
         raise InputError(
-            f"the fit has no solution for this recording: it takes the whole motion for tracking "
-            f"noise ({1e3 * noise:.3g} mm, while the positions scatter by {1e3 * scatter:.3g} mm); "
+            "the fit has no solution for this recording: it attributes the whole "
+            f"motion to tracking noise ({1e3 * noise:.3g} mm, while the positions "
+            f"scatter by {1e3 * scatter:.3g} mm); "
             "the motion does not follow the model, or the tank, the block or the units are wrong"
         )

@@ -84,15 +84,16 @@ def _on_the_data(
     found = []
     if facts["wall_share"] > MOST_WALL_SHARE:
         found.append(
-            f"{facts['wall_share']:.0%} of the intervals are at the wall and were left out: C_d is "
-            "not to be trusted above 30 %; record where the block keeps away from the wall"
+            f"{facts['wall_share']:.0%} of the intervals are at the wall and were "
+            "left out: do not trust C_d above 30 %; record where the block stays "
+            "away from the wall"
         )
     used, usable = facts["samples_used"], facts["intervals_usable"]
     if used < LEAST_USED * usable:
         found.append(
             f"the fit used {used} of {usable} intervals only: at the end of the others the body "
-            "was more than 6 standard deviations from where the model predicted it; what was "
-            "fitted is only a part of the motion"
+            "was more than 6 standard deviations from where the model predicted it; "
+            "the fit describes only a part of the motion"
         )
     std = facts["drag_coefficient_relative_std"]
     wanted = facts.get("drag_coefficient_precision")
@@ -119,12 +120,13 @@ def _on_the_search(facts: Mapping[str, Any]) -> list[str]:
     found = []
     if facts["converged"] == "no":
         found.append(
-            f"the search has not come to its end in {facts['iterations']} steps ([fit] iterations)"
+            f"the search has not converged in {facts['iterations']} steps ([fit] iterations)"
         )
     if facts["restricted"] == "no":
         found.append(
-            "the restricted likelihood has no minimum: C_d is that of the plain one, likely too "
-            "large, and the motion tells little of it or does not follow the model"
+            "the restricted likelihood has no minimum: C_d comes from the plain "
+            "likelihood and is likely too large; the motion says little about C_d or "
+            "does not follow the model"
         )
     return found
 
@@ -140,8 +142,8 @@ def _on_the_model(facts: Mapping[str, Any], whiteness: Whiteness) -> list[str]:
     if off > max(NOTABLE_STDS * whiteness.autocorrelation_std, NOTABLE_AUTOCORRELATION):
         found.append(
             f"the errors of prediction are correlated ({whiteness.autocorrelation:+.2f} from one "
-            "sample to the next): the motion has something that the model has not, and the "
-            "intervals are too narrow"
+            "sample to the next): the motion contains something that the model "
+            "lacks, and the intervals are too narrow"
         )
     return found
 
@@ -152,14 +154,15 @@ def _on_the_turning(facts: Mapping[str, Any], side_m: float) -> list[str]:
     if apart > NOTABLE_DISAGREEMENT:
         found.append(
             f"with the angle as an input C_d is {facts['drag_coefficient_angle_given']:.3g}, "
-            f"{apart:.1f} combined standard deviations away: the turning of the block and its "
-            "motion do not agree on one drag law, and the intervals are too narrow"
+            f"{apart:.1f} combined standard deviations away: the turning of the block "
+            "and its motion do not follow one drag law, and the intervals are too "
+            "narrow"
         )
     lever = facts.get("force_lever_m_interval", (0.0, 0.0))[0]
     if lever > NOTABLE_LEVER * side_m:
         found.append(
             f"the block turns as if the force acted {1e3 * facts['force_lever_m']:.2g} mm from its "
-            "centre: the recorded angle is late, or not that of the block's faces, or the turning "
-            "has an unrest of its own; C_d and the force are then wrong"
+            "centre: the recorded angle is late, or not that of the block's faces, "
+            "or something else makes the block turn; C_d and the force are then wrong"
         )
     return found

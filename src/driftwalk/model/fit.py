@@ -111,13 +111,14 @@ class Fit(Section):
         for name in self.flow_labels:
             if not re.fullmatch(r"[A-Za-z0-9_-]{1,20}", name):
                 raise ConfigurationError(
-                    f"flow_labels: {name!r} is no name of a flow: up to 20 letters, digits, - or _"
+                    f"flow_labels: {name!r} is not a valid name of a flow: use up to "
+                    "20 letters, digits, - or _"
                 )
         for earlier, later in itertools.pairwise(self.flow_labels):
             if earlier == later:
                 raise ConfigurationError(
-                    f"flow_labels: {later!r} stands twice in a row: leave out the switching time "
-                    "between"
+                    f"flow_labels: {later!r} is named twice in a row: leave out the "
+                    "switching time between"
                 )
         return self
 

@@ -90,7 +90,7 @@ def _length_scale(raw: RawRecording, options: ReadOptions) -> tuple[float, bool]
         return _positive(options.metres_per_pixel, "--metres-per-pixel"), True
     if not unit:
         raise InputError(
-            "the file does not say the unit of its positions: give --metres-per-pixel for pixels, "
+            "the file does not name the unit of its positions: give --metres-per-pixel for pixels, "
             "or --length-unit m, cm or mm"
         )
     if options.metres_per_pixel is not None:
@@ -104,7 +104,7 @@ def _ticks(raw: RawRecording, options: ReadOptions) -> tuple[float, float | None
     """Return (units of the clock per second, frame rate if the clock counts frames)."""
     if raw.clock_unit != "frame":
         if options.frame_rate_hz is not None:
-            raise InputError("the file has a clock of its own: leave --frame-rate out")
+            raise InputError("the file has its own clock: leave --frame-rate out")
         return CLOCK_UNITS[raw.clock_unit], None
     rate = options.frame_rate_hz if options.frame_rate_hz is not None else raw.frame_rate_hz
     if rate is None:

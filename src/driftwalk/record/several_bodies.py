@@ -79,7 +79,8 @@ def refuse_several_bodies(body: RawBody, apart: Array, columns: BodyColumns | No
 def _advice(columns: BodyColumns | None) -> str:
     if columns is None:
         return (
-            "the format holds nothing that tells bodies apart: split the file, or mend these rows"
+            "the format has no column that distinguishes bodies: split the file, or "
+            "correct these rows"
         )
     found = columns(False)
     if found:

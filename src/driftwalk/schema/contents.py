@@ -153,9 +153,9 @@ def _check_variable(dataset: xr.Dataset, name: str, on: str, path: Path) -> None
 def _check_attribute(name: str, value: Any, path: Path) -> None:
     if name in TEXT_ATTRIBUTES or name in JSON_ATTRIBUTES:
         if not isinstance(value, str):
-            raise FormatError(f"is damaged: its attribute '{name}' is no text", path=path)
+            raise FormatError(f"is damaged: its attribute '{name}' is not text", path=path)
     elif name in NUMBER_ATTRIBUTES and not isinstance(value, (int, float, np.number)):
-        raise FormatError(f"is damaged: its attribute '{name}' is no number", path=path)
+        raise FormatError(f"is damaged: its attribute '{name}' is not a number", path=path)
     if name in JSON_ATTRIBUTES and value:
         _check_json(name, value, path)
 
@@ -166,7 +166,7 @@ def _check_json(name: str, text: str, path: Path) -> None:
         found = parse_json(text)
     except FormatError as error:
         raise FormatError(
-            f"is damaged: its attribute '{name}' is no JSON ({error})", path=path
+            f"is damaged: its attribute '{name}' is not JSON ({error})", path=path
         ) from error
     if not isinstance(found, expected):
         raise FormatError(

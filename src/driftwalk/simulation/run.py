@@ -217,7 +217,7 @@ def _dataset(
         for name, values in zip(("x", "y", "theta"), poses, strict=True)
     }
     flags = {
-        "long_name": "what went wrong in a world",
+        "long_name": "problems in a world",
         "flag_masks": np.array(list(STATUS.values()), dtype=np.int32),
         "flag_meanings": " ".join(STATUS),
     }

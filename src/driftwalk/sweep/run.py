@@ -174,7 +174,7 @@ def _keep(
         settings = ", ".join(f"{name} = {values[0]}" for name, values in unit.settings.items())
         raise SweepError(
             f"unit {unit.id}, which begins with {settings}, failed: "
-            f"{type(error).__name__}: {error}; the units that are done are kept",
+            f"{type(error).__name__}: {error}; finished units are kept",
             unit_id=unit.id,
         ) from error
     store.write(unit, arrays)
@@ -199,4 +199,4 @@ def _require_distinct(units: Sequence[WorkUnit]) -> None:
     ids = [unit.id for unit in units]
     if len(set(ids)) != len(ids):
         twice = next(unit_id for unit_id in ids if ids.count(unit_id) > 1)
-        raise InputError(f"work unit {twice} is given twice; every unit has to be there once")
+        raise InputError(f"work unit {twice} is given twice; every unit must be given once")

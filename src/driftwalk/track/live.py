@@ -347,7 +347,7 @@ def _listen(host: str, port: int) -> socket.socket:
     except OSError as error:
         if error.errno == errno.EADDRINUSE:
             raise InputError(
-                f"port {port} on {host} is in use: choose another one, or 0 for any that is free"
+                f"port {port} on {host} is in use: choose another one, or 0 for a free port"
             ) from error
         # Python adds what it tried, which the message says already.
         reason = (error.strerror or str(error)).partition(" (while")[0]

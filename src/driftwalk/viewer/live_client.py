@@ -118,7 +118,7 @@ class LiveSource(Source):
     async def _read(self, reader: asyncio.StreamReader, publish: Publish) -> str | None:
         hello = stream_line(await reader.readline())
         if hello is None or hello.get("type") != "hello" or hello.get("format") != FORMAT:
-            return f"what listens on {self.title} is no tracker of driftwalk"
+            return f"the program on {self.title} is not a tracker of driftwalk"
         if hello.get("version") != VERSION:
             return (
                 f"the tracker on {self.title} speaks version {hello.get('version')} of the stream, "

@@ -130,8 +130,8 @@ def _listen(host: str, port: int) -> socket.socket:
     except OSError as error:
         if error.errno == errno.EADDRINUSE:
             raise InputError(
-                f"port {port} on {host} is in use: choose another one (--port), or 0 for any that "
-                "is free"
+                f"port {port} on {host} is in use: choose another one (--port), or 0 "
+                "for a free port"
             ) from error
         reason = (error.strerror or str(error)).partition(" (while")[0]
         raise InputError(f"cannot listen on {host}, port {port}: {reason}") from error

@@ -87,7 +87,7 @@ class SoundFrames:
 
     def note_unreadable(self) -> None:
         """Count a line of the stream that says nothing."""
-        self._note("line", ["it is no JSON object with a type"])
+        self._note("line", ["it is not a JSON object with a type"])
 
     def words(self, *, now: float, last: bool = False) -> str | None:
         """Return what there is to say of what was left out; None when there is nothing new.
@@ -114,7 +114,7 @@ class SoundFrames:
         def check(body: Any) -> Fault:
             fault = _first_fault(body, BODY)
             if fault is None and body["id"] in ids:
-                return "the same id stands twice in a frame"
+                return "a frame has the same id twice"
             if fault is None:
                 ids.add(body["id"])
             return fault

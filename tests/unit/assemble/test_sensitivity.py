@@ -285,7 +285,7 @@ def test_sobol_bounds_are_the_ends_of_the_map() -> None:
 @pytest.mark.parametrize(
     ("axes", "says"),
     [
-        ({"drag": [1.0]}, "axes: nothing is called 'drag'; choose from tank_diameter, blocks"),
+        ({"drag": [1.0]}, "axes: there is no 'drag'; choose from tank_diameter, blocks"),
         ({}, "none was named"),
         ({"blocks": []}, "the list is empty"),
         ({"blocks": [2.5]}, "expected a whole number, got 2.5"),

@@ -49,7 +49,7 @@ def test_a_sound_frame_stays_as_it_is() -> None:
         *[(without(key), f"{key} is missing") for key in ("id", "seen", "x_m", "y_m", "theta_rad")],
         *[(body("odd", id=name), "id is not text") for name in (None, 7, ["a"])],
         (body("odd", seen="yes"), "seen is not true or false"),
-        (body("b"), "the same id stands twice in a frame"),
+        (body("b"), "a frame has the same id twice"),
         *[(one, "it is not an object") for one in (None, "b", [1])],
     ],
 )
@@ -89,7 +89,7 @@ def test_it_is_said_once_and_then_now_and_then() -> None:
     assert at == [0, 100, 100 + round(60 * SAID_EVERY_S)]
     last = frames.words(now=0.0, last=True)
     assert last is not None
-    assert "1 line (it is no JSON object with a type)" in last
+    assert "1 line (it is not a JSON object with a type)" in last
     assert "399 bodies of 399 frames" in last
     assert frames.words(now=1e9, last=True) is None
 

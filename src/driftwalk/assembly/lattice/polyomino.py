@@ -183,7 +183,7 @@ def merged_shape(name: str) -> str:
 def name_of(cells: Cells, chirality: Chirality) -> str:
     """Name a shape given as `moved_to_origin` returns it; fast for one that came before."""
     if len(set(cells)) < len(cells):
-        raise InputError("a cell stands there twice")
+        raise InputError("a cell is given twice")
     if not _is_connected(cells):
         raise InputError("the cells are not joined edge to edge")
     code = _canonical_code(cells, chirality)

@@ -268,7 +268,7 @@ def _parameters(plan: Plan) -> dict[str, Any]:
 
 def _status_flags() -> dict[str, Any]:
     return {
-        "long_name": "what went wrong in a run",
+        "long_name": "problems in a run",
         "flag_masks": np.array(list(STATUS.values()), dtype=np.int32),
         "flag_meanings": " ".join(STATUS),
     }

@@ -36,7 +36,7 @@ ABOUT: Final[dict[str, dict[str, str]]] = {
     "tank_diameter": {"units": "m", "long_name": "diameter of the tank"},
     "blocks": {"units": "1", "long_name": "number of blocks"},
     "flow": {"long_name": "flow field"},
-    "latching": {"long_name": "when two blocks latch"},
+    "latching": {"long_name": "rule by which two blocks latch"},
     "hidden_face_drag": {"long_name": "drag on joined faces"},
     "drag_coefficient": {"units": "1", "long_name": "drag coefficient"},
     "force_std": {"units": "N", "long_name": "standard deviation of the force"},
@@ -138,7 +138,7 @@ def make_axes(study: Study, axes: Mapping[str, Any] | None) -> Axes:
         unknown = [name for name in axes if name not in KEYS]
         if unknown or not axes:
             raise InputError(
-                f"axes: nothing is called {', '.join(map(repr, unknown)) or '(none was named)'}; "
+                f"axes: there is no {', '.join(map(repr, unknown)) or '(none was named)'}; "
                 f"choose from {', '.join(KEYS)}"
             )
         if isinstance(axes.get("flow"), Mapping):

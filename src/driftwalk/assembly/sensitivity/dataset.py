@@ -113,7 +113,7 @@ def map_dataset(
         "first_contact_median": (outcomes.first_contact_median, "s", "median of first contact"),
         "completion_median": (outcomes.completion_median, "s", "median of completion"),
         "l1_distance": (distance, "1", "l1 distance to the reference"),
-        "l1_in_floors": (in_floors, "1", "l1 distance over what chance alone gives"),
+        "l1_in_floors": (in_floors, "1", "l1 distance divided by that of chance alone"),
         "trial": (settings.trial, "1", "address of the random numbers"),
     }
     of_class = {"count": (count, "runs of this class"), "proportion": (share, "share of runs")}

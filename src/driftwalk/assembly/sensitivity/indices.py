@@ -131,9 +131,7 @@ def _design(
     chosen = _bounds_of(study) if bounds is None else bounds
     unknown = [name for name in chosen if name not in INPUTS]
     if unknown:
-        raise InputError(
-            f"bounds: nothing is called '{unknown[0]}'; choose from {', '.join(INPUTS)}"
-        )
+        raise InputError(f"bounds: there is no '{unknown[0]}'; choose from {', '.join(INPUTS)}")
     # The seed of the study may be larger than what the scrambling takes.
     seed = study.sensitivity.seed % MOST_SEED
     return sobol_design(chosen, samples=samples, seed=seed)

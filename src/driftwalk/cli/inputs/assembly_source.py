@@ -74,8 +74,8 @@ def source_from_flow(
     """
     if flow_file is None:
         raise InputError(
-            "nothing says how the water moves: give the run directory of a calibration, or a flow "
-            "field (--flow)"
+            "the flow of the water is missing: give the run directory of a "
+            "calibration, or a flow field (--flow)"
         )
     chosen = resolve_study(study_file, overrides, keys=keys)
     inputs = {"flow": flow_file, **({} if study_file is None else {"study": study_file})}

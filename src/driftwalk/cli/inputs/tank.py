@@ -64,6 +64,6 @@ def require_inside(study: Study, recording: xr.Dataset, body: str | None) -> Non
         raise InputError(
             f"{outside.mean():.0%} of the positions lie outside the tank, a {tank.describe()} "
             f"about the origin: the recording spans x {track.x.min():.3g} to "
-            f"{track.x.max():.3g} m, y {track.y.min():.3g} to {track.y.max():.3g} m; say the tank "
-            "with --tank-diameter, --arena or [tank] in a study file"
+            f"{track.x.max():.3g} m, y {track.y.min():.3g} to {track.y.max():.3g} m; "
+            "state the tank with --tank-diameter, --arena or [tank] in a study file"
         )

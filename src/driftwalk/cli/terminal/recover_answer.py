@@ -112,9 +112,9 @@ def _doubts(part: xr.Dataset) -> list[str]:
     said = []
     if abs(value["bias"]) > max(NOTABLE_BIAS, NOTABLE_STANDARD_ERRORS * chance):
         said.append(
-            f"C_d is off by {value['bias']:+.0%} on average, where chance gives {chance:.0%}: more "
-            "recordings do not mend that, and only a comparison of lengths shows whether longer "
-            "ones do"
+            f"C_d is off by {value['bias']:+.0%} on average, where chance gives "
+            f"{chance:.0%}: more recordings do not help, and only a comparison of "
+            "lengths shows whether longer ones do"
         )
     if value["coverage_high"] < part.attrs["confidence"]:
         said.append(
@@ -220,7 +220,7 @@ def _needed(part: xr.Dataset) -> dict[str, Any]:
 
 def _basis(part: xr.Dataset) -> str:
     lengths = ", ".join(length_text(float(value)) for value in part["duration"].values)
-    return f"rms error of C_d at {lengths}, taken to fall with the square root of the length"
+    return f"rms error of C_d at {lengths}, assumed to fall with the square root of the length"
 
 
 def _needed_sentence(part: xr.Dataset) -> str:

@@ -223,7 +223,7 @@ def _print_indices(indices: xr.Dataset) -> None:
             rows.append([str(name), f"{noise:.1%}", *cells])
     print_table(rows, columns=heads)
     width = indices.attrs["pure_noise_first_order_half_width"]
-    print(f"noise is taken out of the indices; those within {width:.2f} mean nothing")
+    print(f"the indices are corrected for noise; those within {width:.2f} mean nothing")
 
 
 def _text(value: Any) -> str:

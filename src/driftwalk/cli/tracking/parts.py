@@ -220,7 +220,7 @@ def _observer(options: TrackingOptions, side: float | None) -> AssemblyObserver 
     from driftwalk.track import AssemblyObserver
 
     if options.side is not None and options.bodies is None:
-        print_note("who is joined is not said: --side needs --bodies, the number of blocks")
+        print_note("joins are not reported: --side needs --bodies, the number of blocks")
     if side is None or options.bodies is None or options.markers == "blob":
         return None
     return AssemblyObserver(options.bodies, side=side)

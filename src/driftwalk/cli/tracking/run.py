@@ -102,7 +102,7 @@ class TrackingRun:
                     self._save_now_and_then()
                 self.interrupted = source.interrupted
             except KeyboardInterrupt:
-                self.interrupted = f"stopped by hand after {self.frames} frames"
+                self.interrupted = f"interrupted after {self.frames} frames"
                 if not self.options.is_camera:
                     self._keep_what_there_is(live, source)
                     raise
@@ -120,7 +120,7 @@ class TrackingRun:
         self._source_counts = source.counts.to_dict()
         self._save(complete=False)
         if self.saved:
-            print_note(f"wrote {self.out}: {self.frames} frames up to here")
+            print_note(f"wrote {self.out}: {self.frames} frames so far")
 
     def recording(self, *, complete: bool = True) -> xr.Dataset:
         """Return what was tracked up to now.
@@ -152,7 +152,7 @@ class TrackingRun:
     def _what_was_there(self) -> str:
         """Return what was turned down, most of it first, and how to look at it."""
         kinds = [f"{kind} {number}" for kind, number in self.rejected.most_common(_MOST_KINDS)]
-        turned_down = f"; turned down: {', '.join(kinds)}" if kinds else ""
+        turned_down = f"; rejected: {', '.join(kinds)}" if kinds else ""
         return f"{turned_down} (look at a frame with track ... --explain {self.frames // 2})"
 
     def _take(
@@ -193,7 +193,7 @@ class TrackingRun:
                 self._names.add(name)
                 continue
             self._left_out.add(name)
-            print_note(f"warning: {name} is one more than --bodies; who is joined is said without")
+            print_note(f"warning: {name} is one more than --bodies; joins are reported without it")
         return {name: pose for name, pose in seen.items() if name in self._names}
 
     def _open_overlay(self, open_things: contextlib.ExitStack) -> OverlayWriter | None:

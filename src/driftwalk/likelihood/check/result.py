@@ -24,7 +24,7 @@ def white_variables(found: Residuals) -> Parts:
         "autocorrelation_expected": (
             by_lag,
             white.expected,
-            {**ONE, "long_name": "what fitting makes of it if the model is right"},
+            {**ONE, "long_name": "value after fitting if the model is right"},
         ),
         "autocorrelation_std": (by_lag, white.std, ONE),
         "chi_squared_per_dof": (by_component, white.chi_squared, ONE),

@@ -102,8 +102,8 @@ def check_model(
         found = residuals_of(estimate, errors)
     except np.linalg.LinAlgError as error:
         raise InputError(
-            "the model cannot be checked: what is left open by the fit has no finite size; the "
-            "motion tells next to nothing of the flow"
+            "the model cannot be checked: the uncertainty of the fit is infinite; "
+            "the motion says next to nothing about the flow"
         ) from error
     attrs: dict[str, Any] = {
         "kind": "model_check",

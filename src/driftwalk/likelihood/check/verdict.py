@@ -157,7 +157,7 @@ def place_criterion(local: Local, where: Where) -> Criterion:
         p_value,
         f"the mean error of prediction is {off:.1f} sd from zero at {where.place(worst)} "
         f"({local.samples[worst]:.0f} samples), expected below {limit:.1f} in all "
-        f"{cells.size} cells: the flow is not what the fit makes of it there",
+        f"{cells.size} cells: the fitted flow is wrong there",
     )
 
 
@@ -247,7 +247,7 @@ def noise_criterion(spread: Spread, where: Where, *, by: str) -> Criterion:
         name,
         min(1.0, known.size * float(p_values.min())),
         f"the noise is not the same everywhere: {at} the mean square of the errors of prediction "
-        f"is {spread.ratio[worst]:.2f} of that of all, expected 1 ± {spread.std[worst]:.2f}",
+        f"is {spread.ratio[worst]:.2f} of the overall one, expected 1 ± {spread.std[worst]:.2f}",
     )
 
 
@@ -257,16 +257,17 @@ def motion_criterion(motion: Motion | None, *, angle: str) -> Criterion:
         return Criterion("steps", math.nan, "")
     between = float(motion.drawn_between.mean())
     averaged = (
-        "; the fit has averaged the drag over all orientations, which a block that turns does not"
+        "; the fit averaged the drag over all orientations, but a real block turns"
         if angle == "none"
         else ""
     )
     return Criterion(
         "steps",
         motion.p_value,
-        f"simulated recordings have other steps: KS distance {motion.drawn_distance.mean():.3f} to "
+        "simulated recordings have different steps: KS distance "
+        f"{motion.drawn_distance.mean():.3f} to "
         f"those with parameters that the fit allows, expected {between:.3f} ± "
-        f"{motion.drawn_between.std(ddof=1):.3f}, as they have among themselves{averaged}",
+        f"{motion.drawn_between.std(ddof=1):.3f}, the distance among them{averaged}",
     )
 
 

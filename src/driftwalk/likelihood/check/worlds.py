@@ -182,7 +182,8 @@ def _draws(
     widest = float(np.sqrt(np.diag(found).max()))
     if not widest < MOST_LOG_STD:
         raise InputError(
-            "the fit leaves C_d, the force or the tracking noise open by more than a factor of ten"
+            "the fit leaves C_d, the force or the tracking noise uncertain by more "
+            "than a factor of ten"
         )
     logs = generator.multivariate_normal(np.zeros(3), found, size=count)
     free = generator.normal(size=(count, len(spread))) @ spread.T

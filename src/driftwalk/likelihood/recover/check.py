@@ -48,10 +48,10 @@ def check_recovery(study: Study, flow: xr.Dataset | None = None) -> None:
     elif study.recover.flow != RANDOM:
         named = study.recover.flow
         raise InputError(
-            "nothing says how the water moves: name the file of a flow field ([recover] flow), or "
-            'flow = "random"'
+            "the flow of the water is missing: name the file of a flow field "
+            '([recover] flow), or flow = "random"'
             if named is None
-            else f"the flow {named} ([recover] flow) has to be loaded and given along"
+            else f"the flow {named} ([recover] flow) has to be loaded and passed as an argument"
         )
 
 
@@ -70,8 +70,8 @@ def _require_truth(study: Study) -> None:
     for key, value in positive.items():
         if isinstance(value, str) or not value > 0.0:
             raise InputError(
-                f"the truth lacks {key}: a number above 0 is needed to simulate with and to hold "
-                f"the fit beside, got {value!r}"
+                f"the truth lacks {key}: a number above 0 is needed for the "
+                f"simulation and the comparison with the fit, got {value!r}"
             )
     if isinstance(seen.orientation_noise_rad, str) and set(angles_of(study)) != {"none"}:
         raise InputError(
@@ -91,8 +91,8 @@ def _require_length(study: Study) -> None:
         raise InputError(
             f"[recover] durations_s: {shortest:g} s at a sample every "
             f"{settings.sample_interval_s:g} s, {settings.missing_share:.0%} of them missing, are "
-            f"about {samples * kept:.0f} positions; the fit needs {FEWEST_SAMPLES} at least, and "
-            "some minutes to tell anything"
+            f"about {samples * kept:.0f} positions; the fit needs {FEWEST_SAMPLES} at "
+            "least, and some minutes to be of use"
         )
 
 

@@ -56,7 +56,7 @@ class SwisTrackNmeaLoader:
             y=world_y if world else image_y,
             theta=theta,
         )
-        note = "ids repeat within a frame: bodies are told apart by their order in the frame"
+        note = "ids repeat within a frame: bodies are distinguished by their order in the frame"
         return RawRecording(
             bodies,
             length_unit="m" if world else "px",

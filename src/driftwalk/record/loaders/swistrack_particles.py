@@ -52,7 +52,9 @@ class SwisTrackParticlesLoader:
             y=numbers[5 if world else 3],
             theta=numbers[7],
         )
-        note = "particles.csv holds no identities: bodies are told apart by their order in a frame"
+        note = (
+            "particles.csv holds no identities: bodies are distinguished by their order in a frame"
+        )
         return RawRecording(
             bodies,
             clock_unit="s" if timed else "frame",

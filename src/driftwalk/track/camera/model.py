@@ -117,7 +117,7 @@ class Camera(Section):
         description="Height of the images."
     )
     plane_found_by: str | None = Field(
-        default=None, description="What gave the plane of the water: board, rim or scale."
+        default=None, description="Source of the plane of the water: board, rim or scale."
     )
     homography_px_to_m: Nine | None = Field(
         default=None,

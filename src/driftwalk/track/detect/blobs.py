@@ -48,7 +48,7 @@ def median_background(images: list[Image]) -> Image:
     12
     """
     if len(images) < 3:
-        raise InputError(f"a background takes 3 images or more, there are {len(images)}")
+        raise InputError(f"a background needs 3 images or more, there are {len(images)}")
     return np.asarray(np.median(np.stack(images), axis=0), dtype=np.uint8)
 
 

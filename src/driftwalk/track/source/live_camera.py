@@ -78,7 +78,7 @@ class LiveCamera:
         _, _, which = text.partition(":")
         capture = open_capture(int(which) if which.isdigit() else which)
         if not capture.isOpened():
-            raise InputError(f"{public_name(text)}: no such camera, or another program holds it")
+            raise InputError(f"{public_name(text)}: no such camera, or another program uses it")
         # A queue in the driver would hand out old frames.
         capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
         return cls(capture, public_name(text))

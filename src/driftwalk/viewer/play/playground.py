@@ -341,7 +341,7 @@ class PlaySource(Source):
             "id": "density",
             "kind": "density",
             "title": "Step length and turning angle",
-            "note": "Of the blocks that are alone, under the settings as they are now.",
+            "note": "For single blocks, under the present settings.",
             "recording": None if recording is None else recording.steps.name,
         }
         return page_frame(

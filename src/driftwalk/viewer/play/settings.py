@@ -145,8 +145,8 @@ def controls_section(knobs: Mapping[str, Knob], values: Mapping[str, Any]) -> di
         "id": "controls",
         "kind": "controls",
         "title": "Settings",
-        "note": "A change holds from the next draw of the stochastic force on. Without latching, "
-        "what is joined parts too.",
+        "note": "A change takes effect at the next draw of the stochastic force. "
+        "Without latching, joined blocks separate too.",
         "items": [knob.item(values[name]) for name, knob in knobs.items()],
     }
 

@@ -59,8 +59,8 @@ class RunningAssembly:
             {
                 "id": "classes",
                 "kind": "classes",
-                "title": "What the blocks have built so far",
-                "note": f"Of the runs that have ended; the bars hold together with "
+                "title": "Structures built so far",
+                "note": "For the runs that have ended; the bars are simultaneous intervals with "
                 f"{100.0 * confidence:g} % confidence.",
                 "confidence": confidence,
                 "runs": self._runs["fixed"],

@@ -208,7 +208,9 @@ class RunningCalibration:
 
     def _map_section(self) -> Section:
         section = map_section(self._dataset(), self._one_body())
-        waiting = "Settings appear as they are simulated; nothing is final before the run is."
+        waiting = (
+            "Settings appear as they are simulated; nothing is final until the run is finished."
+        )
         return {**section, "note": f"{section['note']} {waiting}"}
 
     def _one_body(self) -> xr.Dataset | None:
@@ -263,8 +265,8 @@ class RunningCalibration:
             "id": "bootstrap",
             "kind": "lines",
             "title": "Bootstrap",
-            "note": "Estimates from recordings that were simulated at the optimum: how far they "
-            "scatter is how well the parameters are known.",
+            "note": "Estimates from recordings simulated at the optimum: their "
+            "scatter shows how well the parameters are known.",
             "x": {"label": "stochastic force σ_F", "unit": "N"},
             "y": {"label": "drag coefficient C_d", "unit": "1"},
             "series": [points],

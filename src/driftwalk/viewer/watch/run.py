@@ -188,8 +188,8 @@ def running_view(folder: Path) -> Running:
         return _view_of(folder, specification)
     except (AttributeError, LookupError, TypeError, ValueError) as error:
         raise InputError(
-            f"{folder / RECORD_FILE} does not say what the run is about: it has been changed or "
-            "damaged; run the same command again, or move the directory away"
+            f"{folder / RECORD_FILE} does not describe the run: it has been changed "
+            "or damaged; run the same command again, or move the directory away"
         ) from error
 
 
@@ -262,7 +262,8 @@ def unfinished_specification(folder: Path) -> dict[str, Any]:
     version = found.get("driftwalk_version")
     if version != __version__:
         raise InputError(
-            f"{folder}: this unfinished run is one of driftwalk {version}, this is {__version__}; "
+            f"{folder}: this unfinished run was made by driftwalk {version}, this is "
+            f"{__version__}; "
             "look at it with that version, or when it is finished"
         )
     return found
