@@ -1,6 +1,5 @@
 """What many blocks build, with what certainty, and how much that depends on the model."""
 
-from driftwalk.assembly.classify import classify
 from driftwalk.assembly.lattice.events import ReplayedEvents, class_at, replay_events
 from driftwalk.assembly.lattice.polyomino import polyomino_cells, polyomino_name, polyominoes
 from driftwalk.assembly.live_world import LiveEvent, LiveTank
@@ -32,6 +31,7 @@ from driftwalk.assembly.outcomes.l1 import (
     pairwise_l1,
 )
 from driftwalk.assembly.outcomes.survival import SurvivalCurve, class_times, survival_curve
+from driftwalk.assembly.recordings import classify
 from driftwalk.assembly.runs.parameters import draw_parameters
 from driftwalk.assembly.runs.path_recording import path_recording
 from driftwalk.assembly.runs.run import assemble, assemble_drawn, assembly_path, check_assembly

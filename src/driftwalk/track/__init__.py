@@ -19,7 +19,7 @@ from driftwalk.track.detect.two_colour.detector import TwoColourDetector
 from driftwalk.track.follow.settings import TrackerSettings
 from driftwalk.track.follow.tracker import Tracker, TrackState
 from driftwalk.track.live import LiveServer, Particle, nmea_frame
-from driftwalk.track.observe.observer import AssemblyObserver, AssemblySeen, SeenEvent, observe
+from driftwalk.track.observer.observer import AssemblyObserver, AssemblySeen, SeenEvent, observe
 from driftwalk.track.overlay import OverlayWriter, draw_states, save_picture
 from driftwalk.track.source.frames import FrameCounts, FrameSource
 from driftwalk.track.source.live_camera import LiveCamera

@@ -12,7 +12,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from lattice_runs import Run, World, random_run
 
-from driftwalk.assembly.classify import classify
+from driftwalk.assembly.recordings import classify
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.schema import build_trajectory
 

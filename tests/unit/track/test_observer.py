@@ -9,13 +9,19 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from driftwalk.assembly import assemble, assembly_path, class_at, classify, path_recording
+from driftwalk.assembly import (
+    assemble,
+    assembly_path,
+    class_at,
+    classify,
+    path_recording,
+)
 from driftwalk.assembly.lattice.polyomino import polyomino_name
 from driftwalk.datasets import tank30_flow
 from driftwalk.model import Study
 from driftwalk.schema import build_trajectory
-from driftwalk.track.observe.observer import AssemblyObserver, observe
-from driftwalk.track.observe.possible import possible_classes
+from driftwalk.track.observer.observer import AssemblyObserver, observe
+from driftwalk.track.observer.possible import possible_classes
 
 RUNS, DURATION = 5, 30.0
 

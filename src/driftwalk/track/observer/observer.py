@@ -16,14 +16,14 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly import classify
-from driftwalk.assembly.classify import HOLD, JOIN_ANGLE, JOIN_DISTANCE, LOOSER, MIN_DURATION
 from driftwalk.assembly.lattice.join_history import Event, JoinHistory
 from driftwalk.assembly.lattice.joined_faces import QUARTER, ROUNDING, Join, JoinRules, PairPoses
 from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
 from driftwalk.assembly.lattice.world import LatticeWorld
+from driftwalk.assembly.recordings import HOLD, JOIN_ANGLE, JOIN_DISTANCE, LOOSER, MIN_DURATION
 from driftwalk.core.errors import InputError
-from driftwalk.track.observe.pair_state import PairState
-from driftwalk.track.observe.possible import Lattice, possible_classes
+from driftwalk.track.observer.pair_state import PairState
+from driftwalk.track.observer.possible import Lattice, possible_classes
 
 if TYPE_CHECKING:
     import xarray as xr
