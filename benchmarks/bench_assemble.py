@@ -62,7 +62,7 @@ def fingerprint(found: Found) -> str:
 
 def distribution(case: Case, found: Found) -> Any:
     """The outcomes of all runs, from what the native core returned."""
-    events = dw.replay_events(
+    events = dw.assembly.replay_events(
         *(found[f"event_{name}"] for name in ("count", "block", "face")),
         **{name: found[name] for name in ("cell", "quarter", "assembly")},
         chirality=case.study.assembly.chirality,
@@ -196,7 +196,7 @@ def print_reference(realisations: int) -> None:
         f"\n{realisations} x {REFERENCE_RUNS} runs of {study.assembly.duration_s:g} s on "
         f"{os.cpu_count()} cores: {wall:.1f} s, {processor:.1f} s of processor time"
     )
-    print(f"mean l1 distance of two realisations {dw.pairwise_l1(found).mean:.3f}")
+    print(f"mean l1 distance of two realisations {dw.assembly.pairwise_l1(found).mean:.3f}")
 
 
 def main() -> None:

@@ -38,7 +38,7 @@ BLOBS = ((640, 480, 4), (1920, 1080, 16))
 
 def settings_for(
     width: int, height: int, markers: int, level: str = "moderate"
-) -> dw.VideoSettings:
+) -> dw.datasets.VideoSettings:
     """A tank that fills the image, its blocks small enough for all to fit."""
     scale = height * 0.95 / 0.30
     side = min(0.03, 0.19 / math.sqrt(markers))
@@ -64,7 +64,7 @@ def blocks(markers: int, frames: int, side: float):
     return build_trajectory(time, x + sway, y - sway, 0.7 * np.arange(markers) + time[:, None])
 
 
-def with_tags(trajectory, settings: dw.VideoSettings) -> list[np.ndarray]:
+def with_tags(trajectory, settings: dw.datasets.VideoSettings) -> list[np.ndarray]:
     """The same frames with coded tags in the place of the blocks, noise and blur alike."""
     tags = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_100)
     side = settings.block_side_m * settings.px_per_m
@@ -101,11 +101,11 @@ def run(width: int, height: int, markers: int, *, rounds: int, frames: int) -> d
     trajectory = blocks(markers, frames, settings.block_side_m)
     images = [image for _, image in dw.render_video(trajectory, settings)]
     tagged = with_tags(trajectory, settings)
-    ours = dw.TwoColourDetector(marker_of(settings), camera_of(settings))
-    peer = dw.TagDetector("4X4_100", camera_of(settings))
+    ours = dw.track.TwoColourDetector(marker_of(settings), camera_of(settings))
+    peer = dw.track.TagDetector("4X4_100", camera_of(settings))
     for name, detector, shown in (("two colours", ours, images), ("ArUco", peer, tagged)):
         require(name, [detector.detect(image)[0] for image in shown], markers)
-    tracker = dw.Tracker(dw.TrackerSettings(max_speed=0.3, bodies=markers))
+    tracker = dw.track.Tracker(dw.track.TrackerSettings(max_speed=0.3, bodies=markers))
     frame = itertools.count()
 
     def follow() -> None:
@@ -135,14 +135,14 @@ def run_heavy(width: int, height: int, markers: int, *, rounds: int, frames: int
         settings = settings_for(width, height, markers, level)
         trajectory = blocks(markers, frames, settings.block_side_m)
         images = [image for _, image in dw.render_video(trajectory, settings)]
-        detector = dw.TwoColourDetector(marker_of(settings), camera_of(settings))
+        detector = dw.track.TwoColourDetector(marker_of(settings), camera_of(settings))
         found = sum(len(detector.detect(image)[0]) for image in images)
         print(f"{level} level: {found} of {markers * frames} markers found")
         ways[level] = partial(_detect_all, detector, images)
     timed(f"{width} x {height}, {markers:2d} markers", ways, rounds=rounds, frames=frames)
 
 
-def _detect_all(detector: dw.TwoColourDetector, images: Sequence[np.ndarray]) -> None:
+def _detect_all(detector: dw.track.TwoColourDetector, images: Sequence[np.ndarray]) -> None:
     for image in images:
         detector.detect(image)
 
@@ -202,7 +202,7 @@ def run_blobs(width: int, height: int, objects: int, *, rounds: int, frames: int
         blurred = cv2.GaussianBlur(image, (0, 0), settings.blur_px).astype(np.float32)
         noise = np.random.default_rng(index).normal(0, settings.noise_std, blurred.shape)
         images.append(np.clip(blurred + noise, 0, 255).astype(np.uint8))
-    ours = dw.BlobDetector(background, camera_of(settings), polarity="dark", objects=objects)
+    ours = dw.track.BlobDetector(background, camera_of(settings), polarity="dark", objects=objects)
     ways = {"blobs": lambda: [ours.detect(image)[0] for image in images]}
     try:
         import trackpy

@@ -1,81 +1,134 @@
 """driftwalk: calibrated stochastic motion models of floating, drifting and stirred robots.
 
-Every public name is resolved on first use, so `import driftwalk` loads nothing heavy. A stage that
-is named like its main function is called as that function: `driftwalk.simulate(study, flow)`.
+The names that most work needs are here, the others by room: `driftwalk.track.Tracker`,
+`driftwalk.plot.plot_flow`. Every name is resolved on first use, so `import driftwalk` loads nothing
+heavy; `__init__.pyi` has the same names for type checkers and editors.
 """
 
 from __future__ import annotations
 
-import sys
-from types import ModuleType
 from typing import Any
 
 __version__ = "0.1.0"
 
-# The stages whose public names are also names of the package; a stage's `__all__` is the only list
-# of its names.
-_STAGES = (
-    "record",
-    "flow",
-    "model",
-    "simulation",
-    "comparison",
-    "calibration",
-    "likelihood",
+_ROOMS = (
     "assembly",
-    "track",
+    "calibration",
+    "comparison",
     "datasets",
-    "plot",
     "figures",
+    "flow",
+    "likelihood",
+    "model",
     "page",
+    "plot",
+    "record",
+    "runs",
+    "simulation",
+    "sweep",
+    "track",
     "viewer",
 )
 
+# From a module to the names of the package that are found there.
+_NAMES = {
+    "driftwalk.assembly": (
+        "LiveTank",
+        "assemble",
+        "assemble_drawn",
+        "assembly_path",
+        "class_times",
+        "classify",
+        "l1_distance",
+        "l1_noise_floor",
+        "outcome_distribution",
+        "path_recording",
+        "principal_components",
+        "sensitivity_indices",
+        "sensitivity_map",
+        "sensitivity_reference",
+    ),
+    "driftwalk.calibration": ("calibrate",),
+    "driftwalk.comparison": (
+        "ComparisonWarning",
+        "compare",
+        "ks_distance",
+        "steps",
+    ),
+    "driftwalk.core.errors": (
+        "ConfigurationError",
+        "DriftwalkError",
+        "FormatError",
+        "InputError",
+        "RunDirectoryError",
+    ),
+    "driftwalk.datasets": (
+        "render_video",
+        "tank30_flow",
+        "tank30_recording",
+        "tank30_truth",
+        "video_settings",
+        "video_truth",
+        "write_video",
+    ),
+    "driftwalk.flow": (
+        "extract_flow",
+        "flow_from_function",
+        "jets_flow",
+        "load_flow",
+        "save_flow",
+        "uniform_flow",
+        "vortex_flow",
+    ),
+    "driftwalk.likelihood": (
+        "check_model",
+        "fit_motion",
+        "fitted_flow",
+        "recovery_study",
+        "score_fit",
+    ),
+    "driftwalk.model": (
+        "Study",
+        "apply_overrides",
+        "load_study",
+    ),
+    "driftwalk.page": (
+        "report_page",
+        "write_report",
+    ),
+    "driftwalk.record": (
+        "describe",
+        "load",
+        "readable_formats",
+        "save_trajectory",
+    ),
+    "driftwalk.simulation": (
+        "simulate",
+        "simulate_like",
+    ),
+    "driftwalk.track": (
+        "observe",
+        "open_source",
+    ),
+    "driftwalk.viewer": ("serve",),
+}
+_MODULE_OF = {name: module for module, names in _NAMES.items() for name in names}
 
-class _Stage(ModuleType):
-    """A stage that holds a function of its own name, and is called as that function."""
-
-    def __call__(self, *arguments: Any, **options: Any) -> Any:
-        """Call the function that the stage is named after."""
-        return getattr(self, self.__name__.rpartition(".")[2])(*arguments, **options)
-
-
-class _Package(ModuleType):
-    """The package: makes a stage callable at the moment at which the import system adds it.
-
-    Without this, `driftwalk.compare` would be the function or the stage, depending on what was
-    imported before.
-    """
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if isinstance(value, ModuleType) and name in getattr(value, "__all__", ()):
-            value.__class__ = _Stage
-        super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package
+__all__ = ["__version__", *_ROOMS, *_MODULE_OF]
 
 
 def __getattr__(name: str) -> Any:
-    """Resolve a public name of a stage, or a stage itself, on first use."""
+    """Resolve a room, or a name of one, on first use."""
     import importlib
 
-    if name in _STAGES:
+    if name in _ROOMS:
         return importlib.import_module(f"driftwalk.{name}")
-    if not name.startswith("_"):
-        for stage in _STAGES:
-            module = importlib.import_module(f"driftwalk.{stage}")
-            if name in module.__all__:
-                globals()[name] = getattr(module, name)
-                return globals()[name]
+    if name in _MODULE_OF:
+        globals()[name] = getattr(importlib.import_module(_MODULE_OF[name]), name)
+        return globals()[name]
     raise AttributeError(f"module 'driftwalk' has no attribute '{name}'")
 
 
 def __dir__() -> list[str]:
-    """List the public names of every stage."""
-    import importlib
-
-    names = {"__version__", *_STAGES}
-    for stage in _STAGES:
-        names.update(importlib.import_module(f"driftwalk.{stage}").__all__)
-    return sorted(names)
+    """List the public names."""
+    return sorted(__all__)

@@ -107,7 +107,7 @@ def rows(
         "two are shown",
         f"{share[0]:.0%} and {share[1]:.0%} of the variance",
     )
-    aligned = dw.disconnected_alignment(components)
+    aligned = dw.assembly.disconnected_alignment(components)
     yield (
         "component 1",
         '"aligned with the physically disconnected" classes',

@@ -109,7 +109,7 @@ def lines_of(known: Known, out: Path, done: set[tuple[str, str]]) -> Iterator[di
         answer = by_likelihood(known, fits[angle], seconds[angle])
         yield line_of(known, f"fit, angle {angle}", answer, fits["state"], out)
     flows: dict[str, Callable[[], xr.Dataset]] = {
-        "own": lambda: dw.recording_flow(known.recording, known.study),
+        "own": lambda: dw.calibration.recording_flow(known.recording, known.study),
         "fitted": lambda: dw.fitted_flow(fits["state"]),
         "true": lambda: known.flow,
     }
@@ -185,7 +185,7 @@ def flow_error(known: Known, flow: xr.Dataset, fit: xr.Dataset) -> float:
     All flows are judged in the same cells: the nodes are those of the fit, and so is where the
     block has been.
     """
-    at_nodes = dw.bilinear(flow, *np.meshgrid(fit["x"].values, fit["y"].values))
+    at_nodes = dw.flow.bilinear(flow, *np.meshgrid(fit["x"].values, fit["y"].values))
     other = fit.assign(
         {name: fit[name].copy(data=part) for name, part in zip("uv", at_nodes, strict=True)}
     )

@@ -107,7 +107,7 @@ def teach(video: Path, markers: Path) -> None:
     """Learn the markers; the proposal takes the red disc for the first, and so it is here."""
     words = (video, *TANK, "--side", "3cm", "-o", markers, "--overwrite")
     driftwalk("markers", "teach", *words)
-    if dw.load_markers(markers).colour_1.a_star < 0.0:
+    if dw.track.load_markers(markers).colour_1.a_star < 0.0:
         raise CommandFailed(f"{markers}: the first disc was taken for the second")
 
 

@@ -50,7 +50,7 @@ class Scene:
         return 1 if self.set_name == "closed-loop" else BLOCKS
 
     @property
-    def settings(self) -> dw.VideoSettings:
+    def settings(self) -> dw.datasets.VideoSettings:
         """What the camera sees: one of the fixed levels."""
         level = "heavy" if self.set_name == "heavy" else "moderate"
         return dw.video_settings(level, seed=self.seed)

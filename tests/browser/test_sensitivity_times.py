@@ -213,7 +213,7 @@ def test_a_running_analysis_shows_the_settings_that_are_there(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Its server is asked for a setting; the reference is what there is of it so far."""
-    study = dw.parse_study(found.attrs["study"])
+    study = dw.model.parse_study(found.attrs["study"])
     flow = dw.load_flow(FLOW)
     specification = {"study": study.to_dict(), "flow_sha256": "0", "flows_sha256": {}}
     with RunDirectory(tmp_path / "run", specification=specification) as opened:

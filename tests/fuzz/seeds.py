@@ -234,8 +234,8 @@ def _images(place: Path) -> Iterator[Seed]:
             cv2.imwrite(str(folder / "images" / f"{index}.png"), frame.image)
         times = "".join(f"{index}.png,{0.1 * index:.1f}\n" for index in range(4))
         _write(folder / "images", {"times.csv": f"file,time_s\n{times}"})
-        dw.save_markers(folder / "markers.toml", marker_of(settings))
-        dw.save_camera(folder / "camera.toml", camera_of(settings))
+        dw.track.save_markers(folder / "markers.toml", marker_of(settings))
+        dw.track.save_camera(folder / "camera.toml", camera_of(settings))
 
     folder = _kept(place / "film", make)
     common = ("--out", "@/tracked.nc", "--bodies", "2")

@@ -38,7 +38,7 @@ def synthetic_recording(duration: float, seed: int = 5):
             "observation.orientation_noise_rad": 0.01,
         },
     )
-    start = dw.Start(0.05, 0.0, 0.0)
+    start = dw.simulation.Start(0.05, 0.0, 0.0)
     run = dw.simulate(study, dw.tank30_flow(), start=start, seed=seed).isel(replicate=0, body=0)
     return build_trajectory(run["time"], run["x"], run["y"], run["theta"])
 

@@ -145,7 +145,7 @@ def test_board_to_metres_and_poses(boards: Path, tmp_path: Path) -> None:
     assert found["images_used"] == 1 + len(HELD)
     assert found["lens_rms_px"] < 0.3
     assert found["plane_rms_px"] < 0.3
-    camera = dw.load_camera(toml)
+    camera = dw.track.load_camera(toml)
     grid = np.stack(np.meshgrid(np.linspace(40, 440, 15), np.linspace(20, 340, 12)), axis=-1)
     pixels = grid.reshape(-1, 2)
     true = water(pixels)
@@ -157,7 +157,7 @@ def test_board_to_metres_and_poses(boards: Path, tmp_path: Path) -> None:
 
     blocks = moving_blocks(20)
     video = dw.write_video(tmp_path / "video.mkv", blocks, TILTED)
-    markers = dw.save_markers(tmp_path / "m.toml", marker_of(TILTED))
+    markers = dw.track.save_markers(tmp_path / "m.toml", marker_of(TILTED))
     for words in ((), ("--tank-diameter", "30cm")):
         out = tmp_path / f"r{len(words)}.nc"
         done = here("track", video, "--markers", markers, "--camera", toml, *words, "-o", out)
@@ -179,15 +179,15 @@ def test_the_rim_gives_the_centre_where_the_board_lay_aside(boards: Path, tmp_pa
     """The board's middle is moved by 2 cm in the file; the tank is found where it is."""
     toml = tmp_path / "camera.toml"
     assert calibrated(boards, toml).code == 0
-    camera = dw.load_camera(toml)
+    camera = dw.track.load_camera(toml)
     aside = np.array([[1, 0, 0.02], [0, 1, 0], [0, 0, 1]]) @ np.reshape(
         camera.homography_px_to_m, (3, 3)
     )
     nine = tuple(aside.ravel().tolist())
-    dw.save_camera(toml, camera.model_copy(update={"homography_px_to_m": nine}))
+    dw.track.save_camera(toml, camera.model_copy(update={"homography_px_to_m": nine}))
     blocks = moving_blocks(8, bodies=1)
     video = dw.write_video(tmp_path / "video.mkv", blocks, TILTED)
-    markers = dw.save_markers(tmp_path / "m.toml", marker_of(TILTED))
+    markers = dw.track.save_markers(tmp_path / "m.toml", marker_of(TILTED))
     track = ("track", video, "--markers", markers, "--camera", toml)
     done = here(*track, "--tank-diameter", "30cm", "-o", tmp_path / "centred.nc")
     assert done.code == 0, done.err

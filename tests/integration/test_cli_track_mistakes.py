@@ -58,7 +58,7 @@ def test_images_of_different_sizes(words: list[object], tmp_path: Path) -> None:
 def test_a_folder_that_does_not_say_when(words: list[object], tmp_path: Path) -> None:
     folder = image_folder(tmp_path / "images", images_of(Path(str(words[0])))[:3])
     (folder / "notes.txt").write_text("not an image")
-    assert dw.frame_count(folder) == 3
+    assert dw.track.frame_count(folder) == 3
     track = ("track", folder, *words[1:], "-o", tmp_path / "r.nc")
     assert "(--image-rate)" in refusal(here(*track))
     assert "--image-rate must be above zero" in refusal(here(*track, "--image-rate", "0"))

@@ -59,7 +59,7 @@ def test_page_of_a_finished_run(server: PageServer, finished: Path) -> None:
     assert sent["state"]["finished"] is True
     found = xr.load_dataset(finished / "calibration.nc", engine="h5netcdf")
     section = next(part for part in sent["sections"] if part["kind"] == "map")
-    np.testing.assert_allclose(dw.decode_array(section["value"]), found["ks_distance"].values)
+    np.testing.assert_allclose(dw.page.decode_array(section["value"]), found["ks_distance"].values)
 
 
 def test_files_and_report(server: PageServer, finished: Path) -> None:
@@ -311,7 +311,7 @@ def test_a_sweep_that_has_not_begun(tmp_path: Path) -> None:
     ):
         page = received(channel, "page")["page"]
         assert page["state"] == {"finished": False, "progress": 0.0, "words": "map: 0 %"}
-        value = dw.decode_array(page["sections"][0]["value"])
+        value = dw.page.decode_array(page["sections"][0]["value"])
         assert np.isnan(value).all()
         say(channel, type="cell", id="map", row=0, column=0)
         assert received(channel, "cell")["excerpt_x"] is None

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import driftwalk as dw
 from driftwalk.assembly.runs.plan import make_plan, simulate_rows, start_poses
@@ -72,7 +71,7 @@ def test_pieces_do_not_matter(
     found = whole_run(model, flow, seed, steps)
     assert np.array_equal(np.stack([tank.x, tank.y, tank.theta], axis=1), found["pose"])
     assert np.array_equal(tank.assembly, found["assembly"])
-    assert tank.outcome == dw.world_class(found["cell"], found["assembly"])
+    assert tank.outcome == dw.assembly.world_class(found["cell"], found["assembly"])
     events = tank.events()
     count = int(found["event_count"])
     assert [round(event.time / STEP) for event in events] == found["event_step"][:count].tolist()

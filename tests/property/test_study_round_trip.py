@@ -6,8 +6,7 @@ import math
 import tomllib
 from typing import Any
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.model import Study, apply_overrides, parse_study, study_template

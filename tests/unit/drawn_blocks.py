@@ -20,14 +20,14 @@ def moving_blocks(frames: int, bodies: int = 4, rate: float = 10.0) -> xr.Datase
     return build_trajectory(time, x, y, 2.3 * angle + 0.6 * time[:, None])
 
 
-def marker_of(settings: dw.VideoSettings) -> dw.TwoColourMarker:
+def marker_of(settings: dw.datasets.VideoSettings) -> dw.track.TwoColourMarker:
     """Return the marker that the renderer draws."""
     colours = []
     for red, green, blue in (settings.disc_1, settings.disc_2):
         pixel = np.array([[[blue, green, red]]], dtype=np.uint8)
         _, a_star, b_star = cv2.cvtColor(pixel, cv2.COLOR_BGR2Lab)[0, 0].astype(float)
         colours.append({"a_star": a_star - 128, "b_star": b_star - 128})
-    return dw.TwoColourMarker(
+    return dw.track.TwoColourMarker(
         spacing_m=settings.marker_spacing_m,
         size_m=settings.marker_diameter_m,
         angle_offset_rad=settings.marker_angle_rad,
@@ -36,9 +36,9 @@ def marker_of(settings: dw.VideoSettings) -> dw.TwoColourMarker:
     )
 
 
-def camera_of(settings: dw.VideoSettings) -> dw.Camera:
+def camera_of(settings: dw.datasets.VideoSettings) -> dw.track.Camera:
     """Return the camera of a video without tilt and distortion."""
-    return dw.Camera.from_scale(
+    return dw.track.Camera.from_scale(
         settings.width_px,
         settings.height_px,
         px_per_m=settings.px_per_m,

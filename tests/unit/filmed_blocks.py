@@ -28,7 +28,7 @@ def film(folder: Path, trajectory: xr.Dataset | None = None, *, frames: int = 24
     blocks = moving_blocks(frames, bodies=2) if trajectory is None else trajectory
     video = dw.write_video(folder / "video.mkv", blocks, settings)
     marker = marker_of(settings).model_copy(update={"block_side_m": settings.block_side_m})
-    return [video, "--markers", dw.save_markers(folder / "m.toml", marker), *TANK]
+    return [video, "--markers", dw.track.save_markers(folder / "m.toml", marker), *TANK]
 
 
 def images_of(video: Path) -> list[np.ndarray]:

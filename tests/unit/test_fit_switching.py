@@ -237,7 +237,7 @@ def test_switching_times_that_do_not_fit_are_refused(
     settings: dict[str, object], message: str
 ) -> None:
     with pytest.raises(InputError, match=message) as caught:
-        dw.check_fit(two_flows(), coarse_study(**settings))
+        dw.likelihood.check_fit(two_flows(), coarse_study(**settings))
     assert "\n" not in str(caught.value)
 
 
@@ -279,7 +279,7 @@ def remembering(count: int, size: float, memory: float) -> np.ndarray:
 
 
 def test_a_moving_block_is_not_refused() -> None:
-    dw.check_fit(moving(), coarse_study())
+    dw.likelihood.check_fit(moving(), coarse_study())
 
 
 @pytest.mark.parametrize(
@@ -291,7 +291,7 @@ def test_a_block_that_only_seems_to_move_is_refused(size: float, memory: float) 
     x, y = 0.02 + remembering(3000, size, memory), 0.03 + remembering(3000, size, memory)[::-1]
     words = r"made\.csv: the body never moves: .*nothing to fit"
     with pytest.raises(InputError, match=words) as caught:
-        dw.check_fit(moving(x=x, y=y), coarse_study())
+        dw.likelihood.check_fit(moving(x=x, y=y), coarse_study())
     assert "\n" not in str(caught.value)
 
 
@@ -299,7 +299,7 @@ def test_jumps_of_the_tracker_are_no_motion() -> None:
     x = 0.02 + 3e-4 * np.random.default_rng(4).normal(size=3000)
     x[::1000] = 0.1
     with pytest.raises(InputError, match="never moves"):
-        dw.check_fit(moving(x=x, y=np.full(3000, 0.01)), coarse_study())
+        dw.likelihood.check_fit(moving(x=x, y=np.full(3000, 0.01)), coarse_study())
 
 
 def test_a_block_at_rest_in_one_interval_is_refused_by_its_times() -> None:
@@ -308,14 +308,14 @@ def test_a_block_at_rest_in_one_interval_is_refused_by_its_times() -> None:
         track[name].values[1000:2000] = track[name].values[1000]
     study = coarse_study(switching_times_s=[100.0, 200.0])
     with pytest.raises(InputError, match=r"made\.csv: 100 s to 200 s: the body never moves"):
-        dw.check_fit(track, study)
+        dw.likelihood.check_fit(track, study)
 
 
 def test_all_intervals_at_the_wall() -> None:
     angle = 0.05 * np.arange(3000)
     track = moving(x=0.135 * np.cos(angle), y=0.135 * np.sin(angle))
     with pytest.raises(InputError, match="all 2999 intervals are at the wall of the tank"):
-        dw.check_fit(track, coarse_study())
+        dw.likelihood.check_fit(track, coarse_study())
 
 
 def test_a_flow_with_the_block_at_the_wall_is_named() -> None:
@@ -325,23 +325,23 @@ def test_a_flow_with_the_block_at_the_wall_is_named() -> None:
     track["y"].values[1000:2000, 0] = 0.135 * np.sin(angle)
     study = coarse_study(switching_times_s=[100.0, 200.0], flow_labels=["A", "pump", "A"])
     with pytest.raises(InputError, match="flow pump \\(100 s to 200 s\\): all 999 intervals"):
-        dw.check_fit(track, study)
+        dw.likelihood.check_fit(track, study)
 
 
 @pytest.mark.parametrize("angle", ["state", "given"])
 def test_angles_that_are_not_there(angle: str) -> None:
     blind = moving(theta=np.full(3000, np.nan))
     with pytest.raises(InputError, match=r"made\.csv: the recording has no orientations") as caught:
-        dw.check_fit([moving(), blind], coarse_study(), angle=angle)
+        dw.likelihood.check_fit([moving(), blind], coarse_study(), angle=angle)
     assert angle in str(caught.value)
 
 
 def test_too_short_says_how_long() -> None:
     with pytest.raises(InputError, match=r"10 to 30 min give C_d to 10 %.* about 5 %"):
-        dw.check_fit(moving(50), coarse_study())
+        dw.likelihood.check_fit(moving(50), coarse_study())
     # The sd falls with the root of the length: 20 min for 5 % with angles, so 125 for 2 %.
     with pytest.raises(InputError, match=r"For C_d to 2 % record some 2.1 h with .* 8.4 h without"):
-        dw.check_fit(moving(50), coarse_study(drag_coefficient_precision=0.02))
+        dw.likelihood.check_fit(moving(50), coarse_study(drag_coefficient_precision=0.02))
 
 
 def test_lengths_in_words() -> None:

@@ -1,31 +1,53 @@
-"""The names of the package: resolved on first use, one list per stage."""
+"""The names of the package: resolved on first use, and the same for type checkers."""
 
 from __future__ import annotations
 
+import ast
+import importlib
+import pickle
+from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import pytest
 
 import driftwalk
-from driftwalk.model import Study
+
+STUB = Path(driftwalk.__file__).with_name("__init__.pyi")
 
 
-def test_public_names_resolve_to_the_stages() -> None:
-    listed: dict[str, Any] = {name: getattr(driftwalk, name) for name in dir(driftwalk)}
-    assert listed["Study"] is Study
-    assert listed["model"].__name__ == "driftwalk.model"
-    stages = [value for value in listed.values() if isinstance(value, ModuleType)]
-    assert stages
-    for stage in stages:
-        assert all(hasattr(stage, name) for name in stage.__all__), stage.__name__
+def names_of_stub() -> dict[str, str]:
+    """Return every name that the stub declares, with the module that it is from."""
+    found = {}
+    for node in ast.parse(STUB.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                # Without `as` a stub does not pass a name on.
+                assert alias.asname == alias.name
+                found[alias.name] = str(node.module)
+    return found
 
 
-def test_a_name_stands_in_one_stage_only() -> None:
-    seen: dict[str, str] = {}
-    for stage in (getattr(driftwalk, name) for name in driftwalk._STAGES):
-        for name in stage.__all__:
-            assert seen.setdefault(name, stage.__name__) == stage.__name__, name
+def test_stub_declares_what_the_package_has() -> None:
+    rooms = dict.fromkeys(driftwalk._ROOMS, "driftwalk")
+    assert names_of_stub() == {**rooms, **driftwalk._MODULE_OF}
+
+
+def test_every_name_is_that_of_its_room() -> None:
+    for name, module in names_of_stub().items():
+        found = getattr(driftwalk, name)
+        if module == "driftwalk":
+            assert isinstance(found, ModuleType)
+        else:
+            assert found is getattr(importlib.import_module(module), name)
+        assert name in dir(driftwalk)
+
+
+def test_a_room_that_is_imported_hides_no_name() -> None:
+    for room in driftwalk._ROOMS:
+        importlib.import_module(f"driftwalk.{room}")
+    assert not [
+        name for name in driftwalk._MODULE_OF if isinstance(getattr(driftwalk, name), ModuleType)
+    ]
 
 
 def test_unknown_name_is_an_attribute_error() -> None:
@@ -33,17 +55,13 @@ def test_unknown_name_is_an_attribute_error() -> None:
         _ = driftwalk.studdy
 
 
-def test_stage_named_like_its_function_is_called_as_it() -> None:
-    stage = ModuleType("driftwalk.drift")
-    stage.__dict__.update(__all__=["drift", "other"], drift=lambda speed, *, time: speed * time)
-    plain = ModuleType("driftwalk.plain")
-    plain.__dict__.update(__all__=["other"])
-    # The import system adds a module to its package in this way.
-    for name, module in (("drift", stage), ("plain", plain)):
-        setattr(driftwalk, name, module)
-    try:
-        assert driftwalk.drift(2.0, time=3.0) == 6.0
-        assert driftwalk.drift.__all__ == ["drift", "other"]
-        assert not callable(driftwalk.plain)
-    finally:
-        del driftwalk.drift, driftwalk.plain
+def test_functions_pickle_and_show_their_signature() -> None:
+    assert pickle.loads(pickle.dumps(driftwalk.simulate)) is driftwalk.simulate
+    assert "Simulate one block" in str(driftwalk.simulate.__doc__)
+
+
+def test_errors_are_exported() -> None:
+    with pytest.raises(driftwalk.InputError) as caught:
+        driftwalk.simulate(driftwalk.Study(), driftwalk.uniform_flow(0.0, 0.0), replicates=0)
+    assert isinstance(caught.value, driftwalk.DriftwalkError)
+    assert isinstance(caught.value, ValueError)

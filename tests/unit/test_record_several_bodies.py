@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from driftwalk.core.errors import InputError
-from driftwalk.record import body_columns as candidates
-from driftwalk.record import load, text
+from driftwalk.record import body_columns as candidates, load, text
 from driftwalk.record.clean import clean_body
 from driftwalk.record.column_names import column_meaning
 from driftwalk.record.raw import RawBody

@@ -128,7 +128,7 @@ def test_the_dataset_is_whole(found: xr.Dataset) -> None:
     assert found["force_std"].attrs["units"] == "N"
     for name, value in (("drag_coefficient", 0.4), ("force_std_N", 6e-4)):
         assert found.attrs[name] == value
-    assert dw.parse_study(found.attrs["study"]).recover.recordings == 2
+    assert dw.model.parse_study(found.attrs["study"]).recover.recordings == 2
     assert np.isfinite(found["needed_duration"].values).all()
     assert found.attrs["flow"] == "flow_true.csv"
 
@@ -186,30 +186,30 @@ def test_a_simulation_that_breaks_is_data(
 def test_refusals(changes: dict, words: str, flow: xr.Dataset) -> None:
     study = apply_overrides(small_study(), changes)
     with pytest.raises(InputError, match=words):
-        dw.check_recovery(study, flow)
+        dw.likelihood.check_recovery(study, flow)
     with pytest.raises(InputError, match=words):
         dw.recovery_study(study, flow)
 
 
 def test_refusals_of_flows(flow: xr.Dataset) -> None:
     with pytest.raises(InputError, match="nothing says how the water moves"):
-        dw.check_recovery(small_study())
+        dw.likelihood.check_recovery(small_study())
     with pytest.raises(InputError, match=r"flow\.nc .* has to be loaded"):
-        dw.check_recovery(small_study(flow="flow.nc"))
+        dw.likelihood.check_recovery(small_study(flow="flow.nc"))
     frames = flow.expand_dims(time=[0.0, 1.0])
     with pytest.raises(InputError, match="frames"):
-        dw.check_recovery(small_study(), frames)
+        dw.likelihood.check_recovery(small_study(), frames)
     with pytest.raises(InputError, match="it spans x from"):
-        dw.check_recovery(small_study(), dw.jets_flow(diameter=0.2))
+        dw.likelihood.check_recovery(small_study(), dw.jets_flow(diameter=0.2))
     narrow = flow.assign(flag=flow["flag"].where(abs(flow["x"]) < 0.1, 0))
     with pytest.raises(InputError, match="nodes in there are flagged as outside"):
-        dw.check_recovery(small_study(), narrow)
-    dw.check_recovery(small_study(flow="random"))
+        dw.likelihood.check_recovery(small_study(), narrow)
+    dw.likelihood.check_recovery(small_study(flow="random"))
 
 
 def test_without_orientation_its_noise_is_not_asked_for(flow: xr.Dataset) -> None:
     changes = {"observation.orientation_noise_rad": "estimate", "recover.angle": ["none"]}
-    dw.check_recovery(apply_overrides(small_study(), changes), flow)
+    dw.likelihood.check_recovery(apply_overrides(small_study(), changes), flow)
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,7 @@ import pytest
 from synthetic_calibration import bundled_flow, bundled_recording, synthetic_calibration
 
 from driftwalk.core.errors import InputError
-from driftwalk.figures import calibration as figures
-from driftwalk.figures import write_figures
+from driftwalk.figures import calibration as figures, write_figures
 from driftwalk.plot.parts.style import STYLE, print_style
 
 NAMES = [

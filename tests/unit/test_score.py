@@ -92,7 +92,8 @@ def test_the_flow_error_by_brute_force(fit: xr.Dataset, track: xr.Dataset) -> No
             ]
             means = [
                 np.mean(
-                    [dw.bilinear(one, [px for px, _ in places], [py for _, py in places])], axis=-1
+                    [dw.flow.bilinear(one, [px for px, _ in places], [py for _, py in places])],
+                    axis=-1,
                 )
                 for one in (estimated, truth)
             ]

@@ -54,7 +54,7 @@ def test_distances_are_those_of_the_simulated_paths() -> None:
     for world, steps in enumerate(_steps_one_by_one(worlds)):
         assert scored["pairs"][world] == len(steps) == PLAN.pairs
         assert scored["ks_distance"][world] == dw.ks_distance(REFERENCE, steps)
-        compared = dw.ks_compare(REFERENCE, steps)
+        compared = dw.comparison.ks_compare(REFERENCE, steps)
         place = compared.place
         got = [scored[f"ks_{key}"][world] for key in ("step_length", "turning_angle", "quadrant")]
         assert got == [place.x, place.y, place.quadrant]

@@ -7,8 +7,7 @@ import time as clock
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.signal import savgol_filter
 
 from driftwalk.core.errors import InputError

@@ -7,8 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, reject, settings
-from hypothesis import strategies as st
+from hypothesis import given, reject, settings, strategies as st
 
 from driftwalk.comparison import ComparisonWarning, apply_steps, plan_steps, steps
 from driftwalk.core.errors import InputError

@@ -38,7 +38,7 @@ def check_recording(
     Examples
     --------
     >>> import driftwalk as dw
-    >>> dw.check_recording(dw.tank30_recording(), dw.Study(), flow=dw.tank30_flow())
+    >>> dw.calibration.check_recording(dw.tank30_recording(), dw.Study(), flow=dw.tank30_flow())
     """
     track = body_track(recording, body)
     camera = recorded_camera(track, study, position_quantum=0.0)

@@ -91,8 +91,7 @@ def simulate(
     """Simulate the motion of the block."""
     from driftwalk.core.atomic import write_atomic
     from driftwalk.flow import load_flow
-    from driftwalk.simulation import simulate as run
-    from driftwalk.simulation import simulate_like
+    from driftwalk.simulation import simulate as run, simulate_like
 
     if backend not in ("cpu", "reference"):
         raise InputError(f"--backend takes cpu or reference, got '{backend}'")

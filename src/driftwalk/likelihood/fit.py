@@ -177,7 +177,7 @@ def check_fit(
     Examples
     --------
     >>> import driftwalk as dw
-    >>> dw.check_fit(dw.tank30_recording())
+    >>> dw.likelihood.check_fit(dw.tank30_recording())
     """
     from driftwalk.model import Study
 

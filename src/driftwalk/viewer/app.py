@@ -13,8 +13,7 @@ from typing import Any, Final
 from fastapi import FastAPI, HTTPException
 from fastapi.responses import FileResponse, HTMLResponse, PlainTextResponse, Response
 from starlette.datastructures import Headers, QueryParams
-from starlette.types import ASGIApp, Receive, Scope, Send
-from starlette.types import Message as AsgiMessage
+from starlette.types import ASGIApp, Message as AsgiMessage, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from driftwalk.core.errors import FormatError

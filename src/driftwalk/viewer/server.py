@@ -49,7 +49,7 @@ def serve(
     Examples
     --------
     >>> import driftwalk as dw
-    >>> dw.serve(dw.RunSource("run"), ready=print)  # doctest: +SKIP
+    >>> dw.serve(dw.viewer.RunSource("run"), ready=print)  # doctest: +SKIP
     http://127.0.0.1:8765/
     """
     uvicorn = require_server()

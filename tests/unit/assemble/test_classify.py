@@ -8,8 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from lattice_runs import Run, World, random_run
 
 from driftwalk.assembly.recordings import classify

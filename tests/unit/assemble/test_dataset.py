@@ -97,7 +97,7 @@ def test_every_variable_has_the_dimensions_of_the_contract() -> None:
     assert (facts["kind"], facts["blocks"], facts["runs"], facts["duration_s"]) == (
         *("assembly", 3, 3, 10.0),
     )
-    assert dw.parse_study(facts["study"]).forces.drag_coefficient == 0.4
+    assert dw.model.parse_study(facts["study"]).forces.drag_coefficient == 0.4
     assert {"seed", "chirality", "latching", "hidden_face_drag", "arena"} <= facts.keys()
     assert {"block_side_m", "time_step_s", "force_interval_s"} <= facts.keys()
 

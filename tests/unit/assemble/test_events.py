@@ -7,8 +7,7 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from lattice_runs import Run, random_run, raw_arrays, small_name
 
 from driftwalk.assembly.lattice.events import ReplayedEvents, class_at, replay_events

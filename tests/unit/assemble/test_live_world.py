@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 from twin.assembly import advance, block_normals, make_rules, start_world
 from twin.latch import Latch
-from twin_assembly import study as tank_study
-from twin_assembly import swirl
+from twin_assembly import study as tank_study, swirl
 
 import driftwalk as dw
 from driftwalk.assembly.runs.address import stream_keys

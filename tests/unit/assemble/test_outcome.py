@@ -6,8 +6,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from lattice_runs import form, random_run, raw_arrays
 
 from driftwalk.assembly.outcomes.classes import (

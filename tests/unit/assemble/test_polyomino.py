@@ -7,8 +7,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from lattice_runs import NAMED, form
 
 from driftwalk.assembly.lattice.polyomino import polyomino_cells, polyomino_name, polyominoes

@@ -17,8 +17,7 @@ from twin.assembly import (
     integrate,
 )
 from twin.block import TwinModel, flow_at, simulate_reference
-from twin.body import Assembly
-from twin.body import single_block as one_block
+from twin.body import Assembly, single_block as one_block
 from twin.contacts import Pair, collide, contact_points, overlap, separate
 from twin.latch import Latch, candidates, latch_once, merged
 from twin.wall import meet_wall

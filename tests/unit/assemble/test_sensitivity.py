@@ -117,7 +117,7 @@ def test_distances_and_floors(found: xr.Dataset, reference: xr.Dataset) -> None:
     floor = dw.l1_noise_floor(reference, RUNS, RUNS * REALISATIONS)
     assert found.attrs["noise_floor_mean"] == floor.mean
     assert found.attrs["noise_floor_95"] == floor.quantile
-    in_floors = dw.l1_in_floors(
+    in_floors = dw.assembly.l1_in_floors(
         found["proportion"].values, known, runs=RUNS, reference_runs=RUNS * REALISATIONS
     )
     np.testing.assert_allclose(found["l1_in_floors"], in_floors)
@@ -299,7 +299,7 @@ def test_sobol_bounds_are_the_ends_of_the_map() -> None:
     ],
 )
 def test_axes_that_cannot_be(study: dw.Study, axes: dict[str, Any], says: str) -> None:
-    for function in (dw.check_sensitivity, dw.sensitivity_map):
+    for function in (dw.assembly.check_sensitivity, dw.sensitivity_map):
         with pytest.raises(InputError) as caught:
             function(study, FLOW, axes=axes)
         assert says in str(caught.value)
@@ -308,7 +308,7 @@ def test_axes_that_cannot_be(study: dw.Study, axes: dict[str, Any], says: str) -
 def test_blocks_that_find_no_place_are_the_users_to_mend() -> None:
     """Enough room by area, not in fact: said before the map, and by the map too."""
     study = small(assembly={"blocks": 14})
-    for function in (dw.check_sensitivity, dw.sensitivity_reference):
+    for function in (dw.assembly.check_sensitivity, dw.sensitivity_reference):
         with pytest.raises(InputError, match="of 14 blocks found a place in the tank"):
             function(study, FLOW)
 
@@ -321,8 +321,8 @@ def test_a_reference_of_the_other_chirality(study: dw.Study, reference: xr.Datas
 
 def test_sobol_needs_two_runs_and_a_power_of_two(study: dw.Study) -> None:
     with pytest.raises(InputError, match="at least 2 runs of each setting"):
-        dw.check_indices(small(sensitivity={"runs": 1}), FLOW, samples=8)
+        dw.assembly.check_indices(small(sensitivity={"runs": 1}), FLOW, samples=8)
     with pytest.raises(InputError, match="a power of two"):
-        dw.check_indices(study, FLOW, samples=9)
+        dw.assembly.check_indices(study, FLOW, samples=9)
     with pytest.raises(InputError, match="nothing is called 'blocks'"):
         dw.sensitivity_indices(study, FLOW, samples=8, bounds={"blocks": (2, 3)})

@@ -13,14 +13,12 @@ import numpy as np
 import pytest
 import small_sensitivity
 import xarray as xr
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from small_sensitivity import FLOW, REALISATIONS, RUNS, by_hand
 
 import driftwalk as dw
 from driftwalk.assembly.runs.run import assembly_path
-from driftwalk.assembly.sensitivity import settings as engine
-from driftwalk.assembly.sensitivity import times as times
+from driftwalk.assembly.sensitivity import settings as engine, times as times
 
 AXES = {"drag_coefficient": [0.2, 1.0], "force_std": [5e-4, 2e-3]}
 
@@ -203,7 +201,7 @@ def made_up(rng: np.random.Generator, names: list[str]) -> tuple[dict[str, np.nd
 
 def test_of_many_classes_the_largest_are_kept_and_the_rest_summed() -> None:
     plan = engine.world_plan(small(blocks=6), FLOW, threads=1)
-    names = list(dw.outcome_classes(6))
+    names = list(dw.assembly.outcome_classes(6))
     rng = np.random.default_rng(4)
     tables, texts = zip(*(made_up(rng, names) for _ in range(6)), strict=True)
     variables, coordinates = times.map_courses(
@@ -238,7 +236,7 @@ def test_of_many_classes_the_largest_are_kept_and_the_rest_summed() -> None:
 @settings(max_examples=25)
 @given(
     st.dictionaries(
-        st.sampled_from(dw.outcome_classes(4)),
+        st.sampled_from(dw.assembly.outcome_classes(4)),
         st.lists(st.integers(0, 10**6), min_size=times.TIMES, max_size=times.TIMES),
     )
 )

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 
 from driftwalk.assembly.runs.start import given_start, overlap_depth, require_room, tank_area
 from driftwalk.core.errors import InputError

@@ -40,7 +40,7 @@ def test_every_setting_has_its_numbers(study: xr.Dataset) -> None:
     for place, name in enumerate(found["classes"]):
         course = study["reference_over_time"].sel(class_over_time=name)
         np.testing.assert_allclose(known[place], course, atol=1e-7)
-    np.testing.assert_array_equal(dw.decode_array(found["count"]), count)
+    np.testing.assert_array_equal(dw.page.decode_array(found["count"]), count)
 
 
 def test_axes_in_another_order_are_the_same_map(study: xr.Dataset) -> None:

@@ -9,8 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from drawn_blocks import moving_blocks
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import driftwalk as dw
 from driftwalk.core.errors import FormatError, InputError
@@ -18,7 +17,7 @@ from driftwalk.track.camera.rim import find_rim
 
 MATRIX = np.array([[620.0, 0.0, 322.0], [0.0, 622.0, 236.0], [0.0, 0.0, 1.0]])
 BENT = np.array([-0.21, 0.06, 0.001, -0.0008, 0.0])
-LENS = dw.Lens(
+LENS = dw.track.Lens(
     focal_x_px=620, focal_y_px=622, centre_column_px=322, centre_row_px=236,
     k1=-0.21, k2=0.06, p1=0.001, p2=-0.0008,
 )  # fmt: skip
@@ -35,7 +34,7 @@ def test_the_lens_bends_as_opencv_does_and_back(u: float, v: float) -> None:
 
 
 def test_jacobian_and_inverse_agree_with_the_map() -> None:
-    camera = dw.Camera.from_scale(640, 480, px_per_m=1500.0, lens=LENS)
+    camera = dw.track.Camera.from_scale(640, 480, px_per_m=1500.0, lens=LENS)
     world = np.array([[0.05, -0.03], [-0.1, 0.08]])
     pixels = camera.to_pixel(world)
     assert camera.to_world(pixels) == pytest.approx(world, abs=1e-9)
@@ -46,9 +45,9 @@ def test_jacobian_and_inverse_agree_with_the_map() -> None:
 
 def test_there_is_no_default_scale() -> None:
     with pytest.raises(InputError, match="--tank-diameter"):
-        dw.Camera(width_px=640, height_px=480).to_world(np.zeros((1, 2)))
+        dw.track.Camera(width_px=640, height_px=480).to_world(np.zeros((1, 2)))
     with pytest.raises(InputError, match="640 x 480"):
-        dw.Camera(width_px=640, height_px=480).check_size(320, 240)
+        dw.track.Camera(width_px=640, height_px=480).check_size(320, 240)
 
 
 @pytest.mark.parametrize(
@@ -64,7 +63,7 @@ def test_a_wrong_camera_file_is_said(tmp_path: Path, text: str, message: str) ->
     path = tmp_path / "camera.toml"
     path.write_text(text)
     with pytest.raises(FormatError, match=message):
-        dw.load_camera(path)
+        dw.track.load_camera(path)
 
 
 @pytest.mark.parametrize(
@@ -82,7 +81,7 @@ def test_a_wrong_markers_file_is_said(tmp_path: Path, line: str, message: str) -
         "[colour_1]\na_star = 60\nb_star = 10\n[colour_2]\na_star = -40\nb_star = 20\n"
     )
     with pytest.raises(FormatError, match=message):
-        dw.load_markers(path)
+        dw.track.load_markers(path)
 
 
 @pytest.mark.parametrize("level", ["moderate", "heavy"])
@@ -92,7 +91,7 @@ def test_the_rim_gives_scale_and_centre(level: str) -> None:
     rim = find_rim(image)
     assert (rim.column, rim.row) == pytest.approx((312.3, 244.8), abs=0.05)
     assert rim.radius_px == pytest.approx(1480 * 0.15, rel=5e-4)
-    camera = dw.camera_from_rim(image, diameter=0.30)
+    camera = dw.track.camera_from_rim(image, diameter=0.30)
     assert camera.to_world(np.array([[312.3 + 148.0, 244.8]])) == pytest.approx(
         np.array([[0.1, 0.0]]), abs=1e-4
     )
@@ -100,9 +99,9 @@ def test_the_rim_gives_scale_and_centre(level: str) -> None:
 
 def test_no_rim_is_said() -> None:
     with pytest.raises(InputError, match="no rim"):
-        dw.camera_from_rim(np.full((240, 320, 3), 90, np.uint8), diameter=0.3)
+        dw.track.camera_from_rim(np.full((240, 320, 3), 90, np.uint8), diameter=0.3)
     with pytest.raises(InputError, match="above zero"):
-        dw.camera_from_rim(np.full((240, 320, 3), 90, np.uint8), diameter=0.0)
+        dw.track.camera_from_rim(np.full((240, 320, 3), 90, np.uint8), diameter=0.0)
 
 
 def drawn_board(turn: tuple[float, float, float], away: tuple[float, float, float]) -> np.ndarray:
@@ -134,8 +133,8 @@ def test_a_lens_is_found_from_drawn_boards() -> None:
         (0, 0.02, 0.26),
     ]
     images = [drawn_board(turn, away) for turn, away in zip(turns, aways, strict=True)]
-    board = dw.Board(9, 7, 0.02)
-    found = dw.calibrate_lens([*images, np.full_like(images[0], 200)], board)
+    board = dw.track.Board(9, 7, 0.02)
+    found = dw.track.calibrate_lens([*images, np.full_like(images[0], 200)], board)
     assert found.used == [0, 1, 2, 3, 4]
     assert found.not_found == [5]
     assert found.rms_px < 0.2
@@ -143,7 +142,7 @@ def test_a_lens_is_found_from_drawn_boards() -> None:
     grid = np.stack(np.meshgrid([60, 320, 580], [60, 240, 420]), axis=-1).reshape(-1, 2) * 1.0
     assert found.lens.k1 == pytest.approx(-0.21, abs=0.03)
     # The board lies flat at 0.25 m: a place 5 cm off is there on the plane that was found.
-    camera = dw.camera_from_board(images[0], board, found.lens)
+    camera = dw.track.camera_from_board(images[0], board, found.lens)
     true = (LENS.straighten(grid) - [322, 236]) / [620, 622] * 0.25
     seen = camera.to_world(grid)
     inside = np.abs(true).max(axis=1) < 0.09
@@ -153,16 +152,16 @@ def test_a_lens_is_found_from_drawn_boards() -> None:
 def test_a_board_that_is_nowhere() -> None:
     grey = [np.full((240, 320, 3), 90, np.uint8)] * 3
     with pytest.raises(InputError, match="found in 0 of 3 images"):
-        dw.calibrate_lens(grey, dw.Board(9, 7, 0.02))
+        dw.track.calibrate_lens(grey, dw.track.Board(9, 7, 0.02))
     with pytest.raises(InputError, match="state their side"):
-        dw.Board(9, 7, 0.02, kind="charuco")
+        dw.track.Board(9, 7, 0.02, kind="charuco")
 
 
 def test_a_charuco_board_gives_the_plane() -> None:
-    board = dw.Board(6, 5, 0.03, kind="charuco", marker_m=0.022)
+    board = dw.track.Board(6, 5, 0.03, kind="charuco", marker_m=0.022)
     image = board.charuco_board(cv2).generateImage((360, 300))
     image = cv2.copyMakeBorder(image, 40, 40, 50, 50, cv2.BORDER_CONSTANT, value=255)
-    camera = dw.camera_from_board(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), board)
+    camera = dw.track.camera_from_board(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR), board)
     # 60 px for 30 mm, drawn upright: the middle of the picture is that of the board.
     middle = np.array([[229.5, 189.5], [229.5 + 60, 189.5 - 60]])
     assert camera.to_world(middle) == pytest.approx(np.array([[0, 0], [0.03, 0.03]]), abs=3e-4)
@@ -178,14 +177,14 @@ def test_tags_tell_who_where_and_how(angle: float) -> None:
     turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
     map_ = np.column_stack([turn, centre - turn @ [middle, middle]])
     image = cv2.warpAffine(tag, map_, (320, 240), flags=cv2.INTER_AREA, borderValue=255)
-    detector = dw.TagDetector("4x4_50", dw.Camera.from_scale(320, 240, px_per_m=1000.0))
+    detector = dw.track.TagDetector("4x4_50", dw.track.Camera.from_scale(320, 240, px_per_m=1000.0))
     found, _ = detector.detect(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR))
     assert [item.key for item in found] == ["7"]
     one = found[0]
     assert (one.x, one.y) == pytest.approx(((170.3 - 159.5) / 1e3, (119.5 - 121.6) / 1e3), abs=4e-4)
     assert abs(math.remainder(one.theta - angle, 2 * math.pi)) < math.radians(1.0)
     with pytest.raises(InputError, match="no dictionary '9X9'"):
-        dw.TagDetector("9X9")
+        dw.track.TagDetector("9X9")
 
 
 def test_blobs_are_found_before_an_uneven_background() -> None:
@@ -200,7 +199,7 @@ def test_blobs_are_found_before_an_uneven_background() -> None:
         noisy = shade * (1 - 0.7 * disc) + generator.normal(0, 4, shade.shape)
         images.append(np.clip(noisy, 0, 255).astype(np.uint8))
         places.append(place)
-    detector = dw.BlobDetector(dw.median_background(images), polarity="dark", objects=1)
+    detector = dw.track.BlobDetector(dw.track.median_background(images), polarity="dark", objects=1)
     off = []
     for image, place in zip(images, places, strict=True):
         found, _ = detector.detect(image)

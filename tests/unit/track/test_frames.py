@@ -11,8 +11,7 @@ import cv2
 import numpy as np
 import pytest
 from drawn_blocks import moving_blocks
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from matroska import give_times
 
 import driftwalk as dw
@@ -21,7 +20,7 @@ from driftwalk.track.source.frames import FrameFilter
 from driftwalk.track.source.gaps import FrameGaps
 
 
-def small(level: str = "moderate") -> dw.VideoSettings:
+def small(level: str = "moderate") -> dw.datasets.VideoSettings:
     return dw.video_settings(level, width_px=160, height_px=120, px_per_m=375.0)
 
 
@@ -42,7 +41,7 @@ def test_a_video_gives_its_times_and_pixels(tmp_path: Path) -> None:
 
 
 def test_dropped_duplicate_and_stale_frames_are_counted() -> None:
-    counts = dw.FrameCounts()
+    counts = dw.track.FrameCounts()
     keep = FrameFilter("list", counts, gaps=FrameGaps())
     times = [0.0, 0.1, 0.1, 0.2, 0.5, 0.6, 0.7]
     values = [1, 2, 2, 3, 4, 4, 5]
@@ -55,7 +54,7 @@ def test_dropped_duplicate_and_stale_frames_are_counted() -> None:
 
 
 def test_a_size_that_changes_names_the_frame() -> None:
-    keep = FrameFilter("list", dw.FrameCounts())
+    keep = FrameFilter("list", dw.track.FrameCounts())
     keep.accept(0, 0.0, picture(1))
     with pytest.raises(FormatError, match=r"list: frame 1 is 10 x 9 pixels, .* 10 x 8"):
         keep.accept(1, 0.1, picture(1, height=9))
@@ -153,7 +152,7 @@ def test_a_file_cut_off_says_where(tmp_path: Path) -> None:
 
 def overlay_of(path: Path, times: list[float]) -> tuple[float, list[int]]:
     """Write pictures of rising brightness at these times; return rate and brightness read back."""
-    writer = dw.OverlayWriter(path)
+    writer = dw.track.OverlayWriter(path)
     for index, time in enumerate(times):
         writer.write(np.full((48, 64, 3), 10 * index, np.uint8), time)
     writer.close()
@@ -198,7 +197,7 @@ class Camera:
 def test_a_camera_hands_out_the_newest_and_may_disappear() -> None:
     camera = Camera(frames=6)
     # A clock that goes on by a second with each frame that is read.
-    live = dw.LiveCamera(camera, "camera:0", patience=60.0, now=lambda: 100.0 - camera.left)
+    live = dw.track.LiveCamera(camera, "camera:0", patience=60.0, now=lambda: 100.0 - camera.left)
     frames, waited = [], []
     for frame in live:
         frames.append(frame)

@@ -7,8 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 
 from driftwalk.track.follow.assign import assign, connected_groups
 from driftwalk.track.follow.kalman import Motion, predict, start_state, update

@@ -26,7 +26,7 @@ def jerky_path() -> np.ndarray:
 def test_what_is_kept_does_not_depend_on_the_scale(px_per_m: float) -> None:
     """A body that starts and turns at once, alone in the picture, loses no sample at any scale."""
     options = TrackingOptions(source="video", markers="blob", px_per_m=px_per_m, bodies=1)
-    camera = dw.Camera.from_scale(640, 480, px_per_m=px_per_m)
+    camera = dw.track.Camera.from_scale(640, 480, px_per_m=px_per_m)
     tracker = tracker_for(options, camera, None)
     spread = np.diag([0.1, 0.1, np.nan]) / px_per_m**2
     for frame, (column, row) in enumerate(np.unwrap(jerky_path(), period=300, axis=0)):

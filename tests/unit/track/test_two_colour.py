@@ -18,7 +18,7 @@ def errors(level: str, frames: int, **changes: object) -> tuple[np.ndarray, floa
     settings = dw.video_settings(level, **changes)
     blocks = moving_blocks(frames)
     truth = dw.video_truth(blocks, settings)
-    detector = dw.TwoColourDetector(marker_of(settings), camera_of(settings))
+    detector = dw.track.TwoColourDetector(marker_of(settings), camera_of(settings))
     rows, wanted, hits, extra = [], 0, 0, 0
     for index, (_, image) in enumerate(dw.render_video(blocks, settings)):
         found, _ = detector.detect(image)
@@ -73,7 +73,7 @@ def test_marker_angle_brightness_and_tilt() -> None:
         lens_k1=-0.06,
     )
     blocks = moving_blocks(2)
-    lens = dw.Lens(
+    lens = dw.track.Lens(
         focal_x_px=640,
         focal_y_px=640,
         centre_column_px=319.5,
@@ -87,10 +87,10 @@ def test_marker_angle_brightness_and_tilt() -> None:
     depth = 1 + turned @ np.array([0.4, -0.3])
     straight = turned * [1, -1] * 1500 / depth[:, None] + [319.5, 239.5]
     nine, _ = cv2.findHomography(straight, world)
-    camera = dw.Camera(
+    camera = dw.track.Camera(
         width_px=640, height_px=480, homography_px_to_m=tuple(nine.ravel()), lens=lens
     )
-    detector = dw.TwoColourDetector(marker_of(settings), camera)
+    detector = dw.track.TwoColourDetector(marker_of(settings), camera)
     for index, (_, image) in enumerate(dw.render_video(blocks, settings)):
         dim = (image * 0.5).astype(np.uint8)
         found, _ = detector.detect(dim)
@@ -109,11 +109,13 @@ def test_rejected_candidates_have_reasons() -> None:
     image[20:60, 20:60] = settings.disc_1[::-1]
     cv2.circle(image, (600, 440), 7, settings.disc_2[::-1], -1)
     cv2.circle(image, (40, 440), 2, settings.disc_2[::-1], -1)
-    found, rejected = dw.TwoColourDetector(marker_of(settings), camera_of(settings)).detect(image)
+    found, rejected = dw.track.TwoColourDetector(marker_of(settings), camera_of(settings)).detect(
+        image
+    )
     assert len(found) == 4
     kinds = {(round(r.column / 20), r.kind) for r in rejected}
     assert kinds == {(2, "too large"), (30, "no partner"), (2, "too small")}
-    drawn = dw.explain_frame(image, found, rejected, camera=camera_of(settings))
+    drawn = dw.track.explain_frame(image, found, rejected, camera=camera_of(settings))
     assert drawn.shape == image.shape
     assert (drawn != image).any()
 
@@ -125,7 +127,9 @@ def test_blocks_side_by_side_keep_their_own_discs() -> None:
     settings = dw.video_settings("moderate")
     blocks = build_trajectory([0.0], [[-0.015, 0.015]], [[0.0, 0.0]], [[0.0, 0.0]])
     _, image = next(dw.render_video(blocks, settings))
-    found, rejected = dw.TwoColourDetector(marker_of(settings), camera_of(settings)).detect(image)
+    found, rejected = dw.track.TwoColourDetector(marker_of(settings), camera_of(settings)).detect(
+        image
+    )
     assert sorted(round(f.x, 4) for f in found) == [-0.015, 0.015]
     assert rejected == []
 
@@ -133,7 +137,7 @@ def test_blocks_side_by_side_keep_their_own_discs() -> None:
 def test_a_proposal_gives_colours_size_and_spacing() -> None:
     settings = dw.video_settings("moderate")
     images = [image for _, image in dw.render_video(moving_blocks(3), settings)]
-    proposal = dw.propose_markers(images, camera_of(settings), block_side=0.03)
+    proposal = dw.track.propose_markers(images, camera_of(settings), block_side=0.03)
     drawn, marker = marker_of(settings), proposal.marker
     assert proposal.pairs == 12
     assert marker.spacing_m == pytest.approx(0.014, rel=0.01)
@@ -146,16 +150,16 @@ def test_a_proposal_gives_colours_size_and_spacing() -> None:
 def test_a_colour_that_never_appears_is_said_with_what_was_seen() -> None:
     settings = dw.video_settings("heavy")
     _, image = next(dw.render_video(moving_blocks(1), settings))
-    blue = dw.TwoColourMarker(
+    blue = dw.track.TwoColourMarker(
         spacing_m=0.014,
         size_m=0.01,
         colour_1={"a_star": 10, "b_star": -50},
         colour_2=marker_of(settings).colour_2.model_dump(),
     )
-    message = dw.missing_colours(blue, [image]) or ""
+    message = dw.track.missing_colours(blue, [image]) or ""
     assert message.startswith("colour 1 (blue) never appears; seen instead: ")
     assert "red" in message
-    assert dw.missing_colours(marker_of(settings), [image]) is None
+    assert dw.track.missing_colours(marker_of(settings), [image]) is None
     grey = np.full((48, 64, 3), 90, np.uint8)
     with pytest.raises(InputError, match="all is grey"):
-        dw.propose_markers([grey], camera_of(settings))
+        dw.track.propose_markers([grey], camera_of(settings))

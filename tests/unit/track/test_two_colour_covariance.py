@@ -26,7 +26,7 @@ def scores(level: str, frames: int, seed: int) -> np.ndarray:
     settings = dw.video_settings(level, seed=seed, width_px=360, height_px=360)
     blocks = moving_blocks(frames, rate=0.5)
     truth = dw.video_truth(blocks, settings)
-    detector = dw.TwoColourDetector(marker_of(settings), camera_of(settings))
+    detector = dw.track.TwoColourDetector(marker_of(settings), camera_of(settings))
     rows = []
     for index, (_, image) in enumerate(dw.render_video(blocks, settings)):
         for one in detector.detect(image)[0]:
@@ -101,7 +101,7 @@ def test_a_noisy_frame_takes_no_time_for_its_specks() -> None:
     """Discs of 9 pixels are searched at full size, where strong noise makes thousands of specks."""
     settings = dw.video_settings("heavy", px_per_m=900.0)
     _, image = next(dw.render_video(moving_blocks(1), settings))
-    detector = dw.TwoColourDetector(marker_of(settings), camera_of(settings))
+    detector = dw.track.TwoColourDetector(marker_of(settings), camera_of(settings))
     detector.detect(image)
     began = time.process_time()
     found, _ = detector.detect(image)

@@ -85,7 +85,7 @@ def test_arrows_are_the_flow() -> None:
     arrows = flow_arrows(dw.uniform_flow(0.1, -0.2))
     assert arrows is not None
     for name, value in (("u", 0.1), ("v", -0.2)):
-        found = dw.decode_array(arrows[name])
+        found = dw.page.decode_array(arrows[name])
         assert found.shape == (len(arrows["y"]), len(arrows["x"]))
         np.testing.assert_allclose(found, value, rtol=1e-6)
 
@@ -155,14 +155,14 @@ def test_the_same_motion_is_near_and_another_far() -> None:
     # The two-sample test at n = m = 2000: D of the same is about the floor, twice the step is not.
     assert found["same"]["ks_distance"] < 2.0 * found["same"]["noise_floor"]
     assert found["other"]["ks_distance"] > 5.0 * found["other"]["noise_floor"]
-    points = dw.apply_steps(dw.plan_steps(time), *walks[1])
+    points = dw.comparison.apply_steps(dw.comparison.plan_steps(time), *walks[1])
     by_hand = dw.ks_distance(
         np.column_stack([points.step_length, points.turning_angle]),
         beside(recording, study).steps.points,
     )
     assert found["same"]["ks_distance"] == pytest.approx(by_hand, abs=1e-12)
     for density in ("simulated", "recording"):
-        assert dw.decode_array(found["same"][density]).sum() == pytest.approx(1.0)
+        assert dw.page.decode_array(found["same"][density]).sum() == pytest.approx(1.0)
 
 
 def test_the_camera_s_noise_is_added() -> None:
@@ -183,7 +183,7 @@ def test_the_camera_s_noise_is_added() -> None:
 @pytest.mark.parametrize("interval", [0.1, 0.04, 1 / 30])
 def test_positions_are_taken_at_the_recording_s_interval(interval: float) -> None:
     """Against the path of the same run at every time step, interpolated."""
-    study, flow = exact(), dw.random_tank_flow(1)
+    study, flow = exact(), dw.flow.random_tank_flow(1)
     source = PlaySource(
         study, flow, blocks=2, recording=circle(0.002, 0.05, 200, interval=interval)
     )
@@ -206,7 +206,7 @@ def test_positions_are_taken_at_the_recording_s_interval(interval: float) -> Non
 
 def test_messages_and_actions() -> None:
     async def run() -> list[Any]:
-        source = PlaySource(Study(), dw.random_tank_flow(1), blocks=3)
+        source = PlaySource(Study(), dw.flow.random_tank_flow(1), blocks=3)
         source.watched(1)
         heard: list[Any] = []
         task = asyncio.create_task(source.run(heard.append))
@@ -349,7 +349,7 @@ def test_the_tank_rests_while_nobody_watches() -> None:
 )
 def test_every_corner_of_the_knobs_has_a_picture_and_a_density(change: dict[str, Any]) -> None:
     """Motion without end, motion without steps: what is sent stays finite and of one shape."""
-    source = PlaySource(Study(), dw.random_tank_flow(1), blocks=4)
+    source = PlaySource(Study(), dw.flow.random_tank_flow(1), blocks=4)
     for name, value in change.items():
         source._set(name, value)
     source._fulfil(lambda content: pytest.fail(str(content)))
@@ -364,7 +364,7 @@ def test_every_corner_of_the_knobs_has_a_picture_and_a_density(change: dict[str,
     assert np.hypot(sent[0]["x"], sent[0]["y"]).max() < 0.15
     values = {item["name"]: item["value"] for item in sent[2]["items"]}
     assert {name: values[name] for name in change} == change
-    shares = dw.decode_array(sent[1]["simulated"])
+    shares = dw.page.decode_array(sent[1]["simulated"])
     assert shares.sum() == pytest.approx(1.0 if sent[1]["steps"] else 0.0)
 
 
@@ -457,7 +457,7 @@ def test_stream_has_every_key_of_the_page() -> None:
         assert not [key for key in part if f"`{key}`" not in text]
     assert len(frame["bodies"]) == 12
     assert frame["outcome"] == tank.outcome
-    sizes = dw.class_shapes(frame["outcome"])
+    sizes = dw.assembly.class_shapes(frame["outcome"])
     assert 12 - len(sizes) <= len(frame["joined"])
     event = frame["events"][0]
     assert event["bodies"] == [str(b) for b in events[0].blocks]

@@ -84,21 +84,21 @@ def the_map(source: RunSource) -> dict[str, Any]:
 def test_map_fills_as_units_are_finished(run: RunDirectory) -> None:
     source = RunSource(run.path)
     assert page(source)["state"]["progress"] == 0.0
-    assert np.isnan(dw.decode_array(the_map(source)["value"])).all()
+    assert np.isnan(dw.page.decode_array(the_map(source)["value"])).all()
     store, done = coarse(run), 0
     for unit in UNITS:
         store.write(unit, arrays(unit))
         done += unit.size
         kinds = [content["type"] for content in source.look()]
         assert kinds == ["section", "state"]
-        value = dw.decode_array(the_map(source)["value"]).reshape(-1)
+        value = dw.page.decode_array(the_map(source)["value"]).reshape(-1)
         np.testing.assert_allclose(value[:done], DISTANCE.mean(axis=1)[:done])
         assert np.isnan(value[done:]).all()
         assert page(source)["state"]["progress"] == pytest.approx(0.4 * done / 12)
         assert source.look() == []
     error = DISTANCE.std(axis=1, ddof=1) / np.sqrt(2)
     np.testing.assert_allclose(
-        dw.decode_array(the_map(source)["standard_error"]).reshape(-1), error, rtol=1e-6
+        dw.page.decode_array(the_map(source)["standard_error"]).reshape(-1), error, rtol=1e-6
     )
     best = int(DISTANCE.mean(axis=1).argmin())
     assert the_map(source)["best"]["y"] == DRAG[best // 4]
@@ -111,7 +111,7 @@ def test_units_may_come_in_any_order(run: RunDirectory) -> None:
         store.write(unit, arrays(unit))
         source.look()
     np.testing.assert_allclose(
-        dw.decode_array(the_map(source)["value"]).reshape(-1), DISTANCE.mean(axis=1)
+        dw.page.decode_array(the_map(source)["value"]).reshape(-1), DISTANCE.mean(axis=1)
     )
 
 
@@ -129,7 +129,7 @@ def test_a_setting_without_numbers_is_as_far_as_can_be(run: RunDirectory) -> Non
     store.write(UNITS[0], broken)
     source.look()
     np.testing.assert_array_equal(
-        dw.decode_array(the_map(source)["value"]).reshape(-1)[:5], np.ones(5)
+        dw.page.decode_array(the_map(source)["value"]).reshape(-1)[:5], np.ones(5)
     )
 
 
@@ -139,9 +139,9 @@ def test_a_cell_gives_its_own_excerpt(run: RunDirectory) -> None:
     source.look()
     assert source._running is not None
     found = source._running.cell(0, 3)
-    np.testing.assert_allclose(dw.decode_array(found["excerpt_x"]), EXCERPT[3], rtol=1e-6)
-    np.testing.assert_allclose(dw.decode_array(found["excerpt_y"]), -EXCERPT[3], rtol=1e-6)
-    assert dw.decode_array(found["density"]).sum() == pytest.approx(1.0)
+    np.testing.assert_allclose(dw.page.decode_array(found["excerpt_x"]), EXCERPT[3], rtol=1e-6)
+    np.testing.assert_allclose(dw.page.decode_array(found["excerpt_y"]), -EXCERPT[3], rtol=1e-6)
+    assert dw.page.decode_array(found["density"]).sum() == pytest.approx(1.0)
     # Both replicates are as far from their mean; the first is taken.
     assert found["ks_step_length"] == 3.0
 
@@ -168,7 +168,7 @@ def test_refined_map_and_bootstrap(run: RunDirectory) -> None:
     part = the_map(source)["refined"]
     assert part["y"] == [0.25, 0.3]
     np.testing.assert_allclose(
-        dw.decode_array(part["value"]), [[0.2, 0.6], [np.nan, np.nan]], rtol=1e-6
+        dw.page.decode_array(part["value"]), [[0.2, 0.6], [np.nan, np.nan]], rtol=1e-6
     )
     assert page(source)["state"]["progress"] == pytest.approx(0.4 + 0.25 * 0.5)
     repeats = run.store("bootstrap-x", fingerprint={"count": 4})
@@ -222,7 +222,7 @@ def test_assembly_counts_the_classes_of_finished_runs(tmp_path: Path) -> None:
         # The run whose numbers were lost has no outcome, but it has ended.
         assert items == Counter({"I3": 3, "2+1": 2, "1+1+1": 2})
         assert section["runs"] == 8
-        low, high = dw.proportion_interval(3, 7, confidence=1 - 0.1 / 3)
+        low, high = dw.assembly.proportion_interval(3, 7, confidence=1 - 0.1 / 3)
         first = section["series"][0]["items"][0]
         assert (first["low"], first["high"]) == pytest.approx((float(low), float(high)))
         assert first["cells"] == [[[0, 0], [1, 0], [2, 0]]]
@@ -249,12 +249,14 @@ def test_sensitivity_fills_its_map(tmp_path: Path) -> None:
         section = page(source)["sections"][0]
         # Eq. 5 by hand: the pooled reference is one half each.
         np.testing.assert_allclose(
-            dw.decode_array(section["value"]), [[0.0, 1.0, 1.0], [0.6, np.nan, np.nan]], rtol=1e-6
+            dw.page.decode_array(section["value"]),
+            [[0.0, 1.0, 1.0], [0.6, np.nan, np.nan]],
+            rtol=1e-6,
         )
         assert section["classes"] == ["2", "1+1"]
         gone = [np.nan, np.nan]
         np.testing.assert_allclose(
-            dw.decode_array(section["shares"]),
+            dw.page.decode_array(section["shares"]),
             [[[0.5, 0.5], [1.0, 0.0], [0.0, 1.0]], [[0.8, 0.2], gone, gone]],
             rtol=1e-6,
         )
@@ -303,17 +305,17 @@ def test_a_setting_of_a_running_sensitivity_has_its_classes_over_time(tmp_path: 
             json.dumps(found, allow_nan=False)
             assert found["classes"] == ["2", "1+1"]
             assert found["cells"][0] == [[[0, 0], [1, 0]]]
-            time = dw.decode_array(found["time"])
+            time = dw.page.decode_array(found["time"])
             np.testing.assert_allclose(time, 0.5 * np.arange(101))
             expected = np.where(np.arange(101) >= at, runs, 0)
             np.testing.assert_array_equal(
-                dw.decode_array(found["count"])[0, 0], [expected, 10 - expected]
+                dw.page.decode_array(found["count"])[0, 0], [expected, 10 - expected]
             )
             assert found["runs"] == [[10]]
             # Twelve of twenty runs of the reference have joined from half of the time on.
             both = np.where(np.arange(101) >= 50, 0.6, 0.0)
             np.testing.assert_allclose(
-                dw.decode_array(found["reference"]), [both, 1.0 - both], atol=1e-7
+                dw.page.decode_array(found["reference"]), [both, 1.0 - both], atol=1e-7
             )
         for row, column in ((1, 2), (2, 0), (0, 3), (-1, 0), (0, -1), (10**9, 10**9)):
             assert running.cell(row, column)["over_time"] is None
@@ -436,7 +438,7 @@ def test_a_one_by_one_search(run: RunDirectory, tmp_path: Path) -> None:
         store.write(unit, arrays(unit))
         source.look()
         assert page(source)["state"]["words"] == "map: done, the next step is under way"
-        found = dw.decode_array(the_map(source)["value"])
+        found = dw.page.decode_array(the_map(source)["value"])
         np.testing.assert_allclose(found, [[DISTANCE[0].mean()]], rtol=1e-6)
 
 
@@ -451,7 +453,7 @@ def test_a_folder_with_any_name_and_no_right_to_write(run: RunDirectory, tmp_pat
         source = RunSource(odd)
         assert source.look() == []
         assert page(source)["subtitle"] == odd.name
-        assert np.isfinite(dw.decode_array(the_map(source)["value"])).sum() == 5
+        assert np.isfinite(dw.page.decode_array(the_map(source)["value"])).sum() == 5
         # Looking changes nothing; for root no folder is read-only, so this is what is checked.
         assert sorted((path, path.stat().st_mtime_ns) for path in odd.rglob("*")) == before
     finally:

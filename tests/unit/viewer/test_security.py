@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from driftwalk.viewer.security import Gate, host_name, is_loopback, make_gate
 from driftwalk.viewer.shell import html_shell, page_frame

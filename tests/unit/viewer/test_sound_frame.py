@@ -7,8 +7,7 @@ import json
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from driftwalk.viewer.messages import to_json
 from driftwalk.viewer.sound_frame import SAID_EVERY_S, SoundFrames

@@ -289,7 +289,7 @@ def check_assembly(
     Examples
     --------
     >>> import driftwalk as dw
-    >>> dw.check_assembly(dw.Study(), dw.uniform_flow(0.0, 0.0))
+    >>> dw.assembly.check_assembly(dw.Study(), dw.uniform_flow(0.0, 0.0))
     """
     start_poses(make_plan(study, flow, settings={}, trial=trial, threads=threads), None)
 

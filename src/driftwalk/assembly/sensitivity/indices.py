@@ -115,7 +115,7 @@ def check_indices(
     Examples
     --------
     >>> import driftwalk as dw
-    >>> dw.check_indices(dw.Study(), dw.uniform_flow(0.0, 0.0), samples=8)
+    >>> dw.assembly.check_indices(dw.Study(), dw.uniform_flow(0.0, 0.0), samples=8)
     32
     """
     settings = _settings(study, flow, _design(study, samples, bounds), threads)

@@ -181,7 +181,7 @@ def check_sensitivity(
     Examples
     --------
     >>> import driftwalk as dw
-    >>> dw.check_sensitivity(dw.Study(), dw.uniform_flow(0.0, 0.0))
+    >>> dw.assembly.check_sensitivity(dw.Study(), dw.uniform_flow(0.0, 0.0))
     961
     """
     chosen = make_axes(study, axes)

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.cli.calibrate import summary as calibration_summary
-from driftwalk.cli.fit import answer
-from driftwalk.cli.fit import summary as fit_summary
+from driftwalk.cli.fit import answer, summary as fit_summary
 from driftwalk.cli.terminal.output import print_note
 
 if TYPE_CHECKING:

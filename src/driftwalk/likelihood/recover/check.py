@@ -36,7 +36,7 @@ def check_recovery(study: Study, flow: xr.Dataset | None = None) -> None:
     Examples
     --------
     >>> import driftwalk as dw
-    >>> dw.check_recovery(dw.Study(), dw.tank30_flow())
+    >>> dw.likelihood.check_recovery(dw.Study(), dw.tank30_flow())
     Traceback (most recent call last):
         ...
     driftwalk.core.errors.InputError: the truth lacks [observation] position_noise_m: ...

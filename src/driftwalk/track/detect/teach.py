@@ -207,7 +207,7 @@ def propose_markers(
     >>> import driftwalk as dw
     >>> track = dw.tank30_recording("without_noise").isel(time=slice(0, 1))
     >>> _, image = next(dw.render_video(track))
-    >>> camera = dw.Camera.from_scale(640, 480, px_per_m=1500.0)
+    >>> camera = dw.track.Camera.from_scale(640, 480, px_per_m=1500.0)
     >>> round(propose_markers([image], camera).marker.spacing_m, 4)
     0.014
     """

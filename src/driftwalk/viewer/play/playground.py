@@ -90,7 +90,7 @@ class PlaySource(Source):
     Examples
     --------
     >>> import driftwalk as dw
-    >>> source = dw.PlaySource(dw.Study(), dw.uniform_flow(0.0, 0.0), blocks=3)
+    >>> source = dw.viewer.PlaySource(dw.Study(), dw.uniform_flow(0.0, 0.0), blocks=3)
     >>> [section["kind"] for section in source.greeting()[0]["page"]["sections"]]
     ['tank', 'controls', 'density']
     """
@@ -134,7 +134,7 @@ class PlaySource(Source):
         Parameters
         ----------
         stream : Stream
-            A `driftwalk.LiveServer` that greets with `hello_line`.
+            A `driftwalk.track.LiveServer` that greets with `hello_line`.
         """
         self._stream = stream
         self._watched.set()

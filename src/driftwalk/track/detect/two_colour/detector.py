@@ -45,7 +45,7 @@ class TwoColourDetector:
     ...     spacing_m=0.014, size_m=0.010,
     ...     colour_1={"a_star": 60, "b_star": 14}, colour_2={"a_star": -44, "b_star": 24},
     ... )
-    >>> camera = dw.Camera.from_scale(640, 480, px_per_m=1500.0)
+    >>> camera = dw.track.Camera.from_scale(640, 480, px_per_m=1500.0)
     >>> track = dw.tank30_recording("without_noise").isel(time=slice(0, 1))
     >>> _, image = next(dw.render_video(track))
     >>> found, _ = TwoColourDetector(marker, camera).detect(image)
