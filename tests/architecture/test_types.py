@@ -13,7 +13,7 @@ import pytest
 SCRIPT = """
 import driftwalk as dw
 
-recording = dw.load("track.csv", arena="circle:30cm")
+recording = dw.load("track.csv", tank="circle:30cm")
 flow = dw.uniform_flow(0.0, 0.01)
 study = dw.apply_overrides(dw.Study(), {"forces.force_interval_s": "16ms"})
 run = dw.simulate(study, flow, replicates=8)

@@ -40,7 +40,7 @@ def bundled(name: str) -> str:
 def test_error_on_the_tank_with_known_flow(truth: xr.Dataset) -> None:
     """17.4 % as measured; without the correction 54 %."""
     xr.testing.assert_identical(truth.x.drop_attrs(), truth.x.round(3).drop_attrs())
-    track = load(bundled("recording.csv"), arena="circle:0.3")
+    track = load(bundled("recording.csv"), tank="circle:0.3")
     flow = extract_flow(track, **BLOCK)
     assert 0.15 < relative_error(flow, truth) < 0.185
     assert np.count_nonzero(flow["count"] >= 3) > 550
@@ -49,7 +49,7 @@ def test_error_on_the_tank_with_known_flow(truth: xr.Dataset) -> None:
 
 def test_noise_costs_little_with_smoothing_and_much_without(truth: xr.Dataset) -> None:
     noisy, clean = (
-        load(bundled(name), arena="circle:0.3")
+        load(bundled(name), tank="circle:0.3")
         for name in ("recording.csv", "without_tracking_noise.csv")
     )
     smoothed = [relative_error(extract_flow(track, **BLOCK), truth) for track in (noisy, clean)]
@@ -62,7 +62,7 @@ def test_noise_costs_little_with_smoothing_and_much_without(truth: xr.Dataset) -
 def test_standard_errors_are_of_the_size_of_the_scatter() -> None:
     """Two realisations differ by noise alone: z of their difference is about standard normal."""
     one, two = (
-        extract_flow(load(bundled(name), arena="circle:0.3"), **BLOCK)
+        extract_flow(load(bundled(name), tank="circle:0.3"), **BLOCK)
         for name in ("recording.csv", "recording_second_seed.csv")
     )
     spread = np.hypot(one.u_standard_error, two.u_standard_error)

@@ -171,13 +171,13 @@ def test_circle_of_the_centres_in_a_tank_of_30_cm(name: str) -> None:
     fit = fit_circle(track.x, track.y)
     assert np.hypot(fit.center_x, fit.center_y) < 6e-3
     assert 0.125 < fit.radius < np.sqrt(0.15**2 - 0.015**2) - 0.015 + 1e-3
-    attrs = load(str(files("driftwalk.datasets") / "tank30_ode_a" / name), arena="circle:0.3").attrs
+    attrs = load(str(files("driftwalk.datasets") / "tank30_ode_a" / name), tank="circle:0.3").attrs
     assert json.loads(attrs["origin_shift_m"]) == [0.0, 0.0]
 
 
 def test_the_fish_tank_is_found(shared_data: SharedData) -> None:
     path = shared_data("rummynose-single-epfl") / "rummy_single_seven_trajectories.txt"
-    dataset = load(path, frame_rate=25.0, metres_per_pixel=1.0, max_speed=2700.0, arena="fit")
+    dataset = load(path, frame_rate=25.0, metres_per_pixel=1.0, max_speed=2700.0, tank="fit")
     found = json.loads(dataset.attrs["arena_found"])
     # The folder's notes: outermost track radius about 335 pixels.
     assert found["radius_of_centers_m"] == pytest.approx(338.0, abs=6.0)

@@ -295,9 +295,9 @@ def test_load_options_are_arguments_of_load() -> None:
     options = study.load_options()
     assert options["columns"] == {"x": "2", "y": "pos_y:mm"}
     assert options["metres_per_pixel"] == 0.0005
-    assert options["arena"] == "circle:0.3@0.1,-0.2"
+    assert options["tank"] == "circle:0.3@0.1,-0.2"
     assert options.keys() <= inspect.signature(load).parameters.keys()
-    assert Study().load_options() == {"sort": "error", "arena": "circle:0.3"}
+    assert Study().load_options() == {"sort": "error", "tank": "circle:0.3"}
 
 
 @pytest.mark.parametrize(
@@ -310,7 +310,7 @@ def test_load_options_are_arguments_of_load() -> None:
     ],
 )
 def test_arena_of_the_recording(values: dict[str, dict[str, object]], arena: str | None) -> None:
-    assert Study(**values).load_options().get("arena") == arena
+    assert Study(**values).load_options().get("tank") == arena
 
 
 def test_study_reads_the_bundled_recording() -> None:

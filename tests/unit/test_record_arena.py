@@ -120,14 +120,14 @@ def test_a_polygon_is_shifted_to_its_centroid(tmp_path: Path) -> None:
     outline.write_text("x_m,y_m\n1,1\n3,1\n3,2\n1,2\n1,1\n")
     recording = tmp_path / "a.csv"
     recording.write_text("t,x,y\n0,2,1.5\n1,2.5,1.5\n")
-    dataset = load(recording, arena=f"polygon:{outline}")
+    dataset = load(recording, tank=f"polygon:{outline}")
     arena = json.loads(dataset.attrs["arena"])
     np.testing.assert_allclose(arena["vertices_m"], [[-1, -0.5], [1, -0.5], [1, 0.5], [-1, 0.5]])
     np.testing.assert_allclose(dataset["x"].values[:, 0], [0.0, 0.5])
     assert json.loads(dataset.attrs["origin_shift_m"]) == [2.0, 1.5]
     outline.write_text("x_m,y_m\n1,1\n3,1\n")
     with pytest.raises(FormatError, match="at least three"):
-        load(recording, arena=f"polygon:{outline}")
+        load(recording, tank=f"polygon:{outline}")
 
 
 @pytest.mark.parametrize(
@@ -144,7 +144,7 @@ def test_shifts_add_up_over_conversions(tmp_path: Path) -> None:
         f"{i},{a!r},{b!r}" for i, (a, b) in enumerate(zip(x.tolist(), y.tolist(), strict=True))
     )
     (tmp_path / "a.csv").write_text("t,x,y\n" + rows + "\n")
-    once = load(tmp_path / "a.csv", arena="circle:0.3@0.4,-0.7")
-    again = load(save_trajectory(once, tmp_path / "a.nc"), arena="circle:0.3@0.01,0.02")
+    once = load(tmp_path / "a.csv", tank="circle:0.3@0.4,-0.7")
+    again = load(save_trajectory(once, tmp_path / "a.nc"), tank="circle:0.3@0.01,0.02")
     assert json.loads(again.attrs["origin_shift_m"]) == pytest.approx([0.41, -0.68])
     np.testing.assert_allclose(again["x"].values[:, 0], x - 0.41, atol=1e-12)

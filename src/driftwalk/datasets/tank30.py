@@ -47,7 +47,7 @@ def tank30_recording(
     from driftwalk.record import load
 
     with as_file(_folder() / _FILES[realisation]) as path:
-        recording = load(path, arena=f"circle:{_diameter()!r}@0,0")
+        recording = load(path, tank=f"circle:{_diameter()!r}@0,0")
     return recording.assign_attrs(simulated="yes")
 
 

@@ -123,19 +123,19 @@ class Study(Section):
     def load_options(self) -> dict[str, Any]:
         """Return the keyword arguments with which `driftwalk.record.load` reads the recording.
 
-        A polygonal tank is in the file's own frame: it takes no `arena`, and the caller writes
+        A polygonal tank is in the file's own frame: it takes no `tank`, and the caller writes
         `Tank.to_arena_json` into the trajectory's attributes.
         """
         options = self.recording.load_options()
         if self.recording.arena == "fit":
-            return {**options, "arena": "fit", "block_side": self.block.side_m}
+            return {**options, "tank": "fit", "block": self.block.side_m}
         if self.recording.arena == "file" or self.tank.shape == "polygon":
             return options
         center = self.recording.arena_center_m
         at = "" if center is None else f"@{center[0]!r},{center[1]!r}"
         width, height = self.tank.extent_m
         size = f"circle:{width!r}" if self.tank.shape == "circle" else f"rect:{width!r}x{height!r}"
-        return {**options, "arena": f"{size}{at}"}
+        return {**options, "tank": f"{size}{at}"}
 
     def to_dict(self) -> dict[str, Any]:
         """Return the study as plain dictionaries, without the keys that are not set."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from os import PathLike
@@ -14,6 +15,7 @@ import numpy as np
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.file_names import text_of_name
 from driftwalk.core.json_text import parse_json
+from driftwalk.core.units import parse_quantity
 from driftwalk.record.arena import PlacedArena, arena_attributes, place_arena
 from driftwalk.record.clean import Counts, clean_body
 from driftwalk.record.clock import check_clock
@@ -36,8 +38,8 @@ def load(
     body: str | None = None,
     start: float | None = None,
     stop: float | None = None,
-    arena: str | None = None,
-    block_side: float | None = None,
+    tank: str | None = None,
+    block: float | str | None = None,
     frame_rate: float | None = None,
     metres_per_pixel: float | None = None,
     length_unit: str | None = None,
@@ -66,12 +68,12 @@ def load(
         Name of the one body to keep; None or ``"all"`` keeps all.
     start, stop : float, optional
         First and last time to keep [s], on the file's clock.
-    arena : str, optional
-        ``circle:D``, ``rect:WxH``, ``polygon:FILE`` or ``fit``; see `driftwalk.record.arena`.
-        Positions are shifted so that its centre is the origin.
-    block_side : float, optional
-        Side of a square block [m]; makes ``arena="fit"`` give a bound of the tank, not of the
-        centres.
+    tank : str, optional
+        The tank: ``circle:D``, ``rect:WxH``, ``polygon:FILE`` or ``fit``; see
+        `driftwalk.record.arena`. Positions are shifted so that its centre is the origin.
+    block : float or str, optional
+        Side of a square block, in metres or as ``"3cm"``; makes ``tank="fit"`` give a bound of the
+        tank, not of the centres.
     frame_rate : float, optional
         Frames per second [Hz] of a recording that counts frames.
     metres_per_pixel : float, optional
@@ -110,10 +112,11 @@ def load(
     --------
     >>> from importlib.resources import files
     >>> recording = files("driftwalk.datasets") / "tank30_ode_a" / "recording.csv"
-    >>> load(str(recording), arena="circle:0.3").sizes["time"]
+    >>> load(str(recording), tank="circle:30cm", block="3cm").sizes["time"]
     18001
     """
     source = Path(path)
+    block_side = None if block is None else _side(block)
     options = ReadOptions(
         columns=dict(columns or {}),
         delimiter=delimiter,
@@ -149,7 +152,7 @@ def load(
                 raise InputError("no sample lies between --from and --to")
             raise InputError("the recording has no row with a time")
         attrs |= {"source": text_of_name(source.name), "format": loader.name}
-        return _assemble(cleaned, counts, attrs, raw, arena=arena, block_side=block_side)
+        return _assemble(cleaned, counts, attrs, raw, tank=tank, block_side=block_side)
     except DAMAGED_GZIP as error:
         raise FormatError(f"is a damaged gzip file: {error}", path=source) from error
     except FormatError as error:
@@ -174,6 +177,14 @@ def readable_formats() -> dict[str, str]:
     from driftwalk.record.registry import loaders
 
     return {name: loader.description for name, loader in loaders().items()}
+
+
+def _side(block: float | str) -> float:
+    """Return the side of a block [m], from a number or a text with a unit."""
+    side = parse_quantity(block, "m")
+    if not (math.isfinite(side) and side > 0.0):
+        raise InputError(f"`block` is the side of a square block, above zero; got {block!r}")
+    return side
 
 
 def _select(bodies: list[RawBody], wanted: str | None) -> list[RawBody]:
@@ -206,13 +217,15 @@ def _assemble(
     attrs: dict[str, Any],
     raw: RawRecording,
     *,
-    arena: str | None,
+    tank: str | None,
     block_side: float | None,
 ) -> xr.Dataset:
     """Place the bodies in their arena and on one clock, and write down what was done."""
     notes = list(raw.notes)
-    if arena is not None:
-        placed = _place(arena, bodies, block_side=block_side)
+    if block_side is not None:
+        attrs["block_side_m"] = block_side
+    if tank is not None:
+        placed = _place(tank, bodies, block_side=block_side)
         _shift(bodies, placed)
         before = parse_json(attrs.get("origin_shift_m", "[0.0, 0.0]"))
         attrs |= arena_attributes(placed, shifted_before=before)
@@ -243,11 +256,11 @@ def _assemble(
     return recording
 
 
-def _place(arena: str, bodies: list[RawBody], *, block_side: float | None) -> PlacedArena:
+def _place(tank: str, bodies: list[RawBody], *, block_side: float | None) -> PlacedArena:
     if len(bodies) == 1:
-        return place_arena(arena, bodies[0].x, bodies[0].y, block_side=block_side)
+        return place_arena(tank, bodies[0].x, bodies[0].y, block_side=block_side)
     x, y = (np.concatenate([getattr(body, axis) for body in bodies]) for axis in ("x", "y"))
-    return place_arena(arena, x, y, block_side=block_side)
+    return place_arena(tank, x, y, block_side=block_side)
 
 
 def _shift(bodies: list[RawBody], placed: PlacedArena) -> None:

@@ -84,7 +84,9 @@ def default_tank_note(study: Study) -> Callable[[], None]:
 def completed(how: RecordingOptions, study: Study) -> RecordingOptions:
     """Return the options, with the study's values where none was given."""
     stated: dict[str, Any] = study.load_options()
-    stated.pop("block_side", None)
+    stated.pop("block", None)
+    if "tank" in stated:
+        stated["arena"] = stated.pop("tank")
     stated["sort"] = stated["sort"] == "sort"
     if "columns" in stated:
         stated["columns"] = [f"{name}={column}" for name, column in stated["columns"].items()]

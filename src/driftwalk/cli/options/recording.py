@@ -142,10 +142,13 @@ class RecordingOptions:
             values["arena"] = f"circle:{tank_diameter!r}"
         values["sort"] = "sort" if self.sort else "error"
         values["columns"] = parse_columns(self.columns or [])
+        values["tank"] = values.pop("arena")
+        if values["tank"] == "fit":
+            values["block"] = side
         words = {"tab": "\t", "\\t": "\t", "space": " "}
         values["delimiter"] = words.get(self.delimiter or "", self.delimiter)
         try:
-            recording = load(path, block_side=side, **values)
+            recording = load(path, **values)
         except FormatError as error:
             other = what_else(path)
             if other is None:
