@@ -6,7 +6,7 @@ import json
 
 import driftwalk as dw
 from driftwalk.cli.inputs.study_recording import load_for_run
-from driftwalk.cli.inputs.tank import study_in_arena
+from driftwalk.conditions.tank import study_in_arena
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.record import save_trajectory
 
