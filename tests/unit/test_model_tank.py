@@ -9,7 +9,6 @@ import pytest
 
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.model import Calibration, FieldOfView, Pose, Tank
-from driftwalk.model.calibration import grid_values
 from driftwalk.model.study import block_corners
 
 HEXAGON = tuple((math.cos(k * math.pi / 3), math.sin(k * math.pi / 3)) for k in range(6))
@@ -117,10 +116,7 @@ def test_corners_of_a_turned_block() -> None:
         assert corner == pytest.approx(wanted, abs=1e-12)
 
 
-def test_grid_values_are_the_decimals_of_the_study() -> None:
-    assert grid_values(0.0, 0.3, 0.1) == (0.0, 0.1, 0.2, 0.3)
-    assert grid_values(0.45, 0.45, 0.1) == (0.45,)
-    assert grid_values(0.0, 0.25, 0.1) == (0.0, 0.1, 0.2)
+def test_the_grid_of_the_paper_has_41_by_41_settings() -> None:
     assert len(Calibration().drag_coefficients) == len(Calibration().force_stds_N) == 41
     assert Calibration().force_stds_N[11] == 0.00055
     assert Calibration().force_stds_N[-1] == 0.002

@@ -10,8 +10,8 @@ from pydantic import Field, field_validator, model_validator
 
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.model.assembly import MOST_BLOCKS, HiddenFaceDrag, Latching
-from driftwalk.model.calibration import MOST_SETTINGS, check_axis, grid_values
 from driftwalk.model.section import Quantity, Section
+from driftwalk.schema.parameters import MOST_SETTINGS, check_axis, grid_values
 
 AXES: Final[dict[str, str]] = {
     "tank_diameter": "tank_diameter_m",

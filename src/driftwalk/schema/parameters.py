@@ -1,0 +1,198 @@
+"""What a motion model can be tuned by: names, units, ranges and scales of its parameters.
+
+Grids, surfaces and regions are computed in the *coordinate* of a parameter: its value on a linear
+scale, the decimal logarithm of its value on a logarithmic one. On a linear scale the two are the
+same bits.
+"""
+
+from __future__ import annotations
+
+import keyword
+import math
+import re
+from dataclasses import dataclass
+from typing import Any, Final, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import ConfigurationError
+
+Floats = npt.NDArray[np.float64]
+Scale = Literal["linear", "log"]
+
+MOST_SETTINGS: Final = 1_000_000
+"""Values that an axis of a grid, and a grid, may have."""
+USUAL_VALUES: Final = 41
+"""Values of the coarse grid of a parameter whose step is left open."""
+REFINEMENT: Final = 5
+"""How many steps of the refined grid a coarse step has, where that is left open."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a motion model, with the range in which it is searched.
+
+    Attributes
+    ----------
+    name : str
+        A Python name: the keyword of the model, and the dimension of every map.
+    unit : str
+        Such as "m/s"; "1" for a number without a unit.
+    low, high : float
+        Ends of the range, both included; a logarithmic scale needs low > 0.
+    step : float
+        Step of the coarse grid: in the unit, or in decades on a logarithmic scale. 0 divides the
+        range into 40 steps.
+    scale : {"linear", "log"}
+        Whether equal steps are equal differences or equal ratios.
+    label : str
+        What figures and messages call it; default: the name with spaces.
+    symbol : str
+        What formulas call it; default: the label.
+    refined_step : float
+        Largest step of the refined grid; 0 takes a fifth of `step`.
+
+    Raises
+    ------
+    ConfigurationError
+        When the name is none, the range is empty or not finite, or the scale is unknown.
+
+    Examples
+    --------
+    >>> speed = Parameter("speed", "m/s", 0.0, 0.1, step=0.05)
+    >>> speed.values, speed.key, speed.label
+    ((0.0, 0.05, 0.1), 'speed_m_s', 'speed')
+    >>> Parameter("rate", "1/s", 0.1, 10.0, step=1.0, scale="log").values
+    (0.1, 1.0, 10.0)
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    step: float = 0.0
+    scale: Scale = "linear"
+    label: str = ""
+    symbol: str = ""
+    refined_step: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.name.isidentifier() or keyword.iskeyword(self.name):
+            raise ConfigurationError(
+                f"a parameter is called {self.name!r}: its name must be one that Python takes as a "
+                "keyword, such as 'turn_rate'"
+            )
+        if self.scale not in get_args(Scale):
+            raise ConfigurationError(
+                f"parameter {self.name}: scale must be one of {', '.join(get_args(Scale))}, "
+                f"got {self.scale!r}"
+            )
+        self._check_range()
+        self._fill("label", self.name.replace("_", " "))
+        self._fill("symbol", self.label)
+        span = float(self.to_coordinate(self.high) - self.to_coordinate(self.low))
+        self._fill("step", span / (USUAL_VALUES - 1) if span > 0 else 1.0)
+        self._fill("refined_step", self.step / REFINEMENT)
+        check_axis(self.name, self._bottom, self._bottom + span, self.step)
+
+    @property
+    def key(self) -> str:
+        """Name with the unit, for attributes and JSON: "force_std_N"."""
+        suffix = unit_suffix(self.unit)
+        return f"{self.name}_{suffix}" if suffix else self.name
+
+    @property
+    def coordinates(self) -> tuple[float, ...]:
+        """Coordinates of the coarse grid."""
+        return grid_values(self._bottom, float(self.to_coordinate(self.high)), self.step)
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Values of the coarse grid, in the unit."""
+        return tuple(float(value) for value in self.to_value(self.coordinates))
+
+    def to_coordinate(self, value: npt.ArrayLike) -> Floats:
+        """Return the coordinates of values."""
+        values = np.asarray(value, dtype=np.float64)
+        return np.log10(values) if self.scale == "log" else values
+
+    def to_value(self, coordinate: npt.ArrayLike) -> Floats:
+        """Return the values at coordinates."""
+        coordinates = np.asarray(coordinate, dtype=np.float64)
+        return np.power(10.0, coordinates) if self.scale == "log" else coordinates
+
+    def describe(self) -> dict[str, Any]:
+        """Return what determines the numbers of a search, for a specification in JSON."""
+        names = ("name", "unit", "low", "high", "step", "scale", "refined_step")
+        return {name: getattr(self, name) for name in names}
+
+    @property
+    def _bottom(self) -> float:
+        return float(self.to_coordinate(self.low))
+
+    def _check_range(self) -> None:
+        numbers = (self.low, self.high, self.step, self.refined_step)
+        if not all(math.isfinite(number) for number in numbers):
+            raise ConfigurationError(f"parameter {self.name}: a number of its range is not finite")
+        if self.scale == "log" and self.low <= 0.0:
+            raise ConfigurationError(
+                f"parameter {self.name}: a logarithmic scale begins above 0, got {self.low:g}"
+            )
+        if self.high < self.low:
+            raise ConfigurationError(
+                f"parameter {self.name}: its range ends at {self.high:g}, below its beginning "
+                f"{self.low:g}"
+            )
+        if self.step < 0.0 or self.refined_step < 0.0:
+            raise ConfigurationError(f"parameter {self.name}: a step is below 0")
+
+    def _fill(self, field: str, value: Any) -> None:
+        if not getattr(self, field):
+            object.__setattr__(self, field, value)
+
+
+def unit_suffix(unit: str) -> str:
+    """Return a unit as it stands in a key: "m_s" for "m/s", "per_s" for "1/s", "" for "1".
+
+    Examples
+    --------
+    >>> unit_suffix("rad2/s"), unit_suffix("1/s"), unit_suffix("1")
+    ('rad2_s', 'per_s', '')
+    """
+    words = re.sub(r"^1\s*/\s*", "per ", unit.strip())
+    return "" if words == "1" else re.sub(r"\W+", "_", words.replace("^", "")).strip("_")
+
+
+def check_axis(name: str, low: float, high: float, step: float) -> None:
+    """Refuse an axis of a grid without a value, or with more than anybody could simulate.
+
+    Raises
+    ------
+    ConfigurationError
+        Names the axis and its ends.
+    """
+    if high < low:
+        raise ConfigurationError(
+            f"the grid has no setting: {name}_max = {high:g} is below {name}_min = {low:g}"
+        )
+    if (high - low) / step > MOST_SETTINGS:
+        raise ConfigurationError(
+            f"{name}: a step of {step:g} from {low:g} to {high:g} gives more than "
+            f"{MOST_SETTINGS} values"
+        )
+
+
+def grid_values(low: float, high: float, step: float) -> tuple[float, ...]:
+    """Return low, low + step, ... up to and including high, rounded to 12 significant digits.
+
+    Rounding makes a value the decimal that the study names (0.15, not 0.15000000000000002); an end
+    that the step misses by less than a millionth of itself is included.
+
+    Examples
+    --------
+    >>> grid_values(0.0, 0.3, 0.1)
+    (0.0, 0.1, 0.2, 0.3)
+    """
+    count = math.floor((high - low) / step + 1e-6) + 1
+    return tuple(float(f"{low + index * step:.12g}") for index in range(count))
