@@ -18,6 +18,14 @@ from driftwalk.comparison.ks import (
 from driftwalk.comparison.motion import compare
 from driftwalk.comparison.plan import AppliedSteps, StepPlan, apply_steps, plan_steps
 from driftwalk.comparison.significance import PermutationTest, block_permutation_test
+from driftwalk.comparison.statistic import (
+    Distances,
+    Statistic,
+    StepDistance,
+    StepReference,
+    StepTable,
+    step_table,
+)
 from driftwalk.comparison.walk import steps
 from driftwalk.comparison.warn import ComparisonWarning
 
@@ -25,11 +33,16 @@ __all__ = [
     "QUADRANTS",
     "AppliedSteps",
     "ComparisonWarning",
+    "Distances",
     "KsComparison",
     "KsPlace",
     "KsReference",
     "PermutationTest",
+    "Statistic",
+    "StepDistance",
     "StepPlan",
+    "StepReference",
+    "StepTable",
     "apply_steps",
     "autocorrelation_time",
     "block_permutation_test",
@@ -41,6 +54,7 @@ __all__ = [
     "memory_time",
     "plan_steps",
     "step_length_edges",
+    "step_table",
     "steps",
     "turning_angle_edges",
 ]

@@ -1,0 +1,227 @@
+"""What a calibration makes small: the distance of simulated steps from the recording's.
+
+A statistic is prepared once with the recording and is then given tables of steps, one row per
+simulated world. `StepDistance` is the paper's: the two-dimensional Kolmogorov-Smirnov distance of
+step lengths and turning angles.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Final, NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk import _core
+from driftwalk.comparison.ks import KsReference
+from driftwalk.comparison.plan import StepPlan, apply_steps, plan_steps
+from driftwalk.core.errors import InputError
+from driftwalk.schema.trajectory import Track
+
+Floats = npt.NDArray[np.float64]
+
+FEWEST_PAIRS: Final = 30
+FARTHEST: Final = 1.0
+"""Distance of a world without a pair of steps."""
+
+
+class StepTable(NamedTuple):
+    """The steps of many worlds, one row each; a row's tail is unused."""
+
+    length: Floats
+    """Step lengths [m], shape (worlds, pairs)."""
+    angle: Floats
+    """Turning angles [rad], shape (worlds, pairs)."""
+    pairs: npt.NDArray[np.int64]
+    """How many entries of a row are used, shape (worlds,)."""
+
+    def rows(self, chosen: slice) -> StepTable:
+        """Return some of the rows."""
+        return StepTable(
+            np.ascontiguousarray(self.length[chosen]),
+            np.ascontiguousarray(self.angle[chosen]),
+            np.ascontiguousarray(self.pairs[chosen]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class StepReference:
+    """The recording's steps, and how those of a simulated world are formed.
+
+    Attributes
+    ----------
+    plan : StepPlan
+        Which samples of a world form steps.
+    steps : ndarray, shape (pairs, 2)
+        The recording's step lengths [m] and turning angles [rad].
+    length_limit, angle_limit : float
+        Densities of steps cover [0, length_limit] m and [-angle_limit, angle_limit] rad.
+    """
+
+    plan: StepPlan
+    steps: Floats
+    length_limit: float
+    angle_limit: float
+
+    @property
+    def table(self) -> StepTable:
+        """The recording's steps as a table of one row."""
+        length, angle = (np.ascontiguousarray(column[None]) for column in self.steps.T)
+        return StepTable(length, angle, np.array([len(self.steps)], dtype=np.int64))
+
+
+class Distances(NamedTuple):
+    """How far worlds are from the recording, shape (worlds,) each."""
+
+    distance: Floats
+    step_length: Floats
+    """Step length at which the difference is largest [m]; 0 where there is none."""
+    turning_angle: Floats
+    """Turning angle at which it is largest [rad]."""
+    quadrant: npt.NDArray[np.int32]
+    """Index into `driftwalk.comparison.QUADRANTS`; -1 where there is no difference."""
+
+
+class Statistic(Protocol):
+    """A distance between motions, of tables of steps."""
+
+    def prepare(self, track: Track, *, step_interval: float | None = None) -> StepReference:
+        """Return the reference of a recorded track."""
+
+    def distances(
+        self, reference: StepReference, worlds: StepTable, *, threads: int = 1
+    ) -> Distances:
+        """Return how far each world is from the recording."""
+
+    def matrix(self, a: StepTable, b: StepTable, *, threads: int = 1) -> Floats:
+        """Return the distance of every row of one table to every row of another."""
+
+
+@dataclass(frozen=True)
+class StepDistance:
+    """The two-dimensional Kolmogorov-Smirnov distance of step lengths and turning angles.
+
+    Examples
+    --------
+    >>> from driftwalk.schema import Track
+    >>> random = np.random.default_rng(1)
+    >>> x, y = np.cumsum(random.normal(size=(2, 100)), axis=1)
+    >>> reference = StepDistance().prepare(Track(np.arange(100.0), x, y, 0 * x))
+    >>> StepDistance().matrix(reference.table, reference.table).tolist()
+    [[0.0]]
+    """
+
+    def prepare(self, track: Track, *, step_interval: float | None = None) -> StepReference:
+        """Return the steps of a recorded track, and the plan by which worlds form theirs.
+
+        Parameters
+        ----------
+        track : Track
+            The present samples of one body.
+        step_interval : float, optional
+            Time between the positions of a step [s]; default: the median sampling interval.
+
+        Raises
+        ------
+        InputError
+            When the track forms fewer than 30 pairs of steps.
+        """
+        plan = plan_steps(track.time - track.time[0], step_interval=step_interval)
+        found = apply_steps(plan, track.x, track.y)
+        steps = np.ascontiguousarray(np.column_stack([found.step_length, found.turning_angle]))
+        if len(steps) < FEWEST_PAIRS:
+            raise InputError(
+                f"the recording gives {len(steps)} pairs of steps, at least {FEWEST_PAIRS} are "
+                "needed: it hardly moves, is too short, or its clock does not suit the step "
+                "interval (--step-interval)"
+            )
+        return StepReference(
+            plan,
+            steps,
+            length_limit=1.5 * float(np.quantile(steps[:, 0], 0.999)),
+            angle_limit=min(np.pi, 2.5 * float(np.quantile(np.abs(steps[:, 1]), 0.98))) or np.pi,
+        )
+
+    def distances(
+        self, reference: StepReference, worlds: StepTable, *, threads: int = 1
+    ) -> Distances:
+        """Return the KS distance of each world to the recording, and where it sits.
+
+        Parameters
+        ----------
+        reference : StepReference
+            The recording.
+        worlds : StepTable
+            Steps of the worlds; one without a pair is as far as can be, 1.
+        threads : int
+            Threads; the result does not depend on it.
+        """
+        native = KsReference(reference.steps).native
+        recorded = len(reference.steps)
+
+        def one(row: int) -> tuple[float, float, float, int]:
+            count = int(worlds.pairs[row])
+            if count == 0:
+                return FARTHEST, 0.0, 0.0, -1
+            sample = np.column_stack([worlds.length[row, :count], worlds.angle[row, :count]])
+            d1, d2, _, _, _, place1, place2 = native.compare(sample, False)
+            x, y, quadrant, _ = place1 if d1 >= d2 else place2
+            return (d1 + d2) / (2 * recorded * count), x, y, quadrant
+
+        with ThreadPoolExecutor(max(threads, 1)) as pool:
+            found = list(pool.map(one, range(worlds.pairs.size)))
+        columns = np.array(found, dtype=np.float64).reshape(-1, 4).T
+        return Distances(columns[0], columns[1], columns[2], columns[3].astype(np.int32))
+
+    def matrix(self, a: StepTable, b: StepTable, *, threads: int = 1) -> Floats:
+        """Return the KS distance of every row of a table to every row of another.
+
+        Parameters
+        ----------
+        a, b : StepTable
+            The tables.
+        threads : int
+            Threads; the result does not depend on it.
+
+        Returns
+        -------
+        ndarray, shape (rows of a, rows of b)
+            1 where either row holds no pair.
+        """
+        return _core.ks_matrix(*a, *b, threads=threads)
+
+
+def step_table(
+    plan: StepPlan, x: npt.NDArray[np.floating], y: npt.NDArray[np.floating]
+) -> StepTable:
+    """Return the steps of many worlds.
+
+    Parameters
+    ----------
+    plan : StepPlan
+        Which samples form steps.
+    x, y : ndarray, shape (worlds, samples)
+        Positions [m]; NaN where a sample is missing.
+
+    Returns
+    -------
+    StepTable
+        One row per world.
+
+    Examples
+    --------
+    >>> plan = plan_steps([0.0, 1.0, 2.0])
+    >>> table = step_table(plan, np.array([[0.0, 1.0, 1.0]]), np.array([[0.0, 0.0, 2.0]]))
+    >>> table.length.tolist(), table.pairs.tolist()
+    ([[2.0]], [1])
+    """
+    length, angle = np.zeros((2, len(x), plan.pairs))
+    pairs = np.zeros(len(x), dtype=np.int64)
+    for world in range(len(x)):
+        found = apply_steps(plan, x[world], y[world])
+        pairs[world] = found.step_length.size
+        length[world, : pairs[world]] = found.step_length
+        angle[world, : pairs[world]] = found.turning_angle
+    return StepTable(length, angle, pairs)
