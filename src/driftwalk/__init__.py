@@ -11,7 +11,17 @@ from typing import Any
 
 __version__ = "0.1.0"
 
-_ROOMS = (
+# The stages whose public names are also names of the package; a stage's `__all__` is the only list
+# of its names.
+_STAGES = (
+    "record",
+    "flow",
+    "model",
+    "simulation",
+    "comparison",
+    "motion",
+    "calibration",
+    "likelihood",
     "assembly",
     "calibration",
     "comparison",

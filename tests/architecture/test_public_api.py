@@ -19,6 +19,7 @@ STAGES = (
     "model",
     "simulation",
     "comparison",
+    "motion",
     "sweep",
     "calibration",
     "likelihood",

@@ -23,9 +23,11 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "sweep": GROUND,
     # `record` for the tracking noise of a recording, which is what "estimate" stands for.
     "simulation": GROUND | {"model", "record"},
-    "calibration": GROUND | {"simulation", "comparison", "flow", "model", "sweep"},
+    "motion": GROUND | {"simulation", "comparison", "model"},
+    "calibration": GROUND | {"motion", "simulation", "comparison", "flow", "model", "sweep"},
     # `calibration` for the check of a fit: how far simulated steps are from the recording's.
-    "likelihood": GROUND | {"simulation", "comparison", "flow", "model", "sweep", "calibration"},
+    "likelihood": GROUND
+    | {"motion", "simulation", "comparison", "flow", "model", "sweep", "calibration"},
     "assembly": GROUND | {"simulation", "comparison", "flow", "model", "sweep"},
     # `assemble` for the observer: what is seen is classified by the rules of simulated runs.
     "track": GROUND | {"record", "model", "assembly"},
@@ -39,18 +41,8 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "viewer": GROUND
     | {"record", "flow", "model", "comparison", "simulation", "assembly", "track", "plot", "page"},
     "cli": GROUND
-    | {"record", "flow", "model", "comparison", "sweep", "simulation", "assembly"}
-    | {
-        "calibration",
-        "likelihood",
-        "track",
-        "datasets",
-        "plot",
-        "figures",
-        "page",
-        "runs",
-        "viewer",
-    },
+    | {"record", "flow", "model", "comparison", "sweep", "simulation", "motion", "assembly"}
+    | {"calibration", "likelihood", "track", "datasets", "plot", "figures", "page", "viewer"},
 }
 HEAVY = frozenset(
     {"xarray", "scipy", "pandas", "cv2", "matplotlib", "dask", "optuna", "h5netcdf", "SALib"}

@@ -1,0 +1,149 @@
+"""The block in a stirred tank as one motion model among others, with its fused native path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from driftwalk import _core
+from driftwalk.comparison import StepReference
+from driftwalk.core.errors import InputError
+from driftwalk.motion.conditions import Conditions
+from driftwalk.motion.protocol import Details, Floats, Keys, Scores, Values, Worlds
+from driftwalk.motion.score import DENSITY_BINS, excerpt_samples
+from driftwalk.schema import Parameter
+from driftwalk.simulation.backend import native_model, world_table
+from driftwalk.simulation.initial import world_orientations
+
+if TYPE_CHECKING:
+    from driftwalk.model import Study
+
+
+class BlockModel:
+    """A floating block, dragged by the water and pushed by a stochastic force.
+
+    Parameters
+    ----------
+    study : Study
+        Block, tank, water and times; its section [calibration] has the ranges of the two
+        parameters.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> [parameter.name for parameter in BlockModel(dw.Study()).parameters]
+    ['drag_coefficient', 'force_std']
+    """
+
+    name = "block"
+    needs_flow = True
+
+    def __init__(self, study: Study) -> None:
+        self.study = study
+        search = study.calibration
+        self.parameters = (
+            Parameter(
+                "drag_coefficient", "1", search.drag_coefficient_min, search.drag_coefficient_max,
+                search.drag_coefficient_step, label="drag coefficient", symbol="C_d",
+                refined_step=search.refined_drag_coefficient_step,
+            ),
+            Parameter(
+                "force_std", "N", search.force_std_min_N, search.force_std_max_N,
+                search.force_std_step_N, label="force_std", symbol="sigma_F",
+                refined_step=search.refined_force_std_step_N,
+            ),
+        )  # fmt: skip
+
+    def simulate(self, values: Values, like: Conditions, keys: Keys) -> Worlds:
+        """Return one world per key; see `MotionModel.simulate`.
+
+        Raises
+        ------
+        InputError
+            When the conditions have no flow.
+        """
+        x, y, theta, status = _core.simulate(
+            self.native(like),
+            _table(values, like, keys),
+            keys,
+            threads=like.threads,
+            precision="single",
+        )
+        return Worlds(x, y, theta, status)
+
+    def score(
+        self,
+        values: Values,
+        like: Conditions,
+        keys: Keys,
+        reference: StepReference,
+        *,
+        details: Details = "none",
+    ) -> Scores:
+        """Return how far every world is from the recording; see `score_worlds`.
+
+        Raises
+        ------
+        InputError
+            When the conditions have no flow.
+        """
+        full = details == "all"
+        return dict(
+            _core.score(
+                self.native(like),
+                _table(values, like, keys),
+                keys,
+                left=reference.plan.left,
+                weight=reference.plan.weight,
+                triple=reference.plan.triple,
+                reference=reference.steps,
+                bins=DENSITY_BINS if full else 0,
+                length_limit=reference.length_limit,
+                angle_limit=reference.angle_limit,
+                excerpt=excerpt_samples(like) if full else 0,
+                keep_steps=details == "steps",
+                threads=like.threads,
+            )
+        )
+
+    def describe(self) -> dict[str, Any]:
+        """Return the study that it was made from."""
+        return {"name": self.name, "study": self.study.to_dict()}
+
+    def facts(self, estimate: Mapping[str, float]) -> dict[str, Any]:
+        """Return the force interval, without which sigma_F has no meaning, and what hangs on it."""
+        interval = self.study.forces.force_interval_s
+        return {
+            "force_interval_s": interval,
+            "force_noise_intensity_N2_s": estimate["force_std"] ** 2 * interval,
+            "wetted_depth_m": self.study.wetted_depth_m,
+            "time_step_s": self.study.time_step_s,
+        }
+
+    def native(self, like: Conditions) -> _core.Model:
+        """Return the core's form of the model under the conditions of a recording.
+
+        Raises
+        ------
+        InputError
+            When the conditions have no flow, or its grid is too fine for the tank.
+        """
+        if like.flow is None:
+            raise InputError("a block drifts in water: its conditions need a flow field")
+        return native_model(self.study, like.flow, like.sample_time, like.camera)
+
+
+def _table(values: Values, like: Conditions, keys: Keys) -> Floats:
+    start = like.start
+    return world_table(
+        x=start.x,
+        y=start.y,
+        theta=world_orientations(start.theta, keys),
+        vx=start.vx,
+        vy=start.vy,
+        omega=start.omega,
+        drag_coefficient=np.asarray(values["drag_coefficient"], dtype=np.float64),
+        force_std=np.asarray(values["force_std"], dtype=np.float64),
+    )

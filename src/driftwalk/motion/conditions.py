@@ -1,0 +1,105 @@
+"""What a simulation takes over from a recording: times and gaps, start, camera, tank and flow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.simulation.backend import Camera, default_threads
+from driftwalk.simulation.initial import Start, recorded_start
+from driftwalk.simulation.run import without_gaps
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import FieldOfView, Study, Tank
+    from driftwalk.schema import Track
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """The conditions of a recording, for every world that is to be compared with it.
+
+    Attributes
+    ----------
+    sample_time : ndarray, shape (n,)
+        Time stamps of a world [s]: the recording's from its first sample on, with its gaps unless
+        the study leaves them out.
+    start : Start
+        Pose and motion at the first sample; theta is NaN where the recording has no orientation.
+    camera : Camera
+        Noise and resolution of the samples.
+    tank : Tank
+        The tank and its wall.
+    view : FieldOfView or None
+        What the camera sees, when that is less than the tank.
+    flow : xarray.Dataset or None
+        The water's velocity, a `flow_field`; None where it plays no part.
+    threads : int
+        Threads to use; results do not depend on it.
+    """
+
+    sample_time: Floats
+    start: Start
+    camera: Camera
+    tank: Tank
+    view: FieldOfView | None
+    flow: xr.Dataset | None
+    threads: int
+
+
+def recorded_conditions(
+    track: Track,
+    study: Study,
+    *,
+    camera: Camera,
+    flow: xr.Dataset | None = None,
+    threads: int | None = None,
+) -> Conditions:
+    """Return the conditions of a recorded track.
+
+    Parameters
+    ----------
+    track : Track
+        The present samples of one body.
+    study : Study
+        Tank, observation and the window over which the start is smoothed.
+    camera : Camera
+        See `recorded_camera`.
+    flow : xarray.Dataset, optional
+        A `flow_field`.
+    threads : int, optional
+        Default: all processors.
+
+    Raises
+    ------
+    InputError
+        When the track has no sample.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> from driftwalk.schema import body_track
+    >>> track = body_track(dw.tank30_recording())
+    >>> camera = dw.recorded_camera(track, dw.Study(), position_quantum=0.0)
+    >>> dw.recorded_conditions(track, dw.Study(), camera=camera).sample_time.size
+    18001
+    """
+    start = recorded_start(track, window=study.flow.smoothing_window_s)
+    time = track.time - track.time[0]
+    if study.observation.gaps == "none":
+        time = without_gaps(time)
+    return Conditions(
+        sample_time=time,
+        start=start,
+        camera=camera,
+        tank=study.tank,
+        view=study.observation.field_of_view,
+        flow=flow,
+        threads=threads or default_threads(),
+    )

@@ -1,0 +1,274 @@
+"""A Python function of the user as a motion model."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import itertools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.motion.camera import observe_worlds
+from driftwalk.motion.conditions import Conditions
+from driftwalk.motion.protocol import Floats, Keys, Values, Worlds
+from driftwalk.motion.random import WorldRandom
+from driftwalk.schema import Parameter
+from driftwalk.simulation.initial import Start, world_orientations
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Tank
+
+Settings = Literal["one", "many"]
+Range = tuple[float, float] | tuple[float, float, str]
+Positions = tuple[Floats, Floats] | tuple[Floats, Floats, Floats]
+MotionFunction = Callable[..., Positions]
+
+SAMPLES_PER_CALL: Final = 4_000_000
+"""Samples that one call of a function may have to return: some 100 MB of positions."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What a function is given besides its parameters: the conditions of a batch of worlds.
+
+    Attributes
+    ----------
+    times : ndarray, shape (samples,)
+        When positions are wanted [s]: from 0 on, increasing, with the recording's gaps.
+    worlds : int
+        How many worlds to simulate.
+    start : Start
+        Pose and motion at time 0, arrays of shape (worlds,): ``x``, ``y`` [m], ``theta`` [rad]
+        (random where the recording has no orientation), ``vx``, ``vy`` [m/s], ``omega`` [rad/s].
+    random : WorldRandom
+        Random numbers, one stream per world. Other sources make results depend on the order.
+    tank : Tank
+        The tank; ``tank.radius_m`` of a circle, ``tank.corners_m`` of other shapes.
+    flow : xarray.Dataset or None
+        The water's velocity, where the calibration was given one.
+    """
+
+    times: Floats
+    worlds: int
+    start: Start
+    random: WorldRandom
+    tank: Tank
+    flow: xr.Dataset | None
+
+
+class FunctionModel:
+    """A motion model made of a Python function; see `motion_model`."""
+
+    needs_flow = False
+
+    def __init__(
+        self, function: MotionFunction, parameters: tuple[Parameter, ...], *, settings: Settings
+    ) -> None:
+        self.name = str(getattr(function, "__name__", type(function).__name__))
+        self.parameters = parameters
+        self.function = function
+        self.settings = settings
+
+    def simulate(self, values: Values, like: Conditions, keys: Keys) -> Worlds:
+        """Return one world per key; see `MotionModel.simulate`.
+
+        Raises
+        ------
+        InputError
+            When the function fails or returns something else than positions.
+        """
+        parts = [
+            self._call(values, like, keys, batch) for batch in self._batches(values, like, keys)
+        ]
+        return Worlds(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+    def describe(self) -> dict[str, Any]:
+        """Return its name, its parameters and a hash of its source, where there is one."""
+        try:
+            source = inspect.getsource(self.function)
+        except (OSError, TypeError):
+            source = ""
+        return {
+            "name": self.name,
+            "parameters": [parameter.describe() for parameter in self.parameters],
+            "source_sha256": hashlib.sha256(source.encode()).hexdigest() if source else None,
+        }
+
+    def facts(self, estimate: Mapping[str, float]) -> dict[str, Any]:  # noqa: ARG002
+        """Return nothing more: the answer is in the parameters."""
+        return {}
+
+    def _batches(self, values: Values, like: Conditions, keys: Keys) -> list[slice]:
+        """Return the worlds of each call: of one setting, unless many may be in a batch."""
+        most = max(SAMPLES_PER_CALL // like.sample_time.size, 1)
+        settings = np.column_stack([values[one.name] for one in self.parameters])
+        changes = np.flatnonzero((np.diff(settings, axis=0) != 0).any(axis=1)) + 1
+        inner = changes.tolist() if self.settings == "one" else []
+        ends = [0, *inner, keys.size]
+        return [
+            slice(first, min(first + most, stop))
+            for begin, stop in itertools.pairwise(ends)
+            for first in range(begin, stop, most)
+        ]
+
+    def _call(self, values: Values, like: Conditions, keys: Keys, batch: slice) -> Worlds:
+        own = keys[batch]
+        scene = Scene(
+            like.sample_time, own.size, _starts(like.start, own), WorldRandom(own), like.tank,
+            like.flow,
+        )  # fmt: skip
+        given = {one.name: np.asarray(values[one.name][batch]) for one in self.parameters}
+        if self.settings == "one":
+            passed: dict[str, Any] = {name: float(column[0]) for name, column in given.items()}
+        else:
+            passed = {name: column[:, None] for name, column in given.items()}
+        try:
+            found = self.function(scene, **passed)
+        except Exception as error:
+            raise InputError(
+                f"{self._called(given)} failed: {type(error).__name__}: {error}"
+            ) from error
+        x, y, theta = self._positions(found, (own.size, like.sample_time.size), given)
+        return observe_worlds(x, y, theta, like, own)
+
+    def _called(self, given: Mapping[str, Floats]) -> str:
+        words = ", ".join(f"{name}={column[0]:g}" for name, column in given.items())
+        return f"the model {self.name}({words})"
+
+    def _positions(
+        self, found: Any, shape: tuple[int, int], given: Mapping[str, Floats]
+    ) -> tuple[Floats, Floats, Floats | None]:
+        if not isinstance(found, tuple) or len(found) not in (2, 3):
+            raise InputError(
+                f"{self._called(given)} returned {type(found).__name__}: return x, y or x, y, theta"
+            )
+        arrays: list[Floats] = []
+        for name, values in zip(("x", "y", "theta"), found, strict=False):
+            try:
+                array = np.asarray(values, dtype=np.float64)
+            except (TypeError, ValueError) as error:
+                raise InputError(
+                    f"{self._called(given)} returned a {name} that is no array of numbers: {error}"
+                ) from error
+            if array.shape != shape:
+                raise InputError(
+                    f"{self._called(given)} returned {name} of shape {array.shape}, expected "
+                    f"{shape}: (scene.worlds, scene.times.size)"
+                )
+            arrays.append(array)
+        return arrays[0], arrays[1], arrays[2] if len(arrays) == 3 else None
+
+
+def motion_model(
+    function: MotionFunction,
+    /,
+    *parameters: Parameter,
+    settings: Settings = "one",
+    **ranges: Range,
+) -> FunctionModel:
+    """Return a motion model made of a Python function.
+
+    The function is called as ``function(scene, speed=0.05, tumble_rate=1.2)``. `Scene` holds the
+    times at which positions are wanted, the start, the number of worlds, and random numbers with
+    one stream per world. The function returns the true positions ``x, y`` [m], or ``x, y, theta``
+    [rad], as arrays of shape ``(scene.worlds, scene.times.size)``; driftwalk adds the noise, the
+    resolution and the gaps of the recording, forms steps and compares. A row with NaN is a world
+    that failed; the others count.
+
+    All worlds of a call have the same parameters, which arrive as floats. With ``settings="many"``
+    they arrive as columns of shape (worlds, 1), and one call simulates many settings: worth it for
+    a function that steps through time in a loop.
+
+    Parameters
+    ----------
+    function : callable
+        The motion.
+    *parameters : Parameter
+        Parameters with a step, a scale or a label of their own.
+    settings : {"one", "many"}
+        Whether the worlds of a call share one setting of the parameters.
+    **ranges : tuple
+        The other parameters by name: ``(low, high)`` or ``(low, high, unit)``.
+
+    Returns
+    -------
+    FunctionModel
+        What `calibrate` takes.
+
+    Raises
+    ------
+    ConfigurationError
+        When there is no parameter, a range is none, or the function does not take them.
+
+    Notes
+    -----
+    Random numbers are to come from ``scene.random`` alone. `driftwalk.testing.MotionModelContract`
+    tells whether a model keeps to it.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> def diffuse(scene, *, diffusivity):
+    ...     spread = np.sqrt(2 * diffusivity * np.diff(scene.times, prepend=0.0))
+    ...     step = spread * scene.random.normal(2, scene.times.size)
+    ...     path = np.cumsum(step, axis=-1)
+    ...     return scene.start.x[:, None] + path[:, 0], scene.start.y[:, None] + path[:, 1]
+    >>> dw.motion_model(diffuse, diffusivity=(1e-6, 1e-4, "m2/s")).parameters[0].key
+    'diffusivity_m2_s'
+    """
+    if not callable(function):
+        raise ConfigurationError(
+            f"a motion model is made of a function, got {type(function).__name__}"
+        )
+    if settings not in get_args(Settings):
+        raise ConfigurationError(
+            f"settings must be one of {', '.join(get_args(Settings))}, got {settings!r}"
+        )
+    named = (*parameters, *(_parameter(name, given) for name, given in ranges.items()))
+    names = [one.name for one in named]
+    if not names:
+        raise ConfigurationError("a motion model needs a parameter: speed=(0, 0.1, 'm/s')")
+    if len(set(names)) < len(names):
+        raise ConfigurationError(f"a parameter is given twice: {', '.join(names)}")
+    _require_takes(function, names)
+    return FunctionModel(function, named, settings=settings)
+
+
+def _parameter(name: str, given: Any) -> Parameter:
+    if not isinstance(given, tuple) or len(given) not in (2, 3):
+        raise ConfigurationError(f"{name}: expected a range such as (0, 0.1, 'm/s'), got {given!r}")
+    low, high, unit = (*given, "1")[:3]
+    try:
+        ends = float(low), float(high)
+    except (TypeError, ValueError) as error:
+        raise ConfigurationError(f"{name}: its range is no two numbers: {given!r}") from error
+    return Parameter(name, str(unit), *ends)
+
+
+def _require_takes(function: MotionFunction, names: list[str]) -> None:
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):
+        return
+    try:
+        signature.bind(None, **dict.fromkeys(names, 0.0))
+    except TypeError as error:
+        called = getattr(function, "__name__", "the function")
+        raise ConfigurationError(
+            f"{called}{signature} cannot be called with a scene and {', '.join(names)}: {error}"
+        ) from error
+
+
+def _starts(start: Start, keys: Keys) -> Start:
+    """Return the start with one entry per world each."""
+    values: dict[str, npt.ArrayLike] = {
+        name: np.full(keys.size, value, dtype=np.float64) for name, value in start._asdict().items()
+    }
+    return Start(**{**values, "theta": world_orientations(start.theta, keys)})

@@ -1,0 +1,125 @@
+"""How far simulated worlds are from a recording: by the model itself, or world by world."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.comparison import Statistic, StepDistance, StepReference, StepTable, step_table
+from driftwalk.motion.conditions import Conditions
+from driftwalk.motion.protocol import Details, Keys, MotionModel, Scores, ScoresItself, Values
+from driftwalk.simulation.backend import STATUS
+
+DENSITY_BINS: Final = 32
+EXCERPT_S: Final = 30.0
+
+
+def score_worlds(
+    model: MotionModel,
+    values: Values,
+    like: Conditions,
+    keys: Keys,
+    reference: StepReference,
+    *,
+    statistic: Statistic | None = None,
+    details: Details = "none",
+) -> Scores:
+    """Simulate worlds and compare each with the recording.
+
+    Parameters
+    ----------
+    model : MotionModel
+        What is simulated.
+    values : mapping of str to ndarray, shape (worlds,)
+        The value of every parameter in every world.
+    like : Conditions
+        The conditions of the recording.
+    keys : ndarray of uint64, shape (worlds,)
+        The address of every world's random numbers.
+    reference : StepReference
+        The recording's steps.
+    statistic : Statistic, optional
+        The distance; default: `StepDistance`.
+    details : {"none", "steps", "all"}
+        What else to keep: nothing, the steps of every world, or its step density and the first 30
+        seconds of its path.
+
+    Returns
+    -------
+    dict of ndarray
+        One entry per world each: ``ks_distance`` (1 for a world without motion or steps), its place
+        ``ks_step_length`` [m], ``ks_turning_angle`` [rad] and ``ks_quadrant``, ``status``,
+        ``pairs``; ``step_length``, ``turning_angle`` with the steps; ``step_density``,
+        ``excerpt_x``, ``excerpt_y`` [m] with all.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> from driftwalk.schema import body_track
+    >>> from driftwalk.simulation.backend import Camera
+    >>> track = body_track(dw.tank30_recording().isel(time=slice(0, 600)))
+    >>> block = dw.BlockModel(dw.Study())
+    >>> camera = Camera(position_noise=3e-4)
+    >>> like = dw.recorded_conditions(track, dw.Study(), camera=camera, flow=dw.tank30_flow())
+    >>> values = {"drag_coefficient": np.array([0.4]), "force_std": np.array([6e-4])}
+    >>> reference = dw.StepDistance().prepare(track)
+    >>> keys = np.array([1], dtype=np.uint64)
+    >>> float(dw.score_worlds(block, values, like, keys, reference)["ks_distance"][0]) < 0.3
+    True
+    """
+    chosen = StepDistance() if statistic is None else statistic
+    if isinstance(model, ScoresItself) and isinstance(chosen, StepDistance):
+        return model.score(values, like, keys, reference, details=details)
+    worlds = model.simulate(values, like, keys)
+    table = step_table(reference.plan, worlds.x, worlds.y)
+    # As in the core: what has no motion, or lost its numbers, is as far as can be.
+    counted = table._replace(pairs=np.where(worlds.status == 0, table.pairs, 0))
+    found = chosen.distances(reference, counted, threads=like.threads)
+    scores: Scores = {
+        "pairs": table.pairs,
+        "status": worlds.status,
+        "ks_distance": found.distance,
+        "ks_step_length": found.step_length,
+        "ks_turning_angle": found.turning_angle,
+        "ks_quadrant": found.quadrant,
+    }
+    if details == "steps":
+        scores |= {"step_length": table.length, "turning_angle": table.angle}
+    if details == "all":
+        first = excerpt_samples(like)
+        scores |= {
+            "step_density": step_densities(reference, table),
+            "excerpt_x": worlds.x[:, :first].astype(np.float32),
+            "excerpt_y": worlds.y[:, :first].astype(np.float32),
+        }
+    return scores
+
+
+def broken_worlds(status: npt.NDArray[np.uint32]) -> npt.NDArray[np.bool_]:
+    """Return which worlds lost their numbers: they have no distance."""
+    return np.asarray((status & (STATUS["non_finite"] | STATUS["escaped"])) != 0)
+
+
+def excerpt_samples(like: Conditions) -> int:
+    """Return the number of samples in the first 30 seconds."""
+    return int(np.searchsorted(like.sample_time, EXCERPT_S, side="right"))
+
+
+def step_densities(reference: StepReference, table: StepTable) -> npt.NDArray[np.float32]:
+    """Return the share of each world's steps in every bin, (worlds, 32 lengths, 32 angles).
+
+    The last bin of the lengths holds all longer steps, the outer bins of the angles all beyond.
+    """
+    density = np.zeros((table.pairs.size, DENSITY_BINS, DENSITY_BINS), dtype=np.float32)
+    across = table.length / reference.length_limit * DENSITY_BINS
+    around = (table.angle / reference.angle_limit + 1.0) * 0.5 * DENSITY_BINS
+    row, column = (
+        np.clip(place, 0.0, DENSITY_BINS - 1.0).astype(np.int64) for place in (across, around)
+    )
+    for world, count in enumerate(table.pairs):
+        cell = row[world, :count] * DENSITY_BINS + column[world, :count]
+        counts = np.bincount(cell, minlength=DENSITY_BINS**2)
+        density[world] = counts.reshape(DENSITY_BINS, DENSITY_BINS) / np.float32(max(count, 1))
+    return density
