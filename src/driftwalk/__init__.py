@@ -11,25 +11,17 @@ from typing import Any
 
 __version__ = "0.1.0"
 
-# The stages whose public names are also names of the package; a stage's `__all__` is the only list
-# of its names.
-_STAGES = (
-    "record",
-    "flow",
-    "model",
-    "simulation",
-    "comparison",
-    "motion",
-    "calibration",
-    "likelihood",
+_ROOMS = (
     "assembly",
     "calibration",
     "comparison",
+    "conditions",
     "datasets",
     "figures",
     "flow",
     "likelihood",
     "model",
+    "motion",
     "page",
     "plot",
     "record",
@@ -102,6 +94,7 @@ _NAMES = {
         "apply_overrides",
         "load_study",
     ),
+    "driftwalk.motion": ("motion_model",),
     "driftwalk.page": (
         "report_page",
         "write_report",

@@ -2,11 +2,13 @@ from driftwalk import (
     assembly as assembly,
     calibration as calibration,
     comparison as comparison,
+    conditions as conditions,
     datasets as datasets,
     figures as figures,
     flow as flow,
     likelihood as likelihood,
     model as model,
+    motion as motion,
     page as page,
     plot as plot,
     record as record,
@@ -77,6 +79,9 @@ from driftwalk.model import (
     Study as Study,
     apply_overrides as apply_overrides,
     load_study as load_study,
+)
+from driftwalk.motion import (
+    motion_model as motion_model,
 )
 from driftwalk.page import (
     report_page as report_page,

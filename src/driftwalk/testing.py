@@ -65,7 +65,7 @@ class MotionModelContract:
         """A model names one parameter or more, each once."""
         model = self.model()
         names = [parameter.name for parameter in model.parameters]
-        assert isinstance(model, MotionModel), "a member of driftwalk.MotionModel is missing"
+        assert isinstance(model, MotionModel), "a member of driftwalk.motion.MotionModel is missing"
         assert names
         assert len(set(names)) == len(names), names
         assert model.name

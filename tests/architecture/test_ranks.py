@@ -23,6 +23,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "sweep": GROUND,
     # `record` for the tracking noise of a recording, which is what "estimate" stands for.
     "simulation": GROUND | {"model", "record"},
+    "conditions": GROUND | {"model"},
     "motion": GROUND | {"simulation", "comparison", "model"},
     "calibration": GROUND | {"motion", "simulation", "comparison", "flow", "model", "sweep"},
     # `calibration` for the check of a fit: how far simulated steps are from the recording's.
@@ -41,8 +42,9 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "viewer": GROUND
     | {"record", "flow", "model", "comparison", "simulation", "assembly", "track", "plot", "page"},
     "cli": GROUND
-    | {"record", "flow", "model", "comparison", "sweep", "simulation", "motion", "assembly"}
-    | {"calibration", "likelihood", "track", "datasets", "plot", "figures", "page", "viewer"},
+    | {"record", "flow", "model", "comparison", "sweep", "simulation", "motion", "conditions"}
+    | {"assembly", "calibration", "likelihood", "track", "datasets", "plot", "figures", "page"}
+    | {"runs", "viewer"},
 }
 HEAVY = frozenset(
     {"xarray", "scipy", "pandas", "cv2", "matplotlib", "dask", "optuna", "h5netcdf", "SALib"}

@@ -6,8 +6,8 @@ import json
 
 import driftwalk as dw
 from driftwalk.cli.inputs.study_recording import load_for_run
-from driftwalk.conditions.tank import study_in_arena
 from driftwalk.cli.options.recording import RecordingOptions
+from driftwalk.conditions.tank import study_in_arena
 from driftwalk.record import save_trajectory
 
 

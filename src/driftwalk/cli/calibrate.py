@@ -87,7 +87,7 @@ def calibrate(
     turning angles, and refines the grid around the minimum. Reports how well the parameters are
     known and whether the model explains the motion. After a kill, the same command continues.
     """
-    from driftwalk.conditions.tank import require_inside, study_in_arena
+    from driftwalk.conditions import require_inside, study_in_arena
     from driftwalk.flow import load_flow
     from driftwalk.runs import CalibrationWork, run_calibration
 

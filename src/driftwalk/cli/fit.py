@@ -127,7 +127,7 @@ def fit(
     (fit.nc), the flow (flow.nc) for every command that takes one, the recording, the check of the
     model (check.nc), figures and manifest.json.
     """
-    from driftwalk.conditions.tank import require_inside, study_in_arena
+    from driftwalk.conditions import require_inside, study_in_arena
     from driftwalk.runs import FitWork, run_fit
 
     overrides = study_overrides(

@@ -1,1 +1,5 @@
-"""What a simulation or a fit takes over from a recording: tank and block, reconciled with the study."""
+"""What a simulation or a fit takes over from a recording: the tank, reconciled with the study."""
+
+from driftwalk.conditions.tank import require_inside, study_in_arena
+
+__all__ = ["require_inside", "study_in_arena"]

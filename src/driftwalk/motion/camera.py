@@ -54,9 +54,9 @@ def observe_worlds(
     >>> from driftwalk.simulation.backend import Camera
     >>> time = np.arange(40) / 20
     >>> track = Track(time, 0.05 * time, 0.0 * time, 0.0 * time)
-    >>> like = dw.recorded_conditions(track, dw.Study(), camera=Camera(position_noise=1e-3))
+    >>> like = dw.motion.recorded_conditions(track, dw.Study(), camera=Camera(position_noise=1e-3))
     >>> keys = np.array([1], dtype=np.uint64)
-    >>> seen = dw.observe_worlds(track.x[None], track.y[None], None, like, keys)
+    >>> seen = dw.motion.observe_worlds(track.x[None], track.y[None], None, like, keys)
     >>> float(np.abs(seen.x - track.x).max()) < 5e-3
     True
     """

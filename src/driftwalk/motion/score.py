@@ -60,13 +60,13 @@ def score_worlds(
     >>> from driftwalk.schema import body_track
     >>> from driftwalk.simulation.backend import Camera
     >>> track = body_track(dw.tank30_recording().isel(time=slice(0, 600)))
-    >>> block = dw.BlockModel(dw.Study())
+    >>> block = dw.motion.BlockModel(dw.Study())
     >>> camera = Camera(position_noise=3e-4)
-    >>> like = dw.recorded_conditions(track, dw.Study(), camera=camera, flow=dw.tank30_flow())
+    >>> like = dw.motion.recorded_conditions(track, dw.Study(), camera=camera, flow=dw.tank30_flow())
     >>> values = {"drag_coefficient": np.array([0.4]), "force_std": np.array([6e-4])}
-    >>> reference = dw.StepDistance().prepare(track)
+    >>> reference = dw.comparison.StepDistance().prepare(track)
     >>> keys = np.array([1], dtype=np.uint64)
-    >>> float(dw.score_worlds(block, values, like, keys, reference)["ks_distance"][0]) < 0.3
+    >>> float(dw.motion.score_worlds(block, values, like, keys, reference)["ks_distance"][0]) < 0.3
     True
     """
     chosen = StepDistance() if statistic is None else statistic

@@ -144,7 +144,7 @@ def test_a_function_that_gives_no_positions_is_named(returned, message):
         (lambda: motion_model(line, sped=(0, 1)), "cannot be called with a scene and sped"),
         (lambda: motion_model(line, settings="few", speed=(0, 1)), "one of one, many, got 'few'"),
         (
-            lambda: motion_model(line, dw.Parameter("speed", "1", 0, 1), speed=(0, 1)),
+            lambda: motion_model(line, dw.motion.Parameter("speed", "1", 0, 1), speed=(0, 1)),
             "given twice: speed, speed",
         ),
     ],
