@@ -15,7 +15,6 @@ from driftwalk.cli.inputs.assembly_source import (
     source_from_flow,
 )
 from driftwalk.cli.options.shared import (
-    ASSEMBLY_KEYS,
     BlockFriction,
     BlockLatching,
     BlockRestitution,
@@ -41,11 +40,11 @@ from driftwalk.cli.options.shared import (
     TimeStep,
     WallFriction,
     WallRestitution,
-    study_overrides,
 )
 from driftwalk.cli.terminal.output import print_json, print_note, print_table, report_command
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.errors import InputError
+from driftwalk.core.study_keys import ASSEMBLY_KEYS, study_overrides
 
 if TYPE_CHECKING:
     import xarray as xr

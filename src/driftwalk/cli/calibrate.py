@@ -12,7 +12,6 @@ from driftwalk.cli.inputs.require_motion import require_motion
 from driftwalk.cli.inputs.study_recording import default_tank_note, load_for_run
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import (
-    CALIBRATION_KEYS,
     Depth,
     FlowFile,
     ForceInterval,
@@ -30,10 +29,10 @@ from driftwalk.cli.options.shared import (
     WallFriction,
     WallRestitution,
     resolve_study,
-    study_overrides,
 )
 from driftwalk.cli.terminal.output import print_json, print_note, report_command
 from driftwalk.cli.terminal.progress import reported
+from driftwalk.core.study_keys import CALIBRATION_KEYS, study_overrides
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,7 +14,6 @@ from driftwalk.cli.inputs.study_recording import default_tank_note, load_for_run
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import (
     PANEL,
-    STUDY_KEYS,
     Depth,
     ForceInterval,
     Json,
@@ -24,23 +23,14 @@ from driftwalk.cli.options.shared import (
     TankDiameter,
     quantity_option,
     resolve_study,
-    study_overrides,
 )
 from driftwalk.cli.terminal.output import print_json, print_note, report_command
 from driftwalk.cli.terminal.progress import reported
+from driftwalk.core.study_keys import FIT_KEYS, study_overrides
 
 if TYPE_CHECKING:
     import xarray as xr
 
-FIT_KEYS: Final[dict[str, str]] = {
-    **STUDY_KEYS,
-    "angle": "fit.angle",
-    "spline_spacing": "fit.spline_spacing_m",
-    "confidence": "fit.confidence",
-    "switching_times": "fit.switching_times_s",
-    "flow_labels": "fit.flow_labels",
-    "precision": "fit.drag_coefficient_precision",
-}
 MOST_FINDINGS: Final = 2
 """Findings that are printed; all are in the file."""
 FAR_ABOVE_FLOOR: Final = 2.0

@@ -11,7 +11,6 @@ from driftwalk.cli.inputs.require_motion import require_motion
 from driftwalk.cli.inputs.study_recording import load_with_study
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import (
-    STUDY_KEYS,
     Depth,
     Json,
     Mass,
@@ -20,9 +19,9 @@ from driftwalk.cli.options.shared import (
     TankDiameter,
     quantity_option,
     resolve_study,
-    study_overrides,
 )
 from driftwalk.cli.terminal.output import print_json, print_note
+from driftwalk.core.study_keys import STUDY_KEYS, study_overrides
 
 if TYPE_CHECKING:
     import xarray as xr

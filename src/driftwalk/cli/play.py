@@ -11,7 +11,6 @@ import typer
 from driftwalk.cli.inputs.study_recording import load_for_run
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.shared import (
-    ASSEMBLY_KEYS,
     Blocks,
     FlowFile,
     Seed,
@@ -19,10 +18,10 @@ from driftwalk.cli.options.shared import (
     TankDiameter,
     override_study,
     resolve_study,
-    study_overrides,
 )
 from driftwalk.cli.terminal.output import print_note
 from driftwalk.cli.view import Host, Open, Port, show
+from driftwalk.core.study_keys import ASSEMBLY_KEYS, study_overrides
 
 if TYPE_CHECKING:
     import xarray as xr

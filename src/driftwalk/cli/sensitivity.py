@@ -18,7 +18,6 @@ from driftwalk.cli.inputs.assembly_source import (
     source_from_flow,
 )
 from driftwalk.cli.options.shared import (
-    SENSITIVITY_KEYS,
     BlockFriction,
     BlockLatching,
     BlockRestitution,
@@ -46,12 +45,12 @@ from driftwalk.cli.options.shared import (
     Vary,
     WallFriction,
     WallRestitution,
-    study_overrides,
 )
 from driftwalk.cli.options.vary import VARY_KEYS, vary_overrides
 from driftwalk.cli.terminal.output import print_json, print_note
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.cli.terminal.sensitivity_answer import print_answer, summary
+from driftwalk.core.study_keys import SENSITIVITY_KEYS, study_overrides
 
 if TYPE_CHECKING:
     from driftwalk.model import Study

@@ -29,10 +29,10 @@ from driftwalk.cli.options.shared import (
     WallFriction,
     WallRestitution,
     resolve_study,
-    study_overrides,
 )
 from driftwalk.cli.terminal.output import print_json, print_note, require_place
 from driftwalk.core.errors import InputError
+from driftwalk.core.study_keys import study_overrides
 
 if TYPE_CHECKING:
     import xarray as xr

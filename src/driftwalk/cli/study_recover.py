@@ -13,24 +13,17 @@ from driftwalk.cli.options.shared import (
     quantity_option,
     quantity_parser,
     resolve_study,
-    study_overrides,
 )
 from driftwalk.cli.terminal.output import print_json
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.study_keys import RECOVER_KEYS, study_overrides
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
 
-RECOVER_KEYS: Final[dict[str, str]] = {
-    "recordings": "recover.recordings",
-    "duration": "recover.durations_s",
-    "flow": "recover.flow",
-    "precision": "recover.drag_coefficient_precision",
-    "seed": "recover.seed",
-}
 STATED: Final = ("forces.drag_coefficient", "forces.force_std_N")
 """What has a default, but is no truth unless the file says it."""
 

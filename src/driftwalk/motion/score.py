@@ -62,7 +62,9 @@ def score_worlds(
     >>> track = body_track(dw.tank30_recording().isel(time=slice(0, 600)))
     >>> block = dw.motion.BlockModel(dw.Study())
     >>> camera = Camera(position_noise=3e-4)
-    >>> like = dw.motion.recorded_conditions(track, dw.Study(), camera=camera, flow=dw.tank30_flow())
+    >>> like = dw.motion.recorded_conditions(
+    ...     track, dw.Study(), camera=camera, flow=dw.tank30_flow()
+    ... )
     >>> values = {"drag_coefficient": np.array([0.4]), "force_std": np.array([6e-4])}
     >>> reference = dw.comparison.StepDistance().prepare(track)
     >>> keys = np.array([1], dtype=np.uint64)

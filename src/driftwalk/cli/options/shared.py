@@ -17,6 +17,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.study_keys import (
+    CALIBRATION_KEYS,
+    STUDY_KEYS,
+)
 from driftwalk.core.units import parse_quantity
 
 if TYPE_CHECKING:
@@ -229,83 +233,6 @@ Vary = Annotated[
         show_default=False,
     ),
 ]
-
-STUDY_KEYS: Final[dict[str, str]] = {
-    "tank_diameter": "tank.diameter_m",
-    "wall_friction": "tank.wall_friction",
-    "wall_restitution": "tank.wall_restitution",
-    "side": "block.side_m",
-    "mass": "block.mass_kg",
-    "depth": "block.depth",
-    "drag_coefficient": "forces.drag_coefficient",
-    "force_std": "forces.force_std_N",
-    "force_interval": "forces.force_interval_s",
-    "time_step": "simulation.time_step_s",
-    "duration": "simulation.duration_s",
-    "sample_rate": "simulation.sample_rate_Hz",
-    "seed": "simulation.seed",
-    "replicates": "simulation.replicates",
-    "step_interval": "steps.step_interval_s",
-    "position_noise": "observation.position_noise_m",
-    "orientation_noise": "observation.orientation_noise_rad",
-}
-"""From an option's name to the key of the study that it sets."""
-
-CALIBRATION_KEYS: Final[dict[str, str]] = {
-    **STUDY_KEYS,
-    "seed": "calibration.seed",
-    "replicates": "calibration.replicates",
-    "bootstrap": "calibration.bootstrap",
-    "confidence": "calibration.confidence",
-}
-"""The same for a calibration, where seed and replicates are those of its simulations."""
-
-ASSEMBLY_KEYS: Final[dict[str, str]] = {
-    **STUDY_KEYS,
-    "blocks": "assembly.blocks",
-    "runs": "assembly.runs",
-    "duration": "assembly.duration_s",
-    "seed": "assembly.seed",
-    "latching": "assembly.latching",
-    "connector_distance": "assembly.connector_distance_m",
-    "connector_axis": "assembly.connector_axis_rad",
-    "hidden_face_drag": "assembly.hidden_face_drag",
-    "chirality": "assembly.chirality",
-    "block_restitution": "assembly.block_restitution",
-    "block_friction": "assembly.block_friction",
-    "confidence": "assembly.confidence",
-}
-"""The same for self-assembly, where seed, duration and confidence are those of its runs."""
-
-SENSITIVITY_KEYS: Final[dict[str, str]] = {
-    **ASSEMBLY_KEYS,
-    "runs": "sensitivity.runs",
-    "realisations": "sensitivity.reference_realisations",
-    "seed": "sensitivity.seed",
-}
-"""The same for a sensitivity analysis, where runs are those of a setting."""
-
-
-def study_overrides(*, keys: Mapping[str, str] = STUDY_KEYS, **options: Any) -> dict[str, Any]:
-    """Return the keys of the study that the options given set; an option that is None sets none.
-
-    Parameters
-    ----------
-    keys : mapping
-        `STUDY_KEYS`, `CALIBRATION_KEYS` or `ASSEMBLY_KEYS`.
-    **options
-        Values by the names in `keys`.
-
-    Examples
-    --------
-    >>> study_overrides(tank_diameter=0.5, seed=None)
-    {'tank.diameter_m': 0.5}
-    """
-    overrides = {keys[name]: value for name, value in options.items() if value is not None}
-    depth = overrides.get("block.depth")
-    if depth is not None and not isinstance(depth, str):
-        overrides["block.depth_m"] = overrides.pop("block.depth")
-    return overrides
 
 
 def resolve_study(

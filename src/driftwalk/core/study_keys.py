@@ -1,0 +1,104 @@
+"""Short names for the keys of a study: arguments of functions and options of the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+STUDY_KEYS: Final[dict[str, str]] = {
+    "tank_diameter": "tank.diameter_m",
+    "wall_friction": "tank.wall_friction",
+    "wall_restitution": "tank.wall_restitution",
+    "side": "block.side_m",
+    "mass": "block.mass_kg",
+    "depth": "block.depth",
+    "drag_coefficient": "forces.drag_coefficient",
+    "force_std": "forces.force_std_N",
+    "force_interval": "forces.force_interval_s",
+    "time_step": "simulation.time_step_s",
+    "duration": "simulation.duration_s",
+    "sample_rate": "simulation.sample_rate_Hz",
+    "seed": "simulation.seed",
+    "replicates": "simulation.replicates",
+    "step_interval": "steps.step_interval_s",
+    "position_noise": "observation.position_noise_m",
+    "orientation_noise": "observation.orientation_noise_rad",
+}
+"""From an argument's name to the key of the study that it sets; an option has the same name."""
+
+CALIBRATION_KEYS: Final[dict[str, str]] = {
+    **STUDY_KEYS,
+    "seed": "calibration.seed",
+    "replicates": "calibration.replicates",
+    "bootstrap": "calibration.bootstrap",
+    "confidence": "calibration.confidence",
+}
+"""The same for a calibration, where seed and replicates are those of its simulations."""
+
+ASSEMBLY_KEYS: Final[dict[str, str]] = {
+    **STUDY_KEYS,
+    "blocks": "assembly.blocks",
+    "runs": "assembly.runs",
+    "duration": "assembly.duration_s",
+    "seed": "assembly.seed",
+    "latching": "assembly.latching",
+    "connector_distance": "assembly.connector_distance_m",
+    "connector_axis": "assembly.connector_axis_rad",
+    "hidden_face_drag": "assembly.hidden_face_drag",
+    "chirality": "assembly.chirality",
+    "block_restitution": "assembly.block_restitution",
+    "block_friction": "assembly.block_friction",
+    "confidence": "assembly.confidence",
+}
+"""The same for self-assembly, where seed, duration and confidence are those of its runs."""
+
+SENSITIVITY_KEYS: Final[dict[str, str]] = {
+    **ASSEMBLY_KEYS,
+    "runs": "sensitivity.runs",
+    "realisations": "sensitivity.reference_realisations",
+    "seed": "sensitivity.seed",
+}
+"""The same for a sensitivity analysis, where runs are those of a setting."""
+
+
+FIT_KEYS: Final[dict[str, str]] = {
+    **STUDY_KEYS,
+    "angle": "fit.angle",
+    "spline_spacing": "fit.spline_spacing_m",
+    "confidence": "fit.confidence",
+    "switching_times": "fit.switching_times_s",
+    "flow_labels": "fit.flow_labels",
+    "precision": "fit.drag_coefficient_precision",
+}
+"""The same for a likelihood fit."""
+
+RECOVER_KEYS: Final[dict[str, str]] = {
+    "recordings": "recover.recordings",
+    "duration": "recover.durations_s",
+    "flow": "recover.flow",
+    "precision": "recover.drag_coefficient_precision",
+    "seed": "recover.seed",
+}
+"""The same for a recovery study."""
+
+
+def study_overrides(*, keys: Mapping[str, str] = STUDY_KEYS, **options: Any) -> dict[str, Any]:
+    """Return the keys of the study that arguments set; an argument that is None sets none.
+
+    Parameters
+    ----------
+    keys : mapping
+        One of the tables of this module.
+    **options
+        Values by the names in `keys`.
+
+    Examples
+    --------
+    >>> study_overrides(tank_diameter=0.5, seed=None)
+    {'tank.diameter_m': 0.5}
+    """
+    overrides = {keys[name]: value for name, value in options.items() if value is not None}
+    depth = overrides.get("block.depth")
+    if depth is not None and depth not in ("immersed", "archimedes"):
+        overrides["block.depth_m"] = overrides.pop("block.depth")
+    return overrides
