@@ -22,6 +22,7 @@ _ROOMS = (
     "likelihood",
     "model",
     "motion",
+    "notebook",
     "page",
     "plot",
     "record",
@@ -36,7 +37,6 @@ _ROOMS = (
 _NAMES = {
     "driftwalk.assembly": (
         "LiveTank",
-        "assemble",
         "assemble_drawn",
         "assembly_path",
         "class_times",
@@ -50,10 +50,9 @@ _NAMES = {
         "sensitivity_map",
         "sensitivity_reference",
     ),
-    "driftwalk.calibration": ("calibrate",),
     "driftwalk.comparison": (
         "ComparisonWarning",
-        "compare",
+        "compare_replicates",
         "ks_distance",
         "steps",
     ),
@@ -95,6 +94,14 @@ _NAMES = {
         "load_study",
     ),
     "driftwalk.motion": ("motion_model",),
+    "driftwalk.notebook": (
+        "assemble",
+        "calibrate",
+        "compare",
+        "fit",
+        "report",
+        "simulate",
+    ),
     "driftwalk.page": (
         "report_page",
         "write_report",
@@ -105,10 +112,7 @@ _NAMES = {
         "readable_formats",
         "save_trajectory",
     ),
-    "driftwalk.simulation": (
-        "simulate",
-        "simulate_like",
-    ),
+    "driftwalk.simulation": ("simulate_like",),
     "driftwalk.track": (
         "observe",
         "open_source",

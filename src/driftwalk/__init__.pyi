@@ -9,6 +9,7 @@ from driftwalk import (
     likelihood as likelihood,
     model as model,
     motion as motion,
+    notebook as notebook,
     page as page,
     plot as plot,
     record as record,
@@ -20,7 +21,6 @@ from driftwalk import (
 )
 from driftwalk.assembly import (
     LiveTank as LiveTank,
-    assemble as assemble,
     assemble_drawn as assemble_drawn,
     assembly_path as assembly_path,
     class_times as class_times,
@@ -34,12 +34,9 @@ from driftwalk.assembly import (
     sensitivity_map as sensitivity_map,
     sensitivity_reference as sensitivity_reference,
 )
-from driftwalk.calibration import (
-    calibrate as calibrate,
-)
 from driftwalk.comparison import (
     ComparisonWarning as ComparisonWarning,
-    compare as compare,
+    compare_replicates as compare_replicates,
     ks_distance as ks_distance,
     steps as steps,
 )
@@ -83,6 +80,14 @@ from driftwalk.model import (
 from driftwalk.motion import (
     motion_model as motion_model,
 )
+from driftwalk.notebook import (
+    assemble as assemble,
+    calibrate as calibrate,
+    compare as compare,
+    fit as fit,
+    report as report,
+    simulate as simulate,
+)
 from driftwalk.page import (
     report_page as report_page,
     write_report as write_report,
@@ -94,7 +99,6 @@ from driftwalk.record import (
     save_trajectory as save_trajectory,
 )
 from driftwalk.simulation import (
-    simulate as simulate,
     simulate_like as simulate_like,
 )
 from driftwalk.track import (

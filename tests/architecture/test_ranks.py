@@ -38,6 +38,9 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "page": GROUND | {"plot"},
     "runs": GROUND
     | {"flow", "model", "sweep", "calibration", "likelihood", "assembly", "plot", "figures"},
+    "notebook": GROUND
+    | {"record", "flow", "model", "comparison", "simulation", "motion", "conditions"}
+    | {"assembly", "calibration", "likelihood", "page", "runs"},
     # `track` for its live server, through which the playground's tank can be watched.
     "viewer": GROUND
     | {"record", "flow", "model", "comparison", "simulation", "assembly", "track", "plot", "page"},

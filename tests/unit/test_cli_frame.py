@@ -22,8 +22,6 @@ from driftwalk.cli import main as cli_main
 from driftwalk.cli.main import COMMANDS, Command, main
 from driftwalk.cli.options import shared as options
 from driftwalk.cli.options.shared import (
-    CALIBRATION_KEYS,
-    STUDY_KEYS,
     DragCoefficient,
     ForceStd,
     Json,
@@ -31,11 +29,11 @@ from driftwalk.cli.options.shared import (
     TankDiameter,
     option_name,
     resolve_study,
-    study_overrides,
 )
 from driftwalk.cli.terminal.output import plain, print_json, print_table, to_json
 from driftwalk.cli.terminal.progress import ProgressReporter, duration_text
 from driftwalk.core.errors import ConfigurationError, FormatError, InputError
+from driftwalk.core.study_keys import CALIBRATION_KEYS, STUDY_KEYS, study_overrides
 from driftwalk.model import Study, load_study
 
 AddCommand = Callable[[Callable[..., None]], None]

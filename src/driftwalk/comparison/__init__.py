@@ -17,6 +17,7 @@ from driftwalk.comparison.ks import (
 )
 from driftwalk.comparison.motion import compare
 from driftwalk.comparison.plan import AppliedSteps, StepPlan, apply_steps, plan_steps
+from driftwalk.comparison.replicates import compare_replicates
 from driftwalk.comparison.significance import PermutationTest, block_permutation_test
 from driftwalk.comparison.statistic import (
     Distances,
@@ -47,6 +48,7 @@ __all__ = [
     "autocorrelation_time",
     "block_permutation_test",
     "compare",
+    "compare_replicates",
     "joint_density",
     "ks_compare",
     "ks_distance",

@@ -83,7 +83,7 @@ def compare(
     trajectories = ((trajectory_a, body_a), (trajectory_b, body_b))
     interval = step_interval
     if interval is None:
-        interval = max(_sampling_interval(dataset, body) for dataset, body in trajectories)
+        interval = max(sampling_interval(dataset, body) for dataset, body in trajectories)
     walks = [steps(dataset, body=body, step_interval=interval) for dataset, body in trajectories]
     points = [_points(walk) for walk in walks]
     result = ks_compare(*points, ties=ties)
@@ -114,11 +114,17 @@ def compare(
     )
 
 
-def _sampling_interval(trajectory: xr.Dataset, body: str | None) -> float:
+def sampling_interval(trajectory: xr.Dataset, body: str | None) -> float:
+    """Return the median time between the samples of a body [s]."""
     time = body_track(trajectory, body).time
     if time.size < 3:
         raise InputError(f"steps need at least three samples, got {time.size}")
     return usual_interval(time)
+
+
+def step_points(trajectory: xr.Dataset, body: str | None, interval: float) -> Points:
+    """Return step lengths [m] and turning angles [rad] of a body, shape (n, 2)."""
+    return _points(steps(trajectory, body=body, step_interval=interval))
 
 
 def _points(walk: xr.Dataset) -> Points:

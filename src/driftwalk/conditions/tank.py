@@ -27,6 +27,18 @@ def study_in_arena(study: Study, recording: xr.Dataset) -> Study:
         Its [tank] stays where the recording has no arena.
     recording : xarray.Dataset
         A `trajectory`, read with an arena or without.
+
+    Returns
+    -------
+    Study
+        The same study where the recording has no arena.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> wide = dw.apply_overrides(dw.Study(), {"tank.diameter_m": 1.0})
+    >>> study_in_arena(wide, dw.tank30_recording()).tank.diameter_m
+    0.3
     """
     from driftwalk.model import Tank, apply_overrides
 
@@ -48,10 +60,24 @@ def study_in_arena(study: Study, recording: xr.Dataset) -> Study:
 def require_inside(study: Study, recording: xr.Dataset, body: str | None) -> None:
     """Refuse a tank that does not hold the recorded positions.
 
+    Parameters
+    ----------
+    study : Study
+        Its tank.
+    recording : xarray.Dataset
+        A `trajectory`.
+    body : str or None
+        The body, where there are several.
+
     Raises
     ------
     InputError
-        When more than 1 % of the positions lie outside; names the options that say the tank.
+        When more than 1 % of the positions lie outside.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> require_inside(dw.Study(), dw.tank30_recording(), None)
     """
     track = body_track(recording, body)
     tank = study.tank

@@ -238,14 +238,15 @@ def apply_overrides(study: Study, overrides: Mapping[str, Any]) -> Study:
     >>> apply_overrides(Study(), {"tank.diameter_m": "50cm"}).tank.diameter_m
     0.5
     """
-    values = study.to_dict()
+    # What the user has not said stays unsaid: a default gives way to what a recording says.
+    values = study.model_dump(mode="python", exclude_none=True, exclude_unset=True)
     changes: dict[str, dict[str, Any]] = {}
     for name, value in overrides.items():
         section, _, key = name.partition(".")
         changes.setdefault(_known_section(section, name), {})[key] = value
     for section, changed in changes.items():
         kind = type(getattr(study, section))
-        kept = values[section]
+        kept = values.setdefault(section, {})
         for key in kind.replaced_by(set(changed)) | set(changed):
             kept.pop(key, None)
         kept.update({key: value for key, value in changed.items() if value is not None})

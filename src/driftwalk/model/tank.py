@@ -6,7 +6,7 @@ import json
 import math
 from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ModelWrapValidatorHandler, field_validator, model_validator
 
 from driftwalk.core.errors import ConfigurationError, FormatError
 from driftwalk.core.json_text import parse_json
@@ -49,13 +49,17 @@ class Outline(Section):
         examples=["[[-0.1, -0.1], [0.2, -0.1], [0.0, 0.2]]"],
     )
 
-    @model_validator(mode="before")
+    @model_validator(mode="wrap")
     @classmethod
-    def _default_circle(cls, data: Any) -> Any:
-        if isinstance(data, dict) and data.get("shape", "circle") == "circle":
-            given = data.get("diameter_m")
-            return {**data, "diameter_m": DEFAULT_DIAMETER_M if given is None else given}
-        return data
+    def _default_circle(cls, data: Any, build: ModelWrapValidatorHandler[Self]) -> Self:
+        if not isinstance(data, dict) or data.get("shape", "circle") != "circle":
+            return build(data)
+        if data.get("diameter_m") is not None:
+            return build(data)
+        outline = build({**data, "diameter_m": DEFAULT_DIAMETER_M})
+        # A default is not stated: it gives way to the tank of a recording.
+        outline.model_fields_set.discard("diameter_m")
+        return outline
 
     @field_validator("vertices_m")
     @classmethod

@@ -2,7 +2,7 @@
 
 from driftwalk.page.arrays import decode_array, encode_array
 from driftwalk.page.html import report_html, write_report
-from driftwalk.page.run_page import joined_page, recording_page, report_page
+from driftwalk.page.run_page import dataset_page, joined_page, recording_page, report_page
 from driftwalk.page.sections.assembly import assembly_sections
 from driftwalk.page.sections.calibration import calibration_sections
 from driftwalk.page.sections.fit import fit_sections
@@ -16,6 +16,7 @@ from driftwalk.page.sections.sensitivity import sensitivity_sections
 __all__ = [
     "assembly_sections",
     "calibration_sections",
+    "dataset_page",
     "decode_array",
     "encode_array",
     "fit_sections",

@@ -94,6 +94,45 @@ def report_page(folder: str | Path) -> dict[str, Any]:
     )
 
 
+def dataset_page(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return the page data of one result that is not in a run directory.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A `fit`, `calibration`, `assembly`, `sensitivity` or `recovery`.
+
+    Returns
+    -------
+    dict
+        Plain JSON, as of `report_page`. Parts that need another dataset are empty, with the reason.
+
+    Raises
+    ------
+    InputError
+        When it is of another kind.
+
+    Examples
+    --------
+    ``dataset_page(fit)["title"]``
+    """
+    kind = str(dataset.attrs.get("kind", ""))
+    if kind not in _SECTIONS_OF_ONE:
+        raise InputError(
+            f"no page shows a dataset of kind {kind!r}: give a recording, or one of "
+            f"{', '.join(_SECTIONS_OF_ONE)}"
+        )
+    make = _SECTIONS_OF_ONE[kind]
+    return _page(
+        title=TITLES[kind],
+        subtitle=None,
+        finished=True,
+        words=None,
+        created=None,
+        sections=attempt("summary", FOUND_TITLE, lambda: make(dataset)),
+    )
+
+
 def recording_page(
     trajectory: xr.Dataset, described: Mapping[str, Any] | None = None
 ) -> dict[str, Any]:
@@ -312,4 +351,12 @@ _SECTIONS: Final[dict[str, Callable[[Run], list[Section]]]] = {
     "assembly": _assembly,
     "sensitivity": _sensitivity,
     "recovery": _recovery,
+}
+
+_SECTIONS_OF_ONE: Final[dict[str, Callable[[xr.Dataset], list[Section]]]] = {
+    "calibration": lambda found: calibration_sections(found, flow=None, recording=None, body=None),
+    "fit": lambda found: fit_sections(found, recordings=[], check=None, body=None),
+    "assembly": lambda found: assembly_sections(assembly=found),
+    "sensitivity": lambda found: sensitivity_sections(sensitivity=found),
+    "recovery": recovery_sections,
 }

@@ -1,0 +1,108 @@
+"""The study of a piece of work: what the user states, with tank and block of the recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+from driftwalk.conditions.tank import require_inside, study_in_arena
+from driftwalk.core.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+_OUTLINE: Final = ("shape", "diameter_m", "width_m", "height_m", "vertices_m")
+_SAME: Final = 1e-9
+"""Relative difference of two lengths up to which they are the same statement."""
+
+
+def study_for(
+    recordings: Sequence[xr.Dataset],
+    study: Study | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    body: str | None = None,
+) -> Study:
+    """Return the study that work on recordings is done with; each fact is stated once.
+
+    Parameters
+    ----------
+    recordings : sequence of xarray.Dataset
+        `trajectory` datasets of one block in one tank. The tank and the block that they were loaded
+        with are those of the study.
+    study : Study, optional
+        Default: the paper's.
+    overrides : mapping, optional
+        Over the study, from ``"section.key"`` to the value.
+    body : str, optional
+        The body, where there are several.
+
+    Returns
+    -------
+    Study
+        With the recordings' tank and block.
+
+    Raises
+    ------
+    InputError
+        When a recording and the study, or two recordings, state two different tanks or blocks, or
+        more than 1 % of the positions lie outside the tank.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> dw.conditions.study_for([dw.tank30_recording()]).tank.diameter_m
+    0.3
+    """
+    from driftwalk.model import Study, apply_overrides
+
+    stated = apply_overrides(study if study is not None else Study(), overrides or {})
+    chosen = stated
+    for recording in recordings:
+        chosen = _with_block(_with_tank(chosen, recording, stated), recording, stated)
+    for recording in recordings:
+        require_inside(chosen, recording, body)
+    return chosen
+
+
+def _with_tank(study: Study, recording: xr.Dataset, stated: Study) -> Study:
+    """Return the study in the tank of a recording; refuse one that is not the stated tank."""
+    own = study_in_arena(study, recording)
+    is_stated = _says_tank(stated) or _outline(study) != _outline(stated)
+    if is_stated and _outline(own) != _outline(study):
+        raise InputError(
+            f"{_name_of(recording)}the recording is in a {own.tank.describe()}, and the study says "
+            f"a {study.tank.describe()}: state the tank once, `tank` when the recording is loaded"
+        )
+    return own
+
+
+def _with_block(study: Study, recording: xr.Dataset, stated: Study) -> Study:
+    """Return the study with the block of a recording; refuse one that is not the stated block."""
+    from driftwalk.model import apply_overrides
+
+    side = recording.attrs.get("block_side_m")
+    if side is None or abs(float(side) - study.block.side_m) <= _SAME * study.block.side_m:
+        return study
+    if "side_m" in stated.block.model_fields_set or study.block.side_m != stated.block.side_m:
+        raise InputError(
+            f"{_name_of(recording)}the recording is of a block of {float(side):g} m, and the study "
+            f"says {study.block.side_m:g} m: state the side once, `block` when the recording is "
+            "loaded"
+        )
+    return apply_overrides(study, {"block.side_m": float(side)})
+
+
+def _outline(study: Study) -> tuple[Any, ...]:
+    return tuple(getattr(study.tank, key) for key in _OUTLINE)
+
+
+def _says_tank(study: Study) -> bool:
+    return not study.tank.model_fields_set.isdisjoint(_OUTLINE)
+
+
+def _name_of(recording: xr.Dataset) -> str:
+    name = recording.attrs.get("source", "")
+    return f"{name}: " if name else ""

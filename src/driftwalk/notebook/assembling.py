@@ -1,0 +1,96 @@
+"""Self-assembly with what a study, a fit or a calibration says."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Unpack
+
+from driftwalk.core.study_keys import ASSEMBLY_KEYS, study_overrides
+from driftwalk.notebook.model_of import model_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+    from driftwalk.notebook.settings import AssemblySettings
+    from driftwalk.runs import Progress
+
+
+def assemble(
+    model: Study | xr.Dataset,
+    flow: xr.Dataset | None = None,
+    *,
+    folder: str | PathLike[str] | None = None,
+    overwrite: bool = False,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    **settings: Unpack[AssemblySettings],
+) -> xr.Dataset:
+    """Simulate what many blocks build.
+
+    Parameters
+    ----------
+    model : Study or xarray.Dataset
+        A study, a `fit` or a `calibration`. With `folder`, a calibration that has a joint region is
+        simulated with parameters drawn from it, too.
+    flow : xarray.Dataset, optional
+        The water's velocity, a `flow_field`; a fit brings its own.
+    folder : path-like, optional
+        Run directory to make or continue, the same as that of ``driftwalk assemble``.
+    overwrite : bool
+        Whether a finished run there is moved aside; it is refused otherwise.
+    threads : int, optional
+        Default: all processors. The result does not depend on it.
+    progress : callable, optional
+        Told how much is done: ``progress(done, total, text)``.
+    **settings
+        Keys of the study by their short names: ``blocks=4``, ``runs=1000``, ``duration="10min"``.
+
+    Returns
+    -------
+    xarray.Dataset
+        An `assembly`, see `driftwalk.assembly.assemble`; `outcome_distribution` makes proportions
+        of it.
+
+    Raises
+    ------
+    InputError
+        When there is no flow, the blocks do not fit, or the flow does not cover the tank.
+    RunDirectoryError
+        When the directory is in use, holds another run, or cannot be written.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> runs = dw.assemble(dw.Study(), dw.tank30_flow(), blocks=2, runs=4, duration="1s")
+    >>> runs.sizes["run"]
+    4
+    """
+    from driftwalk.assembly import assemble as assemble_study
+    from driftwalk.runs import AssemblyWork, run_assembly
+    from driftwalk.runs.folder import silent
+    from driftwalk.schema.netcdf import open_netcdf
+
+    given: dict[str, Any] = dict(settings)
+    found = model_of(model, flow, study_overrides(keys=ASSEMBLY_KEYS, **given))
+    say = progress or silent
+    if folder is None:
+        return assemble_study(
+            found.study,
+            found.flow,
+            threads=threads,
+            progress=lambda done, total: say(done, total, "runs"),
+        )
+    place = Path(folder)
+    region = found.calibration
+    if region is not None and "region_level" not in region.attrs:
+        region = None
+    run_assembly(
+        AssemblyWork(found.study, found.flow, region, {}, threads),
+        place,
+        overwrite=overwrite,
+        progress=say,
+        command=f"driftwalk.assemble(..., folder={str(folder)!r})",
+    )
+    return open_netcdf(place / "assembly.nc")
