@@ -14,17 +14,17 @@ inline driftwalk::AssemblyRules rules_of(const Model& model, std::size_t blocks)
   const driftwalk::Prepared<double>& run = model.twice().view();
   driftwalk::AssemblyRules rules;
   rules.blocks = static_cast<int>(blocks);
-  rules.side = 2 * run.half_side;
+  rules.side = 2 * run.block.half_side;
   rules.mass = run.mass;
   rules.inertia = run.inertia;
-  rules.radius = run.radius;
-  rules.edges = run.edges;
-  rules.edge_count = run.edge_count;
+  rules.radius = run.wall.radius;
+  rules.edges = run.wall.edges;
+  rules.edge_count = run.wall.edge_count;
   rules.low_x = run.flow.low_x;
   rules.high_x = run.flow.high_x;
   rules.low_y = run.flow.low_y;
   rules.high_y = run.flow.high_y;
-  rules.bounce_speed = run.bounce_speed;
+  rules.bounce_speed = run.wall.bounce_speed;
   return rules;
 }
 

@@ -180,9 +180,8 @@ std::tuple<double, double, double> drag(const Model& model, double drag_coeffici
   const driftwalk::Prepared<double>& run = model.twice().view();
   driftwalk::Axes<double> axes;
   driftwalk::sincos(theta, axes.sine, axes.cosine);
-  const driftwalk::BlockShape<double> block{run.half_side, run.strip_width, run.strips};
-  const driftwalk::DragSums<double> sums =
-      driftwalk::drag_sums(block, run.flow, x, y, axes, driftwalk::Motion<double>{vx, vy, omega});
+  const driftwalk::DragSums<double> sums = driftwalk::drag_sums(
+      run.block, run.flow, x, y, axes, driftwalk::Motion<double>{vx, vy, omega});
   const double scale = run.drag_scale * drag_coefficient;
   return {sums.force_x * scale, sums.force_y * scale, sums.torque * scale};
 }

@@ -49,12 +49,12 @@ int padding(double reach, double spacing) {
 
 template <class T>
 PreparedRun<T>::PreparedRun(const BatchModel& model) {
-  view_.half_side = static_cast<T>(model.side / 2);
-  view_.strip_width = static_cast<T>(model.side / model.strips);
-  view_.strips = model.strips;
-  view_.dt = static_cast<T>(model.time_step);
-  view_.per_dt = static_cast<T>(1.0 / model.time_step);
-  view_.per_inertia = static_cast<T>(model.mass / model.inertia);
+  view_.block.half_side = static_cast<T>(model.side / 2);
+  view_.block.strip_width = static_cast<T>(model.side / model.strips);
+  view_.block.strips = model.strips;
+  view_.step.dt = static_cast<T>(model.time_step);
+  view_.step.per_dt = static_cast<T>(1.0 / model.time_step);
+  view_.step.per_inertia = static_cast<T>(model.mass / model.inertia);
   view_.steps_per_interval = model.steps_per_interval;
   view_.drag_scale = 0.5 * model.water_density * (model.side / model.strips) * model.depth;
   view_.mass = model.mass;
@@ -70,13 +70,13 @@ PreparedRun<T>::PreparedRun(const BatchModel& model) {
 
 template <class T>
 void PreparedRun<T>::prepare_wall(const BatchModel& model) {
-  view_.radius = static_cast<T>(model.radius);
-  view_.restitution = static_cast<T>(model.restitution);
-  view_.friction = static_cast<T>(model.friction);
-  view_.bounce_speed = static_cast<T>(model.bounce_speed);
+  view_.wall.radius = static_cast<T>(model.radius);
+  view_.wall.restitution = static_cast<T>(model.restitution);
+  view_.wall.friction = static_cast<T>(model.friction);
+  view_.wall.bounce_speed = static_cast<T>(model.bounce_speed);
   edges_ = prepare_edges<T>(model.edges, model.edge_count);
-  view_.edges = edges_.data();
-  view_.edge_count = model.edge_count;
+  view_.wall.edges = edges_.data();
+  view_.wall.edge_count = model.edge_count;
 }
 
 template <class T>

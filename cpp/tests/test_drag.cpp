@@ -141,7 +141,7 @@ Sums strip_sum(double side, int strips, double x, double y, double theta, double
 template <class Real, class T, class Velocity>
 double worst_drag(synthetic::Tank& tank, const Velocity& velocity) {
   const driftwalk::PreparedRun<T> run(tank.finished());
-  const BlockShape<T> block{run.view().half_side, run.view().strip_width, run.view().strips};
+  const BlockShape<T> block = run.view().block;
   synthetic::Uniform draw;
   double worst = 0;
   for (int k = 0; k < 300; ++k) {
@@ -205,7 +205,7 @@ void check_at_rest_in_the_water() {
   });
   tank.sample_every(0.1, 2);
   const driftwalk::PreparedRun<double> run(tank.finished());
-  const BlockShape<double> block{run.view().half_side, run.view().strip_width, 8};
+  const BlockShape<double> block = run.view().block;
   const Axes<double> axes{0.8, 0.6};
   const DragSums<double> sums = driftwalk::drag_sums(
       block, run.view().flow, 0.05, 0.02, axes, Motion<double>{-0.31 * 0.02, 0.31 * 0.05, 0.31});

@@ -13,7 +13,7 @@ namespace {
 using driftwalk::FloatPack;
 using driftwalk::Motion;
 using driftwalk::Pose;
-using driftwalk::WallEdge;
+using driftwalk::PreparedEdge;
 using driftwalk::WallView;
 using Pack = FloatPack<4>;
 
@@ -40,14 +40,14 @@ double deepest(const WallView<double>& wall, const Pose<double>& pose) {
       depth = std::max(depth, std::hypot(x, y) - wall.radius);
     }
     for (int e = 0; e < wall.edge_count; ++e) {
-      const WallEdge<double>& edge = wall.edges[e];
+      const PreparedEdge<double>& edge = wall.edges[e];
       depth = std::max(depth, x * edge.normal_x + y * edge.normal_y - edge.distance);
     }
   }
   return depth;
 }
 
-const WallEdge<double> right_wall[] = {{1, 0, 0.1}};
+const PreparedEdge<double> right_wall[] = {{1, 0, 0.1}};
 WallView<double> straight(double restitution, double friction) {
   return {0, right_wall, 1, restitution, friction, 0.01};
 }
@@ -131,8 +131,8 @@ struct Corner {
   double x, y;
 };
 
-std::vector<WallEdge<double>> polygon(std::initializer_list<Corner> corners) {
-  std::vector<WallEdge<double>> edges;
+std::vector<PreparedEdge<double>> polygon(std::initializer_list<Corner> corners) {
+  std::vector<PreparedEdge<double>> edges;
   const std::vector<Corner> list(corners);
   for (std::size_t k = 0; k < list.size(); ++k) {
     const Corner a = list[k], b = list[(k + 1) % list.size()];
@@ -189,7 +189,7 @@ int main() {
   check_flat_face();
   check_friction();
   check_random_impacts(circle(0, 0), "circle", 0.01, 1e-15);
-  const auto view = [](const std::vector<WallEdge<double>>& edges) {
+  const auto view = [](const std::vector<PreparedEdge<double>>& edges) {
     return WallView<double>{0, edges.data(), int(edges.size()), 0, 0, 0.01};
   };
   const auto square = polygon({{-0.1, -0.1}, {0.1, -0.1}, {0.1, 0.1}, {-0.1, 0.1}});

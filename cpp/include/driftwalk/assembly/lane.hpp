@@ -216,8 +216,9 @@ inline std::uint32_t lane_status(const Prepared<T>& run, const AssemblyRules& ru
     const T x = get(m.x, lane), y = get(m.y, lane), theta = own_angle<Real, T>(pack, b, lane);
     const T speed = get(m.motion.vx, lane) + get(m.motion.vy, lane) + get(m.motion.omega, lane);
     finite = finite && abs(x + y + theta + speed) < T(1e30);
-    inside = inside && x > run.flow.low_x - run.half_side && x < run.flow.high_x + run.half_side &&
-             y > run.flow.low_y - run.half_side && y < run.flow.high_y + run.half_side;
+    inside = inside && x > run.flow.low_x - run.block.half_side &&
+             x < run.flow.high_x + run.block.half_side &&
+             y > run.flow.low_y - run.block.half_side && y < run.flow.high_y + run.block.half_side;
   }
   return (finite ? 0u : status_non_finite) | (inside ? 0u : status_escaped);
 }

@@ -25,13 +25,7 @@ public:
       : run_(run), rules_(rules), out_(out), scratch_(scratch), blended_flow_(blended_flow),
         memory_(scratch.lanes, capacity), near_(rules), blocks_(rules.blocks),
         listed_(rules.blocks > most_blocks_all_pairs),
-        physics_{{run.half_side, run.strip_width, run.strips},
-                 run.flow,
-                 {run.radius, run.edges, run.edge_count, run.restitution, run.friction,
-                  run.bounce_speed},
-                 {run.dt, run.per_dt, run.per_inertia},
-                 {Real(T(0)), Real(T(0))},
-                 Real(T(0))} {
+        physics_{run.block, run.flow, run.wall, run.step, {Real(T(0)), Real(T(0))}, Real(T(0))} {
     const bool has_lists = capacity > most_blocks_all_pairs;
     for (int lane = 0; lane < lanes; ++lane) {
       load_lane<Real, T>(rules_, start, memory_, lane);
@@ -131,7 +125,8 @@ private:
     for (const LaneBook& book : books_) {
       first = book.running ? book.first_step : first;
     }
-    const double middle = (static_cast<double>(step - first) + 0.5) * static_cast<double>(run_.dt);
+    const double middle =
+        (static_cast<double>(step - first) + 0.5) * static_cast<double>(run_.step.dt);
     physics_.flow.table = flow_table_at(run_, middle, blended_flow_);
   }
 

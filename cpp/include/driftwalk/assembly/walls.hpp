@@ -62,7 +62,7 @@ inline auto push_member(const WallView<T>& wall, T h, T tolerance,
   }
   auto outside = Real(T(0)) > Real(T(0));
   for (int e = 0; e < wall.edge_count; ++e) {
-    const WallEdge<T>& edge = wall.edges[e];
+    const PreparedEdge<T>& edge = wall.edges[e];
     leading_corners(Real(edge.normal_x), Real(edge.normal_y), h, axes, arm, first, second);
     measure_edge(first, edge, pose.x, pose.y);
     outside = outside | push_corner(first, tolerance, lanes, pose);

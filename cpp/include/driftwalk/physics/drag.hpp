@@ -28,13 +28,6 @@ struct Axes {
   Real cosine, sine;
 };
 
-template <class T>
-struct BlockShape {
-  T half_side;   // h = a/2 [m]
-  T strip_width; // a/N [m]
-  int strips;    // N
-};
-
 // Everything divided by K = 1/2 rho C_d (a/N) d.
 template <class Real>
 struct DragSums {

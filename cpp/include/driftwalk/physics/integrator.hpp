@@ -27,13 +27,6 @@ struct WorldConstants {
   Real drag_per_inertia; // K/I [1/m^3]
 };
 
-template <class T>
-struct StepConstants {
-  T dt;          // [s]
-  T per_dt;      // 1/dt
-  T per_inertia; // m/I [1/m^2]
-};
-
 template <class Real, class T>
 inline void step_world(const BlockShape<T>& block, const FlowView<T>& flow, const WallView<T>& wall,
                        const StepConstants<T>& step, const WorldConstants<Real>& constants,

@@ -16,19 +16,6 @@
 
 DRIFTWALK_LANES_BEGIN
 
-template <class T>
-using WallEdge = PreparedEdge<T>;
-
-template <class T>
-struct WallView {
-  T radius;                 // of a circle [m]; 0 for a polygon
-  const WallEdge<T>* edges; // of a polygon
-  int edge_count;
-  T restitution;
-  T friction;
-  T bounce_speed; // no bounce below it [m/s]
-};
-
 template <class Real>
 struct Contact {
   Real rx, ry; // corner from the centre of mass [m]
@@ -177,7 +164,7 @@ inline void measure_circle(Contact<Real>& c, T radius, Real x, Real y) {
 }
 
 template <class Real, class T>
-inline void measure_edge(Contact<Real>& c, const WallEdge<T>& edge, Real x, Real y) {
+inline void measure_edge(Contact<Real>& c, const PreparedEdge<T>& edge, Real x, Real y) {
   c.nx = Real(edge.normal_x);
   c.ny = Real(edge.normal_y);
   c.depth = ((x + c.rx) * edge.normal_x + (y + c.ry) * edge.normal_y) - edge.distance;
@@ -200,7 +187,7 @@ inline void push_inside_edges(const WallView<T>& wall, T h, const Axes<Real>& ax
   for (int round = 0; round < most_rounds; ++round) {
     bool moved = false;
     for (int e = 0; e < wall.edge_count; ++e) {
-      const WallEdge<T>& edge = wall.edges[e];
+      const PreparedEdge<T>& edge = wall.edges[e];
       leading_corners(Real(edge.normal_x), Real(edge.normal_y), h, axes, arm, first, second);
       measure_edge(first, edge, pose.x, pose.y);
       moved = moved || any(first.depth > Real(T(0)));
@@ -264,7 +251,7 @@ inline auto meet_wall(const WallView<T>& wall, T h, Real per_inertia, const Leve
   }
   auto touched = zero > zero;
   for (int e = 0; e < wall.edge_count; ++e) {
-    const WallEdge<T>& edge = wall.edges[e];
+    const PreparedEdge<T>& edge = wall.edges[e];
     const Real along = arm_x(pose.x, arm) * edge.normal_x + arm_y(pose.y, arm) * edge.normal_y;
     if (!any(along > Real(edge.distance - reach))) {
       continue;

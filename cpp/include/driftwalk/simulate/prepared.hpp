@@ -14,6 +14,30 @@ struct PreparedEdge {
   T distance;           // of the edge from the origin along the normal [m]
 };
 
+template <class T>
+struct BlockShape {
+  T half_side;   // h = a/2 [m]
+  T strip_width; // a/N [m]
+  int strips;    // N
+};
+
+template <class T>
+struct StepConstants {
+  T dt;          // [s]
+  T per_dt;      // 1/dt
+  T per_inertia; // m/I [1/m^2]
+};
+
+template <class T>
+struct WallView {
+  T radius;                     // of a circle [m]; 0 for a polygon
+  const PreparedEdge<T>* edges; // of a polygon
+  int edge_count;
+  T restitution;
+  T friction;
+  T bounce_speed; // no bounce below it [m/s]
+};
+
 // Numbers in one node's record of the flow table: (u, u above, v, v above).
 inline constexpr int flow_record = 4;
 
@@ -44,17 +68,12 @@ struct FlowView {
 // per instruction set and must share no container code (see config.hpp).
 template <class T>
 struct Prepared {
-  // block and integrator
-  T half_side, strip_width;
-  int strips;
-  T dt, per_dt, per_inertia;
+  BlockShape<T> block;
+  StepConstants<T> step;
   int steps_per_interval;
   double drag_scale; // 1/2 rho (a/N) d [kg/m^2]: K = drag_scale * C_d
   double mass, inertia;
-  // wall
-  T radius, restitution, friction, bounce_speed;
-  const PreparedEdge<T>* edges;
-  int edge_count;
+  WallView<T> wall;
   // flow: the first of `frames` tables, frame_size numbers each
   FlowView<T> flow;
   std::int64_t frame_size;

@@ -154,7 +154,8 @@ struct Motionless {
   explicit Motionless(const Run& run) : x(T(0)), y(T(0)), path(T(0)), from(run.samples / 2) {
     constexpr double slowest = 1e-6; // [m/s]
     const std::int64_t steps = run.sample_step[run.samples - 1] - run.sample_step[from];
-    threshold = static_cast<T>(slowest * static_cast<double>(steps) * static_cast<double>(run.dt));
+    threshold =
+        static_cast<T>(slowest * static_cast<double>(steps) * static_cast<double>(run.step.dt));
   }
 
   inline void add(std::int64_t sample, Real new_x, Real new_y) {
@@ -168,7 +169,7 @@ struct Motionless {
 
 template <class Real, class T>
 inline typename Numbers<Real>::Bool is_sound(const Prepared<T>& run, const World<Real>& w) {
-  const Real margin{run.half_side};
+  const Real margin{run.block.half_side};
   return (w.pose.x > Real(run.flow.low_x) - margin) & (w.pose.x < Real(run.flow.high_x) + margin) &
          (w.pose.y > Real(run.flow.low_y) - margin) & (w.pose.y < Real(run.flow.high_y) + margin);
 }
@@ -191,10 +192,9 @@ template <class Real, class T>
 inline void run_worlds(const Prepared<T>& run, const BatchWorlds& worlds, std::int64_t first,
                        int count, const SampleSink<T>& sink, std::uint32_t* status) {
   using UInt = typename Numbers<Real>::UInt;
-  const BlockShape<T> block{run.half_side, run.strip_width, run.strips};
-  const StepConstants<T> step{run.dt, run.per_dt, run.per_inertia};
-  const WallView<T> wall{run.radius,      run.edges,    run.edge_count,
-                         run.restitution, run.friction, run.bounce_speed};
+  const BlockShape<T> block = run.block;
+  const StepConstants<T> step = run.step;
+  const WallView<T> wall = run.wall;
   FlowView<T> flow = run.flow;
   World<Real> world;
   Real drag_coefficient, force_std;
@@ -219,7 +219,8 @@ inline void run_worlds(const Prepared<T>& run, const BatchWorlds& worlds, std::i
     const Real noise_y = normals[half + 1] * noise_scale;
     for (int sub = 0; sub < run.steps_per_interval && sample < run.samples; ++sub, ++step_index) {
       if (run.frames > 1) {
-        const double middle = (static_cast<double>(step_index) + 0.5) * static_cast<double>(run.dt);
+        const double middle =
+            (static_cast<double>(step_index) + 0.5) * static_cast<double>(run.step.dt);
         flow.table = flow_table_at(run, middle, sink.blended_flow);
       }
       const Pose<Real> before = world.pose;
