@@ -446,12 +446,12 @@ public:
         heads_(driftwalk::most_cells_per_side * driftwalk::most_cells_per_side),
         next_(blocks_.size()), run_(tank.finished()) {
     const driftwalk::Prepared<double>& run = run_.view();
-    physics_ = {run.block,
-                run.flow,
-                run.wall,
-                run.step,
-                {drag * run.drag_scale / run.mass, drag * run.drag_scale / run.inertia},
-                noise_scale};
+    physics_ = {
+        run.block,
+        run.flow,
+        run.wall,
+        run.step,
+        {drag * run.drag_scale / run.mass, drag * run.drag_scale / run.inertia, noise_scale}};
     driftwalk::AssemblyWorlds worlds;
     worlds.start = crowd.start.data();
     driftwalk::load_lane<double, double>(rules, worlds.start, pack_, 0);

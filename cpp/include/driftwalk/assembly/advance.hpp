@@ -4,21 +4,13 @@
 #pragma once
 
 #include "driftwalk/assembly/member.hpp"
+#include "driftwalk/physics/drag.hpp"
+#include "driftwalk/physics/physics.hpp"
 
 DRIFTWALK_LANES_BEGIN
 
 // Up to this many blocks the sums over members are masked vectors, beyond they go lane by lane.
 inline constexpr int most_blocks_masked = 8;
-
-template <class Real, class T>
-struct Physics {
-  BlockShape<T> block;
-  FlowView<T> flow;
-  WallView<T> wall;
-  StepConstants<T> step;
-  WorldConstants<Real> drag;
-  Real noise_scale; // stochastic force per normal and mass of a block [m/s^2]
-};
 
 template <int Count, class Real>
 inline void sum_masked(const Member<Real>* members, Sums<Real>* sums, int blocks) {
@@ -80,8 +72,8 @@ inline void sum_noise(const Physics<Real, T>& physics, int half, Member<Real>* m
                       Sums<Real>* sums, int blocks) {
   for (int b = 0; b < blocks; ++b) {
     const Member<Real>& m = members[b];
-    const Real x = m.normals[2 * half] * physics.noise_scale;
-    const Real y = m.normals[2 * half + 1] * physics.noise_scale;
+    const Real x = m.normals[2 * half] * physics.world.noise_scale;
+    const Real y = m.normals[2 * half + 1] * physics.world.noise_scale;
     sums[b].part[0] = x;
     sums[b].part[1] = y;
     sums[b].part[2] = m.arm.x * y - m.arm.y * x;
@@ -98,27 +90,17 @@ inline void sum_noise(const Physics<Real, T>& physics, int half, Member<Real>* m
 // Drag of a block half a step ahead, about its assembly's centre of mass.
 template <class Real, class T>
 inline void feel_drag(const Physics<Real, T>& physics, Member<Real>& m, Sums<Real>& sums) {
-  const T half = T(0.5) * physics.step.dt, quarter = T(0.25) * physics.step.dt;
-  const FlowView<T>& flow = physics.flow;
-  const Motion<Real>& v = m.motion;
-  Motion<Real>& ahead = m.ahead;
-  ahead.vx = v.vx + (m.drag.vx + m.noise.vx) * half;
-  ahead.vy = v.vy + (m.drag.vy + m.noise.vy) * half;
-  ahead.omega = v.omega + (m.drag.omega + m.noise.omega) * half;
-  const Axes<Real> axes = axes_at(m.pose.theta + (v.omega + ahead.omega) * quarter);
+  const Ahead<Real> ahead = look_ahead(physics.step, m, m.noise);
+  m.ahead = ahead.motion;
+  const Axes<Real> axes = axes_at(ahead.pose.theta);
   const Real arm_x = m.offset_x * axes.cosine - m.offset_y * axes.sine;
   const Real arm_y = m.offset_x * axes.sine + m.offset_y * axes.cosine;
-  // The clamp is for memory safety alone: a NaN or a runaway stays on the table.
-  const Real x =
-      clamp_to((m.pose.x + (v.vx + ahead.vx) * quarter) + arm_x, flow.low_x, flow.high_x);
-  const Real y =
-      clamp_to((m.pose.y + (v.vy + ahead.vy) * quarter) + arm_y, flow.low_y, flow.high_y);
-  const Motion<Real> own{ahead.vx - ahead.omega * arm_y, ahead.vy + ahead.omega * arm_x,
-                         ahead.omega};
+  const Motion<Real> own{m.ahead.vx - m.ahead.omega * arm_y, m.ahead.vy + m.ahead.omega * arm_x,
+                         m.ahead.omega};
   // Any speed that no water reaches.
   const Real covered{T(-1e9)};
   const DragSums<Real> drag =
-      drag_sums(physics.block, flow, x, y, axes, own,
+      drag_sums(physics.block, physics.flow, ahead.pose.x + arm_x, ahead.pose.y + arm_y, axes, own,
                 [&](int face, Real closing) { return select(m.covered[face], covered, closing); });
   sums.part[0] = drag.force_x;
   sums.part[1] = drag.force_y;
@@ -136,32 +118,18 @@ inline void find_arm(Member<Real>& m) {
 
 // The second half of the step, from the sums over the assembly.
 template <class Real, class T>
-inline void finish_step(const Physics<Real, T>& physics, const Real* total, Member<Real>& m) {
-  const T dt = physics.step.dt, half = T(0.5) * dt;
-  const Real one{T(1)}, per_mass = physics.drag.drag_per_mass;
-  const Real per_inertia = physics.drag.drag_per_inertia;
-  const Motion<Real> v = m.motion;
-  const Real damping = one / (one + total[3] * per_mass * half * m.per_count);
-  const T turning = T(4.0 / 3.0) * physics.block.half_side * physics.block.half_side * half;
-  const Real spin_damping =
-      one /
-      (one + (total[3] * per_inertia * turning + total[4] * per_inertia * half) * m.lightness);
-  Motion<Real> mean;
-  mean.vx = m.ahead.vx + (total[0] * per_mass * m.per_count - m.drag.vx) * damping * half;
-  mean.vy = m.ahead.vy + (total[1] * per_mass * m.per_count - m.drag.vy) * damping * half;
-  mean.omega =
-      m.ahead.omega + (total[2] * per_inertia * m.lightness - m.drag.omega) * spin_damping * half;
+inline void finish_member(const Physics<Real, T>& physics, const Real* total, Member<Real>& m) {
+  const T half = T(0.5) * physics.step.dt, turning = turning_share(physics.block) * half;
+  const Real per_mass = physics.world.drag_per_mass, per_inertia = physics.world.drag_per_inertia;
+  WaterPush<Real> push;
+  push.acceleration = {total[0] * per_mass * m.per_count, total[1] * per_mass * m.per_count,
+                       total[2] * per_inertia * m.lightness};
+  push.stiffness = total[3] * per_mass * half * m.per_count;
+  push.spin_stiffness =
+      (total[3] * per_inertia * turning + total[4] * per_inertia * half) * m.lightness;
   m.before = m.pose;
   m.axes_before = m.axes;
-  m.pose.x = m.pose.x + mean.vx * dt;
-  m.pose.y = m.pose.y + mean.vy * dt;
-  m.pose.theta = wrap_angle(m.pose.theta + mean.omega * dt);
-  m.motion.vx = mean.vx * T(2) - v.vx;
-  m.motion.vy = mean.vy * T(2) - v.vy;
-  m.motion.omega = mean.omega * T(2) - v.omega;
-  m.drag.vx = (m.motion.vx - v.vx) * physics.step.per_dt - m.noise.vx;
-  m.drag.vy = (m.motion.vy - v.vy) * physics.step.per_dt - m.noise.vy;
-  m.drag.omega = (m.motion.omega - v.omega) * physics.step.per_dt - m.noise.omega;
+  finish_step(physics.step, m.noise, m.ahead, push, m);
   find_arm(m);
 }
 
@@ -174,7 +142,7 @@ inline void advance(const Physics<Real, T>& physics, int half, Member<Real>* mem
   }
   sum_members<drag_sums_kept>(members, sums, blocks);
   for (int b = 0; b < blocks; ++b) {
-    finish_step(physics, sums[b].total, members[b]);
+    finish_member(physics, sums[b].total, members[b]);
   }
 }
 

@@ -7,17 +7,16 @@
 
 #include "driftwalk/assembly/kernel.hpp"
 #include "driftwalk/physics/integrator.hpp"
+#include "driftwalk/physics/wall.hpp"
 
 DRIFTWALK_LANES_BEGIN
 
+// A block, with the assembly that it is part of as the body.
 template <class Real>
-struct Member {
+struct Member : Body<Real> {
   using Int = typename Numbers<Real>::Int;
   using Bool = typename Numbers<Real>::Bool;
   // of the assembly
-  Pose<Real> pose;
-  Motion<Real> motion;
-  Motion<Real> drag; // drag acceleration of the previous step
   Axes<Real> axes;   // of pose.theta
   Pose<Real> before; // at the start of the step
   Axes<Real> axes_before;
@@ -33,7 +32,7 @@ struct Member {
   Real normals[4];         // of this force interval and the next
   // of the step under way
   Motion<Real> noise; // acceleration of the assembly by the stochastic forces
-  Motion<Real> ahead;
+  Motion<Real> ahead; // v*
 };
 
 // Sums of a step, of a block and then of its assembly.

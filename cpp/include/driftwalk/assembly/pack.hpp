@@ -25,7 +25,7 @@ public:
       : run_(run), rules_(rules), out_(out), scratch_(scratch), blended_flow_(blended_flow),
         memory_(scratch.lanes, capacity), near_(rules), blocks_(rules.blocks),
         listed_(rules.blocks > most_blocks_all_pairs),
-        physics_{run.block, run.flow, run.wall, run.step, {Real(T(0)), Real(T(0))}, Real(T(0))} {
+        physics_{run.block, run.flow, run.wall, run.step, {Real(T(0)), Real(T(0)), Real(T(0))}} {
     const bool has_lists = capacity > most_blocks_all_pairs;
     for (int lane = 0; lane < lanes; ++lane) {
       load_lane<Real, T>(rules_, start, memory_, lane);
@@ -66,12 +66,11 @@ public:
   }
 
   void set_forces(int lane, double drag_coefficient, double force_std) {
-    // The same roundings as in the one-block kernel.
-    put(physics_.drag.drag_per_mass, lane,
-        static_cast<T>(drag_coefficient) * static_cast<T>(run_.drag_scale / run_.mass));
-    put(physics_.drag.drag_per_inertia, lane,
-        static_cast<T>(drag_coefficient) * static_cast<T>(run_.drag_scale / run_.inertia));
-    put(physics_.noise_scale, lane, static_cast<T>(force_std) * static_cast<T>(1.0 / run_.mass));
+    const WorldConstants<T> own =
+        world_constants(run_, static_cast<T>(drag_coefficient), static_cast<T>(force_std));
+    put(physics_.world.drag_per_mass, lane, own.drag_per_mass);
+    put(physics_.world.drag_per_inertia, lane, own.drag_per_inertia);
+    put(physics_.world.noise_scale, lane, own.noise_scale);
   }
 
   // For all worlds: the flow times a factor.

@@ -150,9 +150,7 @@ inline void meet_walls(const Physics<Real, T>& physics, Member<Real>* members, i
     if (!any(touched)) {
       continue;
     }
-    m.drag.vx = select(touched, zero, m.drag.vx);
-    m.drag.vy = select(touched, zero, m.drag.vy);
-    m.drag.omega = select(touched, zero, m.drag.omega);
+    forget_drag(touched, m);
     const auto joined = touched & (m.per_count < Real(T(0.75)));
     if (any(joined)) {
       spread_where(joined, members, blocks, b);

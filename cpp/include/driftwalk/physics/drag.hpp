@@ -10,23 +10,9 @@
 #pragma once
 
 #include "driftwalk/flow/bilinear.hpp"
+#include "driftwalk/physics/body.hpp"
 
 DRIFTWALK_LANES_BEGIN
-
-template <class Real>
-struct Pose {
-  Real x, y, theta; // [m, m, rad]
-};
-template <class Real>
-struct Motion {
-  Real vx, vy, omega; // [m/s, m/s, rad/s]
-};
-
-// The block's axes: cosine and sine of its orientation.
-template <class Real>
-struct Axes {
-  Real cosine, sine;
-};
 
 // Everything divided by K = 1/2 rho C_d (a/N) d.
 template <class Real>
@@ -44,6 +30,7 @@ struct AllFacesOpen {
   }
 };
 
+// The sums at a place on the table, or at its edge: a NaN or a runaway reads no memory beyond it.
 // `cover(face, closing)` may turn the closing speed of a face's first strip into one so negative
 // that no strip of it is windward.
 template <class Real, class T, class Cover = AllFacesOpen>
@@ -55,8 +42,10 @@ inline DragSums<Real> drag_sums(const BlockShape<T>& block, const FlowView<T>& f
   const int strips = block.strips;
   const T first_offset = w * T(0.5) - h;
   DragSums<Real> sums{Real(T(0)), Real(T(0)), Real(T(0)), Real(T(0))};
-  const Real centre_x = (x - flow.origin_x) * flow.per_spacing_x;
-  const Real centre_y = (y - flow.origin_y) * flow.per_spacing_y;
+  const Real on_table_x = clamp_to(x, flow.low_x, flow.high_x);
+  const Real on_table_y = clamp_to(y, flow.low_y, flow.high_y);
+  const Real centre_x = (on_table_x - flow.origin_x) * flow.per_spacing_x;
+  const Real centre_y = (on_table_y - flow.origin_y) * flow.per_spacing_y;
   Real nx = axes.cosine, ny = axes.sine;
   for (int face = 0; face < 4; ++face) {
     const Real tx = -ny, ty = nx;

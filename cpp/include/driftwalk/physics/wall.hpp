@@ -10,8 +10,7 @@
 // Impulses are per unit mass; `per_inertia` is mass / moment of inertia [1/m^2].
 #pragma once
 
-#include "driftwalk/math/elementary.hpp"
-#include "driftwalk/physics/drag.hpp"
+#include "driftwalk/physics/body.hpp"
 #include "driftwalk/simulate/prepared.hpp"
 
 DRIFTWALK_LANES_BEGIN
@@ -271,13 +270,6 @@ inline auto meet_wall(const WallView<T>& wall, T h, Real per_inertia, const Leve
     push_inside_edges(wall, h, axes_of(pose.theta), arm, pose);
   }
   return touched;
-}
-
-template <class Real>
-inline Axes<Real> axes_at(Real theta) {
-  Axes<Real> axes;
-  sincos(bounded_angle(theta), axes.sine, axes.cosine);
-  return axes;
 }
 
 // The same for a block alone.

@@ -1,16 +1,16 @@
 // The loop of a pack of worlds through a whole run: forces, steps, samples.
 #pragma once
 
-#include "driftwalk/physics/integrator.hpp"
 #include "driftwalk/random/normal.hpp"
 #include "driftwalk/random/philox.hpp"
 #include "driftwalk/simulate/prepared.hpp"
+#include "driftwalk/simulate/step.hpp"
 
 DRIFTWALK_LANES_BEGIN
 
 template <class Real>
-inline void load_worlds(const BatchWorlds& worlds, std::int64_t first, int count,
-                        World<Real>& state, Real& drag_coefficient, Real& force_std,
+inline void load_worlds(const BatchWorlds& worlds, std::int64_t first, int count, Body<Real>& state,
+                        Real& drag_coefficient, Real& force_std,
                         Philox<typename Numbers<Real>::UInt>& stream) {
   constexpr int lanes = Numbers<Real>::lanes;
   // Lanes beyond the last world repeat it; nothing of theirs is written.
@@ -168,19 +168,21 @@ struct Motionless {
 };
 
 template <class Real, class T>
-inline typename Numbers<Real>::Bool is_sound(const Prepared<T>& run, const World<Real>& w) {
+inline typename Numbers<Real>::Bool is_sound(const Prepared<T>& run, const Body<Real>& body) {
   const Real margin{run.block.half_side};
-  return (w.pose.x > Real(run.flow.low_x) - margin) & (w.pose.x < Real(run.flow.high_x) + margin) &
-         (w.pose.y > Real(run.flow.low_y) - margin) & (w.pose.y < Real(run.flow.high_y) + margin);
+  return (body.pose.x > Real(run.flow.low_x) - margin) &
+         (body.pose.x < Real(run.flow.high_x) + margin) &
+         (body.pose.y > Real(run.flow.low_y) - margin) &
+         (body.pose.y < Real(run.flow.high_y) + margin);
 }
 
 // The state at the end of a run says whether every number on the way was one: a NaN never heals.
 template <class Real, class T>
-inline void write_status(const Prepared<T>& run, const World<Real>& w, const Motionless<Real>& rest,
-                         int count, std::uint32_t* status) {
-  const Real total = w.pose.x + w.pose.y + w.pose.theta + w.motion.vx + w.motion.vy;
+inline void write_status(const Prepared<T>& run, const Body<Real>& body,
+                         const Motionless<Real>& rest, int count, std::uint32_t* status) {
+  const Real total = body.pose.x + body.pose.y + body.pose.theta + body.motion.vx + body.motion.vy;
   const auto finite = abs(total) < Real(T(1e30));
-  const auto inside = is_sound(run, w);
+  const auto inside = is_sound(run, body);
   for (int lane = 0; lane < count; ++lane) {
     status[lane] = (lane_of(finite, lane) ? 0u : status_non_finite) |
                    (lane_of(inside, lane) ? 0u : status_escaped) |
@@ -192,19 +194,13 @@ template <class Real, class T>
 inline void run_worlds(const Prepared<T>& run, const BatchWorlds& worlds, std::int64_t first,
                        int count, const SampleSink<T>& sink, std::uint32_t* status) {
   using UInt = typename Numbers<Real>::UInt;
-  const BlockShape<T> block = run.block;
-  const StepConstants<T> step = run.step;
-  const WallView<T> wall = run.wall;
-  FlowView<T> flow = run.flow;
-  World<Real> world;
+  Body<Real> body;
   Real drag_coefficient, force_std;
   Philox<UInt> stream;
-  load_worlds(worlds, first, count, world, drag_coefficient, force_std, stream);
-  const WorldConstants<Real> constants{drag_coefficient * static_cast<T>(run.drag_scale / run.mass),
-                                       drag_coefficient *
-                                           static_cast<T>(run.drag_scale / run.inertia)};
-  const Real noise_scale = force_std * static_cast<T>(1.0 / run.mass);
-  meet_wall(wall, block.half_side, Real(step.per_inertia), world.pose, world.motion);
+  load_worlds(worlds, first, count, body, drag_coefficient, force_std, stream);
+  Physics<Real, T> physics{run.block, run.flow, run.wall, run.step,
+                           world_constants(run, drag_coefficient, force_std)};
+  meet_wall(run.wall, run.block.half_side, Real(run.step.per_inertia), body.pose, body.motion);
 
   Motionless<Real> rest(run);
   Real normals[4];
@@ -215,28 +211,27 @@ inline void run_worlds(const Prepared<T>& run, const BatchWorlds& worlds, std::i
     if (half == 0) {
       draw_normals(stream, Purpose::force, interval >> 1, normals);
     }
-    const Real noise_x = normals[half] * noise_scale;
-    const Real noise_y = normals[half + 1] * noise_scale;
+    const Motion<Real> noise{normals[half] * physics.world.noise_scale,
+                             normals[half + 1] * physics.world.noise_scale, Real(T(0))};
     for (int sub = 0; sub < run.steps_per_interval && sample < run.samples; ++sub, ++step_index) {
       if (run.frames > 1) {
         const double middle =
             (static_cast<double>(step_index) + 0.5) * static_cast<double>(run.step.dt);
-        flow.table = flow_table_at(run, middle, sink.blended_flow);
+        physics.flow.table = flow_table_at(run, middle, sink.blended_flow);
       }
-      const Pose<Real> before = world.pose;
-      Real turned;
-      step_world(block, flow, wall, step, constants, noise_x, noise_y, world, turned);
+      const Pose<Real> before = body.pose;
+      const Real turned = step_block(physics, noise, body);
       for (; sample < run.samples && run.sample_step[sample] == step_index; ++sample) {
         const T weight = run.sample_weight[sample];
-        const Real x = before.x + (world.pose.x - before.x) * weight;
-        const Real y = before.y + (world.pose.y - before.y) * weight;
+        const Real x = before.x + (body.pose.x - before.x) * weight;
+        const Real y = before.y + (body.pose.y - before.y) * weight;
         rest.add(sample, x, y);
         write_sample(run, sink, sample, count, stream, x, y,
                      wrap_angle(before.theta + turned * weight));
       }
     }
   }
-  write_status(run, world, rest, count, status);
+  write_status(run, body, rest, count, status);
 }
 
 DRIFTWALK_LANES_END

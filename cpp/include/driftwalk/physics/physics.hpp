@@ -1,0 +1,33 @@
+// Everything that a time step of a pack of worlds reads.
+#pragma once
+
+#include "driftwalk/simulate/prepared.hpp"
+
+DRIFTWALK_LANES_BEGIN
+
+// What a world keeps through a run, one number per lane.
+template <class Real>
+struct WorldConstants {
+  Real drag_per_mass;    // K/m [1/m]
+  Real drag_per_inertia; // K/I [1/m^3]
+  Real noise_scale;      // stochastic force per normal number and mass of a block [m/s^2]
+};
+
+template <class Real, class T>
+inline WorldConstants<Real> world_constants(const Prepared<T>& run, Real drag_coefficient,
+                                            Real force_std) {
+  return {drag_coefficient * static_cast<T>(run.drag_scale / run.mass),
+          drag_coefficient * static_cast<T>(run.drag_scale / run.inertia),
+          force_std * static_cast<T>(1.0 / run.mass)};
+}
+
+template <class Real, class T>
+struct Physics {
+  BlockShape<T> block;
+  FlowView<T> flow;
+  WallView<T> wall;
+  StepConstants<T> step;
+  WorldConstants<Real> world;
+};
+
+DRIFTWALK_LANES_END
