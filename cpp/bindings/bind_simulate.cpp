@@ -3,6 +3,7 @@
 
 #include "driftwalk/dispatch.hpp"
 #include "driftwalk/math/elementary.hpp"
+#include "driftwalk/physics/laws/quadratic.hpp"
 #include "driftwalk/random/normal.hpp"
 #include "driftwalk/random/philox.hpp"
 #include "driftwalk/simulate/run.hpp"
@@ -180,8 +181,9 @@ std::tuple<double, double, double> drag(const Model& model, double drag_coeffici
   const driftwalk::Prepared<double>& run = model.twice().view();
   driftwalk::Axes<double> axes;
   driftwalk::sincos(theta, axes.sine, axes.cosine);
-  const driftwalk::DragSums<double> sums = driftwalk::drag_sums(
-      run.block, run.flow, x, y, axes, driftwalk::Motion<double>{vx, vy, omega});
+  const driftwalk::DragSums<double> sums =
+      driftwalk::drag_sums(driftwalk::QuadraticDrag{}, run.block, run.flow, x, y, axes,
+                           driftwalk::Motion<double>{vx, vy, omega});
   const double scale = run.drag_scale * drag_coefficient;
   return {sums.force_x * scale, sums.force_y * scale, sums.torque * scale};
 }

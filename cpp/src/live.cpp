@@ -3,6 +3,7 @@
 #include "driftwalk/assembly/assemble.hpp"
 #include "driftwalk/assembly/memory.hpp"
 #include "driftwalk/assembly/pack.hpp"
+#include "driftwalk/physics/laws/quadratic.hpp"
 
 #include <algorithm>
 #include <array>
@@ -10,7 +11,7 @@
 namespace driftwalk {
 
 namespace {
-using OneWorld = WorldPack<double, double>;
+using OneWorld = WorldPack<double, double, QuadraticDrag>;
 
 // Between two calls of `advance` no blocks part, so there are no more joinings in one.
 constexpr int most_events = most_blocks - 1;
@@ -21,7 +22,7 @@ struct LiveWorld::Inside {
          std::uint64_t own_key)
       : run(model.view()), rules(given), key(own_key),
         memory(most_blocks, PackMemory<double>::bytes(most_blocks), model.blended_flow_size()),
-        out(outputs()), pack(run, rules, start, out, memory.scratch(),
+        out(outputs()), pack({}, run, rules, start, out, memory.scratch(),
                              memory.scratch().blended_flow_twice, most_blocks) {
     pack.begin(0, 0, 0, start, key);
   }

@@ -1,11 +1,12 @@
 // The same kernel in double precision, one world at a time: the reference of the batch kernels.
+#include "driftwalk/physics/laws/quadratic.hpp"
 #include "driftwalk/simulate/run.hpp"
 
 namespace driftwalk {
 
 void simulate_reference(const Prepared<double>& run, const BatchWorlds& worlds, std::int64_t world,
                         const SampleSink<double>& sink, std::uint32_t* status) {
-  run_worlds<double, double>(run, worlds, world, 1, sink, status);
+  run_worlds<double, double>(QuadraticDrag{}, run, worlds, world, 1, sink, status);
 }
 
 } // namespace driftwalk

@@ -5,6 +5,7 @@
 #include "driftwalk/assembly/lane.hpp"
 #include "driftwalk/assembly/walls.hpp"
 #include "driftwalk/dispatch.hpp"
+#include "driftwalk/physics/laws/quadratic.hpp"
 #include "synthetic_assembly.hpp"
 
 #include <algorithm>
@@ -447,6 +448,7 @@ public:
         next_(blocks_.size()), run_(tank.finished()) {
     const driftwalk::Prepared<double>& run = run_.view();
     physics_ = {
+        {},
         run.block,
         run.flow,
         run.wall,
@@ -499,7 +501,7 @@ private:
   std::vector<driftwalk::BlockPair> pairs_;
   std::vector<std::int32_t> heads_, next_;
   driftwalk::PreparedRun<double> run_;
-  driftwalk::Physics<double, double> physics_{};
+  driftwalk::Physics<double, double, driftwalk::QuadraticDrag> physics_{};
   driftwalk::Scene scene_{};
 };
 

@@ -2,6 +2,7 @@
 #include "check.hpp"
 #include "driftwalk/math/elementary.hpp"
 #include "driftwalk/physics/drag.hpp"
+#include "driftwalk/physics/laws/quadratic.hpp"
 #include "synthetic_tank.hpp"
 
 #include <algorithm>
@@ -109,12 +110,32 @@ void check_lookups() {
   CHECK(worst_lookup<Pack>(small_single.view().flow, tank, 0.15, false) <= 0.1 / 32767);
 }
 
+// A law of another form than the kernels': F = K max(0, s)^2 w.
+struct CubicDrag {
+  template <class Real>
+  Real conductance(Real closing) const {
+    const Real windward = driftwalk::QuadraticDrag{}.conductance(closing);
+    return windward * windward;
+  }
+  template <class Real>
+  Real force(Real closing) const {
+    return conductance(closing) * closing;
+  }
+};
+
+double by_definition(driftwalk::QuadraticDrag, double closing) {
+  return std::max(0.0, closing);
+}
+double by_definition(CubicDrag, double closing) {
+  return closing > 0 ? closing * closing : 0;
+}
+
 struct Sums {
   double force_x = 0, force_y = 0, torque = 0, conductance = 0;
 };
 
-// Eq. 2 strip by strip, every quantity in the frame of the tank.
-template <class Velocity>
+// The law strip by strip, every quantity in the frame of the tank.
+template <class Law, class Velocity>
 Sums strip_sum(double side, int strips, double x, double y, double theta, double vx, double vy,
                double omega, const Velocity& velocity) {
   Sums sums;
@@ -128,7 +149,7 @@ Sums strip_sum(double side, int strips, double x, double y, double theta, double
       double u, v;
       velocity(x + rx, y + ry, u, v);
       const double wx = u - (vx - omega * ry), wy = v - (vy + omega * rx);
-      const double facing = std::max(0.0, -(nx * wx + ny * wy));
+      const double facing = by_definition(Law{}, -(nx * wx + ny * wy));
       sums.force_x += facing * wx;
       sums.force_y += facing * wy;
       sums.torque += rx * (facing * wy) - ry * (facing * wx);
@@ -138,7 +159,7 @@ Sums strip_sum(double side, int strips, double x, double y, double theta, double
   return sums;
 }
 
-template <class Real, class T, class Velocity>
+template <class Law, class Real, class T, class Velocity>
 double worst_drag(synthetic::Tank& tank, const Velocity& velocity) {
   const driftwalk::PreparedRun<T> run(tank.finished());
   const BlockShape<T> block = run.view().block;
@@ -150,11 +171,11 @@ double worst_drag(synthetic::Tank& tank, const Velocity& velocity) {
     Axes<Real> axes;
     driftwalk::sincos(Real(static_cast<T>(theta)), axes.sine, axes.cosine);
     const DragSums<Real> got = driftwalk::drag_sums(
-        block, run.view().flow, Real(static_cast<T>(x)), Real(static_cast<T>(y)), axes,
+        Law{}, block, run.view().flow, Real(static_cast<T>(x)), Real(static_cast<T>(y)), axes,
         Motion<Real>{Real(static_cast<T>(vx)), Real(static_cast<T>(vy)),
                      Real(static_cast<T>(omega))});
     const Sums want =
-        strip_sum(tank.model.side, tank.model.strips, x, y, theta, vx, vy, omega, velocity);
+        strip_sum<Law>(tank.model.side, tank.model.strips, x, y, theta, vx, vy, omega, velocity);
     // Relative to N (0.1 m/s)^2 and, for the torque, to that at the half side.
     const double scale = tank.model.strips * 0.01, half = tank.model.side / 2;
     worst = std::max({worst, std::fabs(scalar(got.force_x) - want.force_x) / scale,
@@ -165,32 +186,33 @@ double worst_drag(synthetic::Tank& tank, const Velocity& velocity) {
   return worst;
 }
 
-template <class Velocity>
+template <class Law, class Velocity>
 void check_linear_flow(const char* name, const Velocity& velocity) {
   for (const int strips : {1, 2, 8, 64}) {
     synthetic::Tank tank;
     tank.model.strips = strips;
     tank.set_flow(velocity);
     tank.sample_every(0.1, 2);
-    const double twice = worst_drag<double, double>(tank, velocity);
-    const double single = worst_drag<Pack, float>(tank, velocity);
+    const double twice = worst_drag<Law, double, double>(tank, velocity);
+    const double single = worst_drag<Law, Pack, float>(tank, velocity);
     std::printf("%s, %d strips: double %.2g, float %.2g\n", name, strips, twice, single);
     CHECK(twice < 1e-12);
     CHECK(single < 1e-4);
   }
 }
 
+template <class Law>
 void check_strip_sums() {
-  check_linear_flow("still", [](double, double, double& u, double& v) { u = v = 0; });
-  check_linear_flow("uniform", [](double, double, double& u, double& v) {
+  check_linear_flow<Law>("still", [](double, double, double& u, double& v) { u = v = 0; });
+  check_linear_flow<Law>("uniform", [](double, double, double& u, double& v) {
     u = 0.1;
     v = -0.1;
   });
-  check_linear_flow("shear", [](double, double y, double& u, double& v) {
+  check_linear_flow<Law>("shear", [](double, double y, double& u, double& v) {
     u = 0.31 * y;
     v = 0;
   });
-  check_linear_flow("solid rotation", [](double x, double y, double& u, double& v) {
+  check_linear_flow<Law>("solid rotation", [](double x, double y, double& u, double& v) {
     u = -0.31 * y;
     v = 0.31 * x;
   });
@@ -207,8 +229,9 @@ void check_at_rest_in_the_water() {
   const driftwalk::PreparedRun<double> run(tank.finished());
   const BlockShape<double> block = run.view().block;
   const Axes<double> axes{0.8, 0.6};
-  const DragSums<double> sums = driftwalk::drag_sums(
-      block, run.view().flow, 0.05, 0.02, axes, Motion<double>{-0.31 * 0.02, 0.31 * 0.05, 0.31});
+  const DragSums<double> sums =
+      driftwalk::drag_sums(driftwalk::QuadraticDrag{}, block, run.view().flow, 0.05, 0.02, axes,
+                           Motion<double>{-0.31 * 0.02, 0.31 * 0.05, 0.31});
   CHECK(std::fabs(sums.force_x) < 1e-30 && std::fabs(sums.force_y) < 1e-30);
   CHECK(std::fabs(sums.torque) < 1e-30 && std::fabs(sums.conductance) < 1e-15);
 }
@@ -217,7 +240,8 @@ void check_at_rest_in_the_water() {
 
 int main() {
   check_lookups();
-  check_strip_sums();
+  check_strip_sums<driftwalk::QuadraticDrag>();
+  check_strip_sums<CubicDrag>();
   check_at_rest_in_the_water();
   return check::result();
 }

@@ -4,6 +4,7 @@
 #include "driftwalk/infer/expected_drag.hpp"
 #include "driftwalk/infer/innovations.hpp"
 #include "driftwalk/infer/kalman.hpp"
+#include "driftwalk/physics/laws/quadratic.hpp"
 
 #include <algorithm>
 #include <array>
@@ -58,6 +59,51 @@ void check_normal_law() {
     CHECK(law.density[lane] == 0 && law.probability[lane] == lane % 2);
   }
   CHECK_NEAR(law.probability[6], 0.5, 1e-15);
+}
+
+// --- the law's moments
+// ---------------------------------------------------------------------------
+// The mean of h(s, E[w_t | s]) over s > 0, by Simpson's rule: h is at most linear in w_t.
+template <class Function>
+double windward_mean(double mean, double slip, double variance, double cross, const Function& h) {
+  constexpr int parts = 4000;
+  const double tau = std::sqrt(variance);
+  const double from = std::max(0.0, mean - 9 * tau), to = mean + 9 * tau;
+  double sum = 0;
+  for (int k = 0; k <= parts && to > from; ++k) {
+    const double s = from + (to - from) * k / parts, z = (s - mean) / tau;
+    const double weight = k == 0 || k == parts ? 1 : (k % 2 == 1 ? 4 : 2);
+    sum += weight * h(s, slip + cross * z / tau) * std::exp(-0.5 * z * z);
+  }
+  return sum * (to - from) / (3 * parts) / (tau * std::sqrt(2 * std::acos(-1.0)));
+}
+
+void check_quadratic_moments() {
+  double worst = 0;
+  for (const double mean : {-0.02, -0.004, 0.0, 0.003, 0.05}) {
+    for (const double cross : {-3e-5, 0.0, 2e-5}) {
+      const double slip = 0.02, variance = 1e-4, tau = 0.01;
+      const driftwalk::StripMoments m = driftwalk::QuadraticDrag{}.moments(
+          Eight(mean), Eight(slip), Eight(variance), Eight(cross));
+      const auto differs = [&](Eight got, double unit, const auto& h) {
+        const double want = windward_mean(mean, slip, variance, cross, h);
+        worst = std::max(worst, std::fabs(got[0] - want) / unit);
+      };
+      differs(m.conductance, tau, [](double s, double) { return s; });
+      differs(m.force, tau * tau, [](double s, double) { return s * s; });
+      differs(m.slip_force, tau * tau, [](double s, double w) { return s * w; });
+      differs(m.slope, 1, [](double, double) { return 1; });
+      differs(m.slope_force, tau, [](double s, double) { return s; });
+      differs(m.slope_slip, tau, [](double, double w) { return w; });
+      differs(m.bend_force, 1, [](double, double) { return 2; });
+      // g'' is a unit step of the slope at s = 0: the density there, times the slip there.
+      const double z = mean / tau;
+      const double at_edge = std::exp(-0.5 * z * z) / (tau * std::sqrt(2 * std::acos(-1.0)));
+      worst = std::max(worst, std::fabs(m.bend_slip[0] - at_edge * (slip - cross * z / tau)));
+    }
+  }
+  std::printf("moments of the quadratic law: %.1e\n", worst);
+  CHECK(worst < 1e-11);
 }
 
 // --- the flow
@@ -474,6 +520,7 @@ void check_refusals() {
 
 int main() {
   check_normal_law();
+  check_quadratic_moments();
   check_flow();
   check_beyond_the_grid();
   check_that_all_is_written();

@@ -1,5 +1,6 @@
 // The self-assembly kernel, compiled once per instruction set.
 #include "driftwalk/assembly/run.hpp"
+#include "driftwalk/physics/laws/quadratic.hpp"
 
 DRIFTWALK_LANES_BEGIN
 
@@ -17,7 +18,8 @@ using Real = FloatPack<assembly_lanes>;
 std::int64_t assemble(const Prepared<float>& run, const AssemblyRules& rules,
                       const AssemblyWorlds& worlds, const AssemblyOutputs& out,
                       const WorldQueue& queue, AssemblyScratch& scratch) {
-  return AssemblyPack<Real, float>(run, rules, worlds, out, queue, scratch, scratch.blended_flow)
+  return AssemblyPack<Real, float, QuadraticDrag>({}, run, rules, worlds, out, queue, scratch,
+                                                  scratch.blended_flow)
       .run();
 }
 

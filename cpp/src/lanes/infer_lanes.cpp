@@ -1,6 +1,7 @@
 // The innovations filter, compiled once per instruction set.
 #include "driftwalk/infer/filter_kernel.hpp"
 #include "driftwalk/infer/lanes.hpp"
+#include "driftwalk/physics/laws/quadratic.hpp"
 
 DRIFTWALK_LANES_BEGIN
 
@@ -9,7 +10,7 @@ template <int D>
 void run_filter(const FilterProblem& problem, FilterState<D>& state,
                 const FilterScratch<D>& scratch, const FilterOutputs& out, const ProductSums* sums,
                 std::int64_t count) {
-  FilterRun<D>(problem, state, scratch, out, sums).run(count);
+  FilterRun<D, QuadraticDrag>({}, problem, state, scratch, out, sums).run(count);
 }
 
 template <int D>
@@ -17,8 +18,8 @@ DragResponse<D> drag_alone(const FilterProblem& problem, double theta, double om
                            const double* mean, const double (*covariance)[2 * D],
                            StripShare<D>* shares, double* by_coefficients) {
   const UncertainBlock<D> block{mean[0], mean[1], mean[D], mean[D + 1], omega, covariance};
-  const DragResponse<D> drag =
-      expected_drag<D>(problem.flow, problem.block, problem.orientations, theta, block, shares);
+  const DragResponse<D> drag = expected_drag<D>(QuadraticDrag{}, problem.flow, problem.block,
+                                                problem.orientations, theta, block, shares);
   const std::int64_t nodes = std::int64_t(problem.flow.rows) * problem.flow.columns;
   double* rows[D];
   for (int a = 0; a < D; ++a) {

@@ -1,4 +1,5 @@
 // The simulation kernel, compiled once per instruction set.
+#include "driftwalk/physics/laws/quadratic.hpp"
 #include "driftwalk/simulate/lanes.hpp"
 #include "driftwalk/simulate/run.hpp"
 
@@ -15,7 +16,8 @@ constexpr int float_lanes = 4;
 
 void simulate(const Prepared<float>& run, const BatchWorlds& worlds, std::int64_t first, int count,
               const SampleSink<float>& sink, std::uint32_t* status) {
-  run_worlds<FloatPack<float_lanes>, float>(run, worlds, first, count, sink, status);
+  run_worlds<FloatPack<float_lanes>, float>(QuadraticDrag{}, run, worlds, first, count, sink,
+                                            status);
 }
 
 constexpr SimulateKernel kernel{simulate, float_lanes};

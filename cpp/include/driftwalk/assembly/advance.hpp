@@ -67,8 +67,8 @@ inline void sum_members(const Member<Real>* members, Sums<Real>* sums, int block
   }
 }
 
-template <class Real, class T>
-inline void sum_noise(const Physics<Real, T>& physics, int half, Member<Real>* members,
+template <class Real, class T, class Law>
+inline void sum_noise(const Physics<Real, T, Law>& physics, int half, Member<Real>* members,
                       Sums<Real>* sums, int blocks) {
   for (int b = 0; b < blocks; ++b) {
     const Member<Real>& m = members[b];
@@ -88,8 +88,8 @@ inline void sum_noise(const Physics<Real, T>& physics, int half, Member<Real>* m
 }
 
 // Drag of a block half a step ahead, about its assembly's centre of mass.
-template <class Real, class T>
-inline void feel_drag(const Physics<Real, T>& physics, Member<Real>& m, Sums<Real>& sums) {
+template <class Real, class T, class Law>
+inline void feel_drag(const Physics<Real, T, Law>& physics, Member<Real>& m, Sums<Real>& sums) {
   const Ahead<Real> ahead = look_ahead(physics.step, m, m.noise);
   m.ahead = ahead.motion;
   const Axes<Real> axes = axes_at(ahead.pose.theta);
@@ -97,11 +97,10 @@ inline void feel_drag(const Physics<Real, T>& physics, Member<Real>& m, Sums<Rea
   const Real arm_y = m.offset_x * axes.sine + m.offset_y * axes.cosine;
   const Motion<Real> own{m.ahead.vx - m.ahead.omega * arm_y, m.ahead.vy + m.ahead.omega * arm_x,
                          m.ahead.omega};
-  // Any speed that no water reaches.
-  const Real covered{T(-1e9)};
-  const DragSums<Real> drag =
-      drag_sums(physics.block, physics.flow, ahead.pose.x + arm_x, ahead.pose.y + arm_y, axes, own,
-                [&](int face, Real closing) { return select(m.covered[face], covered, closing); });
+  const Real covered{static_cast<T>(closing_where_covered)};
+  const DragSums<Real> drag = drag_sums(
+      physics.law, physics.block, physics.flow, ahead.pose.x + arm_x, ahead.pose.y + arm_y, axes,
+      own, [&](int face, Real closing) { return select(m.covered[face], covered, closing); });
   sums.part[0] = drag.force_x;
   sums.part[1] = drag.force_y;
   sums.part[2] = drag.torque + (arm_x * drag.force_y - arm_y * drag.force_x);
@@ -117,8 +116,9 @@ inline void find_arm(Member<Real>& m) {
 }
 
 // The second half of the step, from the sums over the assembly.
-template <class Real, class T>
-inline void finish_member(const Physics<Real, T>& physics, const Real* total, Member<Real>& m) {
+template <class Real, class T, class Law>
+inline void finish_member(const Physics<Real, T, Law>& physics, const Real* total,
+                          Member<Real>& m) {
   const T half = T(0.5) * physics.step.dt, turning = turning_share(physics.block) * half;
   const Real per_mass = physics.world.drag_per_mass, per_inertia = physics.world.drag_per_inertia;
   WaterPush<Real> push;
@@ -133,8 +133,8 @@ inline void finish_member(const Physics<Real, T>& physics, const Real* total, Me
   find_arm(m);
 }
 
-template <class Real, class T>
-inline void advance(const Physics<Real, T>& physics, int half, Member<Real>* members,
+template <class Real, class T, class Law>
+inline void advance(const Physics<Real, T, Law>& physics, int half, Member<Real>* members,
                     Sums<Real>* sums, int blocks) {
   sum_noise(physics, half, members, sums, blocks);
   for (int b = 0; b < blocks; ++b) {

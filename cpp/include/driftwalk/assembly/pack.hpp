@@ -10,7 +10,7 @@
 
 DRIFTWALK_LANES_BEGIN
 
-template <class Real, class T>
+template <class Real, class T, class Law>
 class WorldPack {
 public:
   static constexpr int lanes = Numbers<Real>::lanes;
@@ -20,12 +20,13 @@ public:
 
   // All lanes get the blocks at `start`; those that never begin move them along for nothing. The
   // memory holds worlds of up to `capacity` blocks. Events go to `out`.
-  WorldPack(const Prepared<T>& run, const AssemblyRules& rules, const double* start,
+  WorldPack(const Law& law, const Prepared<T>& run, const AssemblyRules& rules, const double* start,
             const AssemblyOutputs& out, AssemblyScratch& scratch, Node* blended_flow, int capacity)
       : run_(run), rules_(rules), out_(out), scratch_(scratch), blended_flow_(blended_flow),
         memory_(scratch.lanes, capacity), near_(rules), blocks_(rules.blocks),
         listed_(rules.blocks > most_blocks_all_pairs),
-        physics_{run.block, run.flow, run.wall, run.step, {Real(T(0)), Real(T(0)), Real(T(0))}} {
+        physics_{law,      run.block, run.flow,
+                 run.wall, run.step,  {Real(T(0)), Real(T(0)), Real(T(0))}} {
     const bool has_lists = capacity > most_blocks_all_pairs;
     for (int lane = 0; lane < lanes; ++lane) {
       load_lane<Real, T>(rules_, start, memory_, lane);
@@ -231,7 +232,7 @@ private:
   NearRules<T> near_;
   int blocks_;
   bool listed_;
-  Physics<Real, T> physics_;
+  Physics<Real, T, Law> physics_;
   Philox<UInt> stream_;
   UInt draw_;
   LaneBook books_[lanes];

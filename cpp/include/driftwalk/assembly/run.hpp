@@ -6,17 +6,17 @@
 
 DRIFTWALK_LANES_BEGIN
 
-template <class Real, class T>
+template <class Real, class T, class Law>
 class AssemblyPack {
 public:
   static constexpr int lanes = Numbers<Real>::lanes;
   using Node = typename FlowNumber<T>::type;
 
-  AssemblyPack(const Prepared<T>& run, const AssemblyRules& rules, const AssemblyWorlds& worlds,
-               const AssemblyOutputs& out, const WorldQueue& queue, AssemblyScratch& scratch,
-               Node* blended_flow)
+  AssemblyPack(const Law& law, const Prepared<T>& run, const AssemblyRules& rules,
+               const AssemblyWorlds& worlds, const AssemblyOutputs& out, const WorldQueue& queue,
+               AssemblyScratch& scratch, Node* blended_flow)
       : run_(run), rules_(rules), worlds_(worlds), out_(out), queue_(queue),
-        pack_(run, rules, worlds.start, out, scratch, blended_flow, rules.blocks) {}
+        pack_(law, run, rules, worlds.start, out, scratch, blended_flow, rules.blocks) {}
 
   // Returns the number of block-steps of the worlds that were run.
   std::int64_t run() {
@@ -102,7 +102,7 @@ private:
   const AssemblyWorlds& worlds_;
   const AssemblyOutputs& out_;
   const WorldQueue& queue_;
-  WorldPack<Real, T> pack_;
+  WorldPack<Real, T, Law> pack_;
   bool empty_ = false;
   std::int64_t block_steps_ = 0;
   std::int64_t next_event_ = INT64_MAX; // no world is over before this many steps of the pack

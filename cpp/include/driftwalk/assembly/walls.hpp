@@ -137,8 +137,8 @@ inline void push_members_inside(const WallView<T>& wall, T h, typename Numbers<R
   take_back_jammed(wall, h, lanes, members, blocks);
 }
 
-template <class Real, class T>
-inline void meet_walls(const Physics<Real, T>& physics, Member<Real>* members, int blocks) {
+template <class Real, class T, class Law>
+inline void meet_walls(const Physics<Real, T, Law>& physics, Member<Real>* members, int blocks) {
   const WallView<T>& wall = physics.wall;
   const T h = physics.block.half_side;
   const Real zero{T(0)};

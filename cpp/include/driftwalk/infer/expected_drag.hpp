@@ -2,22 +2,18 @@
 //
 // A strip with outward normal n and tangent t, at r from the centre, moves through the water with
 // w = u(position + r) - velocity - omega J r, J a quarter turn. Its closing speed is s = -n.w, its
-// slip w_t = t.w, and its force max(0, s) w. Seen in the block's own frame, to first order,
+// slip w_t = t.w, and its force is the law's. Seen in the block's own frame, to first order,
 //     dw = grad u dposition - dvelocity - J r domega - q dtheta,  q = J w - grad u J r - omega r
-// so with a normal state of covariance P, (s, w_t) are normal too. For s ~ N(m, tau^2), c = cov(s,
-// w_t), and phi, Phi at m / tau:
-//     E[s+]        = m Phi + tau phi
-//     E[s+^2]      = (m^2 + tau^2) Phi + m tau phi
-//     E[s+ w_t]    = w_t E[s+] + c Phi
-//     E[w_t; s>0]  = w_t Phi + c phi / tau
+// so with a normal state of covariance P, (s, w_t) are normal too, and the law has their moments
+// (physics/drag_law.hpp).
 // Derivatives by velocities are exact for a given P where the angle is known; those by coordinates
 // and coefficients leave out that dw moves with them, which is zero where only the velocities are
 // uncertain. With the angle known to a degree they are off by 0.3 % (force) and 2 % (torque) at
 // most, and that an uncertain angle turns the force, left out too, is some 1e-4 of it.
 #pragma once
 
-#include "driftwalk/infer/normal.hpp"
 #include "driftwalk/infer/spline_flow.hpp"
+#include "driftwalk/physics/drag_law.hpp"
 
 DRIFTWALK_LANES_BEGIN
 
@@ -54,33 +50,6 @@ inline void spread_of(const double (*P)[2 * D], const AlongState<D>& n, const Al
   }
 }
 
-// Moments of the closing speed and the slip of the strips of a side.
-struct StripMoments {
-  Eight closing;       // E[s+]
-  Eight square;        // E[s+^2]
-  Eight closing_slip;  // E[s+ w_t]
-  Eight windward_slip; // E[w_t; s > 0]
-  Eight windward;      // P(s > 0)
-  Eight edge_slip;     // E[w_t delta(s)]
-  Eight::Mask takes_part;
-};
-
-inline StripMoments strip_moments(Eight mean, Eight slip, Eight variance, Eight cross) {
-  // A block that is known exactly has tau = 0; the floor stands for it, at 10 nm/s.
-  const Eight tau = square_root(at_least(variance, 1e-16));
-  const Eight z = mean / tau;
-  const NormalLaw law = normal_law(z);
-  StripMoments m;
-  m.closing = mean * law.probability + tau * law.density;
-  m.square = (mean * mean + variance) * law.probability + mean * (tau * law.density);
-  m.closing_slip = slip * m.closing + cross * law.probability;
-  m.windward_slip = slip * law.probability + cross * law.density / tau;
-  m.windward = law.probability;
-  m.edge_slip = law.density / tau * (slip - cross * mean / (tau * tau));
-  m.takes_part = z > -normal_reach;
-  return m;
-}
-
 template <int D>
 struct DragSumsOfEight {
   Eight acceleration[D];
@@ -90,19 +59,19 @@ struct DragSumsOfEight {
 };
 
 // Adds the second derivatives of the drag of a strip by the velocities. Its forces along -n and t
-// are s+^2 and s+ w_t.
+// are f and g w_t.
 template <int D>
 inline void add_bend(const Eight (&closing)[D], const Eight (&slip)[D], const StripMoments& m,
-                     const Eight (&by_square)[D], const Eight (&by_product)[D],
+                     const Eight (&by_force)[D], const Eight (&by_slip)[D],
                      DragSumsOfEight<D>& sums) {
   for (int b = 0; b < D; ++b) {
     for (int c = b; c < D; ++c) {
       const Eight both = closing[b] * closing[c];
-      const Eight square = 2 * m.windward * both;
-      const Eight product =
-          m.edge_slip * both + m.windward * (closing[b] * slip[c] + slip[b] * closing[c]);
+      const Eight force = m.bend_force * both;
+      const Eight slip_force =
+          m.bend_slip * both + m.slope * (closing[b] * slip[c] + slip[b] * closing[c]);
       for (int a = 0; a < D; ++a) {
-        sums.bend[a][b][c] += by_square[a] * square + by_product[a] * product;
+        sums.bend[a][b][c] += by_force[a] * force + by_slip[a] * slip_force;
       }
     }
   }
@@ -131,8 +100,8 @@ inline void keep_shares(const StripsOnGrid& grid, const Eight (&response)[D][2],
 inline constexpr double lane_numbers[8] = {0, 1, 2, 3, 4, 5, 6, 7};
 
 // Strips `first` .. `first + 7` of a side; `shares` may be null.
-template <int D>
-inline void add_strips(const SplineView& flow, const StripBlock& block,
+template <int D, DragLawWithMoments Law>
+inline void add_strips(const Law& law, const SplineView& flow, const StripBlock& block,
                        const UncertainBlock<D>& state, Side side, int first, double scale,
                        DragSumsOfEight<D>& sums, StripShare<D>* shares, int& count) {
   const double nx = side.nx, ny = side.ny, tx = -ny, ty = nx, h = block.half_side;
@@ -165,26 +134,27 @@ inline void add_strips(const SplineView& flow, const StripBlock& block,
   Eight variance, cross;
   spread_of<D>(state.covariance, along_n, along_t, variance, cross);
   const Eight slip = tx * wx + ty * wy;
-  const StripMoments m = strip_moments(-(nx * wx + ny * wy), slip, variance, cross);
+  const StripMoments m = law.moments(-(nx * wx + ny * wy), slip, variance, cross);
   const Eight::Mask part = m.takes_part & real;
   if (!any(part)) {
     return;
   }
   const Eight K = select(part, Eight(scale), Eight(0));
-  const Eight along_normal = K * m.square, along_tangent = K * m.closing_slip;
+  const Eight along_normal = K * m.force, along_tangent = K * m.slip_force;
   const Eight force[2] = {tx * along_tangent - nx * along_normal,
                           ty * along_tangent - ny * along_normal};
   sums.acceleration[0] += force[0];
   sums.acceleration[1] += force[1];
-  // d(acceleration)/d(velocity) = E[w n'; s > 0] - E[s+] I, with w = -s n + w_t t.
-  const Eight closing = K * m.closing, windward_slip = K * m.windward_slip;
-  const Eight mean_x = tx * windward_slip - nx * closing,
-              mean_y = ty * windward_slip - ny * closing;
+  // d(acceleration)/d(velocity) = E[g' w] n' - E[g] I, with w = -s n + w_t t.
+  const Eight conductance = K * m.conductance;
+  const Eight slope_force = K * m.slope_force, slope_slip = K * m.slope_slip;
+  const Eight mean_x = tx * slope_slip - nx * slope_force,
+              mean_y = ty * slope_slip - ny * slope_force;
   Eight response[D][2];
-  response[0][0] = mean_x * nx - closing;
+  response[0][0] = mean_x * nx - conductance;
   response[0][1] = mean_x * ny;
   response[1][0] = mean_y * nx;
-  response[1][1] = mean_y * ny - closing;
+  response[1][1] = mean_y * ny - conductance;
   if constexpr (D == 3) {
     const Eight lever_x = block.mass_by_inertia * arm_x, lever_y = block.mass_by_inertia * arm_y;
     sums.acceleration[2] += lever_x * force[1] - lever_y * force[0];
@@ -204,37 +174,37 @@ inline void add_strips(const SplineView& flow, const StripBlock& block,
       sums.by_position[a][2] += x * turn_x + y * turn_y;
     }
   }
-  Eight closing_by[D], slip_by[D], by_square[D], by_product[D];
+  Eight closing_by[D], slip_by[D], by_force[D], by_slip[D];
   closing_by[0] = Eight(nx);
   closing_by[1] = Eight(ny);
   slip_by[0] = Eight(-tx);
   slip_by[1] = Eight(-ty);
-  by_square[0] = -nx * K;
-  by_square[1] = -ny * K;
-  by_product[0] = tx * K;
-  by_product[1] = ty * K;
+  by_force[0] = -nx * K;
+  by_force[1] = -ny * K;
+  by_slip[0] = tx * K;
+  by_slip[1] = ty * K;
   if constexpr (D == 3) {
     closing_by[2] = -offset;
     slip_by[2] = Eight(-h);
-    by_square[2] = block.mass_by_inertia * offset * K;
-    by_product[2] = block.mass_by_inertia * h * K;
+    by_force[2] = block.mass_by_inertia * offset * K;
+    by_slip[2] = block.mass_by_inertia * h * K;
   }
-  add_bend<D>(closing_by, slip_by, m, by_square, by_product, sums);
+  add_bend<D>(closing_by, slip_by, m, by_force, by_slip, sums);
   if (shares != nullptr) {
     keep_shares<D>(grid, response, part, shares, count);
   }
 }
 
 // One orientation of the block, its four sides.
-template <int D>
-inline void add_orientation(const SplineView& flow, const StripBlock& block,
+template <int D, DragLawWithMoments Law>
+inline void add_orientation(const Law& law, const SplineView& flow, const StripBlock& block,
                             const UncertainBlock<D>& state, double cosine, double sine,
                             double scale, DragSumsOfEight<D>& sums, StripShare<D>* shares,
                             int& count) {
   Side side{cosine, sine};
   for (int k = 0; k < 4; ++k) {
     for (int first = 0; first < block.strips; first += 8) {
-      add_strips<D>(flow, block, state, side, first, scale, sums, shares, count);
+      add_strips<D>(law, flow, block, state, side, first, scale, sums, shares, count);
     }
     side = {-side.ny, side.nx};
   }
@@ -242,10 +212,11 @@ inline void add_orientation(const SplineView& flow, const StripBlock& block,
 
 // The drag at angle `theta`, or averaged over the orientations, without turning, if there are any.
 // `shares`, if not null, takes what each strip contributes to the derivative by the coefficients.
-template <int D>
-inline DragResponse<D> expected_drag(const SplineView& flow, const StripBlock& block,
-                                     const Orientations& orientations, double theta,
-                                     const UncertainBlock<D>& state, StripShare<D>* shares) {
+template <int D, DragLawWithMoments Law>
+inline DragResponse<D> expected_drag(const Law& law, const SplineView& flow,
+                                     const StripBlock& block, const Orientations& orientations,
+                                     double theta, const UncertainBlock<D>& state,
+                                     StripShare<D>* shares) {
   DragSumsOfEight<D> sums;
   for (int a = 0; a < D; ++a) {
     sums.acceleration[a] = Eight(0);
@@ -259,13 +230,13 @@ inline DragResponse<D> expected_drag(const SplineView& flow, const StripBlock& b
   DragResponse<D> response;
   response.shares = 0;
   if (orientations.count == 0) {
-    add_orientation<D>(flow, block, state, __builtin_cos(theta), __builtin_sin(theta),
+    add_orientation<D>(law, flow, block, state, __builtin_cos(theta), __builtin_sin(theta),
                        block.drag_scale, sums, shares, response.shares);
   }
   UncertainBlock<D> still = state;
   still.omega = 0;
   for (int k = 0; k < orientations.count; ++k) {
-    add_orientation<D>(flow, block, still, orientations.cosine[k], orientations.sine[k],
+    add_orientation<D>(law, flow, block, still, orientations.cosine[k], orientations.sine[k],
                        block.drag_scale / orientations.count, sums, shares, response.shares);
   }
   for (int a = 0; a < D; ++a) {

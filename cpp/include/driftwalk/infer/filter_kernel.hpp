@@ -22,14 +22,14 @@ inline constexpr double outlier_chi_squared = 40;
 inline constexpr double variance_of_nothing = 1e12;
 inline constexpr double full_turn = 6.283185307179586;
 
-template <int D>
+template <int D, DragLawWithMoments Law>
 class FilterRun {
 public:
   // With sums derivatives are added up there instead of handed out.
-  FilterRun(const FilterProblem& problem, FilterState<D>& state, const FilterScratch<D>& scratch,
-            const FilterOutputs& out, const ProductSums* sums)
-      : problem_(problem), track_(problem.track), state_(state), scratch_(scratch), out_(out),
-        sensitivity_(scratch), sums_(sums),
+  FilterRun(const Law& law, const FilterProblem& problem, FilterState<D>& state,
+            const FilterScratch<D>& scratch, const FilterOutputs& out, const ProductSums* sums)
+      : law_(law), problem_(problem), track_(problem.track), state_(state), scratch_(scratch),
+        out_(out), sensitivity_(scratch), sums_(sums),
         products_(sums == nullptr ? ProductSums{} : *sums, scratch.stride) {}
 
   void run(std::int64_t count) {
@@ -180,8 +180,8 @@ private:
       theta = angle[-1] + (angle[0] - angle[-1]) * share;
       block.omega = spin[-1] + (spin[0] - spin[-1]) * share;
     }
-    return expected_drag<D>(problem_.flow, problem_.block, problem_.orientations, theta, block,
-                            scratch_.shares);
+    return expected_drag<D>(law_, problem_.flow, problem_.block, problem_.orientations, theta,
+                            block, scratch_.shares);
   }
 
   void take_sample(std::int64_t row, std::int64_t k, const Sample& found) {
@@ -280,6 +280,7 @@ private:
     }
   }
 
+  [[no_unique_address]] Law law_;
   const FilterProblem& problem_;
   const Track& track_;
   FilterState<D>& state_;

@@ -6,8 +6,8 @@
 // out.
 #pragma once
 
-#include "driftwalk/infer/doubles.hpp"
 #include "driftwalk/infer/problem.hpp"
+#include "driftwalk/math/doubles.hpp"
 
 DRIFTWALK_LANES_BEGIN
 

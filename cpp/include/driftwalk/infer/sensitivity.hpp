@@ -6,9 +6,9 @@
 // good as zero, are set to zero now and then, and left out until they are touched again.
 #pragma once
 
-#include "driftwalk/infer/doubles.hpp"
 #include "driftwalk/infer/kalman.hpp"
 #include "driftwalk/infer/spline_flow.hpp"
+#include "driftwalk/math/doubles.hpp"
 
 DRIFTWALK_LANES_BEGIN
 

@@ -1,8 +1,8 @@
 // The spline flow and its gradient at the eight strips of a side.
 #pragma once
 
-#include "driftwalk/infer/doubles.hpp"
 #include "driftwalk/infer/problem.hpp"
+#include "driftwalk/math/doubles.hpp"
 
 DRIFTWALK_LANES_BEGIN
 

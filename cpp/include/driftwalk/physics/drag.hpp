@@ -1,25 +1,27 @@
 // Drag on a square block in a flow, from N vertical strips on each of its four side faces.
 //
-//     F_k = 1/2 rho C_d (a/N) d max(0, -n.w_k) w_k,   w_k = u(x_k) - v_k,   windward strips only
+//     F_k = K g(s_k) w_k,   w_k = u(x_k) - v_k,   s_k = -n.w_k
 //
-// In the frame of a face (normal n, tangent t, strip offsets o_k along t) with s_k = max(0, -n.w_k)
-// the sums over a face need nine operations a strip:
-//     n.F = -K sum s^2,   t.F = K (t.sum(s u) - (t.v + omega h) sum s),
-//     torque = h t.F + K sum o_k s_k^2,   sum o_k s_k^2 = w ((N+1)/2 sum s^2 - M),
-// M the sum of the running sums of s^2, w = a/N, h = a/2.
+// with the law's conductance g and force f(s) = g(s) s (physics/drag_law.hpp). In the frame of a
+// face (normal n, tangent t, strip offsets o_k along t) the sums over it need few operations a
+// strip, nine with the quadratic law:
+//     n.F = -K sum f,   t.F = K (t.sum(g u) - (t.v + omega h) sum g),
+//     torque = h t.F + K sum o_k f_k,   sum o_k f_k = w ((N+1)/2 sum f - M),
+// M the sum of the running sums of f, w = a/N, h = a/2.
 #pragma once
 
 #include "driftwalk/flow/bilinear.hpp"
 #include "driftwalk/physics/body.hpp"
+#include "driftwalk/physics/drag_law.hpp"
 
 DRIFTWALK_LANES_BEGIN
 
-// Everything divided by K = 1/2 rho C_d (a/N) d.
+// Everything divided by K.
 template <class Real>
 struct DragSums {
   Real force_x, force_y; // [m^2/s^2]
   Real torque;           // [m^3/s^2]
-  Real conductance;      // sum of s over all strips [m/s]: how strongly drag damps motion
+  Real conductance;      // sum of g over all strips [m/s]: how strongly drag damps motion
 };
 
 // Which faces the water does not reach: none of a block alone.
@@ -31,11 +33,11 @@ struct AllFacesOpen {
 };
 
 // The sums at a place on the table, or at its edge: a NaN or a runaway reads no memory beyond it.
-// `cover(face, closing)` may turn the closing speed of a face's first strip into one so negative
-// that no strip of it is windward.
-template <class Real, class T, class Cover = AllFacesOpen>
-inline DragSums<Real> drag_sums(const BlockShape<T>& block, const FlowView<T>& flow, Real x, Real y,
-                                const Axes<Real>& axes, const Motion<Real>& motion,
+// `cover(face, closing)` may turn the closing speed of a face's first strip into
+// closing_where_covered.
+template <class Real, class T, DragLaw<Real> Law, class Cover = AllFacesOpen>
+inline DragSums<Real> drag_sums(const Law& law, const BlockShape<T>& block, const FlowView<T>& flow,
+                                Real x, Real y, const Axes<Real>& axes, const Motion<Real>& motion,
                                 const Cover& cover = {}) {
   const T h = block.half_side;
   const T w = block.strip_width;
@@ -55,26 +57,27 @@ inline DragSums<Real> drag_sums(const BlockShape<T>& block, const FlowView<T>& f
     const Real raw_nx = nx * flow.unit, raw_ny = ny * flow.unit;
     const Real spin_step = motion.omega * w;
     Real closing = cover(face, (nx * motion.vx + ny * motion.vy) - motion.omega * first_offset);
-    Real squares{T(0)}, running{T(0)}, sum_u{T(0)}, sum_v{T(0)}, sum_s{T(0)};
+    Real push{T(0)}, running{T(0)}, sum_u{T(0)}, sum_v{T(0)}, sum_g{T(0)};
     for (int k = 0; k < strips; ++k) {
       Real u, v;
       cursor.read(u, v);
-      const Real s = max(closing - (raw_nx * u + raw_ny * v), Real(T(0)));
-      squares = squares + s * s;
-      running = running + squares;
-      sum_u = sum_u + s * u;
-      sum_v = sum_v + s * v;
-      sum_s = sum_s + s;
+      const Real s = closing - (raw_nx * u + raw_ny * v);
+      const Real g = law.conductance(s);
+      push = push + law.force(s);
+      running = running + push;
+      sum_u = sum_u + g * u;
+      sum_v = sum_v + g * v;
+      sum_g = sum_g + g;
       cursor.advance();
       closing = closing - spin_step;
     }
     const Real slip = (tx * motion.vx + ty * motion.vy) + motion.omega * h;
-    const Real tangential = (tx * sum_u + ty * sum_v) * flow.unit - slip * sum_s;
-    sums.force_x = sums.force_x + (tx * tangential - nx * squares);
-    sums.force_y = sums.force_y + (ty * tangential - ny * squares);
-    const Real lever = squares * (T(0.5) * T(strips + 1)) - running;
+    const Real tangential = (tx * sum_u + ty * sum_v) * flow.unit - slip * sum_g;
+    sums.force_x = sums.force_x + (tx * tangential - nx * push);
+    sums.force_y = sums.force_y + (ty * tangential - ny * push);
+    const Real lever = push * (T(0.5) * T(strips + 1)) - running;
     sums.torque = sums.torque + (tangential * h + lever * w);
-    sums.conductance = sums.conductance + sum_s;
+    sums.conductance = sums.conductance + sum_g;
     nx = tx;
     ny = ty;
   }

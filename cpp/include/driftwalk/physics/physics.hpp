@@ -1,6 +1,7 @@
 // Everything that a time step of a pack of worlds reads.
 #pragma once
 
+#include "driftwalk/physics/drag_law.hpp"
 #include "driftwalk/simulate/prepared.hpp"
 
 DRIFTWALK_LANES_BEGIN
@@ -21,8 +22,9 @@ inline WorldConstants<Real> world_constants(const Prepared<T>& run, Real drag_co
           force_std * static_cast<T>(1.0 / run.mass)};
 }
 
-template <class Real, class T>
+template <class Real, class T, DragLaw<Real> Law>
 struct Physics {
+  [[no_unique_address]] Law law;
   BlockShape<T> block;
   FlowView<T> flow;
   WallView<T> wall;

@@ -190,16 +190,18 @@ inline void write_status(const Prepared<T>& run, const Body<Real>& body,
   }
 }
 
-template <class Real, class T>
-inline void run_worlds(const Prepared<T>& run, const BatchWorlds& worlds, std::int64_t first,
-                       int count, const SampleSink<T>& sink, std::uint32_t* status) {
+template <class Real, class T, class Law>
+inline void run_worlds(const Law& law, const Prepared<T>& run, const BatchWorlds& worlds,
+                       std::int64_t first, int count, const SampleSink<T>& sink,
+                       std::uint32_t* status) {
   using UInt = typename Numbers<Real>::UInt;
   Body<Real> body;
   Real drag_coefficient, force_std;
   Philox<UInt> stream;
   load_worlds(worlds, first, count, body, drag_coefficient, force_std, stream);
-  Physics<Real, T> physics{run.block, run.flow, run.wall, run.step,
-                           world_constants(run, drag_coefficient, force_std)};
+  Physics<Real, T, Law> physics{law,      run.block,
+                                run.flow, run.wall,
+                                run.step, world_constants(run, drag_coefficient, force_std)};
   meet_wall(run.wall, run.block.half_side, Real(run.step.per_inertia), body.pose, body.motion);
 
   Motionless<Real> rest(run);

@@ -9,13 +9,13 @@
 DRIFTWALK_LANES_BEGIN
 
 // Returns the angle by which the water has turned the block [rad].
-template <class Real, class T>
-inline Real step_block(const Physics<Real, T>& physics, const Motion<Real>& noise,
+template <class Real, class T, class Law>
+inline Real step_block(const Physics<Real, T, Law>& physics, const Motion<Real>& noise,
                        Body<Real>& body) {
   const T half = T(0.5) * physics.step.dt;
   const Ahead<Real> ahead = look_ahead(physics.step, body, noise);
-  const DragSums<Real> sums = drag_sums(physics.block, physics.flow, ahead.pose.x, ahead.pose.y,
-                                        axes_at(ahead.pose.theta), ahead.motion);
+  const DragSums<Real> sums = drag_sums(physics.law, physics.block, physics.flow, ahead.pose.x,
+                                        ahead.pose.y, axes_at(ahead.pose.theta), ahead.motion);
   const Real per_mass = physics.world.drag_per_mass, per_inertia = physics.world.drag_per_inertia;
   WaterPush<Real> push;
   push.acceleration = {sums.force_x * per_mass, sums.force_y * per_mass, sums.torque * per_inertia};

@@ -5,7 +5,7 @@
 // cpp/tests/test_infer.cpp).
 #pragma once
 
-#include "driftwalk/infer/doubles.hpp"
+#include "driftwalk/math/doubles.hpp"
 
 DRIFTWALK_LANES_BEGIN
 
