@@ -203,50 +203,22 @@ std::vector<std::uint32_t> philox(std::uint64_t key, const std::vector<std::uint
 
 void register_simulate(nb::module_& module);
 void register_simulate(nb::module_& module) {
-  using driftwalk::BatchModel;
-  nb::class_<Model>(module, "Model")
+  nb::class_<Model> model(module, "Model");
+  model
       .def(
           "__init__",
-          [](Model* self, double side, double mass, double inertia, double depth, int strips,
-             double water_density, double radius, In<double, 2> edges, double restitution,
-             double friction, double bounce_speed, In<double, 3> u, In<double, 3> v,
-             In<double, 1> frame_time, double origin_x, double origin_y, double spacing_x,
-             double spacing_y, double time_step, int steps_per_interval, In<double, 1> sample_time,
-             double position_noise, double orientation_noise, double position_quantum,
-             double view_radius, double view_x, double view_y,
-             std::optional<In<double, 2>> view_edges) {
-            BatchModel model;
-            model.side = side;
-            model.mass = mass;
-            model.inertia = inertia;
-            model.depth = depth;
-            model.strips = strips;
-            model.water_density = water_density;
-            model.radius = radius;
-            model.restitution = restitution;
-            model.friction = friction;
-            model.bounce_speed = bounce_speed;
-            model.origin_x = origin_x;
-            model.origin_y = origin_y;
-            model.spacing_x = spacing_x;
-            model.spacing_y = spacing_y;
-            model.time_step = time_step;
-            model.steps_per_interval = steps_per_interval;
-            model.position_noise = position_noise;
-            model.orientation_noise = orientation_noise;
-            model.position_quantum = position_quantum;
-            model.view_radius = view_radius;
-            model.view_x = view_x;
-            model.view_y = view_y;
-            new (self) Model(model, edges, u, v, frame_time, sample_time, view_edges);
+          [](Model* self, In<double, 2> edges, In<double, 3> u, In<double, 3> v,
+             In<double, 1> frame_time, In<double, 1> sample_time, In<double, 2> view_edges,
+             const nb::kwargs& numbers) {
+            new (self)
+                Model(numbers_of(numbers), {edges, u, v, frame_time, sample_time, view_edges});
           },
-          nb::kw_only(), "side"_a, "mass"_a, "inertia"_a, "depth"_a, "strips"_a, "water_density"_a,
-          "radius"_a, "edges"_a, "restitution"_a, "friction"_a, "bounce_speed"_a, "u"_a, "v"_a,
-          "frame_time"_a, "origin_x"_a, "origin_y"_a, "spacing_x"_a, "spacing_y"_a, "time_step"_a,
-          "steps_per_interval"_a, "sample_time"_a, "position_noise"_a, "orientation_noise"_a,
-          "position_quantum"_a, "view_radius"_a = 0.0, "view_x"_a = 0.0, "view_y"_a = 0.0,
-          "view_edges"_a = nb::none())
+          nb::kw_only(), "edges"_a, "u"_a, "v"_a, "frame_time"_a, "sample_time"_a, "view_edges"_a,
+          "numbers"_a)
       .def_prop_ro("samples", &Model::samples);
+  driftwalk::each_model_number([&](const char* name, const char*, driftwalk::Range, auto field) {
+    model.def_prop_ro(name, [field](const Model& self) { return self.numbers().*field; });
+  });
   module.def("simulate", &simulate, "model"_a, "worlds"_a, "key"_a, nb::kw_only(), "threads"_a,
              "precision"_a);
   module.def("score", &score, "model"_a, "worlds"_a, "key"_a, nb::kw_only(), "left"_a, "weight"_a,

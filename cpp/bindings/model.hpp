@@ -6,7 +6,10 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
+#include <cstdint>
 #include <optional>
+#include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -24,36 +27,77 @@ Out<T> hand_out(std::vector<T>&& values, std::vector<std::size_t> shape) {
   return Out<T>(owned->data(), shape.size(), shape.data(), owner);
 }
 
-// A model with everything it points to, prepared for both number types.
+// The numbers of a model from keyword arguments: each exactly once, and no others.
+inline driftwalk::ModelNumbers numbers_of(const nb::kwargs& given) {
+  driftwalk::ModelNumbers numbers;
+  std::string known;
+  std::size_t found = 0;
+  driftwalk::each_model_number([&](const char* name, const char*, driftwalk::Range, auto field) {
+    if (!given.contains(name) || !nb::try_cast(given[name], numbers.*field)) {
+      throw nb::type_error((std::string(name) + " is missing or not a number").c_str());
+    }
+    known += std::string(known.empty() ? "" : ", ") + name;
+    ++found;
+  });
+  if (given.size() != found) {
+    throw nb::type_error(("a model has no other numbers than " + known).c_str());
+  }
+  driftwalk::check_model_numbers(numbers);
+  return numbers;
+}
+
+struct ModelArrays {
+  In<double, 2> edges;
+  In<double, 3> u, v;
+  In<double, 1> frame_time, sample_time;
+  In<double, 2> view_edges;
+};
+
+inline void check(const ModelArrays& arrays) {
+  const auto& u = arrays.u;
+  const auto& v = arrays.v;
+  if (arrays.edges.shape(1) != 3 || arrays.view_edges.shape(1) != 3) {
+    throw std::invalid_argument("edges and view_edges must have shape (n, 3)");
+  }
+  if (u.size() == 0 || u.shape(0) != v.shape(0) || u.shape(1) != v.shape(1) ||
+      u.shape(2) != v.shape(2) || arrays.frame_time.size() != u.shape(0)) {
+    throw std::invalid_argument("u and v must have the same shape (frames, rows, columns), and "
+                                "frame_time one time per frame");
+  }
+  if (arrays.sample_time.size() == 0) {
+    throw std::invalid_argument("a model has at least one sample");
+  }
+}
+
+// A model, prepared for both number types.
 class Model {
 public:
-  Model(driftwalk::BatchModel model, In<double, 2> edges, In<double, 3> u, In<double, 3> v,
-        In<double, 1> frame_time, In<double, 1> sample_time,
-        const std::optional<In<double, 2>>& view_edges)
-      : samples_(model.samples = static_cast<std::int64_t>(sample_time.size())) {
-    model.edges = edges.data();
-    model.edge_count = static_cast<int>(edges.shape(0));
-    if (view_edges) {
-      model.view_edges = view_edges->data();
-      model.view_edge_count = static_cast<int>(view_edges->shape(0));
-    }
-    model.flow_u = u.data();
-    model.flow_v = v.data();
-    model.frames = static_cast<int>(u.shape(0));
-    model.rows = static_cast<int>(u.shape(1));
-    model.columns = static_cast<int>(u.shape(2));
-    model.frame_time = frame_time.data();
-    model.sample_time = sample_time.data();
+  Model(const driftwalk::ModelNumbers& numbers, const ModelArrays& arrays) : numbers_(numbers) {
+    check(arrays);
+    driftwalk::BatchModel model{numbers};
+    model.edges = arrays.edges.data();
+    model.edge_count = static_cast<int>(arrays.edges.shape(0));
+    model.view_edges = arrays.view_edges.data();
+    model.view_edge_count = static_cast<int>(arrays.view_edges.shape(0));
+    model.flow_u = arrays.u.data();
+    model.flow_v = arrays.v.data();
+    model.frames = static_cast<int>(arrays.u.shape(0));
+    model.rows = static_cast<int>(arrays.u.shape(1));
+    model.columns = static_cast<int>(arrays.u.shape(2));
+    model.frame_time = arrays.frame_time.data();
+    model.sample_time = arrays.sample_time.data();
+    model.samples = static_cast<std::int64_t>(arrays.sample_time.size());
     single_.emplace(model);
     twice_.emplace(model);
   }
 
-  std::int64_t samples() const { return samples_; }
+  const driftwalk::ModelNumbers& numbers() const { return numbers_; }
+  std::int64_t samples() const { return twice().view().samples; }
   const driftwalk::PreparedRun<float>& single() const { return *single_; }
   const driftwalk::PreparedRun<double>& twice() const { return *twice_; }
 
 private:
-  std::int64_t samples_;
+  driftwalk::ModelNumbers numbers_;
   std::optional<driftwalk::PreparedRun<float>> single_;
   std::optional<driftwalk::PreparedRun<double>> twice_;
 };

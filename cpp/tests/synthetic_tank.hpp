@@ -29,6 +29,7 @@ struct Tank {
     model.restitution = 0.5;
     model.bounce_speed = 0.01;
     model.time_step = 0.01;
+    model.steps_per_interval = 1;
   }
 
   template <class Velocity>

@@ -42,38 +42,20 @@ _Keys = npt.NDArray[np.uint64]
 _Counts = npt.NDArray[np.int64]
 
 class Model:
+    # The numbers, and what each may be, are declared in
+    # cpp/include/driftwalk/simulate/model_numbers.hpp. All are given, and can be read back.
     def __init__(
         self,
         *,
-        side: float,
-        mass: float,
-        inertia: float,
-        depth: float,
-        strips: int,
-        water_density: float,
-        radius: float,
         edges: _Floats,
-        restitution: float,
-        friction: float,
-        bounce_speed: float,
         u: _Floats,
         v: _Floats,
         frame_time: _Floats,
-        origin_x: float,
-        origin_y: float,
-        spacing_x: float,
-        spacing_y: float,
-        time_step: float,
-        steps_per_interval: int,
         sample_time: _Floats,
-        position_noise: float,
-        orientation_noise: float,
-        position_quantum: float,
-        view_radius: float = 0.0,
-        view_x: float = 0.0,
-        view_y: float = 0.0,
-        view_edges: _Floats | None = None,
+        view_edges: _Floats,
+        **numbers: float,
     ) -> None: ...
+    def __getattr__(self, number: str) -> float: ...
     @property
     def samples(self) -> int: ...
 

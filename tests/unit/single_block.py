@@ -73,6 +73,10 @@ def model(
         "position_noise": 0.0,
         "orientation_noise": 0.0,
         "position_quantum": 0.0,
+        "view_radius": 0.0,
+        "view_x": 0.0,
+        "view_y": 0.0,
+        "view_edges": np.zeros((0, 3)),
     }
     return _core.Model(**{**settings, **changes})
 
