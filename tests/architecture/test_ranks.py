@@ -49,9 +49,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     | {"assembly", "calibration", "likelihood", "track", "datasets", "plot", "figures", "page"}
     | {"runs", "viewer"},
 }
-HEAVY = frozenset(
-    {"xarray", "scipy", "pandas", "cv2", "matplotlib", "dask", "optuna", "h5netcdf", "SALib"}
-)
+HEAVY = frozenset({"xarray", "scipy", "pandas", "cv2", "matplotlib", "dask", "optuna", "h5netcdf"})
 # The extra of the server: in one module alone, which is imported when a server is started.
 SERVER = frozenset({"fastapi", "starlette", "uvicorn", "websockets"})
 SERVER_MODULE = SOURCE / "viewer" / "app.py"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
 import numpy as np
@@ -13,20 +12,15 @@ from driftwalk.assembly.outcomes.distribution import sampling_variance
 from driftwalk.assembly.sensitivity.sobol import sobol_design, sobol_indices
 from driftwalk.core.errors import InputError
 
-
-def test_without_salib_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in [name for name in sys.modules if name.split(".")[0] == "SALib"]:
-        monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "SALib", None)
-    with pytest.raises(InputError, match=r'pip install "driftwalk\[sobol\]"') as caught:
-        sobol_design({"a": (0.0, 1.0), "b": (0.0, 1.0)}, samples=8, seed=1)
-    assert "\n" not in str(caught.value)
-
-
-pytest.importorskip("SALib")
-
 BOUNDS = {"x1": (-np.pi, np.pi), "x2": (-np.pi, np.pi), "x3": (-np.pi, np.pi)}
 A, B = 7.0, 0.1
+# Four settings of SALib 1.5: sample.sobol.sample, eight base samples of two inputs, seed 3.
+FIRST_GROUP = [
+    [0.6994058797135949, 6.069384528324008],
+    [0.4203219274058938, 6.069384528324008],
+    [0.6994058797135949, 5.775088211521506],
+    [0.4203219274058938, 5.775088211521506],
+]
 
 
 def ishigami(x: np.ndarray) -> np.ndarray:
@@ -67,6 +61,13 @@ def test_the_seed_decides_the_design() -> None:
     assert (one != other).any()
 
 
+def test_a_seed_always_means_the_same_design() -> None:
+    """A run that was stopped is continued with the design of its seed."""
+    bounds = {"a": (0.0, 1.0), "b": (5.0, 7.0)}
+    value = sobol_design(bounds, samples=8, seed=3)["value"].values
+    np.testing.assert_allclose(value[:4], FIRST_GROUP, rtol=0, atol=1e-12)
+
+
 def test_ishigami() -> None:
     """Over ten seeds the largest error of an index at 4096 samples was 0.007."""
     design = sobol_design(BOUNDS, samples=4096, seed=1)
@@ -87,13 +88,9 @@ def test_the_estimators_by_hand() -> None:
     found = sobol_indices(design, y, noise_variance=0.5)
     group = y.reshape(64, 5)
     a, b = group[:, 0], group[:, 4]
-    # SALib centres with the mean of all settings before it takes products.
-    centre = y.mean()
     variance = np.r_[a, b].var()
     for i in range(3):
-        ab = group[:, i + 1]
-        first = ((b - centre) * (ab - a)).mean() / variance
-        total = ((a - ab) ** 2).mean() / 2 / variance
+        first, total = by_hand(a, group[:, i + 1], b)
         assert float(found["first_order"][i]) == pytest.approx(first)
         assert float(found["total_order"][i]) == pytest.approx(total)
         share = 0.5 / variance
@@ -102,6 +99,27 @@ def test_the_estimators_by_hand() -> None:
             (total - share) / (1 - share)
         )
     assert float(found["noise_share"]) == pytest.approx(share)
+
+
+def by_hand(a: np.ndarray, ab: np.ndarray, b: np.ndarray) -> tuple[float, float]:
+    both = np.r_[a, b]
+    first = ((b - both.mean()) * (ab - a)).mean() / both.var()
+    total = ((a - ab) ** 2).mean() / 2 / both.var()
+    return float(first), float(total)
+
+
+def test_the_half_widths_by_hand() -> None:
+    """200 resamples of the groups: 1.6449 times the standard deviation of their indices."""
+    design = sobol_design(BOUNDS, samples=32, seed=2)
+    y = ishigami(design["value"].values)
+    found = sobol_indices(design, y, seed=5)
+    group = y.reshape(32, 5)
+    draws = np.random.default_rng(6).integers(32, size=(32, 200))
+    for i in range(3):
+        drawn = [by_hand(*group[draws[:, k]][:, [0, i + 1, 4]].T) for k in range(200)]
+        first, total = 1.6448536 * np.std(drawn, axis=0, ddof=1)
+        assert float(found["first_order_half_width"][i]) == pytest.approx(first)
+        assert float(found["total_order_half_width"][i]) == pytest.approx(total)
 
 
 def test_noise_is_taken_out_again() -> None:

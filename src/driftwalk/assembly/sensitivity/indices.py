@@ -70,8 +70,8 @@ def sensitivity_indices(
     Raises
     ------
     InputError
-        When SALib is not installed, an input is not known, a bound is out of range, a setting has
-        fewer than two runs with an outcome, or as `sensitivity_map`.
+        When an input is not known, a bound is out of range, a setting has fewer than two runs with
+        an outcome, or as `sensitivity_map`.
 
     Examples
     --------

@@ -7,7 +7,6 @@ every other one. The indices therefore come with the share of noise, and without
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -24,13 +23,12 @@ Floats = npt.NDArray[np.float64]
 
 SCHEMA_VERSION = 1
 RESAMPLES = 200
-MEASURES = {
-    "first_order": "S1",
-    "first_order_half_width": "S1_conf",
-    "total_order": "ST",
-    "total_order_half_width": "ST_conf",
-}
-"""The indices, and what SALib calls them."""
+MEASURES = (
+    "first_order",
+    "first_order_half_width",
+    "total_order",
+    "total_order_half_width",
+)
 LONG_NAMES = {
     "first_order": "first order Sobol' index",
     "first_order_half_width": "half width of its confidence interval",
@@ -71,7 +69,7 @@ def sobol_design(
     Raises
     ------
     InputError
-        When SALib is not installed, or a bound or an option is out of range.
+        When a bound or an option is out of range.
 
     Examples
     --------
@@ -80,14 +78,20 @@ def sobol_design(
     {'setting': 32, 'input': 2}
     """
     import xarray as xr
+    from scipy.stats import qmc
 
     low, high = _checked_bounds(bounds)
     if samples < 8 or samples & (samples - 1):
         raise InputError(f"samples must be a power of two of at least 8, got {samples}")
     _check_seed(seed)
-    value = _salib("sample.sobol").sample(
-        _problem(list(bounds), low, high), samples, calc_second_order=False, seed=seed
-    )
+    count = len(bounds)
+    # SciPy's newer `rng` would spawn from the seed, and make other settings of it than `seed` does.
+    a, b = np.split(qmc.Sobol(2 * count, seed=seed).random(samples), 2, axis=1)
+    # In each group of settings: A, A with one input of B after the other, B.
+    unit = np.repeat(a[:, None, :], count + 2, axis=1)
+    unit[:, np.arange(1, count + 1), np.arange(count)] = b
+    unit[:, -1] = b
+    value = qmc.scale(unit.reshape(-1, count), low, high)
     return xr.Dataset(
         {
             "value": (("setting", "input"), value, {"long_name": "value of the input"}),
@@ -143,8 +147,7 @@ def sobol_indices(
     Raises
     ------
     InputError
-        When SALib is not installed, the outputs do not fit the design or are not all finite, or an
-        option is out of range.
+        When the outputs do not fit the design or are not all finite, or an option is out of range.
 
     Notes
     -----
@@ -164,23 +167,29 @@ def sobol_indices(
     >>> found["first_order"].values.round(2).tolist(), found["total_order"].values.round(2).tolist()
     ([0.8, 0.2], [0.8, 0.2])
     """
-    inputs, problem, samples = _problem_of(design)
-    settings = samples * (len(inputs) + 2)
+    inputs, samples = _size_of(design)
+    settings = samples * (inputs + 2)
     table, other = _checked_outputs(outputs, settings)
     noise = _checked_noise(noise_variance, np.shape(outputs)).reshape(table.shape)
     if not 0 < confidence < 1:
         raise InputError(f"confidence must lie between 0 and 1, got {confidence}")
     _check_seed(seed)
     # The first and last of each group of settings are independent draws: Saltelli's A and B.
-    place = np.arange(settings) % (len(inputs) + 2)
-    independent = (place == 0) | (place == len(inputs) + 1)
+    place = np.arange(settings) % (inputs + 2)
+    independent = (place == 0) | (place == inputs + 1)
     varies = np.ptp(table[independent], axis=0) > 0
     variance = np.where(varies, table[independent].var(axis=0), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(varies, noise[independent].mean(axis=0) / variance, np.nan)
-    indices = np.full((len(MEASURES), table.shape[1], len(inputs)), np.nan)
+    # The seed itself is usually that of the design; the two draws stay apart.
+    drawn = np.random.default_rng(seed + 1).integers(samples, size=(samples, RESAMPLES)).T
+    sigmas = _normal_quantile(confidence)
+    indices = np.full((len(MEASURES), table.shape[1], inputs), np.nan)
     for i in np.flatnonzero(varies):
-        indices[:, i] = _analyse(problem, table[:, i], confidence, seed)
+        groups = table[:, i].reshape(samples, inputs + 2)
+        found = _estimates(groups[np.vstack([np.arange(samples), drawn])])
+        indices[0::2, i] = found[:, 0]
+        indices[1::2, i] = sigmas * found[:, 1:].std(axis=1, ddof=1)
     by_name = dict(zip(MEASURES, indices, strict=True)) | _corrected(indices, share)
     return _dataset(
         by_name,
@@ -190,39 +199,21 @@ def sobol_indices(
             "samples": samples,
             "confidence": confidence,
             "seed": seed,
-            "pure_noise_first_order_half_width": _normal_quantile(confidence)
-            * math.sqrt(2 / samples),
+            "pure_noise_first_order_half_width": sigmas * math.sqrt(2 / samples),
             "pure_noise_total_order": 1.0,
         },
         one_output=np.ndim(outputs) == 1,
     )
 
 
-def _salib(module: str) -> Any:
-    """Return a module of SALib, which is an optional part of the installation."""
-    try:
-        return importlib.import_module(f"SALib.{module}")
-    except ImportError as error:
-        raise InputError(
-            'Sobol indices need SALib, which is not installed: pip install "driftwalk[sobol]"'
-        ) from error
-
-
-def _problem(names: list[str], low: Floats, high: Floats) -> dict[str, Any]:
-    """Return the inputs as SALib wants them."""
-    bounds = [[float(a), float(b)] for a, b in zip(low, high, strict=True)]
-    return {"num_vars": len(names), "names": names, "bounds": bounds}
-
-
-def _problem_of(design: xr.Dataset) -> tuple[list[str], dict[str, Any], int]:
+def _size_of(design: xr.Dataset) -> tuple[int, int]:
+    """Return the numbers of inputs and of base samples."""
     if design.attrs.get("kind") != "sobol_design":
         raise InputError(
             f"not a Sobol design: its kind is {design.attrs.get('kind')!r}; give what sobol_design "
             "made"
         )
-    names = [str(name) for name in design["input"].values]
-    problem = _problem(names, design["low"].values, design["high"].values)
-    return names, problem, int(design.attrs["samples"])
+    return design.sizes["input"], int(design.attrs["samples"])
 
 
 def _checked_bounds(bounds: Mapping[str, tuple[float, float]]) -> tuple[Floats, Floats]:
@@ -282,18 +273,23 @@ def _checked_noise(noise_variance: npt.ArrayLike, shape: tuple[int, ...]) -> Flo
     return np.broadcast_to(noise, shape)
 
 
-def _analyse(problem: dict[str, Any], output: Floats, confidence: float, seed: int) -> Floats:
-    """Return the indices of one output that varies, in the order of `MEASURES`."""
-    found = _salib("analyze.sobol").analyze(
-        problem,
-        output,
-        calc_second_order=False,
-        num_resamples=RESAMPLES,
-        conf_level=confidence,
-        # SALib takes seed 0 for none.
-        seed=seed + 1,
-    )
-    return np.array([found[name] for name in MEASURES.values()], dtype=np.float64)
+def _estimates(groups: Floats) -> Floats:
+    """Return first and total order indices, shape (2, resample, input), of at least two resamples.
+
+    To SciPy every resample is an output of its own: its bootstrap takes no seed. One that happens
+    to hold a single value has indices of 0.
+
+    Parameters
+    ----------
+    groups : ndarray, shape (resample, sample, input + 2)
+        One output at the settings of each group of the design.
+    """
+    from scipy.stats import sobol_indices as indices_of
+
+    a, b = groups[..., 0], groups[..., -1]
+    between = np.moveaxis(groups[..., 1:-1], -1, 0)
+    found = indices_of(func={"f_A": a, "f_B": b, "f_AB": between}, n=groups.shape[1])
+    return np.stack([found.first_order, found.total_order])
 
 
 def _corrected(indices: Floats, noise_share: Floats) -> dict[str, Floats]:
