@@ -8,6 +8,9 @@ from pydantic import Field
 
 from driftwalk.model.section import Quantity, Section
 
+DragCoefficient = Annotated[float, Quantity("1", ge=0, le=100)]
+ForceStd = Annotated[float, Quantity("N", ge=0, le=10)]
+
 
 class Forces(Section):
     """Drag coefficient C_d and stochastic force F ~ N(0, σ_F² I₂), redrawn every interval.
@@ -20,10 +23,10 @@ class Forces(Section):
 
     section_name: ClassVar[str] = "forces"
 
-    drag_coefficient: Annotated[float, Quantity("1", ge=0, le=100)] = Field(
+    drag_coefficient: DragCoefficient = Field(
         default=0.45, description="Drag coefficient C_d of a side face."
     )
-    force_std_N: Annotated[float, Quantity("N", ge=0, le=10)] = Field(
+    force_std_N: ForceStd = Field(
         default=0.55e-3,
         description=(
             "Standard deviation sigma_F of each horizontal component of the stochastic force on "

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Final, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.model.assembly import MOST_BLOCKS, HiddenFaceDrag, Latching
-from driftwalk.model.section import Quantity, Section
-from driftwalk.schema.parameters import MOST_SETTINGS, check_axis, grid_values
+from driftwalk.model.force_grid import ForceGrid
+from driftwalk.model.forces import DragCoefficient, ForceStd
+from driftwalk.model.section import Quantity
+from driftwalk.schema.parameters import MOST_SETTINGS
 
 AXES: Final[dict[str, str]] = {
     "tank_diameter": "tank_diameter_m",
@@ -26,7 +27,7 @@ AXES: Final[dict[str, str]] = {
 LISTS: Final = tuple(AXES.values())
 
 
-class Sensitivity(Section):
+class Sensitivity(ForceGrid):
     """The settings whose outcomes are compared with those of a reference.
 
     Without lists the map over the ranges of C_d and σ_F. As soon as a list is given, the lists are
@@ -42,23 +43,11 @@ class Sensitivity(Section):
 
     section_name: ClassVar[str] = "sensitivity"
 
-    drag_coefficient_min: Annotated[float, Quantity("1", ge=0, le=100)] = Field(
-        default=0.0, description="Smallest drag coefficient of the map."
+    drag_coefficient_max: DragCoefficient = Field(
+        default=1.5, description="Largest drag coefficient of the grid, included."
     )
-    drag_coefficient_max: Annotated[float, Quantity("1", ge=0, le=100)] = Field(
-        default=1.5, description="Largest drag coefficient of the map, included."
-    )
-    drag_coefficient_step: Annotated[float, Quantity("1", gt=0, le=100)] = Field(
-        default=0.05, description="Step of the map in the drag coefficient."
-    )
-    force_std_min_N: Annotated[float, Quantity("N", ge=0, le=10)] = Field(
-        default=0.0, description="Smallest force_std of the map."
-    )
-    force_std_max_N: Annotated[float, Quantity("N", ge=0, le=10)] = Field(
-        default=1.5e-3, description="Largest force_std of the map, included."
-    )
-    force_std_step_N: Annotated[float, Quantity("N", gt=0, le=10)] = Field(
-        default=5e-5, description="Step of the map in force_std."
+    force_std_max_N: ForceStd = Field(
+        default=1.5e-3, description="Largest force_std of the grid, included."
     )
     runs: Annotated[int, Quantity("1", ge=1, le=10_000_000, whole=True)] = Field(
         default=1000,
@@ -97,12 +86,12 @@ class Sensitivity(Section):
         description="Rules for the drag on joined faces to compare, an axis of the map.",
         examples=['["none", "full"]'],
     )
-    drag_coefficient: tuple[Annotated[float, Quantity("1", ge=0, le=100)], ...] | None = Field(
+    drag_coefficient: tuple[DragCoefficient, ...] | None = Field(
         default=None,
         description="Drag coefficients to compare, an axis of the map, instead of the range.",
         examples=["[0.2, 0.45, 1.0]"],
     )
-    force_std_N: tuple[Annotated[float, Quantity("N", ge=0, le=10)], ...] | None = Field(
+    force_std_N: tuple[ForceStd, ...] | None = Field(
         default=None,
         description="Values of force_std to compare, an axis of the map, instead of the range.",
         examples=['["0.2mN", "0.55mN"]'],
@@ -119,8 +108,6 @@ class Sensitivity(Section):
 
     @model_validator(mode="after")
     def _grid_has_settings(self) -> Self:
-        for name, low, high, step in self._grids():
-            check_axis(name, low, high, step)
         lengths = [len(values) for values in self.axes.values()]
         settings = math.prod(lengths)
         if settings > MOST_SETTINGS:
@@ -137,22 +124,3 @@ class Sensitivity(Section):
         given = {name: values for name, values in lists.items() if values is not None}
         ranges = {"drag_coefficient": self.drag_coefficients, "force_std": self.force_stds_N}
         return given or ranges
-
-    @property
-    def drag_coefficients(self) -> tuple[float, ...]:
-        """Drag coefficients of the range."""
-        return grid_values(
-            self.drag_coefficient_min, self.drag_coefficient_max, self.drag_coefficient_step
-        )
-
-    @property
-    def force_stds_N(self) -> tuple[float, ...]:
-        """Values of force_std of the range [N]."""
-        return grid_values(self.force_std_min_N, self.force_std_max_N, self.force_std_step_N)
-
-    def _grids(self) -> Iterator[tuple[str, float, float, float]]:
-        for name, unit in (("drag_coefficient", ""), ("force_std", "_N")):
-            low, high, step = (
-                getattr(self, f"{name}_{end}{unit}") for end in ("min", "max", "step")
-            )
-            yield name, low, high, step
