@@ -84,8 +84,8 @@ def test_shares_and_intervals_are_those_of_both_distributions(
 
 
 def test_sketches_are_the_cells_of_the_shapes() -> None:
-    assert cells_of("T") == [[[0, 1], [1, 1], [2, 1], [1, 0]]]
-    assert cells_of("L3+1") == [[[0, 1], [0, 0], [1, 0]], [[0, 0]]]
+    assert cells_of("T") == [[[0, 1], [1, 0], [1, 1], [2, 1]]]
+    assert cells_of("L3+1") == [[[0, 0], [0, 1], [1, 0]], [[0, 0]]]
     assert cells_of("xx/xx") == cells_of("O")
     assert cells_of("<script>") == []
 

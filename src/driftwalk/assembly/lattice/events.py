@@ -13,12 +13,12 @@ import numpy.typing as npt
 
 from driftwalk.assembly.lattice.polyomino import (
     Chirality,
-    moved_to_origin,
     name_of,
     require_chirality,
 )
 from driftwalk.assembly.outcomes.classes import class_name, listed_classes, listed_shapes
 from driftwalk.core.errors import InputError
+from driftwalk.schema.shapes import moved_to_origin
 
 if TYPE_CHECKING:
     import xarray as xr

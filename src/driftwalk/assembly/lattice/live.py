@@ -8,8 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.events import STEP, rotate
-from driftwalk.assembly.lattice.polyomino import Cell, Chirality, moved_to_origin, name_of
+from driftwalk.assembly.lattice.polyomino import Chirality, name_of
 from driftwalk.assembly.outcomes.classes import class_name
+from driftwalk.schema.shapes import Cell, moved_to_origin
 
 Integers = npt.NDArray[np.int64]
 

@@ -17,28 +17,13 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
+from driftwalk.schema.shapes import NAMED_SHAPES, Cell, Cells, cells_of_shape, moved_to_origin
 
 Chirality = Literal["merged", "distinct"]
-Cell = tuple[int, int]
-Cells = tuple[Cell, ...]
 
 LARGEST: Final = 10
 """Largest size of which all shapes are listed: there are 4655, and four times more per cell."""
 
-# As people draw them, which is not always the canonical code. The order is that of all lists.
-_DRAWN: Final = {
-    "1": "x",
-    "2": "xx",
-    "I3": "xxx",
-    "L3": "x./xx",
-    "I": "xxxx",
-    "O": "xx/xx",
-    "T": "xxx/.x.",
-    "S": ".xx/xx.",
-    "Z": "xx./.xx",
-    "L": "x./x./xx",
-    "J": ".x/.x/xx",
-}
 _MIRRORED: Final = frozenset({"Z", "J"})
 _LARGEST_NAMED: Final = 4
 # Cells before gaps, and wide shapes before narrow ones.
@@ -105,12 +90,12 @@ def polyomino_cells(name: str) -> npt.NDArray[np.int32]:
     >>> polyomino_cells("L3").tolist()
     [[0, 0], [0, 1], [1, 0]]
     """
-    cells = _cells_of_rows(_DRAWN.get(name, name))
+    cells = cells_of_shape(name)
     words: tuple[Chirality, ...] = get_args(Chirality) if _is_connected(cells) else ()
     if name not in {name_of(cells, chirality) for chirality in words}:
         raise InputError(
-            f"no shape is called '{name}': the names are {', '.join(_DRAWN)}, and for five cells "
-            "and more rows such as xxx/x.x"
+            f"no shape is called '{name}': the names are {', '.join(NAMED_SHAPES)}, and for five "
+            "cells and more rows such as xxx/x.x"
         )
     return np.array(cells, dtype=np.int32)
 
@@ -152,7 +137,7 @@ def polyominoes(size: int, *, chirality: Chirality = "merged") -> tuple[str, ...
     found = {
         name_of(moved_to_origin((*cells, new)), chirality)
         for name in polyominoes(size - 1, chirality=chirality)
-        for cells in [_cells_of_rows(_DRAWN.get(name, name))]
+        for cells in [cells_of_shape(name)]
         for new in _neighbours(cells)
     }
     return tuple(sorted(found, key=shape_order))
@@ -161,8 +146,8 @@ def polyominoes(size: int, *, chirality: Chirality = "merged") -> tuple[str, ...
 @lru_cache(maxsize=1 << 16)
 def shape_order(name: str) -> tuple[int, int, str, str]:
     """Return what shapes are sorted by: their size, then their place among those of that size."""
-    if name in _DRAWN:
-        return shape_size(name), list(_DRAWN).index(name), "", ""
+    if name in NAMED_SHAPES:
+        return shape_size(name), list(NAMED_SHAPES).index(name), "", ""
     both = merged_shape(name), name
     merged, own = (code.translate(_BY_CELLS) for code in both)
     return shape_size(name), name.count("/"), merged, own
@@ -170,13 +155,13 @@ def shape_order(name: str) -> tuple[int, int, str, str]:
 
 def shape_size(name: str) -> int:
     """Return the number of cells of a shape."""
-    return _DRAWN.get(name, name).count("x")
+    return NAMED_SHAPES.get(name, name).count("x")
 
 
 @lru_cache(maxsize=1 << 16)
 def merged_shape(name: str) -> str:
     """Return the name of a shape when mirror images count as one."""
-    return name_of(_cells_of_rows(_DRAWN.get(name, name)), "merged")
+    return name_of(cells_of_shape(name), "merged")
 
 
 @lru_cache(maxsize=1 << 16)
@@ -190,13 +175,6 @@ def name_of(cells: Cells, chirality: Chirality) -> str:
     return _short_names(chirality).get(code, code) if len(cells) <= _LARGEST_NAMED else code
 
 
-def moved_to_origin(cells: Cells) -> Cells:
-    """Return the cells sorted, the least column and the least row being 0."""
-    left = min(x for x, _ in cells)
-    bottom = min(y for _, y in cells)
-    return tuple(sorted((x - left, y - bottom) for x, y in cells))
-
-
 def require_chirality(chirality: str) -> None:
     """Refuse a word that is no chirality."""
     if chirality not in get_args(Chirality):
@@ -207,8 +185,8 @@ def require_chirality(chirality: str) -> None:
 def _short_names(chirality: Chirality) -> dict[str, str]:
     """Return the names of the small shapes by their canonical codes."""
     return {
-        _canonical_code(_cells_of_rows(rows), chirality): name
-        for name, rows in _DRAWN.items()
+        _canonical_code(cells_of_shape(name), chirality): name
+        for name in NAMED_SHAPES
         if chirality == "distinct" or name not in _MIRRORED
     }
 
@@ -235,18 +213,6 @@ def _code(cells: Cells) -> str:
     for x, y in cells:
         rows[top - y][x - left] = "x"
     return "/".join(map("".join, rows))
-
-
-def _cells_of_rows(code: str) -> Cells:
-    """Return the cells of a code; none when it is no code."""
-    rows = code.split("/")
-    if set(code) - set("x./") or len({len(row) for row in rows}) > 1 or "x" not in code:
-        return ()
-    return moved_to_origin(
-        tuple(
-            (x, -y) for y, row in enumerate(rows) for x, letter in enumerate(row) if letter == "x"
-        )
-    )
 
 
 def _neighbours(cells: Cells) -> set[Cell]:

@@ -6,8 +6,9 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 from driftwalk.assembly.lattice.joined_faces import Join
-from driftwalk.assembly.lattice.polyomino import Cell, Chirality, moved_to_origin, name_of
+from driftwalk.assembly.lattice.polyomino import Chirality, name_of
 from driftwalk.assembly.outcomes.classes import class_name
+from driftwalk.schema.shapes import Cell, moved_to_origin
 
 # From a cell to its neighbour at each face.
 _STEP: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))

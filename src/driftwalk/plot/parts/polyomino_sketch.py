@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
 from driftwalk.plot.parts.style import BLUE, INK
+from driftwalk.schema.shapes import NAMED_SHAPES, cells_of_shape
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,20 +20,6 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 Orientation = Literal["wide", "tall"]
 
-# Rows from top to bottom, as seen from above with y upwards; larger shapes are named by theirs.
-NAMED_SHAPES: Final[dict[str, str]] = {
-    "1": "x",
-    "2": "xx",
-    "I3": "xxx",
-    "L3": "x./xx",
-    "I": "xxxx",
-    "O": "xx/xx",
-    "T": "xxx/.x.",
-    "S": ".xx/xx.",
-    "Z": "xx./.xx",
-    "L": "x./x./xx",
-    "J": ".x/.x/xx",
-}
 # Empty space between the shapes of a class, in sides of a block.
 GAP: Final = 0.6
 # Font size of the names under sketches, and how wide its letters are [pt].
@@ -65,18 +52,15 @@ def shape_cells(shape: str) -> npt.NDArray[np.int64]:
     Examples
     --------
     >>> shape_cells("L3").tolist()
-    [[0, 1], [0, 0], [1, 0]]
+    [[0, 0], [0, 1], [1, 0]]
     """
-    rows = NAMED_SHAPES.get(shape, shape).split("/")
-    filled = [[letter == "x" for letter in row] for row in rows]
-    readable = set(shape) <= set("x./") or shape in NAMED_SHAPES
-    if not readable or len({len(row) for row in rows}) != 1 or not any(map(any, filled)):
+    cells = cells_of_shape(shape)
+    if not cells:
         raise InputError(
             f"'{shape}' is no shape: expected one of {', '.join(NAMED_SHAPES)}, or rows such as "
             "xxx/.x. with x for a cell"
         )
-    row, column = np.nonzero(np.array(filled))
-    return np.column_stack([column, len(rows) - 1 - row]).astype(np.int64)
+    return np.array(cells, dtype=np.int64)
 
 
 def class_cells(name: str, *, orientation: Orientation = "wide") -> Array:
@@ -315,12 +299,7 @@ def is_class(name: str) -> bool:
     >>> is_class("I3+1"), is_class("other")
     (True, False)
     """
-    try:
-        for shape in name.split("+"):
-            shape_cells(shape)
-    except InputError:
-        return False
-    return True
+    return all(cells_of_shape(shape) for shape in name.split("+"))
 
 
 def _turned(cells: npt.NDArray[np.int64], orientation: Orientation) -> npt.NDArray[np.int64]:

@@ -13,7 +13,8 @@ from functools import lru_cache
 from typing import Final
 
 from driftwalk.assembly import class_name, outcome_classes
-from driftwalk.assembly.lattice.polyomino import Cell, Chirality, moved_to_origin, name_of
+from driftwalk.assembly.lattice.polyomino import Chirality, name_of
+from driftwalk.schema.shapes import Cell, moved_to_origin
 
 Lattice = dict[Cell, int]
 """From a cell to the assembly whose block stands there."""
