@@ -1,4 +1,4 @@
-"""JSON of a file or an attribute: read whole, or refused with the place of what is wrong.
+"""JSON: values made ready for it; texts read whole, or refused with the place of what is wrong.
 
 Python's own reader lets three things pass that are no mistake of its caller: it ends with
 `RecursionError` on brackets that are nested too deeply, with `ValueError` on integers of more than
@@ -8,7 +8,9 @@ Python's own reader lets three things pass that are no mistake of its caller: it
 from __future__ import annotations
 
 import json
-from pathlib import Path
+import math
+from collections.abc import Mapping
+from pathlib import Path, PurePath
 from typing import Any, Final
 
 from driftwalk.core.bounded import MIB, read_bounded
@@ -68,6 +70,45 @@ def parse_json(text: str | bytes, *, path: str | Path | None = None) -> Any:
         raise FormatError("expected JSON, got brackets nested too deeply", path=path) from None
     refuse_deep(values, path=path)
     return values
+
+
+def json_value(value: Any) -> Any:
+    """Return a value in JSON's own types: numpy to Python, a path to text, what is not finite null.
+
+    Parameters
+    ----------
+    value : object
+        Numbers, text, None, paths, numpy scalars and arrays; mappings, lists and tuples of them.
+
+    Returns
+    -------
+    object
+        The same, with dicts for mappings and lists for tuples and arrays, and None for every number
+        that is not finite.
+
+    Raises
+    ------
+    TypeError
+        When a value has no such form.
+
+    Examples
+    --------
+    >>> json_value({"x": float("nan"), 1: (True, 2)})
+    {'x': None, '1': [True, 2]}
+    """
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, (str, bool, int)):
+        return value
+    if isinstance(value, Mapping):
+        return {str(key): json_value(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [json_value(item) for item in value]
+    if isinstance(value, PurePath):
+        return str(value)
+    raise TypeError(f"cannot write {type(value).__name__} as JSON")
 
 
 def _integer(digits: str) -> int | float:

@@ -230,33 +230,6 @@ def plain(value: Any) -> Any:
     raise InputError(f"cannot describe a {type(value).__name__} as JSON: {value!r:.80}")
 
 
-def finite_or_none(value: Any) -> Any:
-    """Return a value with None, which is JSON's null, for every number that is not finite.
-
-    Parameters
-    ----------
-    value : object
-        JSON's types, tuples and mappings; anything else is returned as it is.
-
-    Returns
-    -------
-    object
-        The same, with dicts for mappings and lists for tuples.
-
-    Examples
-    --------
-    >>> finite_or_none({"x": float("nan"), "y": (1.5, float("inf"))})
-    {'x': None, 'y': [1.5, None]}
-    """
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {str(key): finite_or_none(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [finite_or_none(item) for item in value]
-    return value
-
-
 def utc_now() -> str:
     """Return the time as ISO 8601 in UTC, to the second: ``2011-09-25T12:00:00Z``."""
     return datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")

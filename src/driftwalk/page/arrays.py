@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.json_text import json_value
 
 Floats = npt.NDArray[np.float64]
 DType = Literal["f4", "f8", "i2", "i4", "u1"]
@@ -150,7 +151,7 @@ def plain_list(values: npt.ArrayLike) -> Any:
     """
     if np.size(values) > MOST_LISTED:
         raise InputError(f"{np.size(values)} numbers in one list are more than a page shows")
-    return _plain(np.asarray(values, dtype=np.float64).tolist())
+    return json_value(np.asarray(values, dtype=np.float64))
 
 
 def number(value: Any) -> float | None:
@@ -188,12 +189,6 @@ def nice_step(extent: float, parts: float) -> float:
     power = math.floor(math.log10(rough))
     factor = next((f for f in (5, 2, 1) if f * 10.0**power <= rough * (1.0 + 1e-9)), 1)
     return float(f"{factor}e{power}")
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, list):
-        return [_plain(item) for item in value]
-    return value if math.isfinite(value) else None
 
 
 def _encode_whole(array: Floats, dtype: DType) -> dict[str, Any]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from driftwalk.core.errors import DriftwalkError, FormatError, InputError
-from driftwalk.core.json_text import parse_json
+from driftwalk.core.json_text import json_value, parse_json
 from driftwalk.page.arrays import number
 from driftwalk.plot.parts.arena import arena_of
 from driftwalk.plot.parts.labels import interval_of
@@ -125,7 +125,7 @@ def arena_part(dataset: xr.Dataset) -> dict[str, Any] | None:
     if needed is None or any(key not in arena for key in needed):
         return None
     kept = ("shape", *needed, "center_m")
-    return {key: plain_json(arena[key]) for key in kept if key in arena}
+    return {key: json_value(arena[key]) for key in kept if key in arena}
 
 
 def axis(name: str, label: str, unit: str, values: Any) -> dict[str, Any]:
@@ -189,24 +189,3 @@ def warnings_section(items: Sequence[str], *, title: str = "Warnings") -> Sectio
     """Return the warnings; that there are none is said too."""
     note = None if items else "None."
     return section("warnings", "warnings", title, note, items=list(items))
-
-
-def plain_json(value: Any) -> Any:
-    """Return a value in JSON's own types: what is not finite becomes null, the unknown its text.
-
-    Examples
-    --------
-    >>> plain_json({"a": np.float64("nan"), 1: (True, 2)})
-    {'a': None, '1': [True, 2]}
-    """
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if value is None or isinstance(value, (str, bool, int)):
-        return value
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {str(key): plain_json(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain_json(item) for item in value]
-    return str(value)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.json_text import parse_json
+from driftwalk.core.json_text import json_value, parse_json
 from driftwalk.record.circle import fit_circle
 from driftwalk.record.noise import estimate_tracking_noise
 from driftwalk.record.raw import Array
@@ -57,8 +57,8 @@ def describe(trajectory: xr.Dataset) -> dict[str, Any]:
         "arena": _json_attribute(attrs, "arena", None),
         "arena_found": _json_attribute(attrs, "arena_found", None),
         "origin_shift_m": _json_attribute(attrs, "origin_shift_m", None),
-        "position_quantum_m": _number(float(attrs.get("position_quantum_m", math.nan))),
-        "metres_per_pixel": _number(float(attrs.get("metres_per_pixel", math.nan))),
+        "position_quantum_m": json_value(float(attrs.get("position_quantum_m", math.nan))),
+        "metres_per_pixel": json_value(float(attrs.get("metres_per_pixel", math.nan))),
         "tracking": _tracking(attrs),
         "counts": counts,
         "warnings": warnings,
@@ -104,15 +104,7 @@ def _describe_body(trajectory: xr.Dataset, name: str) -> dict[str, Any]:
     if "ambiguous" in trajectory:
         scores = trajectory["ambiguous"].sel(body=name).values
         described["ambiguous_share"] = float((scores > 0).mean())
-    return {
-        key: _number(value) if isinstance(value, float) else value
-        for key, value in described.items()
-    }
-
-
-def _number(value: float) -> float | None:
-    """Return the number, None when it is not finite: JSON has no NaN."""
-    return value if math.isfinite(value) else None
+    return {key: json_value(value) for key, value in described.items()}
 
 
 def _clock(track: Track) -> dict[str, Any]:

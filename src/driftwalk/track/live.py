@@ -21,9 +21,8 @@ from types import TracebackType
 from typing import Any, Final, NamedTuple, Self
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.json_text import parse_json
+from driftwalk.core.json_text import json_value, parse_json
 from driftwalk.core.opencv import require_opencv
-from driftwalk.core.provenance import finite_or_none
 from driftwalk.track.types import Image
 
 LOOPBACK: Final = "127.0.0.1"
@@ -253,7 +252,7 @@ class _Client:
 
 def json_line(content: Mapping[str, Any]) -> str:
     """Return a message as one line of JSON; a number that is not finite becomes null."""
-    return json.dumps(finite_or_none(content), separators=(",", ":"), allow_nan=False) + "\n"
+    return json.dumps(json_value(content), separators=(",", ":"), allow_nan=False) + "\n"
 
 
 def requested_width(line: bytes) -> int | None:

@@ -12,7 +12,7 @@ import json
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
-from driftwalk.core.provenance import finite_or_none
+from driftwalk.core.json_text import json_value
 
 PACED: Final = frozenset({"tank", "frame"})
 """Kinds that wait until the browser has drawn the last one."""
@@ -57,7 +57,7 @@ def to_json(content: Any) -> str:
     try:
         return json.dumps(content, separators=(",", ":"), allow_nan=False)
     except ValueError:
-        return json.dumps(finite_or_none(content), separators=(",", ":"), allow_nan=False)
+        return json.dumps(json_value(content), separators=(",", ":"), allow_nan=False)
 
 
 class Outbox:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import Any
 
 from driftwalk.core.atomic import require_free
 from driftwalk.core.errors import InputError
+from driftwalk.core.json_text import json_value
 
 
 def print_json(values: Mapping[str, Any]) -> None:
@@ -36,30 +36,7 @@ def print_json(values: Mapping[str, Any]) -> None:
 
 def to_json(values: Mapping[str, Any]) -> str:
     """Return the text that `print_json` prints."""
-    return json.dumps(plain(values), indent=2, allow_nan=False, ensure_ascii=True)
-
-
-def plain(value: Any) -> Any:
-    """Return a value in JSON's own types: numpy to Python, a path to text, NaN to None.
-
-    Raises
-    ------
-    TypeError
-        When a value has no such form.
-    """
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if value is None or isinstance(value, (str, bool, int)):
-        return value
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
-    if isinstance(value, PurePath):
-        return str(value)
-    raise TypeError(f"cannot write {type(value).__name__} as JSON")
+    return json.dumps(json_value(values), indent=2, allow_nan=False, ensure_ascii=True)
 
 
 def print_table(

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Any, Final
 
-from driftwalk.page.parts import Section, plain_json, section
+from driftwalk.core.json_text import json_value
+from driftwalk.page.parts import Section, section
 
 PAPER_TITLE: Final = "A trajectory-based calibration method for stochastic motion models"
 PAPER_AUTHORS: Final = (
@@ -55,7 +56,7 @@ def manifest_section(manifest: Mapping[str, Any]) -> Section:
         "manifest", "manifest", "How this was made",
         "The command makes the same numbers again from the same inputs.",
         command=str(manifest.get("command", "")),
-        entries=plain_json(entries),
+        entries=json_value(entries),
         inputs=_inputs(manifest),
         cite=citation(version),
         bibtex=bibtex(version),
