@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from driftwalk.core.errors import InputError
+from driftwalk.core.run_stages import CALIBRATION_STAGES
 from driftwalk.runs.folder import Progress, open_run, silent
 from driftwalk.runs.stored import dataset_hash, netcdf_bytes
 
@@ -17,14 +18,6 @@ if TYPE_CHECKING:
     from driftwalk.core.rundir import RunDirectory
     from driftwalk.model import Study
     from driftwalk.sweep import Store
-
-STAGES = ("coarse", "refined", "bootstrap", "validation")
-WORDS = {
-    "coarse": "map",
-    "refined": "refined map",
-    "bootstrap": "bootstrap",
-    "validation": "halves",
-}
 
 
 @dataclass(frozen=True)
@@ -126,7 +119,7 @@ def run_calibration(
             body=work.body,
             threads=work.threads,
             stores=_stores(run),
-            tell=lambda stage, done, total: progress(*_overall(stage, done, total), WORDS[stage]),
+            tell=lambda stage, done, total: progress(*_overall(stage, done, total)),
         )
         run.write("calibration.nc", netcdf_bytes(found))
         progress(100, 100, "figures")
@@ -171,11 +164,6 @@ def _stores(run: RunDirectory) -> Any:
     return store
 
 
-# Share of the time that each stage takes, of 100.
-_BEGIN = {"coarse": 0.0, "refined": 40.0, "bootstrap": 65.0, "validation": 93.0}
-_END = {"coarse": 40.0, "refined": 65.0, "bootstrap": 93.0, "validation": 98.0}
-
-
-def _overall(stage: str, done: int, total: int) -> tuple[int, int]:
-    share = done / total if total else 1.0
-    return round(_BEGIN[stage] + share * (_END[stage] - _BEGIN[stage])), 100
+def _overall(name: str, done: int, total: int) -> tuple[int, int, str]:
+    stage = CALIBRATION_STAGES[name]
+    return round(stage.percent(done / total if total else 1.0)), 100, stage.words

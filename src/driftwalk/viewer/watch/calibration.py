@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import DriftwalkError
+from driftwalk.core.run_stages import CALIBRATION_STAGES
 from driftwalk.page import encode_array, map_section
 from driftwalk.viewer.watch.running import NO_CELL, Section
 from driftwalk.viewer.watch.shards import FinishedUnit, RunReader
@@ -21,12 +22,6 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
     from driftwalk.viewer.watch.recording_steps import RecordedSteps
 
-STAGES: Final[dict[str, tuple[str, float, float]]] = {
-    "coarse": ("map", 0.0, 0.4),
-    "refined": ("refined map", 0.4, 0.65),
-    "bootstrap": ("bootstrap", 0.65, 0.93),
-}
-"""What each stage is called, and its share of the time: from, to."""
 DETAILS: Final = ("excerpt_x", "excerpt_y", "step_density", "ks_step_length", "ks_turning_angle")
 GRID: Final = ("drag_coefficient", "force_std")
 NO_DISTANCE: Final = 1.0
@@ -106,7 +101,7 @@ class RunningCalibration:
         changed = set()
         for name, reader in self._reader.sweeps.items():
             stage = name.partition("-")[0]
-            if stage not in STAGES:
+            if stage not in CALIBRATION_STAGES:
                 continue
             self._stage = stage
             if stage != "bootstrap" and name not in self._maps:
@@ -127,10 +122,10 @@ class RunningCalibration:
 
     def state(self) -> tuple[float | None, str]:
         """Return the progress and the stage."""
-        words, begin, end = STAGES[self._stage]
+        stage = CALIBRATION_STAGES[self._stage]
         share = self._share()
         how_far = f"{100.0 * share:.0f} %" if share < 1.0 else "done, the next step is under way"
-        return begin + share * (end - begin), f"{words}: {how_far}"
+        return stage.percent(share) / 100.0, f"{stage.words}: {how_far}"
 
     def cell(self, row: int, column: int) -> dict[str, Any]:
         """Return the kept excerpt and step density of a setting."""

@@ -1,0 +1,33 @@
+"""The stages of a calibration, whose names begin those of its sweeps."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+
+class Stage(NamedTuple):
+    """A stage of a calibration."""
+
+    words: str
+    """What people call it."""
+    begin: float
+    end: float
+    """Its share of the time of the calibration: from, to [%]."""
+
+    def percent(self, share: float) -> float:
+        """Return how much of the calibration is done when a share of this stage is [%].
+
+        Examples
+        --------
+        >>> CALIBRATION_STAGES["refined"].percent(0.5)
+        52.5
+        """
+        return self.begin + share * (self.end - self.begin)
+
+
+CALIBRATION_STAGES: Final[dict[str, Stage]] = {
+    "coarse": Stage("map", 0.0, 40.0),
+    "refined": Stage("refined map", 40.0, 65.0),
+    "bootstrap": Stage("bootstrap", 65.0, 93.0),
+    "validation": Stage("halves", 93.0, 98.0),
+}
