@@ -261,7 +261,7 @@ def _print(summary: dict[str, Any]) -> None:
 
 def _save(found: xr.Dataset, path: Path) -> None:
     from driftwalk.core.atomic import write_atomic
-    from driftwalk.runs import netcdf_bytes
+    from driftwalk.schema.netcdf import netcdf_bytes
 
     # In memory first: HDF5 does not survive a disk that fills while it writes.
     write_atomic(path, netcdf_bytes(found))

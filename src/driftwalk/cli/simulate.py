@@ -123,7 +123,7 @@ def simulate(
     else:
         recording = RecordingOptions(body=body).load(like)
         result = simulate_like(chosen, field, recording)
-    from driftwalk.runs import netcdf_bytes
+    from driftwalk.schema.netcdf import netcdf_bytes
 
     write_atomic(out, netcdf_bytes(result))
     facts = summary(result)

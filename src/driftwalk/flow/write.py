@@ -11,6 +11,7 @@ import numpy as np
 from driftwalk.core.atomic import atomic_path, require_target, write_atomic
 from driftwalk.core.errors import InputError
 from driftwalk.schema import check_flow_field
+from driftwalk.schema.netcdf import netcdf_bytes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,10 +62,7 @@ def save_flow(flow: xr.Dataset, path: str | PathLike[str], *, existing: str = "e
     if target.suffix.lower() == ".csv":
         _write_csv(flow, target)
         return target
-    # In memory first: HDF5 does not survive a disk that fills while it writes.
-    encoding = {str(name): {"zlib": True, "complevel": 4} for name in flow.data_vars}
-    stored = flow.assign_attrs(Conventions=CONVENTIONS)
-    write_atomic(target, stored.to_netcdf(engine="h5netcdf", encoding=encoding))
+    write_atomic(target, netcdf_bytes(flow.assign_attrs(Conventions=CONVENTIONS)))
     return target
 
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from driftwalk.core.atomic import atomic_path, require_target
+from driftwalk.core.atomic import atomic_path, require_target, write_atomic
 from driftwalk.schema import body_names, check_trajectory
+from driftwalk.schema.netcdf import netcdf_bytes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -60,17 +61,12 @@ def save_trajectory(
     check_trajectory(dataset)
     target = Path(path)
     require_target(target, existing=existing, endings=(".nc", ".csv"))
-    write = _write_csv if target.suffix.lower() == ".csv" else _write_netcdf
-    with atomic_path(target) as partial:
-        write(dataset, partial)
+    if target.suffix.lower() == ".csv":
+        with atomic_path(target) as partial:
+            _write_csv(dataset, partial)
+    else:
+        write_atomic(target, netcdf_bytes(dataset))
     return target
-
-
-def _write_netcdf(dataset: xr.Dataset, path: Path) -> None:
-    numbers = [name for name, field in dataset.data_vars.items() if field.dims[:1] == ("time",)]
-    encoding = {name: {"zlib": True, "complevel": 4} for name in numbers}
-    # In memory first: HDF5 does not survive a disk that fills while it writes.
-    path.write_bytes(dataset.to_netcdf(engine="h5netcdf", encoding=encoding))
 
 
 def _write_csv(dataset: xr.Dataset, path: Path) -> None:

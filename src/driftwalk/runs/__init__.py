@@ -7,7 +7,7 @@ from driftwalk.runs.fit import Fitted, FitWork, run_fit
 from driftwalk.runs.folder import Progress
 from driftwalk.runs.recovery import RecoveryWork, run_recovery
 from driftwalk.runs.sensitivity import SensitivityResult, SensitivityWork, run_sensitivity
-from driftwalk.runs.stored import netcdf_bytes
+from driftwalk.schema.netcdf import netcdf_bytes
 
 __all__ = [
     "AssemblyResult",

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.runs.folder import Progress, open_run, silent
-from driftwalk.runs.stored import dataset_hash, netcdf_bytes
-from driftwalk.schema.netcdf import open_netcdf
+from driftwalk.runs.stored import dataset_hash
+from driftwalk.schema.netcdf import netcdf_bytes, open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr

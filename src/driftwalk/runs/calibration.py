@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import CALIBRATION_STAGES
 from driftwalk.runs.folder import Progress, open_run, silent
-from driftwalk.runs.stored import dataset_hash, netcdf_bytes
+from driftwalk.runs.stored import dataset_hash
+from driftwalk.schema.netcdf import netcdf_bytes
 
 if TYPE_CHECKING:
     import xarray as xr

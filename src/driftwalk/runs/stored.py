@@ -1,4 +1,4 @@
-"""Datasets as they are stored in a run directory, and what tells two of them apart."""
+"""What tells two datasets of a run directory apart."""
 
 from __future__ import annotations
 
@@ -7,28 +7,6 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import xarray as xr
-
-
-def netcdf_bytes(dataset: xr.Dataset) -> bytes:
-    """Return a dataset as the bytes of a NetCDF-4 file, numbers compressed.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Any dataset of driftwalk.
-
-    Examples
-    --------
-    >>> import driftwalk as dw
-    >>> netcdf_bytes(dw.tank30_flow())[1:4]
-    b'HDF'
-    """
-    packed = {
-        name: {"zlib": True, "complevel": 4, "shuffle": True}
-        for name, variable in dataset.data_vars.items()
-        if variable.dtype.kind in "fiu" and variable.size > 1000
-    }
-    return bytes(dataset.to_netcdf(engine="h5netcdf", encoding=packed))
 
 
 def dataset_hash(dataset: xr.Dataset, names: tuple[str, ...]) -> str:
