@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from matplotlib.path import Path
 
-from driftwalk.calibration.region import Bootstrap, confidence_region, region_contains
+from driftwalk.calibration.region import Bootstrap, confidence_region
 from driftwalk.calibration.surface import make_smoother
 
 DRAG = np.linspace(0.3, 0.5, 21)
@@ -75,4 +76,5 @@ def test_a_region_that_reaches_the_end_of_the_grid_is_closed_along_it():
 )
 def test_a_point_is_in_the_region_where_the_surface_is_low(point, inside):
     region = confidence_region(SMOOTHER, SURFACE, bootstrap_with(np.full(10, 0.09)), confidence=0.9)
-    assert region_contains(SMOOTHER, SURFACE, region, *point) is inside
+    border = Path(np.column_stack([region.drag_coefficient, region.force_std]))
+    assert border.contains_point(point) == inside

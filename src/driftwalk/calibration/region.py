@@ -36,7 +36,6 @@ SURFACE_REPLICATES = 4
 MET_BY_EACH = 2
 """Replicates of the surface that one recording is compared with."""
 RECORDINGS_PER_UNIT = 10
-REGION_VERTICES = 72
 FLOOR_REFERENCES = 8
 
 
@@ -339,14 +338,3 @@ def _largest_contour(smoother: Smoother, surface: Floats, level: float) -> Float
     lines = contour_generator(x=axes[1], y=axes[0], z=rimmed).lines(level)
     longest = max((np.asarray(line) for line in lines), key=lambda line: line.shape[0])
     return np.ascontiguousarray(longest[:, ::-1])
-
-
-def region_contains(
-    smoother: Smoother, surface: Floats, region: Region, drag_coefficient: float, force_std: float
-) -> bool:
-    """Return whether the joint region holds a point: whether the surface there is low enough."""
-    from scipy.interpolate import RegularGridInterpolator
-
-    axes = (smoother.drag_coefficient, smoother.force_std)
-    value = RegularGridInterpolator(axes, surface, bounds_error=False, fill_value=np.inf)
-    return bool(value((drag_coefficient, force_std)) <= region.level)

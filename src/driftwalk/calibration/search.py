@@ -14,7 +14,6 @@ from driftwalk.simulation.backend import STATUS
 from driftwalk.sweep import Design, Store, WorkUnit, grid, run_sweep
 
 Progress = Callable[[int, int], None]
-StoreFactory = Callable[[str, dict[str, Any]], Store | None]
 
 SETTINGS_PER_UNIT = 64
 """Settings of a work unit: about a second's work, so that a kill or Ctrl-C loses no more."""
