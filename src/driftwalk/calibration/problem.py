@@ -11,8 +11,9 @@ import numpy.typing as npt
 from driftwalk import _core
 from driftwalk.comparison import StepPlan, apply_steps, plan_steps
 from driftwalk.core.errors import InputError
+from driftwalk.core.processors import default_threads
 from driftwalk.core.seeds import world_keys
-from driftwalk.simulation.backend import Camera, default_threads, native_model, world_table
+from driftwalk.simulation.backend import Camera, native_model, world_table
 from driftwalk.simulation.initial import Start, recorded_start, world_orientations
 from driftwalk.simulation.run import without_gaps
 

@@ -10,7 +10,7 @@ import typer
 from driftwalk.cli.inputs.study_recording import load_with_study
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json, Side, StudyFile, quantity_option, resolve_study
-from driftwalk.cli.terminal.output import print_json, print_note, print_table
+from driftwalk.cli.terminal.output import print_json, print_note, print_table, save_dataset
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.schema.contents import check_contents
 from driftwalk.schema.netcdf import kind_of, open_netcdf
@@ -120,7 +120,7 @@ def classify(
     except InputError as error:
         raise InputError(f"{poses}: {error}") from error
     if out is not None:
-        _save(found, out)
+        save_dataset(found, out)
     summary = summarise(found)
     if json:
         print_json({"poses": poses, **summary})
@@ -257,12 +257,3 @@ def _print(summary: dict[str, Any]) -> None:
         print("no blocks joined")
     print()
     print_table([["at the end", summary["final"] or "unknown"]])
-
-
-def _save(found: xr.Dataset, path: Path) -> None:
-    from driftwalk.core.atomic import write_atomic
-    from driftwalk.schema.netcdf import netcdf_bytes
-
-    # In memory first: HDF5 does not survive a disk that fills while it writes.
-    write_atomic(path, netcdf_bytes(found))
-    print_note(f"wrote {path}")

@@ -13,7 +13,13 @@ import typer
 from driftwalk.cli.inputs.motion import load_motion
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json, StepInterval
-from driftwalk.cli.terminal.output import print_json, print_note, print_table, require_place
+from driftwalk.cli.terminal.output import (
+    print_json,
+    print_note,
+    print_table,
+    require_place,
+    save_dataset,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -103,7 +109,7 @@ def compare(
             seed=seed,
         )
     if out is not None:
-        _save(result, out)
+        save_dataset(result, out)
     summary = summarise(result)
     # What `compare` warned of in passing stands in the result as well, there with the motion.
     noted = " ".join(summary["warnings"])
@@ -141,12 +147,3 @@ def _print(summary: dict[str, Any]) -> None:
     print()
     rows = [[key, summary["motion_a"][key], summary["motion_b"][key]] for key in _BY_MOTION]
     print_table(rows, columns=["motion", "a", "b"])
-
-
-def _save(result: xr.Dataset, path: Path) -> None:
-    from driftwalk.core.atomic import write_atomic
-    from driftwalk.schema.netcdf import netcdf_bytes
-
-    # In memory first: HDF5 does not survive a disk that fills while it writes.
-    write_atomic(path, netcdf_bytes(result))
-    print_note(f"wrote {path}")

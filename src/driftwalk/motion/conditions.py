@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.simulation.backend import Camera, default_threads
+from driftwalk.core.processors import default_threads
+from driftwalk.simulation.backend import Camera
 from driftwalk.simulation.initial import Start, recorded_start
 from driftwalk.simulation.run import without_gaps
 

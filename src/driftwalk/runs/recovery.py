@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from driftwalk.core.processors import default_threads
 from driftwalk.runs.folder import Progress, open_run, silent
 from driftwalk.runs.stored import dataset_hash
 from driftwalk.schema.netcdf import netcdf_bytes
@@ -101,17 +101,12 @@ def run_recovery(
             work.study,
             work.flow,
             store=run.store("recordings"),
-            threads=work.threads or _processors(),
+            threads=work.threads or default_threads(),
             tell=lambda done, total: progress(done, total, "fits"),
         )
         run.write("recovery.nc", netcdf_bytes(found))
         write_recovery_figures(run.folder("figures"), recovery=found)
     return found
-
-
-def _processors() -> int:
-    """Return how many processors this process may run on."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _specification(work: RecoveryWork) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -35,11 +34,6 @@ class Camera:
     position_noise: float = 0.0
     orientation_noise: float = 0.0
     position_quantum: float = 0.0
-
-
-def default_threads() -> int:
-    """Return how many threads to use: the processors that this process may run on."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def native_model(

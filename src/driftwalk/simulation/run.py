@@ -9,8 +9,9 @@ import numpy.typing as npt
 
 from driftwalk import _core
 from driftwalk.core.errors import InputError
+from driftwalk.core.processors import default_threads
 from driftwalk.core.seeds import world_keys
-from driftwalk.simulation.backend import STATUS, Camera, default_threads, native_model, world_table
+from driftwalk.simulation.backend import STATUS, Camera, native_model, world_table
 from driftwalk.simulation.initial import Start, random_start, recorded_start, world_orientations
 
 if TYPE_CHECKING:

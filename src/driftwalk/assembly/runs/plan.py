@@ -13,7 +13,8 @@ from driftwalk.assembly.runs.address import stream_keys
 from driftwalk.assembly.runs.cover import require_cover
 from driftwalk.assembly.runs.start import given_start, place_blocks, require_room
 from driftwalk.core.errors import InputError
-from driftwalk.simulation.backend import Camera, default_threads, native_model
+from driftwalk.core.processors import default_threads
+from driftwalk.simulation.backend import Camera, native_model
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,11 +8,14 @@ import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from driftwalk.core.atomic import require_free
 from driftwalk.core.errors import InputError
 from driftwalk.core.json_text import json_value
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def print_json(values: Mapping[str, Any]) -> None:
@@ -37,6 +40,15 @@ def print_json(values: Mapping[str, Any]) -> None:
 def to_json(values: Mapping[str, Any]) -> str:
     """Return the text that `print_json` prints."""
     return json.dumps(json_value(values), indent=2, allow_nan=False, ensure_ascii=True)
+
+
+def save_dataset(dataset: xr.Dataset, path: Path) -> None:
+    """Write a dataset as NetCDF, and say so."""
+    from driftwalk.core.atomic import write_atomic
+    from driftwalk.schema.netcdf import netcdf_bytes
+
+    write_atomic(path, netcdf_bytes(dataset))
+    print_note(f"wrote {path}")
 
 
 def print_table(
