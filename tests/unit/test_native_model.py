@@ -10,7 +10,7 @@ from single_block import model, study
 
 import driftwalk as dw
 from driftwalk import _core
-from driftwalk.simulate.backend import Camera, native_model
+from driftwalk.simulation.backend import Camera, native_model
 
 NUMBERS = sorted(
     name for name in dir(_core.Model) if not name.startswith("_") and name != "samples"
