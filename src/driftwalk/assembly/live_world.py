@@ -12,10 +12,11 @@ import numpy.typing as npt
 
 from driftwalk import _core
 from driftwalk.assembly.lattice.live import Lattice
-from driftwalk.assembly.runs.dataset import BROKEN, times_of
+from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import MOST_STEPS, make_plan, start_poses
 from driftwalk.assembly.runs.start import require_room
 from driftwalk.core.errors import InputError
+from driftwalk.simulation.backend import BROKEN
 
 if TYPE_CHECKING:
     import xarray as xr

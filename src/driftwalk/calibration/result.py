@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from driftwalk.calibration.problem import DENSITY_BINS, Floats, Problem
 from driftwalk.calibration.search import Map
-from driftwalk.simulation.backend import STATUS
+from driftwalk.simulation.backend import BROKEN, STATUS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -150,7 +150,7 @@ def _map_variables(
     status = found.arrays["status"]
     cause = np.zeros(status.shape[:2], dtype=np.int8)
     cause[(status & STATUS["no_motion"]).all(axis=2) > 0] |= CELL_STATUS["no_motion"]
-    broken = (status & (STATUS["non_finite"] | STATUS["escaped"])) > 0
+    broken = (status & BROKEN) > 0
     cause[broken.any(axis=2)] |= CELL_STATUS["non_finite"]
     cause[found.arrays["pairs"] == 0] |= CELL_STATUS["too_few_steps"]
     flags = {

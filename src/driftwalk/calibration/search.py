@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from driftwalk.calibration.problem import Floats, Problem, score_worlds, worlds_of
 from driftwalk.calibration.surface import Optimum, Smoother, make_smoother
-from driftwalk.simulation.backend import STATUS
+from driftwalk.simulation.backend import BROKEN
 from driftwalk.sweep import Design, Store, WorkUnit, grid, run_sweep
 
 Progress = Callable[[int, int], None]
@@ -114,7 +114,7 @@ def _by_setting(
         name: values.reshape(-1, replicates, *values.shape[1:]) for name, values in worlds.items()
     }
     # A world that lost its numbers has no distance; one that does not move is as far as can be.
-    broken = (rows["status"] & (STATUS["non_finite"] | STATUS["escaped"])) != 0
+    broken = (rows["status"] & BROKEN) != 0
     rows["ks_distance"] = np.where(broken, np.nan, rows["ks_distance"])
     rows["pairs"] = rows["pairs"].min(axis=1)
     if "step_density" in rows:

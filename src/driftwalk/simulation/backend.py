@@ -22,6 +22,8 @@ Floats = npt.NDArray[np.float64]
 
 STATUS: Final[dict[str, int]] = {"non_finite": 1, "escaped": 2, "no_motion": 4}
 """Bits of a world's status; 0 is sound."""
+BROKEN: Final = STATUS["non_finite"] | STATUS["escaped"]
+"""Bits of a world that lost its numbers: it has no distance and no outcome."""
 
 MOST_NODES_PER_SIDE: Final = 16_000
 MOST_NODES: Final = 50_000_000

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
-from driftwalk.simulation.backend import STATUS
+from driftwalk.simulation.backend import BROKEN, STATUS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,8 +27,6 @@ Floats = npt.NDArray[np.float64]
 SCHEMA_VERSION: Final = 1
 DECIMALS: Final = 9
 """Times are kept to a nanosecond."""
-BROKEN: Final = STATUS["non_finite"] | STATUS["escaped"]
-"""Status bits of a run that has no outcome."""
 
 
 def build_assembly(plan: Plan, arrays: Arrays, *, attrs: dict[str, Any]) -> xr.Dataset:

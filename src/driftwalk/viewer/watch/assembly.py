@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.assembly import class_cells, outcome_distribution, world_class
-from driftwalk.assembly.runs.dataset import BROKEN
+from driftwalk.simulation.backend import BROKEN
 from driftwalk.viewer.watch.running import NO_CELL, Section
 from driftwalk.viewer.watch.shards import FinishedUnit, RunReader
 
