@@ -25,13 +25,16 @@ from timing import machine
 
 from driftwalk import _core
 from driftwalk.calibration import calibrate
-from driftwalk.calibration.problem import prepare_problem, worlds_of
+from driftwalk.calibration.problem import prepare_problem
 from driftwalk.cli.demo import demo_study
+from driftwalk.core.seeds import world_keys
 from driftwalk.datasets import tank30_flow, tank30_recording, tank30_truth
 from driftwalk.figures import write_figures
+from driftwalk.motion import BlockModel
 from driftwalk.schema import body_track
 from driftwalk.simulation import recorded_camera
-from driftwalk.simulation.backend import default_threads
+from driftwalk.simulation.backend import default_threads, world_table
+from driftwalk.simulation.initial import world_orientations
 
 TARGET_MAP_S = 60.0
 TARGET_ALL_S = 120.0
@@ -78,15 +81,14 @@ def baseline_seconds(recording: Any, flow: Any, study: Any, threads: int) -> flo
     camera = recorded_camera(track, study, position_quantum=quantum)
     problem = prepare_problem(track, study, flow, camera=camera, threads=threads)
     forces = study.forces
-    table, keys = worlds_of(
-        problem,
-        forces.drag_coefficient,
-        forces.force_std_N,
-        stage="coarse",
-        first=0,
-        replicates=BASELINE_WORLDS,
+    keys = world_keys(study.calibration.seed, trial=0, replicate=np.arange(BASELINE_WORLDS))
+    start = problem.like.start
+    table = world_table(
+        **{**start._asdict(), "theta": world_orientations(start.theta, keys)},
+        drag_coefficient=np.full(BASELINE_WORLDS, forces.drag_coefficient),
+        force_std=forces.force_std_N,
     )
-    model = problem.model()
+    model = BlockModel(study).native(problem.like)
     begin = time.process_time()
     _core.simulate(model, table, keys, threads=1, precision="double")
     per_world = (time.process_time() - begin) / BASELINE_WORLDS

@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 
 import driftwalk as dw
-from driftwalk import _core
 from driftwalk.calibration.problem import prepare_problem
 from driftwalk.calibration.quality import noise_floor_at, quality_of_fit
 from driftwalk.calibration.region import (
@@ -30,7 +29,7 @@ from driftwalk.calibration.region import (
     run_bootstrap,
     simulated_steps,
 )
-from driftwalk.calibration.search import Map, Window, window_smoother
+from driftwalk.calibration.search import Map, window_smoother
 from driftwalk.schema import body_track
 from driftwalk.simulation import recorded_camera
 
@@ -63,16 +62,15 @@ def calibrate_truth(problem: Any, index: int, truth: tuple[float, float], wanted
     if not missing:
         return
     # The truth lies between the nodes of the grid, as it would in life.
-    window = Window(
+    window = (
         np.round(truth[0] + STEPS[0] * (np.arange(-10, 11) + 0.37), 12),
         np.round(truth[1] + STEPS[1] * (np.arange(-10, 11) - 0.29), 12),
     )
-    drag, force = (axis.ravel() for axis in np.meshgrid(*window, indexing="ij"))
-    shared = simulated_steps(problem, drag, force, stage="refined", replicates=REPLICATES)
+    settings = [axis.ravel() for axis in np.meshgrid(*window, indexing="ij")]
+    shared = simulated_steps(problem, settings, stage="refined", replicates=REPLICATES)
     recordings = simulated_steps(
         problem,
-        np.array([truth[0]]),
-        np.array([truth[1]]),
+        truth,
         stage="coverage",
         replicates=wanted.recordings,
         first=index,
@@ -80,10 +78,11 @@ def calibrate_truth(problem: Any, index: int, truth: tuple[float, float], wanted
     for k in missing:
         row = recordings.rows(slice(k, k + 1))
         steps = np.column_stack([row.length[0], row.angle[0]]).astype(np.float64)[: row.pairs[0]]
-        matrix = _core.ks_matrix(*row, *shared, threads=problem.threads)
+        matrix = problem.statistic.matrix(row, shared, threads=problem.like.threads)
         distance = matrix.reshape(*(axis.size for axis in window), REPLICATES)
-        own = replace(problem, steps=np.ascontiguousarray(steps))
-        line = calibrate_one(own, Map(*window, distance, {}), truth, 1000 * index + k, wanted)
+        reference = replace(problem.reference, steps=np.ascontiguousarray(steps))
+        own = replace(problem, reference=reference)
+        line = calibrate_one(own, Map(window, distance, {}), truth, 1000 * index + k, wanted)
         with RESULTS.open("a") as file:
             file.write(json.dumps({"truth": index, "recording": k, **line}) + "\n")
         print(index, k, line, flush=True)
@@ -95,21 +94,21 @@ def calibrate_one(
     """Calibrate one recording and say what holds the truth."""
     search = problem.study.calibration.model_copy(update={"seed": 100 + seed})
     problem = replace(problem, study=problem.study.model_copy(update={"calibration": search}))
-    smoother = window_smoother(Window(refined.drag_coefficient, refined.force_std), STEPS)
+    smoother = window_smoother(refined.axes, STEPS)
     optimum = smoother.optimum(refined.mean)
     surface = smoother.surface(refined.mean.ravel())
-    floor = noise_floor_at(problem, optimum.drag_coefficient, optimum.force_std)
-    stored = build_surface(problem, refined, optimum, STEPS, margin=floor)
+    floor = noise_floor_at(problem, optimum.point)
+    stored = build_surface(problem, refined, optimum, margin=floor)
     bootstrap = run_bootstrap(problem, optimum, stored, count=wanted.bootstrap)
     quality = quality_of_fit(bootstrap)
     region = confidence_region(
         smoother, surface, bootstrap, confidence=0.9, stretch=quality.stretch
     )
-    drag, force = region.drag_coefficient_interval, region.force_std_interval
+    drag, force = region.intervals
     return {
-        "drag_coefficient": optimum.drag_coefficient,
-        "force_std_N": optimum.force_std,
-        "region_holds": region_contains(smoother, surface, region, *truth),
+        "drag_coefficient": optimum.point[0],
+        "force_std_N": optimum.point[1],
+        "region_holds": region_contains(smoother, surface, region, truth),
         "drag_coefficient_holds": drag[0] <= truth[0] <= drag[1],
         "force_std_holds": force[0] <= truth[1] <= force[1],
         "drag_coefficient_extent": drag[1] - drag[0],

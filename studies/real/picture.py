@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from driftwalk.calibration.problem import Problem, prepare_problem, score_worlds, worlds_of
+from driftwalk.calibration.problem import Problem, prepare_problem, score_settings
 from driftwalk.model import parse_study
 from driftwalk.plot.parts.style import (
     INK,
@@ -70,9 +70,10 @@ def simulate_optimum(run: Path, body: str | None) -> tuple[Fit, Problem]:
     camera = recorded_camera(track, study, position_quantum=quantum)
     flow = xr.open_dataset(run / "flow.nc")
     problem = prepare_problem(track, study, flow, camera=camera)
-    optimum = [found.attrs["drag_coefficient"]], [found.attrs["force_std_N"]]
-    worlds = worlds_of(problem, *optimum, stage="floor", first=1, replicates=REPLICATES)
-    scored = score_worlds(problem, problem.model(), worlds, keep_steps="yes")
+    optimum = found.attrs["drag_coefficient"], found.attrs["force_std_N"]
+    scored = score_settings(
+        problem, optimum, stage="floor", first=1, replicates=REPLICATES, details="steps"
+    )
     middle = int(np.argsort(scored["ks_distance"])[REPLICATES // 2])
     steps = [
         np.column_stack([scored["step_length"][i, :pairs], scored["turning_angle"][i, :pairs]])
@@ -85,8 +86,10 @@ def simulate_optimum(run: Path, body: str | None) -> tuple[Fit, Problem]:
 
 def draw(fit: Fit, problem: Problem, name: str, file: Path) -> None:
     """Write the figure."""
-    length = 1e3 * np.linspace(0.0, problem.length_limit, 33)
-    angle = np.degrees(np.linspace(-problem.angle_limit, problem.angle_limit, 33))
+    length = 1e3 * np.linspace(0.0, problem.reference.length_limit, 33)
+    angle = np.degrees(
+        np.linspace(-problem.reference.angle_limit, problem.reference.angle_limit, 33)
+    )
     shares = [_histogram(steps, length, angle) for steps in (fit.recorded, fit.simulated)]
     top = max(float(density_of(share, length, angle).max()) for share in shares)
     with print_style():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import driftwalk as dw
-from driftwalk.calibration.problem import prepare_problem, score_worlds, worlds_of
+from driftwalk.calibration.problem import prepare_problem, score_settings
 from driftwalk.core.errors import InputError
 from driftwalk.model import apply_overrides
 from driftwalk.schema import body_track
@@ -52,8 +52,8 @@ def test_steps_that_the_camera_did_not_see_are_left_out_of_the_score():
         if name is not None:
             study = apply_overrides(study, {"observation.field_of_view": VIEWS[name]})
         problem = prepare_problem(track, study, dw.tank30_flow(), camera=Camera(), threads=1)
-        worlds = worlds_of(problem, [0.45], [6e-4], stage="coarse", first=0, replicates=3)
-        pairs[name] = score_worlds(problem, problem.model(), worlds)["pairs"]
+        found = score_settings(problem, (0.45, 6e-4), stage="coarse", first=0, replicates=3)
+        pairs[name] = found["pairs"]
     assert (pairs[None] == 998).all()
     assert (pairs["circle"] < 998).all()
     assert (pairs["circle"] > 100).all()
@@ -71,7 +71,7 @@ def test_the_recordings_gaps_are_kept_unless_the_study_leaves_them_out():
     np.testing.assert_allclose(np.diff(without["time"]), 0.1)
     track = body_track(gappy)
     pairs = [
-        prepare_problem(track, chosen, dw.tank30_flow(), camera=Camera()).plan.pairs
+        prepare_problem(track, chosen, dw.tank30_flow(), camera=Camera()).reference.plan.pairs
         for chosen in (dw.Study(), study)
     ]
     assert pairs == [20 * 43, 993]

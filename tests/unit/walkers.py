@@ -27,5 +27,5 @@ def tumble(scene, *, speed, tumble_rate):
 def diffuse(scene, *, diffusivity):
     """Brownian motion."""
     spread = np.sqrt(2.0 * diffusivity * np.diff(scene.times, prepend=0.0))
-    path = np.cumsum(spread * scene.random.normal(2, scene.times.size), axis=-1)
-    return scene.start.x[:, None] + path[:, 0], scene.start.y[:, None] + path[:, 1]
+    x, y = (np.cumsum(spread * scene.random.normal(scene.times.size), axis=1) for _ in "xy")
+    return scene.start.x[:, None] + x, scene.start.y[:, None] + y

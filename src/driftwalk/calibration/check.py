@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from driftwalk.calibration.problem import prepare_problem
+from driftwalk.motion import BlockModel
 from driftwalk.schema import body_track
 from driftwalk.simulation import recorded_camera
 
@@ -42,4 +43,5 @@ def check_recording(
     """
     track = body_track(recording, body)
     camera = recorded_camera(track, study, position_quantum=0.0)
-    prepare_problem(track, study, flow, camera=camera).model()
+    problem = prepare_problem(track, study, flow, camera=camera)
+    BlockModel(study).native(problem.like)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from driftwalk import _core
-from driftwalk.calibration.problem import Problem
+from driftwalk.calibration.problem import Axes, Problem
 from driftwalk.calibration.region import Bootstrap, recordings_at, simulated_steps
-from driftwalk.calibration.search import Map, Window, refined_window, run_map, window_smoother
+from driftwalk.calibration.search import Map, refined_window, run_map, window_smoother
 from driftwalk.calibration.surface import Optimum
 
 FAR_ABOVE_FLOOR = 2.0
@@ -18,16 +18,10 @@ FLOOR_REPLICATES = 8
 VALIDATION_REPLICATES = 16
 
 
-def noise_floor_at(problem: Problem, drag_coefficient: float, force_std: float) -> float:
-    """Return the median KS distance between two simulated recordings of the same parameters."""
-    steps = simulated_steps(
-        problem,
-        np.array([drag_coefficient]),
-        np.array([force_std]),
-        stage="floor",
-        replicates=FLOOR_REPLICATES,
-    )
-    matrix = _core.ks_matrix(*steps, *steps, threads=problem.threads)
+def noise_floor_at(problem: Problem, point: Sequence[float]) -> float:
+    """Return the median distance between two simulated recordings of the same parameters."""
+    steps = simulated_steps(problem, point, stage="floor", replicates=FLOOR_REPLICATES)
+    matrix = problem.statistic.matrix(steps, steps, threads=problem.like.threads)
     return float(np.median(matrix[np.triu_indices(FLOOR_REPLICATES, 1)]))
 
 
@@ -67,16 +61,15 @@ def quality_of_fit(bootstrap: Bootstrap) -> Quality:
 class Halves(NamedTuple):
     """A calibration on the first half of a recording, judged on the second."""
 
-    drag_coefficient: float
-    force_std: float
-    """Optimum on the first half, [N]."""
+    point: tuple[float, ...]
+    """Coordinates of the optimum on the first half."""
     distance: float
     """Mean KS distance on the second half."""
     floor: float
     """Noise floor of recordings as long as the second half."""
 
 
-def validate_on_halves(first: Problem, second: Problem, *, steps: tuple[float, float]) -> Halves:
+def validate_on_halves(first: Problem, second: Problem) -> Halves:
     """Calibrate on the first half of a recording and measure the distance on the second.
 
     The search is the usual one with a single replicate per setting, then two on a refined grid
@@ -86,49 +79,27 @@ def validate_on_halves(first: Problem, second: Problem, *, steps: tuple[float, f
     ----------
     first, second : Problem
         The halves; `second` has the flow of `first`.
-    steps : tuple of float
-        Steps of the refined grid.
     """
-    grid = first.study.calibration
     coarse = run_map(
         first,
-        grid.drag_coefficients,
-        grid.force_stds_N,
+        [parameter.coordinates for parameter in first.parameters],
         stage="first_half",
         replicates=1,
-        details="none",
     )
-    doubled = (2 * steps[0], 2 * steps[1])
+    doubled = [2 * step for step in first.refined_steps]
     window = refined_window(coarse, doubled, 0.0)
     optimum = refine(first, window, doubled, stage="first_half_refined", replicates=2)[1]
     recordings, distances = recordings_at(
         second, optimum, stage="second_half", count=VALIDATION_REPLICATES
     )
-    among = _core.ks_matrix(*recordings, *recordings, threads=second.threads)
+    among = second.statistic.matrix(recordings, recordings, threads=second.like.threads)
     floor = np.median(among[np.triu_indices(VALIDATION_REPLICATES, 1)])
-    return Halves(
-        optimum.drag_coefficient,
-        optimum.force_std,
-        float(distances.mean()),
-        float(floor),
-    )
+    return Halves(optimum.point, float(distances.mean()), float(floor))
 
 
 def refine(
-    problem: Problem,
-    window: Window,
-    steps: tuple[float, float],
-    *,
-    stage: str,
-    replicates: int,
+    problem: Problem, window: Axes, steps: Sequence[float], *, stage: str, replicates: int
 ) -> tuple[Map, Optimum]:
     """Run a refined grid and return it with the optimum of its smooth surface."""
-    found = run_map(
-        problem,
-        window.drag_coefficient,
-        window.force_std,
-        stage=stage,
-        replicates=replicates,
-        details="none",
-    )
+    found = run_map(problem, window, stage=stage, replicates=replicates)
     return found, window_smoother(window, steps).optimum(found.mean)

@@ -7,7 +7,7 @@ part of what chance does.) For each, the truth is known: it is the optimum. How 
 lies above the smallest D of its own surface, the excess, is what chance does; its 90 % quantile is
 the level up to which the real recording's surface is plausible. So the region follows the valley,
 whatever its shape, and holds the truth in 90 % of recordings if the model is true. Intervals come
-from profiles, the smallest D over the other parameter, in the same way.
+from profiles, the smallest D over the other parameters, in the same way.
 
 Where D at the optimum stays above the noise floor the model is not quite true; the level is then
 raised by their ratio, as a reduced chi-square above one widens the errors of a least-squares fit
@@ -16,20 +16,21 @@ raised by their ratio, as a reduced chi-square above one widens the errors of a 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk import _core
-from driftwalk.calibration.problem import Floats, Problem, score_worlds, worlds_of
-from driftwalk.calibration.search import BANDWIDTH_STEPS, Map, Progress, Window, window_smoother
+from driftwalk.calibration.problem import Axes, Floats, Problem, score_settings
+from driftwalk.calibration.search import BANDWIDTH_STEPS, Map, Progress, window_smoother
 from driftwalk.calibration.surface import FINENESS, Optimum, Smoother, make_smoother
+from driftwalk.comparison import Statistic, StepTable
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
 
-SURFACE_POINTS = (13, 15)
-"""Most settings along each axis of the stored surface."""
+SURFACE_POINTS: Final[dict[int, tuple[int, ...]]] = {1: (101,), 2: (13, 15)}
+"""Most settings along each axis of the stored surface, by the number of parameters."""
 SURFACE_MARGIN = 3
 """Refined steps around the settings that could be the optimum."""
 SURFACE_REPLICATES = 4
@@ -39,58 +40,36 @@ RECORDINGS_PER_UNIT = 10
 FLOOR_REFERENCES = 8
 
 
-class Steps(NamedTuple):
-    """The steps of many simulated recordings, one row each; a row's tail is unused."""
-
-    length: npt.NDArray[np.float64]
-    angle: npt.NDArray[np.float64]
-    pairs: npt.NDArray[np.int64]
-
-    def rows(self, chosen: slice) -> Steps:
-        """Return some of the rows."""
-        return Steps(
-            np.ascontiguousarray(self.length[chosen]),
-            np.ascontiguousarray(self.angle[chosen]),
-            np.ascontiguousarray(self.pairs[chosen]),
-        )
-
-
 @dataclass(frozen=True, eq=False)
 class StoredSurface:
     """Simulated steps of the settings around an optimum, to estimate any recording against."""
 
     smoother: Smoother
-    parts: tuple[Steps, ...]
+    parts: tuple[StepTable, ...]
     """Each holds `MET_BY_EACH` replicates of every setting, replicates fastest."""
+    statistic: Statistic
     threads: int
 
-    def distances(self, recordings: Steps, part: int) -> Floats:
-        """Return the mean KS distance of each recording to each setting, (recording, setting)."""
+    def distances(self, recordings: StepTable, part: int) -> Floats:
+        """Return the mean distance of each recording to each setting, (recording, setting)."""
         chosen = self.parts[part % len(self.parts)]
-        matrix = _core.ks_matrix(*recordings, *chosen, threads=self.threads)
+        matrix = self.statistic.matrix(recordings, chosen, threads=self.threads)
         return np.asarray(matrix.reshape(len(matrix), -1, MET_BY_EACH).mean(axis=2))
 
 
 def build_surface(
-    problem: Problem,
-    refined: Map,
-    optimum: Optimum,
-    steps: tuple[float, float],
-    *,
-    margin: float,
+    problem: Problem, refined: Map, optimum: Optimum, *, margin: float
 ) -> StoredSurface:
     """Simulate the settings that could be a recording's optimum.
 
     Parameters
     ----------
     problem : Problem
-        The recording.
+        The recording and the model.
     refined : Map
         The second pass of the search.
     optimum : Optimum
         Its minimum.
-    steps : tuple of float
-        Steps of the refined grid.
     margin : float
         Settings whose smooth distance is within `margin` of the minimum are covered: the noise
         floor.
@@ -101,85 +80,82 @@ def build_surface(
         On the refined grid, or on every k-th value of it where that has too many settings.
     """
     axes, bandwidth = [], []
+    steps = problem.refined_steps
     ranges = _plausible_ranges(refined, optimum, steps, margin)
     for axis, (low, high), step, most in zip(
-        (refined.drag_coefficient, refined.force_std), ranges, steps, SURFACE_POINTS, strict=True
+        refined.axes, ranges, steps, SURFACE_POINTS[len(steps)], strict=True
     ):
         stride = max(int(np.ceil((high - low) / (most - 1))), 1)
         axes.append(axis[low : high + 1 : stride])
         bandwidth.append((BANDWIDTH_STEPS if stride == 1 else 1.5 * stride) * step)
-    drag, force = (values.ravel() for values in np.meshgrid(*axes, indexing="ij"))
+    settings = [values.ravel() for values in np.meshgrid(*axes, indexing="ij")]
     parts = tuple(
         simulated_steps(
             problem,
-            drag,
-            force,
+            settings,
             stage="surface",
             replicates=MET_BY_EACH,
-            first=part * drag.size,
+            first=part * settings[0].size,
         )
         for part in range(SURFACE_REPLICATES // MET_BY_EACH)
     )
-    smoother = make_smoother(axes[0], axes[1], bandwidth=(bandwidth[0], bandwidth[1]))
-    return StoredSurface(smoother, parts, problem.threads)
+    smoother = make_smoother(axes, bandwidth=bandwidth)
+    return StoredSurface(smoother, parts, problem.statistic, problem.like.threads)
 
 
 def _plausible_ranges(
-    refined: Map, optimum: Optimum, steps: tuple[float, float], margin: float
+    refined: Map, optimum: Optimum, steps: Sequence[float], margin: float
 ) -> list[tuple[int, int]]:
     """Return the index ranges of the refined grid that hold what could be the optimum."""
-    window = Window(refined.drag_coefficient, refined.force_std)
-    surface = window_smoother(window, steps).surface(refined.mean.ravel())[::FINENESS, ::FINENESS]
-    inside = np.argwhere(surface <= optimum.distance + margin)
+    surface = window_smoother(refined.axes, steps).surface(refined.mean.ravel())
+    inside = np.argwhere(at_settings(surface) <= optimum.distance + margin)
     return [
         (max(int(low) - SURFACE_MARGIN, 0), min(int(high) + SURFACE_MARGIN, axis.size - 1))
-        for axis, low, high in zip(window, inside.min(axis=0), inside.max(axis=0), strict=True)
+        for axis, low, high in zip(
+            refined.axes, inside.min(axis=0), inside.max(axis=0), strict=True
+        )
     ]
+
+
+def at_settings(surface: Floats) -> Floats:
+    """Return a surface at the settings of its grid: every `FINENESS`-th point of the lattice."""
+    return np.asarray(surface[(slice(None, None, FINENESS),) * surface.ndim])
 
 
 def simulated_steps(
     problem: Problem,
-    drag_coefficient: Floats,
-    force_std: Floats,
+    settings: Sequence[npt.ArrayLike],
     *,
     stage: str,
     replicates: int,
     first: int = 0,
-) -> Steps:
+) -> StepTable:
     """Simulate settings and return the steps of every world, replicates fastest."""
-    worlds = worlds_of(
-        problem, drag_coefficient, force_std, stage=stage, first=first, replicates=replicates
+    found = score_settings(
+        problem, settings, stage=stage, first=first, replicates=replicates, details="steps"
     )
-    found = score_worlds(problem, problem.model(), worlds, keep_steps="yes")
-    return Steps(found["step_length"], found["turning_angle"], found["pairs"])
+    return StepTable(found["step_length"], found["turning_angle"], found["pairs"])
 
 
 def recordings_at(
     problem: Problem, optimum: Optimum, *, stage: str, count: int
-) -> tuple[Steps, Floats]:
+) -> tuple[StepTable, Floats]:
     """Simulate recordings at an optimum; return their steps and distances to the real one."""
-    worlds = worlds_of(
-        problem,
-        [optimum.drag_coefficient],
-        [optimum.force_std],
-        stage=stage,
-        first=0,
-        replicates=count,
+    found = score_settings(
+        problem, optimum.point, stage=stage, first=0, replicates=count, details="steps"
     )
-    found = score_worlds(problem, problem.model(), worlds, keep_steps="yes")
-    steps = Steps(found["step_length"], found["turning_angle"], found["pairs"])
+    steps = StepTable(found["step_length"], found["turning_angle"], found["pairs"])
     return steps, np.asarray(found["ks_distance"])
 
 
 class Bootstrap(NamedTuple):
     """Recordings simulated at the optimum, and what is learnt from them."""
 
-    drag_coefficient: Floats
-    force_std: Floats
-    """Their estimates, [N]."""
+    estimates: Floats
+    """Coordinates of their estimates, shape (recording, parameter)."""
     excess: Floats
     """D at the truth above the smallest D: jointly, and of the profile along each parameter;
-    shape (recording, 3)."""
+    shape (recording, 1 + parameters)."""
     to_recording: Floats
     """KS distance of each to the real recording."""
     to_each_other: Floats
@@ -200,7 +176,7 @@ def run_bootstrap(
     Parameters
     ----------
     problem : Problem
-        The recording.
+        The recording and the model.
     optimum : Optimum
         Where to simulate.
     surface : StoredSurface
@@ -213,56 +189,51 @@ def run_bootstrap(
         Told the number of recordings done and in all.
     """
     recordings, to_recording = recordings_at(problem, optimum, stage="bootstrap", count=count)
+    names = [parameter.name for parameter in problem.parameters]
 
     def compute(unit: WorkUnit) -> dict[str, npt.NDArray[Any]]:
         rows = recordings.rows(slice(unit.start, unit.stop))
         distances = surface.distances(rows, unit.start // RECORDINGS_PER_UNIT)
-        estimates = [surface.smoother.optimum(row) for row in distances]
+        estimates = [surface.smoother.optimum(row).point for row in distances]
+        columns = np.array(estimates).reshape(-1, len(names)).T
         return {
-            "drag_coefficient": np.array([found.drag_coefficient for found in estimates]),
-            "force_std": np.array([found.force_std for found in estimates]),
+            **dict(zip(names, columns, strict=True)),
             "excess": np.array([_excess(surface.smoother, row, optimum) for row in distances]),
         }
 
     units = grid(recording=np.arange(count)).units(RECORDINGS_PER_UNIT)
     estimates = run_sweep(compute, units, store=store, progress=progress)
     few = min(FLOOR_REFERENCES, count // 2)
-    among = _core.ks_matrix(
-        *recordings.rows(slice(0, few)),
-        *recordings.rows(slice(few, count)),
-        threads=problem.threads,
+    among = problem.statistic.matrix(
+        recordings.rows(slice(0, few)),
+        recordings.rows(slice(few, count)),
+        threads=problem.like.threads,
     )
     return Bootstrap(
-        estimates["drag_coefficient"],
-        estimates["force_std"],
+        np.column_stack([estimates[name] for name in names]),
         estimates["excess"],
         to_recording,
         among,
     )
 
 
-def _excess(smoother: Smoother, distance: Floats, truth: Optimum) -> tuple[float, float, float]:
+def _excess(smoother: Smoother, distance: Floats, truth: Optimum) -> tuple[float, ...]:
     """Return how far D at the truth lies above the minimum: jointly, and along each profile."""
     surface = smoother.surface(distance)
-    row = int(np.argmin(np.abs(smoother.drag_coefficient - truth.drag_coefficient)))
-    column = int(np.argmin(np.abs(smoother.force_std - truth.force_std)))
+    at = smoother.nearest(truth.point)
     low = surface.min()
-    return (
-        float(surface[row, column] - low),
-        float(surface[row].min() - low),
-        float(surface[:, column].min() - low),
-    )
+    profiles = [surface.take(index, axis=axis).min() for axis, index in enumerate(at)]
+    return tuple(float(value - low) for value in (surface[at], *profiles))
 
 
 class Region(NamedTuple):
     """Where the true parameters may be."""
 
-    drag_coefficient_interval: tuple[float, float]
-    force_std_interval: tuple[float, float]
-    """[N]"""
-    drag_coefficient: Floats
-    """Vertices of the border of the joint region, closed."""
-    force_std: Floats
+    intervals: tuple[tuple[float, float], ...]
+    """Coordinates of the ends, one pair per parameter."""
+    border: Floats
+    """Border of the joint region, shape (vertices, parameters): a closed line for two parameters,
+    the two ends for one."""
     level: float
     """The smooth surface is below it in the region."""
 
@@ -295,18 +266,23 @@ def confidence_region(
     Region
         Where the region has several parts the border is that of the largest.
     """
-    joint, along_drag, along_force = (
+    joint, *along = (
         float(surface.min() + max(stretch, 1.0) * value)
         for value in np.quantile(bootstrap.excess, confidence, axis=0)
     )
-    border = _largest_contour(smoother, surface, joint)
-    return Region(
-        _interval(smoother.drag_coefficient, surface.min(axis=1), along_drag),
-        _interval(smoother.force_std, surface.min(axis=0), along_force),
-        border[:, 0],
-        border[:, 1],
-        joint,
+    profiles = [
+        surface.min(axis=tuple(other for other in range(surface.ndim) if other != axis))
+        for axis in range(surface.ndim)
+    ]
+    intervals = tuple(
+        _interval(axis, profile, level)
+        for axis, profile, level in zip(smoother.axes, profiles, along, strict=True)
     )
+    if surface.ndim == 1:
+        border = np.array(_interval(smoother.axes[0], surface, joint))[:, None]
+    else:
+        border = _largest_contour(smoother.axes, surface, joint)
+    return Region(intervals, border, joint)
 
 
 def _interval(axis: Floats, profile: Floats, level: float) -> tuple[float, float]:
@@ -323,7 +299,7 @@ def _interval(axis: Floats, profile: Floats, level: float) -> tuple[float, float
     return ends[0], ends[1]
 
 
-def _largest_contour(smoother: Smoother, surface: Floats, level: float) -> Floats:
+def _largest_contour(lattice: Axes, surface: Floats, level: float) -> Floats:
     """Return the longest closed border of the part below the level, shape (vertices, 2)."""
     from contourpy import contour_generator
 
@@ -332,9 +308,19 @@ def _largest_contour(smoother: Smoother, surface: Floats, level: float) -> Float
     rimmed = np.pad(surface, 1, constant_values=high)
     axes = [
         np.concatenate([[axis[0] - 1e-9 * step], axis, [axis[-1] + 1e-9 * step]])
-        for axis in (smoother.drag_coefficient, smoother.force_std)
+        for axis in lattice
         for step in (axis[1] - axis[0] if axis.size > 1 else 1.0,)
     ]
     lines = contour_generator(x=axes[1], y=axes[0], z=rimmed).lines(level)
     longest = max((np.asarray(line) for line in lines), key=lambda line: line.shape[0])
     return np.ascontiguousarray(longest[:, ::-1])
+
+
+def region_contains(
+    smoother: Smoother, surface: Floats, region: Region, point: Sequence[float]
+) -> bool:
+    """Return whether the joint region holds a point: whether the surface there is low enough."""
+    from scipy.interpolate import RegularGridInterpolator
+
+    value = RegularGridInterpolator(smoother.axes, surface, bounds_error=False, fill_value=np.inf)
+    return bool(value(np.asarray(point)[None])[0] <= region.level)

@@ -1,32 +1,32 @@
 """The `calibration` dataset: everything that a calibration found, in one file.
 
-Coarse map on ``(drag_coefficient, force_std[, replicate])``, refined map on the same names with the
-prefix ``refined_``, what is kept of every setting (excerpt, step density, place of the KS maximum),
-the recording's own steps, the bootstrap and the joint region. The answer stands in ``attrs``.
+Coarse map on the model's parameters by name, ``(drag_coefficient, force_std[, replicate])`` for the
+block, refined map on the same names with the prefix ``refined_``, what is kept of every setting
+(excerpt, step density, place of the KS maximum), the recording's own steps, the bootstrap and the
+joint region. The answer stands in ``attrs``, under the parameters' names with their units.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.problem import DENSITY_BINS, Floats, Problem
+from driftwalk.calibration.problem import Floats, Problem
 from driftwalk.calibration.search import Map
-from driftwalk.simulation.backend import BROKEN, STATUS
+from driftwalk.motion.score import DENSITY_BINS, broken_worlds, excerpt_samples
+from driftwalk.schema import Parameter
+from driftwalk.simulation.backend import STATUS
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.calibration.region import Bootstrap, Region
-    from driftwalk.calibration.surface import Optimum
-
 SCHEMA_VERSION: Final = 1
 CELL_STATUS: Final[dict[str, int]] = {"no_motion": 1, "non_finite": 2, "too_few_steps": 4}
-GRID: Final = ("drag_coefficient", "force_std")
-REFINED: Final = ("refined_drag_coefficient", "refined_force_std")
 
 _Variable = tuple[tuple[str, ...], npt.NDArray[Any], dict[str, Any]]
 
@@ -56,87 +56,117 @@ def build_calibration(
     """
     import xarray as xr
 
+    parameters = problem.parameters
+    names = tuple(parameter.name for parameter in parameters)
+    reference = problem.reference
     data: dict[str, _Variable] = {
-        **_map_variables(coarse, GRID, "", "replicate"),
-        **_details(coarse),
+        **_map_variables(coarse, names, "", "replicate"),
+        **_details(coarse, names),
         **_recording(problem),
     }
     coords: dict[str, Any] = {
-        "drag_coefficient": ("drag_coefficient", coarse.drag_coefficient, _units("1", "C_d")),
-        "force_std": ("force_std", coarse.force_std, _units("N", "sigma_F")),
+        **_axes(parameters, coarse.axes, ""),
         "step_length_edge": (
             "step_length_edge",
-            np.linspace(0.0, problem.length_limit, DENSITY_BINS + 1),
+            np.linspace(0.0, reference.length_limit, DENSITY_BINS + 1),
             _units("m", "edges of the step-length bins; the last bin holds all longer steps"),
         ),
         "turning_angle_edge": (
             "turning_angle_edge",
-            np.linspace(-problem.angle_limit, problem.angle_limit, DENSITY_BINS + 1),
+            np.linspace(-reference.angle_limit, reference.angle_limit, DENSITY_BINS + 1),
             _units("rad", "edges of the turning-angle bins; the outer bins hold all beyond"),
         ),
     }
     if refined is not None and surface is not None:
-        data.update(_map_variables(refined, REFINED, "refined_", "refined_replicate"))
+        dims = tuple(f"refined_{name}" for name in names)
+        data.update(_map_variables(refined, dims, "refined_", "refined_replicate"))
         data["refined_surface"] = (
-            REFINED,
+            dims,
             surface,
             _units("1", "smooth surface through the refined distances"),
         )
-        coords[REFINED[0]] = (REFINED[0], refined.drag_coefficient, _units("1", "C_d"))
-        coords[REFINED[1]] = (REFINED[1], refined.force_std, _units("N", "sigma_F"))
+        coords.update(_axes(parameters, refined.axes, "refined_"))
     return xr.Dataset(
         data, coords, {"kind": "calibration", "schema_version": SCHEMA_VERSION, **attrs}
     )
 
 
-def add_uncertainty(dataset: xr.Dataset, bootstrap: Bootstrap, region: Region) -> xr.Dataset:
+def _axes(
+    parameters: Sequence[Parameter], axes: Sequence[Floats], prefix: str
+) -> dict[str, tuple[str, Floats, dict[str, Any]]]:
+    """Return the coordinates of a map, in the units of the parameters."""
+    found = {}
+    for parameter, axis in zip(parameters, axes, strict=True):
+        facts = _units(parameter.unit, parameter.symbol)
+        if parameter.scale != "linear":
+            facts["scale"] = parameter.scale
+        name = f"{prefix}{parameter.name}"
+        found[name] = (name, parameter.to_value(axis), facts)
+    return found
+
+
+def add_uncertainty(
+    dataset: xr.Dataset, problem: Problem, bootstrap: Bootstrap, region: Region
+) -> xr.Dataset:
     """Return the calibration with its bootstrap estimates and joint region."""
-    return dataset.assign(
-        bootstrap_drag_coefficient=(
-            "bootstrap",
-            bootstrap.drag_coefficient,
-            _units("1", "C_d estimated from a recording simulated at the optimum"),
-        ),
-        bootstrap_force_std=(
-            "bootstrap",
-            bootstrap.force_std,
-            _units("N", "sigma_F estimated from a recording simulated at the optimum"),
-        ),
-        bootstrap_ks_distance=(
-            "bootstrap",
-            bootstrap.to_recording,
-            _units("1", "KS distance of a recording simulated at the optimum to the real one"),
-        ),
-        region_drag_coefficient=(
-            "region_vertex",
-            region.drag_coefficient,
-            _units("1", "C_d at the border of the joint region"),
-        ),
-        region_force_std=(
-            "region_vertex",
-            region.force_std,
-            _units("N", "sigma_F at the border of the joint region"),
-        ),
+    estimates: dict[str, _Variable] = {}
+    border: dict[str, _Variable] = {}
+    for index, parameter in enumerate(problem.parameters):
+        words = f"{parameter.symbol} estimated from a recording simulated at the optimum"
+        estimates[f"bootstrap_{parameter.name}"] = (
+            ("bootstrap",),
+            parameter.to_value(bootstrap.estimates[:, index]),
+            _units(parameter.unit, words),
+        )
+        border[f"region_{parameter.name}"] = (
+            ("region_vertex",),
+            parameter.to_value(region.border[:, index]),
+            _units(parameter.unit, f"{parameter.symbol} at the border of the joint region"),
+        )
+    to_recording: _Variable = (
+        ("bootstrap",),
+        bootstrap.to_recording,
+        _units("1", "KS distance of a recording simulated at the optimum to the real one"),
     )
+    return dataset.assign({**estimates, "bootstrap_ks_distance": to_recording, **border})
 
 
-def answer_attrs(problem: Problem, optimum: Optimum) -> dict[str, Any]:
-    """Return the point estimate as attributes; sigma_F is never without its interval."""
-    interval = problem.study.forces.force_interval_s
+def answer_attrs(problem: Problem, point: Sequence[float]) -> dict[str, Any]:
+    """Return the point estimate as attributes, with what the model says of it."""
+    estimate = dict(
+        zip((one.name for one in problem.parameters), _values(problem, point), strict=True)
+    )
     return {
-        "drag_coefficient": optimum.drag_coefficient,
-        "force_std_N": optimum.force_std,
-        "force_interval_s": interval,
-        "force_noise_intensity_N2_s": optimum.force_std**2 * interval,
-        "wetted_depth_m": problem.study.wetted_depth_m,
-        "position_noise_m": problem.camera.position_noise,
-        "orientation_noise_rad": problem.camera.orientation_noise,
-        "position_quantum_m": problem.camera.position_quantum,
-        "step_interval_s": float(problem.plan.step_interval),
-        "time_step_s": problem.study.time_step_s,
+        **estimate_attrs(problem, point),
+        **problem.model.facts(estimate),
+        "position_noise_m": problem.like.camera.position_noise,
+        "orientation_noise_rad": problem.like.camera.orientation_noise,
+        "position_quantum_m": problem.like.camera.position_quantum,
+        "step_interval_s": float(problem.reference.plan.step_interval),
         "duration_s": problem.duration,
         "recording_pairs": len(problem.steps),
     }
+
+
+def estimate_attrs(problem: Problem, point: Sequence[float], prefix: str = "") -> dict[str, float]:
+    """Return a point as attributes: the parameters' names with their units."""
+    keys = (f"{prefix}{parameter.key}" for parameter in problem.parameters)
+    return dict(zip(keys, _values(problem, point), strict=True))
+
+
+def interval_attrs(problem: Problem, region: Region) -> dict[str, list[float]]:
+    """Return the intervals as attributes."""
+    return {
+        f"{parameter.key}_interval": [float(parameter.to_value(end)) for end in ends]
+        for parameter, ends in zip(problem.parameters, region.intervals, strict=True)
+    }
+
+
+def _values(problem: Problem, point: Sequence[float]) -> list[float]:
+    return [
+        float(parameter.to_value(coordinate))
+        for parameter, coordinate in zip(problem.parameters, point, strict=True)
+    ]
 
 
 def as_json(values: Any) -> str:
@@ -145,13 +175,12 @@ def as_json(values: Any) -> str:
 
 
 def _map_variables(
-    found: Map, dims: tuple[str, str], prefix: str, replicate: str
+    found: Map, dims: tuple[str, ...], prefix: str, replicate: str
 ) -> dict[str, _Variable]:
     status = found.arrays["status"]
-    cause = np.zeros(status.shape[:2], dtype=np.int8)
-    cause[(status & STATUS["no_motion"]).all(axis=2) > 0] |= CELL_STATUS["no_motion"]
-    broken = (status & BROKEN) > 0
-    cause[broken.any(axis=2)] |= CELL_STATUS["non_finite"]
+    cause = np.zeros(status.shape[:-1], dtype=np.int8)
+    cause[(status & STATUS["no_motion"]).all(axis=-1) > 0] |= CELL_STATUS["no_motion"]
+    cause[broken_worlds(status).any(axis=-1)] |= CELL_STATUS["non_finite"]
     cause[found.arrays["pairs"] == 0] |= CELL_STATUS["too_few_steps"]
     flags = {
         "long_name": "reason why a setting has no ordinary distance",
@@ -174,9 +203,9 @@ def _map_variables(
     }
 
 
-def _details(coarse: Map) -> dict[str, _Variable]:
+def _details(coarse: Map, names: tuple[str, ...]) -> dict[str, _Variable]:
     arrays = coarse.arrays
-    place = (*GRID, "replicate")
+    place = (*names, "replicate")
     return {
         "ks_step_length": (
             place,
@@ -198,17 +227,17 @@ def _details(coarse: Map) -> dict[str, _Variable]:
             },
         ),
         "excerpt_x": (
-            (*GRID, "excerpt_sample"),
+            (*names, "excerpt_sample"),
             arrays["excerpt_x"],
             _units("m", "position x, first seconds of replicate 0"),
         ),
         "excerpt_y": (
-            (*GRID, "excerpt_sample"),
+            (*names, "excerpt_sample"),
             arrays["excerpt_y"],
             _units("m", "position y, first seconds of replicate 0"),
         ),
         "step_density": (
-            (*GRID, "density_step_length", "density_turning_angle"),
+            (*names, "density_step_length", "density_turning_angle"),
             arrays["step_density"].astype(np.float32),
             _units("1", "share of the steps in a bin"),
         ),
@@ -217,13 +246,14 @@ def _details(coarse: Map) -> dict[str, _Variable]:
 
 def _recording(problem: Problem) -> dict[str, _Variable]:
     length, angle = problem.steps.T
+    reference = problem.reference
     bins = [
-        np.linspace(0.0, problem.length_limit, DENSITY_BINS + 1),
-        np.linspace(-problem.angle_limit, problem.angle_limit, DENSITY_BINS + 1),
+        np.linspace(0.0, reference.length_limit, DENSITY_BINS + 1),
+        np.linspace(-reference.angle_limit, reference.angle_limit, DENSITY_BINS + 1),
     ]
     density, _, _ = np.histogram2d(
-        np.clip(length, 0.0, problem.length_limit),
-        np.clip(angle, -problem.angle_limit, problem.angle_limit),
+        np.clip(length, 0.0, reference.length_limit),
+        np.clip(angle, -reference.angle_limit, reference.angle_limit),
         bins=bins,
     )
     return {
@@ -244,7 +274,7 @@ def _recording(problem: Problem) -> dict[str, _Variable]:
         ),
         "excerpt_time": (
             ("excerpt_sample",),
-            problem.sample_time[: problem.excerpt],
+            problem.like.sample_time[: excerpt_samples(problem.like)],
             _units("s", "time of the excerpt's samples"),
         ),
     }

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from driftwalk.calibration.problem import Problem, prepare_problem
+from driftwalk.calibration.problem import Axes, Problem, prepare_problem
 from driftwalk.calibration.quality import (
     FAR_ABOVE_FLOOR,
     Halves,
@@ -16,25 +16,35 @@ from driftwalk.calibration.quality import (
     quality_of_fit,
     validate_on_halves,
 )
+from driftwalk.calibration.refuse import require_searchable
 from driftwalk.calibration.region import (
     Bootstrap,
     Region,
+    at_settings,
     build_surface,
     confidence_region,
     run_bootstrap,
 )
-from driftwalk.calibration.result import add_uncertainty, answer_attrs, as_json, build_calibration
+from driftwalk.calibration.result import (
+    add_uncertainty,
+    answer_attrs,
+    as_json,
+    build_calibration,
+    estimate_attrs,
+    interval_attrs,
+)
 from driftwalk.calibration.search import (
     Map,
-    Window,
     recentre,
     refined_replicates,
     refined_window,
     run_map,
     window_smoother,
 )
-from driftwalk.calibration.surface import FINENESS, Optimum
+from driftwalk.calibration.surface import Optimum
+from driftwalk.comparison import Statistic
 from driftwalk.core.errors import InputError
+from driftwalk.motion import BlockModel, Details, MotionModel
 from driftwalk.schema import Track, body_track
 from driftwalk.simulation import recorded_camera
 
@@ -48,7 +58,7 @@ MOST_RECENTRINGS = 3
 WIDE_SHARE = 0.05
 
 Tell = Callable[[str, int, int], None]
-FlowSource = Callable[[Track], "xr.Dataset"]
+FlowSource = Callable[[Track], "xr.Dataset | None"]
 
 
 class Stores(Protocol):
@@ -60,31 +70,39 @@ class Stores(Protocol):
 
 def calibrate(
     recording: xr.Dataset,
-    study: Study | None = None,
+    model: MotionModel | Study | None = None,
     *,
+    study: Study | None = None,
+    statistic: Statistic | None = None,
     flow: xr.Dataset | None = None,
     body: str | None = None,
     threads: int | None = None,
     stores: Stores | None = None,
     tell: Tell | None = None,
 ) -> xr.Dataset:
-    """Calibrate drag coefficient and stochastic force on a recording.
+    """Find the parameters of a motion model that explain a recording.
 
-    The paper's exhaustive grid over (C_d, sigma_F): every setting is simulated as long as the
-    recording, at its time stamps, with its gaps, start and camera noise, and its step lengths and
-    turning angles are compared with the recording's by the two-dimensional Kolmogorov-Smirnov
-    distance. A second, finer pass around the minimum follows; the optimum is that of a smooth
-    surface through it. A parametric bootstrap gives the intervals and the joint region, and the
-    distance at the optimum is judged against the noise floor.
+    An exhaustive grid over the model's parameters, one or two: every setting is simulated as long
+    as the recording, at its time stamps, with its gaps, start and camera noise, and its step
+    lengths and turning angles are compared with the recording's by the two-dimensional
+    Kolmogorov-Smirnov distance. A second, finer pass around the minimum follows; the optimum is
+    that of a smooth surface through it. A parametric bootstrap gives the intervals and the joint
+    region, and the distance at the optimum is judged against the noise floor. With the block in
+    stirred water, the default, this is the paper's calibration of (C_d, sigma_F).
 
     Parameters
     ----------
     recording : xarray.Dataset
         A `trajectory`.
+    model : MotionModel or Study, optional
+        What is calibrated: a `motion_model`, or the block of a study.
     study : Study, optional
-        Model and search; default: the paper's.
+        Tank, observation, step interval and search; default: that of `model`, else the paper's.
+        The ranges of the parameters are the model's.
+    statistic : Statistic, optional
+        The distance that is made small; default: `StepDistance`.
     flow : xarray.Dataset, optional
-        The water's velocity. Without it the field is extracted from the recording.
+        The water's velocity. For the block it is extracted from the recording when left out.
     body : str, optional
         The body, where the recording has several.
     threads : int, optional
@@ -97,15 +115,16 @@ def calibrate(
     Returns
     -------
     xarray.Dataset
-        See `driftwalk.calibration.result`. The answer stands in its attributes:
-        ``drag_coefficient``, ``force_std_N``, both with ``_interval``, ``force_interval_s``,
-        ``force_noise_intensity_N2_s`` (what the recording can tell), ``ks_distance``,
-        ``noise_floor``, ``warnings``.
+        See `driftwalk.calibration.result`. The answer stands in its attributes, under the names
+        of the parameters with their units: ``drag_coefficient`` and ``force_std_N`` for the block,
+        each with ``_interval``; ``ks_distance``, ``noise_floor``, ``warnings``; for the block
+        ``force_interval_s`` and ``force_noise_intensity_N2_s`` (what the recording can tell).
 
     Raises
     ------
     InputError
-        When the recording is too short, does not move, or several bodies are there and none named.
+        When the recording is too short, does not move, or several bodies are there and none named;
+        when the model has more than two parameters.
 
     Notes
     -----
@@ -119,19 +138,49 @@ def calibrate(
     >>> found.attrs["drag_coefficient"]  # doctest: +SKIP
     0.39
     """
-    from driftwalk.model import Study
-
-    chosen = study if study is not None else Study()
+    chosen, searched = _study_and_model(model, study)
+    require_searchable(searched)
     track = body_track(recording, body)
     quantum = float(recording.attrs.get("position_quantum_m", 0.0))
-    flow_of = _flow_source(chosen, flow)
+    flow_of = _flow_source(chosen, searched, flow)
     camera = recorded_camera(track, chosen, position_quantum=quantum)
-    problem = prepare_problem(track, chosen, flow_of(track), camera=camera, threads=threads)
+    problem = prepare_problem(
+        track,
+        chosen,
+        flow_of(track),
+        camera=camera,
+        model=searched,
+        statistic=statistic,
+        threads=threads,
+    )
     keep = stores if stores is not None else _in_memory
     say = tell if tell is not None else _silent
     result = _Calibration(problem, keep, say).run()
     halves = _halves(track, problem, flow_of, say)
     return _finish(result, halves, recording, problem)
+
+
+def _study_and_model(
+    model: MotionModel | Study | None, study: Study | None
+) -> tuple[Study, MotionModel]:
+    """Return the conditions and the search, and what is searched."""
+    from driftwalk.model import Study
+
+    if isinstance(model, Study):
+        if study is not None:
+            raise InputError("two studies are given: give one, or a motion model and a study")
+        return model, BlockModel(model)
+    if model is None:
+        chosen = study if study is not None else Study()
+        return chosen, BlockModel(chosen)
+    if not isinstance(model, MotionModel):
+        raise InputError(
+            f"expected a motion model or a study, got {type(model).__name__}: a function becomes "
+            "one by motion_model(function, speed=(0, 0.1, 'm/s'))"
+        )
+    if study is None:
+        study = model.study if isinstance(model, BlockModel) else Study()
+    return study, model
 
 
 def _in_memory(name: str, fingerprint: dict[str, Any]) -> Store | None:  # noqa: ARG001
@@ -142,9 +191,9 @@ def _silent(stage: str, done: int, total: int) -> None:
     """Tell nobody."""
 
 
-def _flow_source(study: Study, flow: xr.Dataset | None) -> FlowSource:
+def _flow_source(study: Study, model: MotionModel, flow: xr.Dataset | None) -> FlowSource:
     """Return what gives the flow for a track: the given field, or one extracted from the track."""
-    if flow is not None:
+    if flow is not None or not model.needs_flow:
         return lambda track: flow  # noqa: ARG005
     from driftwalk.calibration.own_flow import flow_from_track
 
@@ -162,22 +211,16 @@ class _Calibration:
         self.region: Region | None = None
         self._keep = keep
         self._say = say
-        grid = problem.study.calibration
-        self._steps = (grid.refined_drag_coefficient_step, grid.refined_force_std_step_N)
+        self._steps = problem.refined_steps
 
     def run(self) -> _Calibration:
         """Run every stage that the study asks for."""
         search = self.problem.study.calibration
-        self.coarse = self._map(
-            "coarse",
-            Window(np.array(search.drag_coefficients), np.array(search.force_stds_N)),
-            search.replicates,
-            "all",
-        )
-        row, column = self.coarse.cell_of_minimum()
-        cell = self.coarse.drag_coefficient[row], self.coarse.force_std[column]
-        self.optimum = Optimum(float(cell[0]), float(cell[1]), float(self.coarse.mean[row, column]))
-        self.floor = noise_floor_at(self.problem, *cell)
+        axes = tuple(np.array(one.coordinates) for one in self.problem.parameters)
+        self.coarse = self._map("coarse", axes, search.replicates, "all")
+        cell = self.coarse.cell_of_minimum()
+        self.optimum = Optimum(self.coarse.point(cell), float(self.coarse.mean[cell]))
+        self.floor = noise_floor_at(self.problem, self.optimum.point)
         self.refined: Map | None = None
         self.surface: Any = None
         if search.refine == "auto":
@@ -187,15 +230,14 @@ class _Calibration:
             self._bootstrap(search.bootstrap)
         return self
 
-    def _map(self, stage: str, window: Window, replicates: int, details: str) -> Map:
+    def _map(self, stage: str, window: Axes, replicates: int, details: Details) -> Map:
         store = self._keep(
             f"{stage}-{_window_id(window)}",
             {"axes": [axis.tolist() for axis in window], "replicates": replicates},
         )
         return run_map(
             self.problem,
-            window.drag_coefficient,
-            window.force_std,
+            window,
             stage=stage,
             replicates=replicates,
             details=details,
@@ -217,26 +259,24 @@ class _Calibration:
         self.window = window
 
     def _check_edges(self) -> None:
-        for axis, value, name in (
-            (self.coarse.drag_coefficient, self.optimum.drag_coefficient, "drag coefficient"),
-            (self.coarse.force_std, self.optimum.force_std, "force_std"),
+        for parameter, axis, value in zip(
+            self.problem.parameters, self.coarse.axes, self.optimum.point, strict=True
         ):
             spacing = np.diff(axis).min() if axis.size > 1 else 0.0
             for edge in {axis[0], axis[-1]}:
                 if abs(value - edge) <= 0.5 * spacing:
+                    found, end = (float(parameter.to_value(one)) for one in (value, edge))
                     self.warnings.append(
-                        f"the optimum lies at the edge of the grid: {name} = {value:g} with the "
-                        f"grid ending at {edge:g}; extend the grid, or question the model"
+                        f"the optimum lies at the edge of the grid: {parameter.label} = {found:g} "
+                        f"with the grid ending at {end:g}; extend the grid, or doubt the model"
                     )
 
     def _bootstrap(self, count: int) -> None:
         assert self.refined is not None
-        surface = build_surface(
-            self.problem, self.refined, self.optimum, self._steps, margin=self.floor
-        )
-        axes = (surface.smoother.drag_coefficient, surface.smoother.force_std)
+        surface = build_surface(self.problem, self.refined, self.optimum, margin=self.floor)
+        axes = surface.smoother.axes
         fingerprint = {
-            "optimum": list(self.optimum),
+            "optimum": [*self.optimum.point, self.optimum.distance],
             "axes": [axis.tolist() for axis in axes],
             "count": count,
         }
@@ -257,7 +297,7 @@ class _Calibration:
             confidence=self.problem.study.calibration.confidence,
             stretch=self.quality.stretch,
         )
-        self._check_window(*axes)
+        self._check_window(axes)
         if not self.quality.explained:
             self.warnings.append(
                 f"the model does not explain the recording: D = {self.quality.distance:.3f} at the "
@@ -265,43 +305,35 @@ class _Calibration:
                 f"floor {self.quality.floor:.3f}; the parameters are the best of bad fits"
             )
 
-    def _check_window(self, drag: Any, force: Any) -> None:
+    def _check_window(self, axes: Axes) -> None:
         """Warn where what could be the truth goes on beyond the settings that were simulated.
 
-        `drag` and `force` are the axes on which the bootstrap's recordings were estimated.
+        `axes` are those on which the bootstrap's recordings were estimated.
         """
         found, region = self.bootstrap, self.region
         assert found is not None
         assert region is not None
-        for axis, values, window, limits, interval, name in (
-            (
-                drag,
-                found.drag_coefficient,
-                self.window.drag_coefficient,
-                self.coarse.drag_coefficient,
-                region.drag_coefficient_interval,
-                "drag coefficient",
-            ),
-            (
-                force,
-                found.force_std,
-                self.window.force_std,
-                self.coarse.force_std,
-                region.force_std_interval,
-                "force_std",
-            ),
-        ):
+        for index, parameter in enumerate(self.problem.parameters):
+            axis, window, limits = axes[index], self.window[index], self.coarse.axes[index]
+            step = self._steps[index]
             for side in (0, -1):
-                crowded = np.mean(np.isclose(values, axis[side])) > WIDE_SHARE
-                cut = np.isclose(interval[side], window[side])
-                if (crowded or cut) and not np.isclose(window[side], limits[side]):
+                estimated_there = _close(found.estimates[:, index], axis[side], step)
+                crowded = np.mean(estimated_there) > WIDE_SHARE
+                cut = _close(region.intervals[index][side], window[side], step)
+                if (crowded or cut) and not _close(window[side], limits[side], step):
+                    end = float(parameter.to_value(window[side]))
                     self.warnings.append(
-                        f"the interval of the {name} reaches the end of the refined grid "
-                        f"({window[side]:g}): it is wider than stated"
+                        f"the interval of the {parameter.label} reaches the end of the refined "
+                        f"grid ({end:g}): it is wider than stated"
                     )
 
 
-def _window_id(window: Window) -> str:
+def _close(values: Any, end: float, step: float) -> Any:
+    """Return whether coordinates are the same but for rounding, on the scale of a grid's step."""
+    return np.abs(values - end) <= min(1e-8 + 1e-5 * abs(end), 1e-3 * step)
+
+
+def _window_id(window: Axes) -> str:
     """Name a grid by its ends and sizes, so that a moved window has a store of its own."""
     ends = [f"{axis[0]:.6g}-{axis[-1]:.6g}-{axis.size}" for axis in window]
     return "x".join(ends).replace(".", "p").replace("+", "")
@@ -319,15 +351,19 @@ def _halves(track: Track, problem: Problem, flow_of: FlowSource, say: Tell) -> H
         flow = flow_of(early)
         first, second = (
             prepare_problem(
-                half, problem.study, flow, camera=problem.camera, threads=problem.threads
+                half,
+                problem.study,
+                flow,
+                camera=problem.like.camera,
+                model=problem.model,
+                statistic=problem.statistic,
+                threads=problem.like.threads,
             )
             for half in (early, late)
         )
     except InputError:
         return None
-    search = problem.study.calibration
-    steps = (search.refined_drag_coefficient_step, search.refined_force_std_step_N)
-    halves = validate_on_halves(first, second, steps=steps)
+    halves = validate_on_halves(first, second)
     say("validation", 1, 1)
     return halves
 
@@ -337,7 +373,7 @@ def _finish(
 ) -> xr.Dataset:
     """Put the pieces into one dataset and state the answer in its attributes."""
     study = problem.study
-    attrs: dict[str, Any] = answer_attrs(problem, found.optimum)
+    attrs: dict[str, Any] = answer_attrs(problem, found.optimum.point)
     attrs["ks_distance"] = found.optimum.distance
     attrs["noise_floor"] = found.floor
     if found.quality is not None:
@@ -346,33 +382,24 @@ def _finish(
         attrs["noise_floor_upper"] = found.quality.floor_upper
         attrs["distance_to_floor_ratio"] = found.quality.distance / found.quality.floor
         attrs["far_above_floor"] = FAR_ABOVE_FLOOR
-    attrs["coarse_drag_coefficient"], attrs["coarse_force_std_N"] = _coarse_cell(found.coarse)
+    lowest = found.coarse.point(found.coarse.cell_of_minimum())
+    attrs.update(estimate_attrs(problem, lowest, "coarse_"))
     if halves is not None:
-        attrs["first_half_drag_coefficient"] = halves.drag_coefficient
-        attrs["first_half_force_std_N"] = halves.force_std
+        attrs.update(estimate_attrs(problem, halves.point, "first_half_"))
         attrs["second_half_ks_distance"] = halves.distance
         attrs["second_half_noise_floor"] = halves.floor
     attrs["recording_name"] = str(recording.attrs.get("source", ""))
     attrs["simulated_recording"] = str(recording.attrs.get("simulated", "no"))
     attrs["study"] = study.to_toml()
-    # The lattice of the surface meets the refined settings at every FINENESS-th point.
-    surface = None
-    if found.surface is not None:
-        surface = found.surface[::FINENESS, ::FINENESS]
+    surface = None if found.surface is None else at_settings(found.surface)
     dataset = build_calibration(problem, found.coarse, found.refined, surface, attrs=attrs)
     if found.bootstrap is not None:
         assert found.quality is not None
         assert found.region is not None
-        dataset = add_uncertainty(dataset, found.bootstrap, found.region)
+        dataset = add_uncertainty(dataset, problem, found.bootstrap, found.region)
         dataset.attrs["region_level"] = found.region.level
         dataset.attrs["interval_stretch"] = found.quality.stretch
-        dataset.attrs["drag_coefficient_interval"] = list(found.region.drag_coefficient_interval)
-        dataset.attrs["force_std_N_interval"] = list(found.region.force_std_interval)
+        dataset.attrs.update(interval_attrs(problem, found.region))
         dataset.attrs["confidence"] = study.calibration.confidence
     dataset.attrs["warnings"] = as_json(found.warnings)
     return dataset
-
-
-def _coarse_cell(coarse: Map) -> tuple[float, float]:
-    row, column = coarse.cell_of_minimum()
-    return float(coarse.drag_coefficient[row]), float(coarse.force_std[column])

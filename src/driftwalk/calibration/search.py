@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.problem import Floats, Problem, score_worlds, worlds_of
+from driftwalk.calibration.problem import Axes, Floats, Problem, score_settings
 from driftwalk.calibration.surface import Optimum, Smoother, make_smoother
-from driftwalk.simulation.backend import BROKEN
+from driftwalk.motion import Details
+from driftwalk.motion.score import broken_worlds
 from driftwalk.sweep import Design, Store, WorkUnit, grid, run_sweep
 
 Progress = Callable[[int, int], None]
@@ -22,18 +24,19 @@ WINDOW_STEPS = 10
 MOST_REFINED_WORLDS = 7056
 BANDWIDTH_STEPS = 2.0
 """Bandwidth of the surface in refined steps."""
+ROUNDING = 1e-12
+"""What rounding may leave between two coordinates that are the same."""
 
 
 class Map(NamedTuple):
     """Distances over a grid of settings."""
 
-    drag_coefficient: Floats
-    force_std: Floats
-    """[N]"""
+    axes: Axes
+    """Coordinates of the grid, one array per parameter."""
     distance: Floats
-    """Shape (drag_coefficient, force_std, replicate)."""
+    """Shape (*grid, replicate)."""
     arrays: dict[str, npt.NDArray[Any]]
-    """Everything else that the worlds gave, (drag_coefficient, force_std, ...)."""
+    """Everything else that the worlds gave, (*grid, ...)."""
 
     @property
     def mean(self) -> Floats:
@@ -48,20 +51,23 @@ class Map(NamedTuple):
             return np.full(self.distance.shape[:-1], np.nan)
         return np.asarray(self.distance.std(axis=-1, ddof=1) / np.sqrt(count))
 
-    def cell_of_minimum(self) -> tuple[int, int]:
+    def cell_of_minimum(self) -> tuple[int, ...]:
         """Return the indices of the smallest mean distance."""
-        row, column = np.unravel_index(int(np.argmin(self.mean)), self.mean.shape)
-        return int(row), int(column)
+        lowest = np.unravel_index(int(np.argmin(self.mean)), self.mean.shape)
+        return tuple(int(index) for index in lowest)
+
+    def point(self, cell: Sequence[int]) -> tuple[float, ...]:
+        """Return the coordinates of a cell."""
+        return tuple(float(axis[at]) for axis, at in zip(self.axes, cell, strict=True))
 
 
 def run_map(
     problem: Problem,
-    drag_coefficient: npt.ArrayLike,
-    force_std: npt.ArrayLike,
+    axes: Sequence[npt.ArrayLike],
     *,
     stage: str,
     replicates: int,
-    details: str,
+    details: Details = "none",
     store: Store | None = None,
     progress: Progress | None = None,
 ) -> Map:
@@ -70,9 +76,9 @@ def run_map(
     Parameters
     ----------
     problem : Problem
-        The recording.
-    drag_coefficient, force_std : array_like
-        Axes of the grid; force_std in N.
+        The recording and the model.
+    axes : sequence of array_like
+        Coordinates of the grid, one array per parameter.
     stage : str
         Name of the stage; its random streams are its own.
     replicates : int
@@ -84,26 +90,25 @@ def run_map(
     progress : callable, optional
         Told the number of settings done and in all.
     """
-    design: Design = grid(drag_coefficient=drag_coefficient, force_std=force_std)
-    model = problem.model()
+    names = [parameter.name for parameter in problem.parameters]
+    design: Design = grid(**dict(zip(names, axes, strict=True)))
 
     def compute(unit: WorkUnit) -> dict[str, npt.NDArray[Any]]:
-        worlds = worlds_of(
+        worlds = score_settings(
             problem,
-            unit.settings["drag_coefficient"],
-            unit.settings["force_std"],
+            [unit.settings[name] for name in names],
             stage=stage,
             first=unit.start,
             replicates=replicates,
+            details=details,
         )
-        return _by_setting(score_worlds(problem, model, worlds, details=details), replicates)
+        return _by_setting(worlds, replicates)
 
     arrays = design.unstack(
         run_sweep(compute, design.units(SETTINGS_PER_UNIT), store=store, progress=progress)
     )
     distance = arrays.pop("ks_distance")
-    axes = design.axes
-    return Map(axes["drag_coefficient"], axes["force_std"], distance, arrays)
+    return Map(tuple(design.axes[name] for name in names), distance, arrays)
 
 
 def _by_setting(
@@ -114,8 +119,7 @@ def _by_setting(
         name: values.reshape(-1, replicates, *values.shape[1:]) for name, values in worlds.items()
     }
     # A world that lost its numbers has no distance; one that does not move is as far as can be.
-    broken = (rows["status"] & BROKEN) != 0
-    rows["ks_distance"] = np.where(broken, np.nan, rows["ks_distance"])
+    rows["ks_distance"] = np.where(broken_worlds(rows["status"]), np.nan, rows["ks_distance"])
     rows["pairs"] = rows["pairs"].min(axis=1)
     if "step_density" in rows:
         rows["step_density"] = rows["step_density"].mean(axis=1)
@@ -124,29 +128,22 @@ def _by_setting(
     return rows
 
 
-class Window(NamedTuple):
-    """A refined grid: its axes."""
-
-    drag_coefficient: Floats
-    force_std: Floats
-
-
-def refined_window(coarse: Map, steps: tuple[float, float], margin: float) -> Window:
+def refined_window(coarse: Map, steps: Sequence[float], margin: float) -> Axes:
     """Choose the refined grid: the coarse cells that could hold the optimum, and some around.
 
     Parameters
     ----------
     coarse : Map
         The first pass.
-    steps : tuple of float
-        Steps of the refined grid along both axes.
+    steps : sequence of float
+        Steps of the refined grid along each axis.
     margin : float
         Cells connected with the minimum whose distance is within `margin` of it are covered; it is
         the noise floor of the distance.
 
     Returns
     -------
-    Window
+    tuple of ndarray
         At least 10 steps on each side of the minimum, within the coarse grid, and no more cells
         than `MOST_REFINED_WORLDS` allows at two replicates.
     """
@@ -155,63 +152,49 @@ def refined_window(coarse: Map, steps: tuple[float, float], margin: float) -> Wi
     cell = coarse.cell_of_minimum()
     labels, _ = label(coarse.mean <= coarse.mean[cell] + margin)
     plausible = np.argwhere(labels == labels[cell])
-    ranges = []
+    most = int((MOST_REFINED_WORLDS / 2) ** (1.0 / len(steps))) // 2
+    axes = []
     for axis, step, low, high, at in zip(
-        (coarse.drag_coefficient, coarse.force_std),
-        steps,
-        plausible.min(axis=0),
-        plausible.max(axis=0),
-        cell,
-        strict=True,
+        coarse.axes, steps, plausible.min(axis=0), plausible.max(axis=0), cell, strict=True
     ):
         first = axis[max(low - 1, 0)]
         last = axis[min(high + 1, axis.size - 1)]
         down = max(int(np.ceil((axis[at] - first) / step - 1e-9)), WINDOW_STEPS)
         up = max(int(np.ceil((last - axis[at]) / step - 1e-9)), WINDOW_STEPS)
-        ranges.append((down, up))
-    most = int(np.sqrt(MOST_REFINED_WORLDS / 2)) // 2
-    axes = [
-        _refined_axis(axis, axis[at], step, min(down, most), min(up, most))
-        for axis, at, step, (down, up) in zip(
-            (coarse.drag_coefficient, coarse.force_std), cell, steps, ranges, strict=True
-        )
-    ]
-    return Window(*axes)
+        axes.append(_refined_axis(axis, axis[at], step, min(down, most), min(up, most)))
+    return tuple(axes)
 
 
 def _refined_axis(axis: Floats, centre: float, step: float, down: int, up: int) -> Floats:
-    values = np.round(centre + step * np.arange(-down, up + 1), 12)
-    inside = (values >= axis[0] - 1e-12) & (values <= axis[-1] + 1e-12)
+    # Twelve digits make a value the decimal that it is; a small step has the digits it needs.
+    digits = max(12, 3 - math.floor(math.log10(step)))
+    values = np.round(centre + step * np.arange(-down, up + 1), digits)
+    slack = min(ROUNDING, 1e-6 * step)
+    inside = (values >= axis[0] - slack) & (values <= axis[-1] + slack)
     return np.asarray(values[inside])
 
 
-def refined_replicates(window: Window, wanted: int) -> int:
+def refined_replicates(window: Axes, wanted: int) -> int:
     """Return how many replicates a window can have without outgrowing the coarse map's cost."""
-    cells = window.drag_coefficient.size * window.force_std.size
+    cells = math.prod(axis.size for axis in window)
     return max(min(wanted, MOST_REFINED_WORLDS // cells), 2)
 
 
-def recentre(window: Window, optimum: Optimum, coarse: Map, steps: tuple[float, float]) -> Window:
+def recentre(window: Axes, optimum: Optimum, coarse: Map, steps: Sequence[float]) -> Axes:
     """Return the window moved so that an optimum near its edge comes to its middle."""
     axes = []
-    for axis, limits, value, step in zip(
-        window,
-        (coarse.drag_coefficient, coarse.force_std),
-        (optimum.drag_coefficient, optimum.force_std),
-        steps,
-        strict=True,
-    ):
+    for axis, limits, value, step in zip(window, coarse.axes, optimum.point, steps, strict=True):
+        slack = min(ROUNDING, 1e-6 * step)
         half = max((axis.size - 1) // 2, WINDOW_STEPS)
-        at_low = value - axis[0] < 2.5 * step and axis[0] > limits[0] + 1e-12
-        at_high = axis[-1] - value < 2.5 * step and axis[-1] < limits[-1] - 1e-12
+        at_low = value - axis[0] < 2.5 * step and axis[0] > limits[0] + slack
+        at_high = axis[-1] - value < 2.5 * step and axis[-1] < limits[-1] - slack
         if at_low or at_high:
             nearest = axis[int(np.argmin(np.abs(axis - value)))]
             axis = _refined_axis(limits, nearest, step, half, half)
         axes.append(axis)
-    return Window(*axes)
+    return tuple(axes)
 
 
-def window_smoother(window: Window, steps: tuple[float, float]) -> Smoother:
+def window_smoother(window: Axes, steps: Sequence[float]) -> Smoother:
     """Return the smoother of a refined grid, with the bandwidth that all stages share."""
-    bandwidth = (BANDWIDTH_STEPS * steps[0], BANDWIDTH_STEPS * steps[1])
-    return make_smoother(window.drag_coefficient, window.force_std, bandwidth=bandwidth)
+    return make_smoother(window, bandwidth=[BANDWIDTH_STEPS * step for step in steps])

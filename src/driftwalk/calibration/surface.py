@@ -1,15 +1,17 @@
 """The optimum of a smooth surface through noisy distances, instead of the luckiest cell.
 
-At every point of a fine lattice a quadratic in (C_d, sigma_F) is fitted to the distances of the
-cells nearby, weighted by (1 - r^2/4)^3 for r < 2 bandwidths, and its value there is the surface.
-The fit is linear in the data: one matrix serves the recording and every bootstrap sample. The
-valley of D is narrow and sharp in C_d, so the bandwidth is two refined steps: wider ones shift the
-minimum towards the flatter side.
+At every point of a fine lattice a quadratic in the n parameters, (n + 1)(n + 2) / 2 terms, is
+fitted to the distances of the cells nearby, weighted by (1 - r^2/4)^3 for r < 2 bandwidths, and its
+value there is the surface. The fit is linear in the data: one matrix serves the recording and every
+bootstrap sample. The valley of D of the block is narrow and sharp in C_d, so the bandwidth is two
+refined steps: wider ones shift the minimum towards the flatter side.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations_with_replacement
 from typing import NamedTuple
 
 import numpy as np
@@ -25,9 +27,8 @@ _RIDGE = 1e-9
 class Optimum(NamedTuple):
     """The lowest point of a surface."""
 
-    drag_coefficient: float
-    force_std: float
-    """[N]"""
+    point: tuple[float, ...]
+    """Its coordinates, one per parameter."""
     distance: float
     """Value of the smooth surface there (a KS distance)."""
 
@@ -38,43 +39,48 @@ class Smoother:
 
     Attributes
     ----------
-    drag_coefficient, force_std : ndarray
-        Axes of the lattice.
+    axes : tuple of ndarray
+        Axes of the lattice, one per parameter.
     matrix : ndarray, shape (lattice points, cells)
         Weights of the cells in the value at each lattice point.
     """
 
-    drag_coefficient: Floats
-    force_std: Floats
+    axes: tuple[Floats, ...]
     matrix: Floats
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Points of the lattice along each axis."""
+        return tuple(axis.size for axis in self.axes)
 
     def surface(self, distance: Floats) -> Floats:
         """Return the surface on the lattice, from distances on the grid (..., cells)."""
         values = np.asarray(distance) @ self.matrix.T
-        shape = (*values.shape[:-1], self.drag_coefficient.size, self.force_std.size)
-        return np.asarray(values.reshape(shape))
+        return np.asarray(values.reshape(*values.shape[:-1], *self.shape))
 
     def optimum(self, distance: Floats) -> Optimum:
         """Return the minimum of the surface through distances on the grid, shape (cells,)."""
         surface = self.surface(np.ravel(distance))
-        row, column = np.unravel_index(int(np.argmin(surface)), surface.shape)
-        return Optimum(
-            float(self.drag_coefficient[row]),
-            float(self.force_std[column]),
-            float(surface[row, column]),
+        lowest = np.unravel_index(int(np.argmin(surface)), surface.shape)
+        point = tuple(float(axis[at]) for axis, at in zip(self.axes, lowest, strict=True))
+        return Optimum(point, float(surface[lowest]))
+
+    def nearest(self, point: Sequence[float]) -> tuple[int, ...]:
+        """Return the indices of the lattice point next to a point."""
+        return tuple(
+            int(np.argmin(np.abs(axis - value)))
+            for axis, value in zip(self.axes, point, strict=True)
         )
 
 
-def make_smoother(
-    drag_coefficient: Floats, force_std: Floats, *, bandwidth: tuple[float, float]
-) -> Smoother:
+def make_smoother(axes: Sequence[Floats], *, bandwidth: Sequence[float]) -> Smoother:
     """Prepare the surface for a grid.
 
     Parameters
     ----------
-    drag_coefficient, force_std : ndarray
-        Axes of the grid, increasing, evenly spaced.
-    bandwidth : tuple of float
+    axes : sequence of ndarray
+        Axes of the grid, one per parameter, increasing, evenly spaced.
+    bandwidth : sequence of float
         Bandwidth of the fit along each axis, in the axis's unit; at least one grid step is used.
 
     Returns
@@ -86,35 +92,41 @@ def make_smoother(
     --------
     >>> axis = np.linspace(-1.0, 1.0, 9)
     >>> bowl = (axis[:, None] - 0.3) ** 2 + axis[None, :] ** 2
-    >>> make_smoother(axis, axis, bandwidth=(0.5, 0.5)).optimum(bowl).drag_coefficient
-    0.3125
+    >>> make_smoother([axis, axis], bandwidth=(0.5, 0.5)).optimum(bowl).point
+    (0.3125, 0.0)
     """
-    lattice = [_lattice(axis) for axis in (drag_coefficient, force_std)]
+    lattice = tuple(_lattice(axis) for axis in axes)
     widths = [
-        max(width, 1.01 * _spacing(axis))
-        for axis, width in zip((drag_coefficient, force_std), bandwidth, strict=True)
+        max(width, 1.01 * _spacing(axis)) for axis, width in zip(axes, bandwidth, strict=True)
     ]
-    cell_x, cell_y = (
+    cells = [
         grid.ravel() / width
-        for grid, width in zip(
-            np.meshgrid(drag_coefficient, force_std, indexing="ij"), widths, strict=True
-        )
-    )
-    rows = [_fit_row(x / widths[0], lattice[1] / widths[1], cell_x, cell_y) for x in lattice[0]]
-    return Smoother(lattice[0], lattice[1], np.concatenate(rows))
+        for grid, width in zip(np.meshgrid(*axes, indexing="ij"), widths, strict=True)
+    ]
+    scaled = [axis / width for axis, width in zip(lattice, widths, strict=True)]
+    # One row of the lattice at a time: all its points but those of the first axis.
+    rest = [grid.ravel() for grid in np.meshgrid(*scaled[1:], indexing="ij")]
+    rows = [_fit_row(x, rest, cells) for x in scaled[0]]
+    return Smoother(lattice, np.concatenate(rows))
 
 
-def _fit_row(x: float, y: Floats, cell_x: Floats, cell_y: Floats) -> Floats:
-    """Return the weights of the cells at the lattice points (x, y[0]), (x, y[1]), ..."""
-    dx = np.broadcast_to(cell_x - x, (y.size, cell_x.size))
-    dy = cell_y - y[:, None]
-    weight = np.clip(1.0 - (dx**2 + dy**2) / 4.0, 0.0, None) ** 3
-    terms = np.stack([np.ones_like(dx), dx, dy, dx**2, dx * dy, dy**2], axis=-1)
+def _fit_row(x: float, rest: Sequence[Floats], cells: Sequence[Floats]) -> Floats:
+    """Return the weights of the cells at the lattice points (x, rest[0]), (x, rest[1]), ..."""
+    points = rest[0].size if rest else 1
+    away = [np.broadcast_to(cells[0] - x, (points, cells[0].size))]
+    away += [cell - at[:, None] for cell, at in zip(cells[1:], rest, strict=True)]
+    squares = away[0] ** 2
+    for one in away[1:]:
+        squares = squares + one**2
+    weight = np.clip(1.0 - squares / 4.0, 0.0, None) ** 3
+    products = [a * b for a, b in combinations_with_replacement(away, 2)]
+    terms = np.stack([np.ones_like(away[0]), *away, *products], axis=-1)
     weighted = terms * weight[..., None]
     normal = np.einsum("lca,lcb->lab", weighted, terms)
     # Where a narrow grid cannot tell two terms apart the ridge decides, and the value stays sound.
-    normal += _RIDGE * np.eye(6) * weight.sum(axis=1)[:, None, None]
-    value = np.zeros((y.size, 6, 1))
+    count = terms.shape[-1]
+    normal += _RIDGE * np.eye(count) * weight.sum(axis=1)[:, None, None]
+    value = np.zeros((points, count, 1))
     value[:, 0] = 1.0
     solution = np.linalg.solve(normal, value)[..., 0]
     fitted: Floats = np.einsum("la,lca->lc", solution, weighted)

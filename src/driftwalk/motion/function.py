@@ -102,8 +102,11 @@ class FunctionModel:
         }
 
     def facts(self, estimate: Mapping[str, float]) -> dict[str, Any]:  # noqa: ARG002
-        """Return nothing more: the answer is in the parameters."""
-        return {}
+        """Return which function it was: its name, and a hash of its source where there is one."""
+        described = self.describe()
+        source = described["source_sha256"]
+        hashed = {} if source is None else {"model_source_sha256": source}
+        return {"model": self.name, **hashed}
 
     def _batches(self, values: Values, like: Conditions, keys: Keys) -> list[slice]:
         """Return the worlds of each call: of one setting, unless many may be in a batch."""
@@ -217,9 +220,8 @@ def motion_model(
     >>> import driftwalk as dw
     >>> def diffuse(scene, *, diffusivity):
     ...     spread = np.sqrt(2 * diffusivity * np.diff(scene.times, prepend=0.0))
-    ...     step = spread * scene.random.normal(2, scene.times.size)
-    ...     path = np.cumsum(step, axis=-1)
-    ...     return scene.start.x[:, None] + path[:, 0], scene.start.y[:, None] + path[:, 1]
+    ...     x, y = (np.cumsum(spread * scene.random.normal(spread.size), axis=1) for _ in "xy")
+    ...     return scene.start.x[:, None] + x, scene.start.y[:, None] + y
     >>> dw.motion_model(diffuse, diffusivity=(1e-6, 1e-4, "m2/s")).parameters[0].key
     'diffusivity_m2_s'
     """

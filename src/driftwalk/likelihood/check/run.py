@@ -133,7 +133,7 @@ def check_model(
             np.concatenate([problem.steps for problem in problems]),
             replicates_at_estimate(fit, problems, count=replicates, seed=seed),
             drawn,
-            threads=problems[0].threads,
+            threads=problems[0].like.threads,
         )
         paths = [(one.series.time, one.series.x, one.series.y) for one in errors]
         scan = scan_of(paths, drawn.paths, found.layout)

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk import _core
 from driftwalk.calibration.problem import Problem, prepare_problem
 from driftwalk.comparison import apply_steps, plan_steps
 from driftwalk.core.errors import InputError
@@ -23,8 +22,6 @@ from driftwalk.likelihood.result import fitted_flow
 from driftwalk.likelihood.spline import Floats
 from driftwalk.schema import Track
 from driftwalk.simulation import recorded_camera
-from driftwalk.simulation.backend import world_table
-from driftwalk.simulation.initial import world_orientations
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -152,17 +149,19 @@ def replicates_drawn(
         def simulated(
             k: int, problem: Problem = problem, keys: Keys = keys, series: Series = series
         ) -> list[_World]:
-            x, y = problem.flow["x"].values, problem.flow["y"].values
+            like = problem.like
+            assert like.flow is not None
+            x, y = like.flow["x"].values, like.flow["y"].values
             point = replace(estimate.point, coefficients=coefficients[k]).in_flow(series.flow)
             u, v = estimate.passes.spline.values(point.coefficients, x, y)
-            flow = problem.flow.assign(u=(("y", "x"), u), v=(("y", "x"), v))
-            noise = problem.camera.position_noise * float(factors[k, 2])
-            camera = replace(problem.camera, position_noise=noise)
-            own = replace(problem, flow=flow, camera=camera, threads=1)
+            flow = like.flow.assign(u=(("y", "x"), u), v=(("y", "x"), v))
+            noise = like.camera.position_noise * float(factors[k, 2])
+            camera = replace(like.camera, position_noise=noise)
+            own = replace(problem, like=replace(like, flow=flow, camera=camera, threads=1))
             begin = float(series.time[0])
             return _simulated(own, keys[flow_of == k], float(drag[k]), float(force[k]), begin)
 
-        with ThreadPoolExecutor(problem.threads) as pool:
+        with ThreadPoolExecutor(problem.like.threads) as pool:
             found = list(pool.map(simulated, range(flows)))
         parts.append([found[k][j // flows] for j, k in enumerate(flow_of)])
     return _joined(parts, flow_of)
@@ -207,20 +206,17 @@ def _keys(seed: int, kind: int, index: int, count: int) -> Keys:
 def _simulated(
     problem: Problem, keys: Keys, drag: float, force: float, begin: float = 0.0
 ) -> list[_World]:
-    start = problem.start
-    table = world_table(
-        **{**start._asdict(), "theta": world_orientations(start.theta, keys)},
-        drag_coefficient=np.full(keys.size, drag),
-        force_std=force,
-    )
-    x, y, _, status = _core.simulate(
-        problem.model(), table, keys, threads=problem.threads, precision="single"
-    )
+    like = problem.like
+    values = {
+        "drag_coefficient": np.full(keys.size, drag),
+        "force_std": np.full(keys.size, force),
+    }
+    x, y, _, status = problem.model.simulate(values, like, keys)
     worlds = []
     for k in range(keys.size):
-        found = apply_steps(problem.plan, x[k], y[k])
+        found = apply_steps(problem.reference.plan, x[k], y[k])
         steps = np.column_stack([found.step_length, found.turning_angle])
-        path = (begin + problem.sample_time, x[k].astype(np.float64), y[k].astype(np.float64))
+        path = (begin + like.sample_time, x[k].astype(np.float64), y[k].astype(np.float64))
         worlds.append(_World(steps, path, bool(status[k] == 0 and len(steps) > 0)))
     return worlds
 
