@@ -136,7 +136,7 @@ def test_the_block_is_a_model_among_others():
     recording = dw.tank30_recording().isel(time=slice(0, 600))
     flow = dw.tank30_flow()
     as_study = dw.calibrate(recording, study, flow=flow)
-    assert dw.calibrate(recording, dw.BlockModel(study), flow=flow).identical(as_study)
+    assert dw.calibrate(recording, dw.motion.BlockModel(study), flow=flow).identical(as_study)
     assert dw.calibrate(recording, study=study, flow=flow).identical(as_study)
 
 

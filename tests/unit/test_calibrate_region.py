@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from matplotlib.path import Path
 
-from driftwalk.calibration.region import Bootstrap, confidence_region
+from driftwalk.calibration.region import Bootstrap, confidence_region, region_contains
 from driftwalk.calibration.surface import make_smoother
 
 DRAG = np.linspace(0.3, 0.5, 21)

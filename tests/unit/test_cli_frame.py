@@ -20,6 +20,7 @@ import typer
 from driftwalk import __version__
 from driftwalk.cli import main as cli_main
 from driftwalk.cli.main import COMMANDS, Command, main
+from driftwalk.cli.options import shared as options
 from driftwalk.cli.options.shared import (
     DragCoefficient,
     ForceStd,
@@ -28,7 +29,6 @@ from driftwalk.cli.options.shared import (
     TankDiameter,
     option_name,
     resolve_study,
-    shared as options,
 )
 from driftwalk.cli.terminal.output import print_json, print_table, to_json
 from driftwalk.cli.terminal.progress import ProgressReporter, duration_text

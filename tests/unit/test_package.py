@@ -57,7 +57,7 @@ def test_unknown_name_is_an_attribute_error() -> None:
 
 def test_functions_pickle_and_show_their_signature() -> None:
     assert pickle.loads(pickle.dumps(driftwalk.simulate)) is driftwalk.simulate
-    assert "Simulate one block" in str(driftwalk.simulation.__doc__)
+    assert "Simulate one block" in str(driftwalk.simulate.__doc__)
 
 
 def test_errors_are_exported() -> None:

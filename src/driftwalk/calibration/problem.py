@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from driftwalk.comparison import Statistic, StepDistance, StepReference, plan_steps
 from driftwalk.core.errors import InputError
-from driftwalk.core.processors import default_threads
 from driftwalk.core.seeds import world_keys
 from driftwalk.motion import (
     BlockModel,

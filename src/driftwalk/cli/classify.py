@@ -98,7 +98,7 @@ def classify(
     is the multiset of the shapes that they form. The side of the blocks is that of the study, by
     default 3 cm.
     """
-    from driftwalk.assembly import recordings as classify_recording
+    from driftwalk.assembly import classify as classify_recording
     from driftwalk.core.atomic import require_target
 
     if out is not None:

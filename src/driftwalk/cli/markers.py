@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from driftwalk.cli.main import paragraphs
-from driftwalk.cli.options.shared import tracking as given
+from driftwalk.cli.options import tracking as given
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.terminal.output import print_note, print_table
 from driftwalk.core.errors import DriftwalkError, InputError

@@ -7,7 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from driftwalk.cli.options.shared import Json, tracking as given
+from driftwalk.cli.options import tracking as given
+from driftwalk.cli.options.shared import Json
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.terminal.output import print_json, print_note, print_table
 from driftwalk.core.errors import InputError

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from driftwalk.cli.options.shared import tracking as given
+from driftwalk.cli.options import tracking as given
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.terminal.output import print_note
 from driftwalk.core.errors import InputError

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from driftwalk.comparison import Statistic, StepDistance, StepReference, StepTable, step_table
 from driftwalk.motion.conditions import Conditions
 from driftwalk.motion.protocol import Details, Keys, MotionModel, Scores, ScoresItself, Values
+from driftwalk.simulation.backend import BROKEN
 
 DENSITY_BINS: Final = 32
 EXCERPT_S: Final = 30.0
@@ -96,6 +97,11 @@ def score_worlds(
             "excerpt_y": worlds.y[:, :first].astype(np.float32),
         }
     return scores
+
+
+def broken_worlds(status: npt.NDArray[np.uint32]) -> npt.NDArray[np.bool_]:
+    """Return which worlds lost their numbers: they have no distance."""
+    return np.asarray((status & BROKEN) != 0)
 
 
 def excerpt_samples(like: Conditions) -> int:

@@ -13,8 +13,8 @@ from driftwalk.assembly import (
     assemble,
     assembly_path,
     class_at,
+    classify,
     path_recording,
-    recordings as classify,
 )
 from driftwalk.assembly.lattice.polyomino import polyomino_name
 from driftwalk.datasets import tank30_flow

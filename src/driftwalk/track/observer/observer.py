@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly import recordings as classify
+from driftwalk.assembly import classify
 from driftwalk.assembly.lattice.join_history import Event, JoinHistory
 from driftwalk.assembly.lattice.joined_faces import QUARTER, ROUNDING, Join, JoinRules, PairPoses
 from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
