@@ -115,10 +115,10 @@ def test_a_recording_that_packs_as_well_as_any_is_read(tmp_path: Path) -> None:
         (lambda d: d.assign(x=("time", d["x"].values[:, 0])), r"'x' lies on \(time\)"),
         (lambda d: d.assign(x=(d["x"].dims, d["x"].values.astype(str))), "'x' holds no numbers"),
         (lambda d: d.assign_coords(body=[7.0]), "'body' holds no text"),
-        (lambda d: d.assign_attrs(arena=3.0), "attribute 'arena' is no text"),
-        (lambda d: d.assign_attrs(arena=DEEP), "attribute 'arena' is no JSON"),
+        (lambda d: d.assign_attrs(arena=3.0), "attribute 'arena' is not text"),
+        (lambda d: d.assign_attrs(arena=DEEP), "attribute 'arena' is not JSON"),
         (lambda d: d.assign_attrs(counts="[1]"), "attribute 'counts' holds no JSON object"),
-        (lambda d: d.assign_attrs(position_quantum_m="x"), "'position_quantum_m' is no number"),
+        (lambda d: d.assign_attrs(position_quantum_m="x"), "'position_quantum_m' is not a number"),
     ],
 )
 def test_an_odd_trajectory_is_refused(tmp_path: Path, change, message: str) -> None:

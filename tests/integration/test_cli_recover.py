@@ -160,7 +160,7 @@ def test_people_read_a_table_of_random_flows_without_orientation(tmp_path: Path)
         (("0.6mN", "0mN"), "the truth lacks [forces] force_std_N"),
         (('position_noise_m = "0.3mm"\n', ""), "lacks [observation] position_noise_m"),
         (('orientation_noise_rad = "0.5deg"\n', ""), "lacks [observation] orientation_noise_rad"),
-        (('flow = "flow/true.csv"\n', ""), "nothing says how the water moves"),
+        (('flow = "flow/true.csv"\n', ""), "the flow of the water is missing"),
         (("flow/true.csv", "nowhere.nc"), "nowhere.nc: there is no such file"),
         (("recordings = 3", "recordings = 1"), "[recover] recordings: must be at least 2"),
         (('"1min"', '"3s"'), "the fit needs 100 at least"),

@@ -172,7 +172,7 @@ def test_other_axes_and_the_answer_for_people(tmp_path: Path) -> None:
     assert any(line.startswith("smallest: ") and "blocks = 3" in line for line in lines)
     head = next(line for line in lines if line.startswith("Sobol' indices"))
     assert "tank_diameter" in head
-    assert "the wall of a smaller one cuts it off" in done.err
+    assert "the wall of a smaller tank cuts it off" in done.err
     assert "they have no l1 distance" in done.err
     found, indices = (dataset(tmp_path / "run" / f"{n}.nc") for n in ("sensitivity", "sobol"))
     assert found.sizes["class"] == 6

@@ -300,7 +300,7 @@ def test_mistakes_are_said_in_one_line(folder: Path, tmp_path: Path) -> None:
     assert "is not a video that OpenCV can read" in refusal(
         here("track", text, "--markers", markers, *TANK, "-o", out)
     )
-    assert "it takes markers with an orientation" in refusal(
+    assert "watch needs markers with an orientation" in refusal(
         here("watch", video, "--markers", markers, *TANK)
     )
     assert "--squares is columns x rows" in refusal(

@@ -113,7 +113,7 @@ def test_a_video_without_colours_teaches_nothing_and_says_what_to_do(tmp_path: P
         assert cv2.imwrite(str(folder / f"{number}.png"), image)
     teach = ("markers", "teach", folder, "--image-rate", "10Hz", "--px-per-m", 200)
     said = refusal(here(*teach, "-o", tmp_path / "m.toml"))
-    assert "what stands out: all is grey; take a video in brighter, even light" in said
+    assert "seen: all is grey; take a video in brighter, even light" in said
 
 
 @pytest.mark.parametrize(

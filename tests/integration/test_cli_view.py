@@ -356,7 +356,7 @@ def test_play_does_without_a_bundled_flow(tmp_path: Path) -> None:
             assert page["sections"][2]["recording"] is None
         code, words = started.stop()
     assert code == 0
-    assert "the water moves in a random one" in words
+    assert "the water moves in a random flow" in words
     # Not a word more than that: nothing complains at the end.
     assert words.count("\n") == 2
 

@@ -110,7 +110,7 @@ except RunDirectoryError as error:
     [
         ("no/such/folder/a.nc", "its folder does not exist"),
         ("file/a.nc", "a part of its path is a file"),
-        ("folder", "it exists and is no regular file"),
+        ("folder", "it exists and is not a regular file"),
         ("x" * 300, "its name is too long"),
     ],
 )
@@ -122,7 +122,7 @@ def test_impossible_places(tmp_path: Path, name: str, reason: str) -> None:
 
 
 def test_device_is_not_replaced() -> None:
-    with pytest.raises(RunDirectoryError, match="no regular file"):
+    with pytest.raises(RunDirectoryError, match="not a regular file"):
         write_atomic("/dev/null", b"x")
     assert Path("/dev/null").is_char_device()
 

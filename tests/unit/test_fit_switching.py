@@ -248,8 +248,11 @@ def test_switching_times_that_do_not_fit_are_refused(
         ({"switching_times_s": [600.0, 600.0]}, "must increase"),
         ({"switching_times_s": []}, "the list is empty"),
         ({"flow_labels": ["A", "B"]}, "2 names, but switching_times_s makes 1 interval:"),
-        ({"switching_times_s": [1.0], "flow_labels": ["A", "A"]}, "stands twice in a row"),
-        ({"switching_times_s": [1.0], "flow_labels": ["A", "b/c"]}, "is no name of a flow"),
+        ({"switching_times_s": [1.0], "flow_labels": ["A", "A"]}, "is named twice in a row"),
+        (
+            {"switching_times_s": [1.0], "flow_labels": ["A", "b/c"]},
+            "is not a valid name of a flow",
+        ),
         ({"drag_coefficient_precision": 1.5}, "must be less than 1"),
     ],
 )

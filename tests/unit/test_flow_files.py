@@ -253,7 +253,7 @@ def test_netcdf_that_is_no_flow_field_is_refused(tmp_path: Path) -> None:
 
 def test_own_file_keeps_its_flags_and_is_checked(tmp_path: Path) -> None:
     path = save_flow(vortex_flow(1.0), tmp_path / "flow.nc")
-    with pytest.raises(InputError, match="flags of its own"):
+    with pytest.raises(InputError, match="its own flags"):
         load_flow(path, arena={"shape": "circle", "diameter_m": 0.2})
     broken = shear_flow(1.0)
     broken["u"][3, 3] = np.nan

@@ -143,7 +143,7 @@ def test_without_an_outline_every_node_is_inside() -> None:
 
 def test_refuses_to_fill_from_nothing() -> None:
     grid = Grid(np.arange(3.0), np.arange(3.0), 1.0)
-    with pytest.raises(InputError, match="nothing to fill from"):
+    with pytest.raises(InputError, match="no known node to fill from"):
         fill_velocity(grid, np.zeros((3, 3, 2)), known=np.zeros((3, 3), dtype=bool))
 
 

@@ -82,7 +82,7 @@ def test_manifest_round_trip(tmp_path: Path) -> None:
     [
         (b'{"a": 1,\n "b" 2}', "line 2, column 6: expected JSON"),
         (b"[1]", "expected an object, got list"),
-        (b"\xff\xfe\x00", "bytes that are no text"),
+        (b"\xff\xfe\x00", "bytes that are not text"),
         (b"", "line 1, column 1: expected JSON"),
     ],
 )

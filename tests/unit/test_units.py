@@ -53,7 +53,7 @@ def test_degrees_become_radians() -> None:
 @pytest.mark.parametrize(
     ("text", "unit", "words"),
     [
-        ("12px", "m", "a pixel is not a unit; say how many metres it is"),
+        ("12px", "m", "a pixel is not a unit; give its size in metres"),
         ("1,5mm", "m", "decimal point"),
         ("5s", "m", "'s' measures something else"),
         ("5", "m", None),

@@ -1,4 +1,4 @@
-"""How well the parameters are known: a parametric bootstrap on a stored surface.
+"""Uncertainty of the parameters: a parametric bootstrap on a stored surface.
 
 Recordings are simulated at the optimum, with the length, gaps and camera noise of the real one, and
 each is estimated anew with the same smooth surface, against steps that were simulated once around

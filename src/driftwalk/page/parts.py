@@ -28,7 +28,7 @@ _ARENA_KEYS: Final = {
 LONGEST_REASON: Final = 200
 """Letters of an error that are shown."""
 FOUND_TITLE: Final = "What was found"
-SIMULATED: Final = "The recording was simulated: it is no measurement."
+SIMULATED: Final = "The recording was simulated: it is not a measurement."
 MOST_SETTINGS: Final = 50_000
 """Combinations of parameters that a page names; a cube of 31 values a side has 29,791."""
 
@@ -108,7 +108,7 @@ def texts_of(dataset: xr.Dataset, name: str) -> list[str]:
     try:
         found = parse_json(str(dataset.attrs.get(name, "[]")))
     except FormatError as error:
-        raise InputError(f"the attribute '{name}' is no JSON: {error}") from error
+        raise InputError(f"the attribute '{name}' is not JSON: {error}") from error
     return [str(item) for item in found] if isinstance(found, list) else [str(found)]
 
 

@@ -77,7 +77,7 @@ def report_page(folder: str | Path) -> dict[str, Any]:
     run = open_run_folder(Path(folder))
     sections = _sections_of(run)
     if run.state == "finished" and run.read == 0:
-        reason = "; ".join(run.problems) or "none of the results that driftwalk knows is there"
+        reason = "; ".join(run.problems) or "it holds no result that driftwalk can show"
         raise InputError(f"{run.folder} holds a finished run, but {reason}")
     words = _words_of_state(run)
     if words is not None:
@@ -266,8 +266,8 @@ def _words_of_state(run: Run) -> str | None:
     since = run.manifest.get("started_utc")
     begun = "" if since is None else f" It was begun on {since}."
     return (
-        f"This run is not finished.{begun} The same command, run again, continues it; what is "
-        "there so far is shown."
+        f"This run is not finished.{begun} The same command continues it. This page "
+        "shows the results so far."
     )
 
 
@@ -287,14 +287,14 @@ def _remarks(run: Run) -> list[str]:
     """Return what a reader has to know of the files themselves."""
     from driftwalk import __version__
 
-    remarks = [f"{problem}: what it holds is not shown" for problem in run.problems]
+    remarks = [f"{problem}: its contents are not shown" for problem in run.problems]
     if run.version is not None and run.version != __version__:
         remarks.append(
-            f"made by driftwalk {run.version} and shown by {__version__}: what has changed between "
-            "them may be missing here"
+            f"made by driftwalk {run.version} and shown by {__version__}: the page "
+            "may lack results that changed between them"
         )
     if run.kind is None:
-        remarks.append("nothing says which kind of run this is")
+        remarks.append("the kind of run is unknown")
     return remarks
 
 

@@ -147,7 +147,7 @@ def _kind_of(specification: Mapping[str, Any]) -> str | None:
 
 def _no_run(folder: Path) -> str:
     if not folder.is_dir():
-        return f"{folder} does not exist" if not folder.exists() else f"{folder} is no directory"
+        return f"{folder} does not exist" if not folder.exists() else f"{folder} is not a directory"
     inside = []
     for entry in visible(folder):
         try:

@@ -201,7 +201,9 @@ def block_corners(dataset: xr.Dataset) -> Array:
         When the side of the blocks is not known.
     """
     if "block_side_m" not in dataset.attrs:
-        raise InputError("the dataset has no attribute 'block_side_m': how large are the blocks?")
+        raise InputError(
+            "the dataset has no attribute 'block_side_m': the size of the blocks is unknown"
+        )
     half = CM_PER_M * float(dataset.attrs["block_side_m"]) / 2.0
     x, y, theta = (
         np.asarray(dataset[name].transpose(..., "block").values, dtype=np.float64)

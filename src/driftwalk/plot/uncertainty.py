@@ -72,7 +72,7 @@ def plot_distance_profile(
 
     Dots are the replicates, the line joins their means with one standard error either way. The
     diamond is the distance at the optimum, the dashed line the noise floor: the distance between
-    two runs of one and the same model. The shaded band is the interval of the parameter.
+    two runs of the same model. The shaded band is the interval of the parameter.
 
     Parameters
     ----------

@@ -151,20 +151,21 @@ def test_the_summary_has_the_answer_with_its_uncertainty(
     assert force["note"] == "redrawn every 16 ms"
     assert shown["noise intensity"]["value"] == pytest.approx(0.61e-3**2 * 0.016)
     text = " ".join(part["paragraphs"])
-    assert text.startswith("The recording was simulated: it is no measurement.")
+    assert text.startswith("The recording was simulated: it is not a measurement.")
     for words in (
         "C_d = 0.39 (90 % interval 0.34 to 0.44)",
         "σ_F = 0.61 mN (90 % interval 0.53 mN to 0.7 mN), redrawn every 16 ms",
         "289 settings",
         "4 runs each",
         "17999 pairs of steps of 100 ms",
-        "1.28 times it, near what chance alone gives",
+        "1.28 times it, near the chance level",
     ):
         assert words in text
 
 
 @pytest.mark.parametrize(
-    ("distance", "words"), [(0.041, "no proof that the model is right"), (0.2, "does not explain")]
+    ("distance", "words"),
+    [(0.041, "does not prove that the model is right"), (0.2, "does not explain")],
 )
 def test_a_distance_is_judged_by_the_floor(
     calibration: xr.Dataset, distance: float, words: str

@@ -109,7 +109,7 @@ def test_a_check_without_simulated_recordings_says_why() -> None:
     assert "the steps are too few" in part_of(made, "check-step-length")["reason"]
     text = " ".join(part_of(made, "summary")["paragraphs"])
     assert "There is no KS distance: the steps are too few." in text
-    assert "finds many faults, not all" in text
+    assert "finds many faults, but not all" in text
 
 
 def test_a_recovery_study_beside_its_truth() -> None:

@@ -133,7 +133,7 @@ def test_a_page_of_a_recording_says_what_its_description_says(recording: xr.Data
     page = recording_page(recording.assign_attrs(source="r.csv", simulated="yes"), described)
     assert (page["title"], page["subtitle"]) == ("Recording", "r.csv")
     assert part_of(page, "warnings")["items"] == [
-        "The recording was simulated: it is no measurement.",
+        "The recording was simulated: it is not a measurement.",
         "<b>look</b>",
     ]
     noise = numbers_of(part_of(page, "recording-1"), "facts")["tracking noise"]
@@ -169,9 +169,7 @@ def test_a_page_of_a_tracked_recording_says_how_it_was_tracked() -> None:
     assert told["frames tracked"] == 4
     assert told["frames dropped"] == 1
     assert told["positions taken back"] == 2
-    assert part_of(page, "warnings")["items"] == [
-        "the tracking did not come to its end: the disk is full"
-    ]
+    assert part_of(page, "warnings")["items"] == ["the tracking broke off: the disk is full"]
 
 
 def test_each_body_has_its_own_noise_and_ambiguity() -> None:

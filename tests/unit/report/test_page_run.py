@@ -135,7 +135,7 @@ def test_an_unfinished_run_shows_what_is_there(
     words = part_of(page, "state")["paragraphs"][0]
     assert words == page["state"]["words"]
     assert words.startswith("This run is not finished. It was begun on ")
-    assert "The same command, run again, continues it" in words
+    assert "The same command continues it" in words
     assert part_of(page, "summary")["reason"] == "There is no calibration yet."
     assert part_of(page, "recording-1")["kind"] == "trajectory"
     assert part_of(page, "manifest")["entries"]["study"] == {"seed": 1}
@@ -202,7 +202,7 @@ def test_a_finished_run_of_which_nothing_can_be_read_is_refused(
     with pytest.raises(InputError, match=r"finished run, but calibration\.nc cannot be read"):
         report_page(folder)
     bare = make_run(tmp_path / "bare", {})
-    with pytest.raises(InputError, match="none of the results that driftwalk knows"):
+    with pytest.raises(InputError, match="it holds no result that driftwalk can show"):
         report_page(bare)
 
 
@@ -210,7 +210,7 @@ def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="does not exist"):
         report_page(tmp_path / "nowhere")
     (tmp_path / "file").write_text("x", encoding="utf-8")
-    with pytest.raises(InputError, match="is no directory"):
+    with pytest.raises(InputError, match="is not a directory"):
         report_page(tmp_path / "file")
     with pytest.raises(InputError, match="is no run directory: give one that calibrate"):
         report_page(tmp_path)

@@ -238,10 +238,10 @@ def test_images_come_for_as_long_as_a_browser_wants_them() -> None:
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        (b"220 mail.example ESMTP\r\n", "is no tracker of driftwalk"),
-        (b'{"type": "hello", "format": "other"}\n', "is no tracker of driftwalk"),
+        (b"220 mail.example ESMTP\r\n", "is not a tracker of driftwalk"),
+        (b'{"type": "hello", "format": "other"}\n', "is not a tracker of driftwalk"),
         (b'{"type": "hello", "format": "driftwalk live", "version": 2}\n', "speaks version 2"),
-        (b"$STEP_START*0D\r\n", "is no tracker of driftwalk"),
+        (b"$STEP_START*0D\r\n", "is not a tracker of driftwalk"),
     ],
 )
 def test_others_are_named(line: bytes, words: str) -> None:

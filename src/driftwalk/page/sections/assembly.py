@@ -76,12 +76,14 @@ def assembly_sections(
             lambda: assembly_summary(distribution, distribution_drawn, class_times, assembly),
             lambda: _left_out(found),
         )
-        made += attempt("classes", "What the blocks built", lambda: classes_section(found))
+        made += attempt("classes", "Structures built", lambda: classes_section(found))
     if class_times is not None:
         made += attempt(
             "class-times", "Outcome classes over time", lambda: class_times_section(class_times)
         )
-        made += attempt("survival", "How long it takes", lambda: survival_section(class_times))
+        made += attempt(
+            "survival", "Time to contact and completion", lambda: survival_section(class_times)
+        )
     if path is not None:
         made += attempt("replay", "Sample runs", lambda: replay_section(path, assembly))
     if assembly_drawn is not None:
@@ -116,14 +118,10 @@ def assembly_summary(
     if drawn is not None:
         paragraphs.append(_beside(distribution, drawn))
         shown.append(_complete(drawn, "complete, parameters drawn"))
-    paragraphs.append(
-        "These are predictions of the model with rules of latching that no recording has settled."
-    )
+    paragraphs.append("These predictions use latching rules that no recording has settled.")
     if times is not None:
         shown += [_median(times, name) for name in SURVIVAL]
-    return section(
-        "summary", "summary", "What was done and found", paragraphs=paragraphs, numbers=shown
-    )
+    return section("summary", "summary", "Method and results", paragraphs=paragraphs, numbers=shown)
 
 
 def survival_section(times: xr.Dataset) -> Section:
@@ -136,7 +134,7 @@ def survival_section(times: xr.Dataset) -> Section:
         band = (times[ends[0]].values, times[ends[1]].values) if known else None
         drawn.append(series(words, times["time"].values, times[name].values, ends=band))
     return chart(
-        "survival", "How long it takes",
+        "survival", "Time to contact and completion",
         x=label("time", "s"), y=label("share of runs"), series=drawn,
         marks=[mark("half of the runs", y=0.5)],
     )  # fmt: skip
@@ -149,9 +147,9 @@ def drawn_section(assembly: xr.Dataset) -> Section:
     what = str(assembly.attrs.get("drawn", "")).split()
     every = value_of(assembly, "force_interval_s")
     redrawn = "" if every is None else f", redrawn every {quantity(every, 's')}"
-    note = f"{count(int(force.size), 'run')}, each with parameters of its own."
+    note = f"{count(int(force.size), 'run')}, each with its own parameters."
     if "flow" in what:
-        note += " Each has a flow of its own, too, drawn within the errors of the field."
+        note += " Each also has its own flow, drawn within the errors of the field."
     return chart(
         "drawn", "The drawn parameters", note,
         x=label(f"stochastic force σ_F{redrawn}", "N"), y=label("drag coefficient C_d"),
@@ -178,9 +176,10 @@ def _beside(distribution: xr.Dataset, drawn: xr.Dataset) -> str:
     what = " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
     apart, chance = l1_and_chance(distribution, drawn)
     return (
-        f"In a second set each run has its own {what or 'parameters'}, drawn from what the "
-        f"calibration leaves open. The l1 distance of the two sets is {apart:.3g} (0: alike, 2: "
-        f"nothing in common); by chance alone it would be {chance:.2g} on average."
+        f"In a second set each run has its own {what or 'parameters'}, drawn from the "
+        "uncertainty of the calibration. The l1 distance of the two sets is "
+        f"{apart:.3g} (0: identical, 2: nothing in common); by chance alone it would "
+        f"be {chance:.2g} on average."
     )
 
 

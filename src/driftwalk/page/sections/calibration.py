@@ -105,13 +105,11 @@ def calibration_summary(calibration: xr.Dataset) -> Section:
         figure("KS distance at the optimum", facts.get("ks_distance"), symbol="D"),
         figure(
             "noise floor", facts.get("noise_floor"),
-            note="distance between two runs of one and the same model",
+            note="distance between two runs of the same model",
         ),
     ]  # fmt: skip
     paragraphs += _how_good(calibration)
-    return section(
-        "summary", "summary", "What was done and found", paragraphs=paragraphs, numbers=shown
-    )
+    return section("summary", "summary", "Method and results", paragraphs=paragraphs, numbers=shown)
 
 
 def profile_sections(calibration: xr.Dataset) -> list[Section]:
@@ -123,7 +121,7 @@ def profile_sections(calibration: xr.Dataset) -> list[Section]:
 def bootstrap_section(calibration: xr.Dataset) -> Section:
     """Return the estimates from simulated recordings, with the joint region."""
     names = ("bootstrap_force_std", "bootstrap_drag_coefficient")
-    title = "How well the parameters are known"
+    title = "Uncertainty of the parameters"
     if any(name not in calibration for name in names):
         reason = "The calibration was made without a bootstrap: no interval, no region."
         return empty_section("bootstrap", title, reason)
@@ -147,7 +145,7 @@ def bootstrap_section(calibration: xr.Dataset) -> Section:
 
 def validation_section(calibration: xr.Dataset) -> Section:
     """Return the calibration on the first half, judged on the second."""
-    title = "First half fitted, second half judged"
+    title = "Fitted on the first half, tested on the second"
     if "second_half_ks_distance" not in calibration.attrs:
         return empty_section("validation", title, "The recording was not split into halves.")
     keys = (
@@ -198,9 +196,8 @@ def _what_was_found(calibration: xr.Dataset) -> str:
     intensity = quantity(required(calibration, "force_noise_intensity_N2_s"), "N² s")
     return (
         f"The best agreement is at a drag coefficient C_d = {drag} and a stochastic force "
-        f"σ_F = {force}, redrawn every {every}. What the recording can tell is σ_F²·τ = "
-        f"{intensity}: σ_F means nothing "
-        "without its interval."
+        f"σ_F = {force}, redrawn every {every}. The recording determines only σ_F²·τ = "
+        f"{intensity}: σ_F means nothing without its interval."
     )
 
 
@@ -212,12 +209,12 @@ def _how_good(calibration: xr.Dataset) -> list[str]:
     ratio = distance / floor
     far = ratio >= (value_of(calibration, "far_above_floor") or FAR)
     verdict = (
-        "far above what chance alone gives: the model does not explain this motion"
+        "far above the chance level: the model does not explain this motion"
         if far
-        else "near what chance alone gives; a small distance is no proof that the model is right"
+        else "near the chance level; a small distance does not prove that the model is right"
     )
     words = (
-        f"There D = {distance:.4g}, where two runs of one and the same model are {floor:.4g} apart "
+        f"There D = {distance:.4g}, where two runs of the same model are {floor:.4g} apart "
         f"(noise floor): {ratio:.2f} times it, {verdict}."
     )
     second, second_floor = (
@@ -228,8 +225,8 @@ def _how_good(calibration: xr.Dataset) -> list[str]:
     return [
         words,
         f"Calibrated on the first half, it is {second:.4g} from the second (noise floor "
-        f"{second_floor:.4g}). In that are the errors of the parameters and the flow of half a "
-        "recording too: some floors are no surprise where it is short.",
+        f"{second_floor:.4g}). This includes the errors of the parameters and the "
+        "flow of half a recording, so a few floors are normal for a short recording.",
     ]
 
 
@@ -281,7 +278,7 @@ def _noise(calibration: xr.Dataset) -> Noise | None:
     value = value_of(calibration, "position_noise_m")
     if value is None:
         return None
-    return Noise(value, None, None, "what the simulated camera was given")
+    return Noise(value, None, None, "used in the simulated camera")
 
 
 def _one_body(recording: xr.Dataset | None, body: str | None) -> xr.Dataset | None:

@@ -42,7 +42,7 @@ def check_sections(check: xr.Dataset) -> list[Section]:
         A `model_check`.
     """
     makers: tuple[tuple[str, str, Callable[[xr.Dataset], Section]], ...] = (
-        ("check", "Does the model explain it?", _criteria),
+        ("check", "Does the model explain the recording?", _criteria),
         ("check-innovations", "Are the errors of prediction white?", _innovations),
         ("check-place", "Errors of prediction in the tank", _mean_errors),
         ("check-noise", "Size of the errors in the tank", _noise_ratio),
@@ -107,7 +107,7 @@ def _noise_ratio(check: xr.Dataset) -> Section:
     off = (check["noise_ratio"].values - 1.0) / check["noise_ratio_std"].values
     top = max(LEAST_TOP, float(np.nanmax(np.abs(off), initial=0.0)))
     return _field(
-        check, off, "Mean square of the errors against that of all cells.",
+        check, off, "Mean square of the errors relative to that of all cells.",
         words="off the mean (standard deviations)", diverging=True, limits=[-top, top],
     )  # fmt: skip
 
@@ -171,7 +171,7 @@ def _drag_by_speed(check: xr.Dataset) -> Section:
     middle = 0.5 * (check["speed_low"].values + check["speed_high"].values)
     return chart(
         "", "", "A right drag law has the same C_d at all speeds; 95 % bars.",
-        x=label("speed through the water", "m/s"), y=label("C_d, relative to that of all"),
+        x=label("speed through the water", "m/s"), y=label("C_d, relative to the overall value"),
         series=[_with_bars("ranges of speed", middle, value, reach)],
         marks=[mark("no change", y=0.0)],
     )  # fmt: skip

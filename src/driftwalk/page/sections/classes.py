@@ -69,9 +69,9 @@ def classes_section(series: dict[str, xr.Dataset], *, id: str = "classes") -> Se
     confidence = value_of(first, "confidence")
     note = None
     if confidence is not None:
-        note = f"{percent(confidence)} intervals that hold all at once."
+        note = f"{percent(confidence)} simultaneous intervals."
     return section(
-        id, "classes", "What the blocks built", note,
+        id, "classes", "Structures built", note,
         confidence=confidence,
         runs=int(first.attrs.get("runs", 0)),
         series=[

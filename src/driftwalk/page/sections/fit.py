@@ -77,7 +77,7 @@ def fit_sections(
         if check is None:
             why = fit.attrs.get("check_left_out")
             reason = f"{why}." if why else "The model was not checked against the recording."
-            made.append(empty_section("check", "Does the model explain it?", reason))
+            made.append(empty_section("check", "Does the model explain the recording?", reason))
     if check is not None:
         made += check_sections(check)
     return made
@@ -103,9 +103,7 @@ def fit_summary(fit: xr.Dataset, check: xr.Dataset | None = None) -> Section:
         figure("mean squared error of prediction", fit.attrs.get("chi_squared_per_dof"),
                note="1 if the model is right"),
     ]  # fmt: skip
-    return section(
-        "summary", "summary", "What was done and found", paragraphs=paragraphs, numbers=shown
-    )
+    return section("summary", "summary", "Method and results", paragraphs=paragraphs, numbers=shown)
 
 
 def _what_was_done(fit: xr.Dataset) -> str:
@@ -129,8 +127,8 @@ def _what_was_done(fit: xr.Dataset) -> str:
     visited = value_of(fit, "visited_share")
     seen = "" if visited is None else f" The block has been over {percent(visited)} of the tank."
     return (
-        f"{words}. A filter predicts each position from the earlier ones; the parameters are those "
-        f"that make its errors likely.{seen}"
+        f"{words}. A filter predicts each position from the earlier ones; the fit "
+        f"chooses the parameters that make its errors most likely.{seen}"
     )
 
 
@@ -154,7 +152,7 @@ def _what_was_found(fit: xr.Dataset) -> str:
 def _verdict(check: xr.Dataset) -> str:
     explained = str(required(check, "explained")) == "yes"
     words = (
-        "The check found nothing that speaks against the model; it finds many faults, not all."
+        "The check found no evidence against the model. It finds many faults, but not all."
         if explained
         else "THE MODEL DOES NOT EXPLAIN THIS RECORDING: see the warnings."
     )

@@ -53,8 +53,8 @@ def manifest_section(manifest: Mapping[str, Any]) -> Section:
         }
     version = _version(manifest)
     return section(
-        "manifest", "manifest", "How this was made",
-        "The command makes the same numbers again from the same inputs.",
+        "manifest", "manifest", "How to reproduce this",
+        "The command reproduces the same numbers from the same inputs.",
         command=str(manifest.get("command", "")),
         entries=json_value(entries),
         inputs=_inputs(manifest),

@@ -59,7 +59,7 @@ def map_section(calibration: xr.Dataset, recording: xr.Dataset | None = None) ->
     status, causes = _status(calibration, distance)
     cells = _cells(calibration)
     return section(
-        "map", "map", "How well each setting explains the recording", _note(calibration, cells),
+        "map", "map", "Agreement of each setting with the recording", _note(calibration, cells),
         x=force_axis(calibration),
         y=drag_axis(calibration),
         value=encode_array(distance, dtype="f8"),
@@ -231,11 +231,11 @@ def _note(calibration: xr.Dataset, cells: dict[str, Any] | None) -> str:
     ]
     floor = value_of(calibration, "noise_floor")
     if floor is not None:
-        words.append(f"Two runs of one and the same model are {floor:.3g} apart (noise floor).")
+        words.append(f"Two runs of the same model are {floor:.3g} apart (noise floor).")
     region = region_part(calibration)
     if region is not None and region["confidence"] is not None:
         words.append(f"The line encloses the joint {percent(region['confidence'])} region.")
     if cells is not None and cells["excerpt_x"] is not None:
         step = quantity(cells["excerpt_x"]["scale"], "m")
-        words.append(f"A click shows what is kept of a setting (positions to {step}).")
+        words.append(f"Click a setting to see its motion (positions to {step}).")
     return " ".join(words)

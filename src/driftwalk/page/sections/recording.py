@@ -184,7 +184,7 @@ def noise_of(described: Mapping[str, Any], body: str) -> Noise | None:
     if error is None:
         return Noise(value, None, None, "estimated from the recording")
     if value == 0.0:
-        words = "standard error of an estimate of zero: too small for the recording to tell"
+        words = "standard error of an estimate of zero: too small to determine from the recording"
         return Noise(error, None, None, words)
     words = "estimated from the recording, ± standard error"
     return Noise(value, max(value - error, 0.0), value + error, words)

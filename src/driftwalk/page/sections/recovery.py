@@ -93,8 +93,8 @@ def recovery_summary(recovery: xr.Dataset) -> Section:
     confidence = value_of(recovery, "confidence")
     done = (
         f"{count(recovery.sizes['recording'], 'recording')} of each length ({lengths}) were "
-        "simulated with known parameters and fitted. All of this is simulation: it says what the "
-        "fit would tell if the model were right."
+        "simulated with known parameters and fitted. All of this is simulated: it "
+        "shows how well the fit would do if the model were right."
     )
     truth = ", ".join(
         f"{words} = {quantity(float(required(recovery, key)), unit)}"
@@ -122,9 +122,7 @@ def recovery_summary(recovery: xr.Dataset) -> Section:
                 "confidence": value_of(recovery, "needed_confidence"),
             }
         )
-    return section(
-        "summary", "summary", "What was done and found", paragraphs=paragraphs, numbers=shown
-    )
+    return section("summary", "summary", "Method and results", paragraphs=paragraphs, numbers=shown)
 
 
 def errors_section(recovery: xr.Dataset) -> Section:

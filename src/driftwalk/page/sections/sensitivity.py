@@ -59,7 +59,7 @@ def sensitivity_sections(
     ['empty']
     """
     if sensitivity is None:
-        made = empty_head("The map of settings is not there yet.")
+        made = empty_head("There is no map of settings yet.")
     else:
         made = head_sections(
             lambda: sensitivity_summary(sensitivity, reference), lambda: _warnings(sensitivity)
@@ -105,7 +105,7 @@ def sensitivity_summary(sensitivity: xr.Dataset, reference: xr.Dataset | None) -
         )
     known = distance.values[np.isfinite(distance.values)]
     floor = value_of(sensitivity, "noise_floor_95")
-    paragraphs = [f"{done}. The l1 distance runs from 0, alike, to 2, nothing in common."]
+    paragraphs = [f"{done}. The l1 distance runs from 0 (identical) to 2 (nothing in common)."]
     if known.size:
         told = (
             f"It lies between {known.min():.3g} and {known.max():.3g}, with median "
@@ -123,9 +123,7 @@ def sensitivity_summary(sensitivity: xr.Dataset, reference: xr.Dataset | None) -
         figure("largest l1 distance", known.max() if known.size else None),
         figure("by chance, 95 %", floor, note="distance of the reference to itself"),
     ]
-    return section(
-        "summary", "summary", "What was done and found", paragraphs=paragraphs, numbers=shown
-    )
+    return section("summary", "summary", "Method and results", paragraphs=paragraphs, numbers=shown)
 
 
 def _warnings(sensitivity: xr.Dataset) -> list[str]:

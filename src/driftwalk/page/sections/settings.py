@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-NOT_REACHED: Final = "Blank where half the runs did not reach it."
+NOT_REACHED: Final = "Blank if fewer than half of the runs reached it."
 MOST_SLICES: Final = 12
 
 
@@ -126,7 +126,7 @@ def _l1_map(part: xr.Dataset, x: str, y: str, id: str, title: str) -> Section:
         kept = classes_to_show(names, largest)
         shown, shares = [names[k] for k in kept], encode_array(every[:, :, kept])
     floor = value_of(part, "noise_floor_95")
-    note = "0: the outcomes of the reference; 2: none in common."
+    note = "0: the same outcomes as the reference; 2: none in common."
     if floor is not None:
         note += f" Chance alone gives up to {floor:.3g} (95 %)."
     at = [_reference(part, name) for name in (x, y)]

@@ -46,7 +46,7 @@ def sobol_section(sobol: xr.Dataset) -> Section:
     columns = ["output", "input", "first order", "± half width", "total", "± half width"]
     return section(
         "sobol", "table", "Sobol' indices",
-        "Share of an output's variance that an input makes alone (first order), and with the "
-        "others (total).",
+        "Share of an output's variance that an input explains alone (first order), "
+        "and together with the others (total).",
         columns=columns, rows=rows,
     )  # fmt: skip

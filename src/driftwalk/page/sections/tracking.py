@@ -9,10 +9,10 @@ from driftwalk.page.parts import Section, figure, section
 
 COUNTED: Final = {
     "frames": ("frames tracked", None),
-    "dropped": ("frames dropped", "lost before they were looked at"),
+    "dropped": ("frames dropped", "lost before processing"),
     "duplicates": ("frames doubled", "no later than the one before, left out"),
     "stale": ("frames stale", "the same image as the one before, left out"),
-    "taken_back": ("positions taken back", "they turned out to be something else"),
+    "taken_back": ("positions taken back", "rejected as something else"),
 }
 
 
@@ -38,13 +38,13 @@ def tracking_sections(tracking: Mapping[str, Any] | None) -> list[Section]:
     rejected = tracking.get("rejected") or {}
     if rejected:
         listed = ", ".join(f"{reason} {number}" for reason, number in rejected.items())
-        words.append(f"What was found and turned down, over all frames: {listed}.")
+        words.append(f"Candidates rejected, over all frames: {listed}.")
     numbers = [
         figure(label, tracking[key], note=note)
         for key, (label, note) in COUNTED.items()
         if key in tracking
     ]
-    return [section("tracking", "summary", "How it was tracked", paragraphs=words, numbers=numbers)]
+    return [section("tracking", "summary", "Tracking", paragraphs=words, numbers=numbers)]
 
 
 def tracking_warnings(tracking: Mapping[str, Any] | None) -> list[str]:
@@ -53,7 +53,7 @@ def tracking_warnings(tracking: Mapping[str, Any] | None) -> list[str]:
     Examples
     --------
     >>> tracking_warnings({"complete": False, "interrupted": "the disk is full"})
-    ['the tracking did not come to its end: the disk is full']
+    ['the tracking broke off: the disk is full']
     >>> tracking_warnings({"complete": True, "interrupted": None}), tracking_warnings(None)
     ([], [])
     """
@@ -61,4 +61,4 @@ def tracking_warnings(tracking: Mapping[str, Any] | None) -> list[str]:
         return []
     reason = tracking.get("interrupted")
     ending = "" if reason is None else f": {reason}"
-    return [f"the tracking did not come to its end{ending}"]
+    return [f"the tracking broke off{ending}"]

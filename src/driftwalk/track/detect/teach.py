@@ -224,8 +224,7 @@ def propose_markers(
     if best is None:
         what = ", ".join(map(str, seen)) if seen else "all is grey"
         raise InputError(
-            "no two colours were found whose discs form pairs at one distance; the "
-            f"strongest colours: {what}"
+            f"no two colours were found whose discs form pairs at one distance; seen: {what}"
         )
     number, _, marker, pairs = best
     return MarkerProposal(marker, number, seen, _picture(cv2, images[0], pairs))
