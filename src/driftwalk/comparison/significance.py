@@ -59,7 +59,7 @@ def block_permutation_test(
 ) -> PermutationTest:
     """Test whether two serially correlated series of points have one distribution.
 
-    Both series are cut into blocks, the blocks are dealt out anew, and D is computed each time;
+    Both series are cut into blocks, the blocks are shuffled, and D is computed each time;
     p = (1 + #{D_permuted >= D}) / (1 + permutations), integers compared. Incomplete blocks at the
     ends are left out of the test.
 

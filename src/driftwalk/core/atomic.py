@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all: written beside their place, then renamed into it."""
+"""Files that exist whole or not at all: written next to their place, then renamed into it."""
 
 from __future__ import annotations
 
@@ -177,9 +177,9 @@ def require_target(path: Path, *, existing: str, endings: tuple[str, ...]) -> No
     path : Path
         The file to write.
     existing : {"error", "replace"}
-        What to do when it is there already.
+        Behaviour if the file exists already.
     endings : tuple of str
-        What its name may end in, such as ``".nc"``.
+        Endings that its name may have, such as ``".nc"``.
 
     Raises
     ------
@@ -199,7 +199,7 @@ def require_free(path: Path, *, existing: str) -> None:
     path : Path
         The file to write.
     existing : {"error", "replace"}
-        What to do when it is there already.
+        Behaviour if the file exists already.
 
     Raises
     ------

@@ -28,7 +28,7 @@ class FormatError(InputError):
     Parameters
     ----------
     message : str
-        What was wrong and what to do.
+        The problem and the remedy.
     path : path-like, optional
         The file.
     line, column : int, optional

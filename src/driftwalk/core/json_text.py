@@ -18,7 +18,7 @@ from driftwalk.core.errors import FormatError
 from driftwalk.core.nesting import refuse_deep
 
 MOST_BYTES: Final = 64 * MIB
-"""What a JSON file may hold: some 3 million points, or any manifest."""
+"""Largest JSON file: some 3 million points, or any manifest."""
 _INTEGER_DIGITS: Final = 20
 """Characters of the longest integer of 64 bits."""
 

@@ -20,7 +20,7 @@ def require_opencv(purpose: str = "tracking") -> Any:
     Parameters
     ----------
     purpose : str
-        What needs it, for the message.
+        The feature that needs it, for the message.
 
     Raises
     ------

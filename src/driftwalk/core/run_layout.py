@@ -1,4 +1,4 @@
-"""What lies in a run directory, and the moves, removals and the lock that keep it whole."""
+"""Files of a run directory, and the moves, removals and the lock that keep it whole."""
 
 from __future__ import annotations
 

@@ -64,21 +64,21 @@ class RunDirectory:
     path : path-like
         The folder; made when absent. A folder with files but no run in it is refused.
     specification : mapping
-        What determines the numbers: the resolved study, seeds, hashes of the inputs. The version
-        of driftwalk is added. A run continues only under the same specification.
+        Everything that determines the numbers: the resolved study, seeds, hashes of the inputs. The
+        version of driftwalk is added. A run continues only under the same specification.
     on_existing : {"resume", "refuse", "overwrite"}
-        What to do with a run that is there. "resume" continues an unfinished run of the same
-        specification and refuses a finished one; "refuse" refuses both; "overwrite" moves a
-        finished run, or an unfinished one of another specification, into
-        ``previous/<UTC time>/``. It continues an unfinished run of the same specification, so
-        that a killed command can be repeated as it stands. Nothing is deleted.
+        Behaviour if the directory holds a run already. "resume" continues an unfinished run of the
+        same specification and refuses a finished one; "refuse" refuses both; "overwrite" moves a
+        finished run, or an unfinished one of another specification, into ``previous/<UTC time>/``.
+        It continues an unfinished run of the same specification, so that a killed command can be
+        repeated as it stands. Nothing is deleted.
 
     Attributes
     ----------
     path : pathlib.Path
         The folder.
     specification : dict
-        What determines the numbers, in JSON's types.
+        Everything that determines the numbers, in JSON's types.
     state : {"new", "unfinished"}
         Whether the run began with this ``with`` block or continues.
     moved_to : pathlib.Path or None
@@ -148,7 +148,8 @@ class RunDirectory:
         name : str
             Name of the sweep, such as "coarse".
         fingerprint : mapping, optional
-            What determines the sweep's numbers besides the run's own specification.
+            Everything that determines the sweep's numbers, in addition to the run's own
+            specification.
         """
         self._require_held()
         folder = self.path / SHARD_FOLDER / checked_name(name, kind="store")
@@ -177,7 +178,7 @@ class RunDirectory:
         Parameters
         ----------
         manifest : mapping
-            What `driftwalk.core.provenance.manifest` gives. Start and end, fingerprint,
+            Result of `driftwalk.core.provenance.manifest`. Start and end, fingerprint,
             specification, and hash and size of every file in the folder are added.
         """
         self._require_held()

@@ -2,7 +2,7 @@
 
 A world's key is a hash of (seed, trial, replicate); the counter within its stream is made of the
 index of the force interval, the body, the draw and the purpose (`cpp/include/driftwalk/random`).
-A random number is thus a function of its address alone, whatever ran before it or beside it.
+A random number is thus a function of its address alone, whatever ran before it or at the same time.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ class ShardStore:
         Made when absent, with the folders above it.
     fingerprint : mapping
         The specification that determines the numbers: parameters, seeds, hashes of inputs. It is
-        stored beside the shards, and its hash in each of them.
+        stored with the shards, and its hash in each of them.
 
     Raises
     ------
@@ -229,7 +229,7 @@ def make_folder(folder: Path) -> None:
 
 
 def write_specification(path: Path, specification: Mapping[str, Any], **more: Any) -> None:
-    """Write a specification and its fingerprint beside what it determines."""
+    """Write a specification and its fingerprint next to the data that it determines."""
     values = {
         "fingerprint": fingerprint_of(specification),
         "specification": plain(specification),

@@ -35,7 +35,7 @@ def local_quadratic(
 
     The fit at sample ``i`` uses the samples within ``window / 2`` of its time, at the times at
     which they were taken: the clock may be uneven. An interval longer than `gap_factor` times the
-    median one is a gap, and no window reaches across a gap: beside a gap, and at both ends, the
+    median one is a gap, and no window reaches across a gap: next to a gap, and at both ends, the
     window is one-sided. On an evenly sampled stretch this is the Savitzky-Golay filter of degree 2.
 
     Parameters

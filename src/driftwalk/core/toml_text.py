@@ -12,7 +12,7 @@ from driftwalk.core.errors import FormatError
 from driftwalk.core.nesting import refuse_deep
 
 MOST_BYTES: Final = MIB
-"""What such a file may hold, comments too: its reader takes time that grows with the square of
+"""Largest such file, including comments: its reader takes time that grows with the square of
 some of what it holds."""
 _LARGE: Final = "an integer has more than 64 bits"
 

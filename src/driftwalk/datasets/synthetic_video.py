@@ -180,7 +180,8 @@ def write_video(
 
 
 class _Painter:
-    """What is the same in all frames: the empty tank, the light, the poses and their rates."""
+    """Everything that is the same in all frames: the empty tank, the light, the poses and their
+    rates."""
 
     def __init__(self, trajectory: xr.Dataset, settings: VideoSettings) -> None:
         self.cv2: Any = require_opencv("drawing a synthetic video")

@@ -1,4 +1,4 @@
-"""What a synthetic video shows and what spoils it; three levels of spoiling are fixed here.
+"""Contents of a synthetic video and its disturbances; three levels of disturbance are fixed here.
 
 The levels stand apart from every tracker: they were fixed before one was written.
 """
@@ -166,7 +166,7 @@ VIDEO_LEVELS: Final[dict[str, dict[str, float]]] = {
         "bar_time_share": 0.2,
     },
 }
-"""What each level of disturbance changes in `VideoSettings`."""
+"""Changes of each level of disturbance to `VideoSettings`."""
 
 
 def video_settings(level: str = "moderate", **changes: Any) -> VideoSettings:

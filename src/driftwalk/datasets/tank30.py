@@ -1,8 +1,8 @@
 """A simulated 30-minute recording of a block in a 30-cm tank, with everything about it known.
 
 It was integrated by the Open Dynamics Engine, independently of driftwalk, with a static flow of
-swirl, centripetal drift and four wall jets; camera noise was added. See PROVENANCE.md beside the
-data. It is simulated, and every result made from it says so.
+swirl, centripetal drift and four wall jets; camera noise was added. See PROVENANCE.md in the folder
+of the data. It is simulated, and every result made from it says so.
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ def write_assembly_figures(
     beside : xarray.Dataset, optional
         A second `outcome_distribution` to compare with.
     labels : tuple of str
-        What the first and the second are.
+        Names of the first and the second.
     realisations : xarray.Dataset, optional
         Repetitions of the first: ``proportion`` on (realisation, class).
     times : xarray.Dataset, optional
@@ -158,7 +158,7 @@ def outcomes_figure(
 
 
 def class_times_figure(times: xr.Dataset) -> Figure:
-    """Return the classes over time beside the survival curves."""
+    """Return the classes over time next to the survival curves."""
     figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=75.0)
     row = list(figure.subplots(1, 2, width_ratios=[1.25, 1.0]))
     plot_class_times(times, row[0])

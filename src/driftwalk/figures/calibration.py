@@ -56,7 +56,7 @@ def write_figures(
     Parameters
     ----------
     calibration : xarray.Dataset
-        What `driftwalk.calibration.calibrate` returns.
+        Result of `driftwalk.calibrate.calibrate`.
     flow : xarray.Dataset
         The `flow_field` that was used.
     trajectory : xarray.Dataset
@@ -99,7 +99,7 @@ def write_figures(
 
 
 def flow_figure(flow: xr.Dataset) -> Figure:
-    """Return Fig. 2: the block's velocity beside the water's, or the water's alone."""
+    """Return Fig. 2: the block's velocity next to the water's, or the water's alone."""
     has_block = all(name in flow for name in COMPONENTS["block"])
     if not has_block:
         figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=76.0, layout="compressed")
@@ -156,7 +156,7 @@ def steps_figure(calibration: xr.Dataset) -> Figure:
 
 
 def ks_map_figure(calibration: xr.Dataset) -> Figure:
-    """Return Fig. 6: the whole map beside the refined one, or the whole map alone."""
+    """Return Fig. 6: the whole map next to the refined one, or the whole map alone."""
     if "refined_ks_distance" not in calibration:
         figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=80.0)
         _legend_above(plot_ks_map(calibration, figure.add_subplot()))

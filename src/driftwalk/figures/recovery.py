@@ -1,4 +1,4 @@
-"""The figures of a recovery study: estimates beside the truth, and how their error falls."""
+"""The figures of a recovery study: estimates next to the truth, and how their error falls."""
 
 from __future__ import annotations
 
@@ -55,9 +55,9 @@ def plot_recovery(
     Parameters
     ----------
     recovery : xarray.Dataset
-        What `recovery_study` returns.
+        Result of `recovery_study`.
     parameter : {"drag_coefficient", "force_std", "tracking_noise"}
-        What is drawn.
+        The parameter to draw.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure when left out.
 
@@ -104,7 +104,7 @@ def plot_flow_recovery(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     recovery : xarray.Dataset
-        What `recovery_study` returns.
+        Result of `recovery_study`.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure when left out.
 
@@ -146,7 +146,7 @@ def plot_recovery_error(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     recovery : xarray.Dataset
-        What `recovery_study` returns.
+        Result of `recovery_study`.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure when left out.
 
@@ -208,7 +208,7 @@ def write_recovery_figures(
     folder : path-like
         Where to write; made when absent.
     recovery : xarray.Dataset
-        What `recovery_study` returns.
+        Result of `recovery_study`.
     formats : sequence of {"png", "svg", "pdf"}
         File formats.
 

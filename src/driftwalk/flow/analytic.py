@@ -135,7 +135,7 @@ def jets_velocity(
 ) -> tuple[Array, Array]:
     """Return the flow of a round tank with inlets in its wall: jets, a swirl and a sink.
 
-    From every inlet a Gaussian jet: at a distance s along its axis and n beside it, the speed is
+    From every inlet a Gaussian jet: at a distance s along its axis and n across it, the speed is
     ``jet_speed sqrt(jet_width / b) exp(-(n / b)²)`` with ``b = jet_width + 0.1 s``, a plane jet
     that spreads and keeps its momentum; nothing behind the inlet. Swirl and sink are
     ``4 q (1 - q)`` times their speeds, with q = r / radius, and vanish at the centre and the wall.

@@ -30,7 +30,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class CellMeans:
-    """What is known of every cell; rows of NaN where there is too little."""
+    """Results for every cell; rows of NaN where there are too few samples."""
 
     count: Indices
     """Samples, shape (cells,)."""

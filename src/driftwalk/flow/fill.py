@@ -34,8 +34,8 @@ def fill_velocity(
     that of the energy ``sum |u_i - u_j|² + sum (u_i · n)² / d`` over neighbouring nodes and over
     the links that the wall cuts at a distance of d cells, so no filled speed exceeds the largest
     known one. Nodes outside the tank continue the field in the same way without a wall, and keep
-    the component along the nearest wall only: a bilinear lookup beside the wall finds no flow
-    into it.
+    the component along the nearest wall only: a bilinear lookup near the wall finds no flow into
+    it.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ def load_flow(
     arena : mapping or str, optional
         The tank, for a file that does not know it: nodes beyond its wall are flagged *outside*.
     own_flags : {"refuse", "keep"}
-        What to do with `arena` for a file that has flags of its own: "keep" leaves it aside.
+        Behaviour of `arena` for a file with its own flags: "keep" ignores it.
 
     Returns
     -------

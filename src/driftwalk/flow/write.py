@@ -33,7 +33,7 @@ def save_flow(flow: xr.Dataset, path: str | PathLike[str], *, existing: str = "e
     path : path-like
         Where to write. The file appears whole or not at all.
     existing : {"error", "replace"}
-        What to do when the file is there already.
+        Behaviour if the file exists already.
 
     Returns
     -------

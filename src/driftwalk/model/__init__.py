@@ -1,4 +1,4 @@
-"""What is simulated and how: frozen parameters with units, read from and written to TOML."""
+"""Parameters of a simulation: frozen, with units, read from and written to TOML."""
 
 from driftwalk.model.assembly import Assembly
 from driftwalk.model.block import Block

@@ -1,4 +1,4 @@
-"""What a calibration searches: the grid of settings, its refinement, its uncertainty."""
+"""Search of a calibration: the grid of settings, its refinement, its uncertainty."""
 
 from __future__ import annotations
 

@@ -44,5 +44,6 @@ class Forces(Section):
 
     @property
     def force_noise_intensity_N2_s(self) -> float:
-        """What a recording can tell of the stochastic force: σ_F² · force interval [N² s]."""
+        """Noise intensity, all that a recording determines of the stochastic force: σ_F² · force
+        interval [N² s]."""
         return self.force_std_N**2 * self.force_interval_s

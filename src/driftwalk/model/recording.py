@@ -127,7 +127,7 @@ class Recording(Section):
     def load_options(self) -> dict[str, Any]:
         """Return the keyword arguments of `driftwalk.record.load` but for the arena.
 
-        What is not set is left out, so that the loader's own default holds.
+        Options that are not set are left out, so that the loader's own default applies.
         """
         named = {
             "format": self.format if self.format != "auto" else None,

@@ -123,7 +123,7 @@ def true_time_step_s(time_step_s: float | Literal["auto"], *, force_interval_s: 
     Parameters
     ----------
     time_step_s : float or "auto"
-        What [simulation] says: taken where it is not above 2.5 ms.
+        The value of [simulation]; used if it is not above 2.5 ms.
     force_interval_s : float
         How long one draw of the stochastic force lasts [s].
 

@@ -1,4 +1,4 @@
-"""What every section of a study has in common: declared quantities and readable errors.
+"""Base of every section of a study: declared quantities and readable errors.
 
 A field is declared once: type, unit, range, default and meaning stand together, and the same
 declaration checks the value, writes the commented template and makes the reference page.
@@ -29,7 +29,7 @@ class Quantity:
     ge, gt, le, lt : float, optional
         Bounds: at least, more than, at most, less than.
     words : tuple of str
-        Words that may stand for a number (``"auto"``, ``"estimate"``).
+        Words that may replace a number (``"auto"``, ``"estimate"``).
     whole : bool
         Whether only whole numbers are accepted.
     """

@@ -1,4 +1,4 @@
-"""What a sensitivity analysis varies: the map over C_d and σ_F, or other axes."""
+"""Axes of a sensitivity analysis: the map over C_d and σ_F, or others."""
 
 from __future__ import annotations
 

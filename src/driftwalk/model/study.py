@@ -193,7 +193,7 @@ def parse_study(text: str, *, source: str = "study") -> Study:
     text : str
         TOML.
     source : str
-        What to call the text in an error message.
+        Name of the text in an error message.
 
     Raises
     ------

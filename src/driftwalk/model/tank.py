@@ -154,7 +154,7 @@ class Outline(Section):
 
 
 class FieldOfView(Outline):
-    """What the camera sees, when that is less than the tank."""
+    """Field of view of the camera, if smaller than the tank."""
 
     section_name: ClassVar[str] = "observation.field_of_view"
 

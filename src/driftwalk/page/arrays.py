@@ -88,7 +88,7 @@ def decode_array(encoded: Mapping[str, Any]) -> Floats:
     Parameters
     ----------
     encoded : mapping
-        What `encode_array` returned.
+        Result of `encode_array`.
 
     Returns
     -------
@@ -192,7 +192,7 @@ def nice_step(extent: float, parts: float) -> float:
 
 
 def _encode_whole(array: Floats, dtype: DType) -> dict[str, Any]:
-    """Encode whole numbers as they are; the lowest of the type stands for none."""
+    """Encode whole numbers as they are; the lowest of the type means none."""
     missing = -_LIMIT[dtype] - 1
     known = _whole(array[np.isfinite(array)], -_LIMIT[dtype], _LIMIT[dtype])
     stored = np.full(array.shape, missing, dtype=f"<{dtype}")

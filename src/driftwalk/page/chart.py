@@ -31,11 +31,11 @@ def chart(
     id, title, note : str
         As of every section.
     x, y : mapping
-        What `label` gives, or the axis of a map.
+        Result of `label`, or the axis of a map.
     series : sequence of mapping
-        What `series` gives.
+        Results of `series`.
     marks : sequence of mapping
-        What `mark` gives.
+        Results of `mark`.
     """
     axes = [{key: axis[key] for key in ("label", "unit", "log") if key in axis} for axis in (x, y)]
     return section(
@@ -67,7 +67,7 @@ def series(
     Parameters
     ----------
     name : str
-        What the legend says.
+        Text of the legend.
     x, y : array_like
         Places; NaN breaks a line. For steps x has one more than y.
     ends : tuple of array_like, optional

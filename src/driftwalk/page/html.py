@@ -30,7 +30,7 @@ def report_html(page: Mapping[str, Any], *, connect: Literal["none", "self"] = "
     Parameters
     ----------
     page : mapping
-        What `report_page` returns.
+        Result of `report_page`.
     connect : {"none", "self"}
         Whether the document may talk to the server that it came from.
 
@@ -94,11 +94,11 @@ def write_report(
     Parameters
     ----------
     page : mapping
-        What `report_page` returns.
+        Result of `report_page`.
     path : path-like
         The file, which ends in ``.html`` or ``.htm``.
     existing : {"error", "replace"}
-        What to do when it is there already.
+        Behaviour if the file exists already.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What every section of a page is made of, and what becomes of one that cannot be made."""
+"""Parts of every section of a page, and the section that replaces one that cannot be made."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _ARENA_KEYS: Final = {
 }
 LONGEST_REASON: Final = 200
 """Letters of an error that are shown."""
-FOUND_TITLE: Final = "What was found"
+FOUND_TITLE: Final = "Results"
 SIMULATED: Final = "The recording was simulated: it is not a measurement."
 MOST_SETTINGS: Final = 50_000
 """Combinations of parameters that a page names; a cube of 31 values a side has 29,791."""

@@ -45,7 +45,7 @@ TITLES: Final = {
 _SHOWN_ONCE: Final = ("trajectory", "flow")
 """Kinds of sections that several runs have in common: what they were made of."""
 _BESIDE_CONTENT: Final = ("id", "note", "facts")
-"""What two pages may say differently of one thing, such as the noise of a recording."""
+"""Keys in which two pages may differ about one thing, such as the noise of a recording."""
 
 
 def report_page(folder: str | Path) -> dict[str, Any]:
@@ -54,14 +54,15 @@ def report_page(folder: str | Path) -> dict[str, Any]:
     Parameters
     ----------
     folder : path-like
-        What `driftwalk calibrate`, `fit`, `assemble`, `sensitivity` or `study recover` made.
+        A run directory of `driftwalk calibrate`, `fit`, `assemble`, `sensitivity` or `study
+        recover`.
 
     Returns
     -------
     dict
-        Plain JSON: format, version, title, state and sections, see
-        ``docs/reference/page-data.md``. What a run lacks is an empty section with the reason.
-        The same run gives the same data.
+        Plain JSON: format, version, title, state and sections, see ``docs/reference/page-data.md``.
+        Missing parts of a run become an empty section with the reason. The same run gives the same
+        data.
 
     Raises
     ------
@@ -143,7 +144,7 @@ def recording_page(
     trajectory : xarray.Dataset
         A `trajectory`, as from `driftwalk.load`.
     described : mapping, optional
-        What `driftwalk.describe` returns: for the tracking, its noise and the warnings.
+        Result of `driftwalk.describe`: for the tracking, its noise and the warnings.
 
     Returns
     -------
@@ -191,7 +192,7 @@ def joined_page(pages: Sequence[Mapping[str, Any]], *, title: str) -> dict[str, 
     Parameters
     ----------
     pages : sequence of mapping
-        What `report_page` returns, at least one; their subtitles differ.
+        Results of `report_page`, at least one; their subtitles differ.
     title : str
         Of the page.
 

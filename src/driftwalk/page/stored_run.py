@@ -29,7 +29,7 @@ MAIN_FILES: Final = {
 
 @dataclass
 class Run:
-    """What a run directory holds.
+    """Contents of a run directory.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Run:
     manifest : dict
         The manifest; of an unfinished run its specification and when it was started.
     problems : list of str
-        What could not be read, filled by `dataset`.
+        Parts that could not be read, filled by `dataset`.
     """
 
     folder: Path
@@ -66,7 +66,7 @@ class Run:
 
     @property
     def specification(self) -> Mapping[str, Any]:
-        """What determines the numbers of the run."""
+        """Everything that determines the numbers of the run."""
         found = self.manifest.get("specification")
         return found if isinstance(found, Mapping) else {}
 

@@ -172,7 +172,7 @@ def _shown(times: xr.Dataset) -> tuple[list[str], Array]:
 
 
 def _label_right(ax: Axes, names: list[str], height: Array, colors: dict[str, str]) -> None:
-    """Put sketch and name of every class beside its end, moved apart where they would meet."""
+    """Put sketch and name of every class at its end, moved apart where they would meet."""
     total_pt = float(axes_points(ax)[1])
     low, high = ax.get_ylim()
     share = (height - low) / (high - low)

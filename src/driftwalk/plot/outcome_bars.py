@@ -70,9 +70,9 @@ def plot_outcomes(
         Where to draw; a new figure when left out, two columns wide for two distributions or more
         than 12 classes.
     beside : xarray.Dataset, optional
-        A second `outcome_distribution`, drawn beside the first. Classes are matched by name.
+        A second `outcome_distribution`, drawn next to the first. Classes are matched by name.
     labels : tuple of str
-        What the first and the second are, for the legend.
+        Names of the first and the second, for the legend.
     realisations : xarray.Dataset, optional
         Repetitions of the first distribution: ``proportion`` on (realisation, class), at least 2.
 

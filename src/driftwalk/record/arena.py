@@ -25,7 +25,7 @@ class PlacedArena:
     arena: dict[str, Any]
     """As it goes into the dataset, centre at the origin."""
     origin: tuple[float, float]
-    """What is subtracted from the positions [m]."""
+    """Shift subtracted from the positions [m]."""
     found: dict[str, Any] = field(default_factory=dict)
     """How the centre and the size were found."""
     notes: list[str] = field(default_factory=list)
@@ -212,7 +212,7 @@ def arena_attributes(
     placed : PlacedArena
         The arena.
     shifted_before : sequence of float
-        What an earlier conversion subtracted from the positions [m].
+        Shift that an earlier conversion subtracted from the positions [m].
     """
     shift = [old + new for old, new in zip(shifted_before, placed.origin, strict=True)]
     return {

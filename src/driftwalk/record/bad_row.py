@@ -10,7 +10,12 @@ import re
 from pathlib import Path
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.layout import MISSING, TableLayout
+
+if TYPE_CHECKING:
+    from driftwalk.record.text import TableLayout
+
+MISSING = frozenset({"", "NaN", "nan", "NAN", "NA", "N/A", "null", "NULL", "None", "none", "-nan"})
+"""Words that trackers write for a missing number."""
 
 DELIMITER_NAMES = {",": "a comma", "\t": "a tab", ";": "a semicolon", " ": "blanks"}
 _COMMA_DECIMAL = re.compile(r"[+-]?\d+,\d+")

@@ -19,7 +19,7 @@ from driftwalk.record.several_bodies import (
 
 @dataclass
 class Counts:
-    """What cleaning found in one body."""
+    """Findings of the cleaning in one body."""
 
     rows: int = 0
     """Rows of the body in the file."""
@@ -63,7 +63,7 @@ def clean_body(
     body : RawBody
         In SI units. Arrays without a fault are used as they are, not copied.
     sort : {"error", "sort"}
-        What to do when times go backwards.
+        Behaviour if times go backwards.
     start, stop : float, optional
         First and last time to keep [s].
     max_speed : float, optional

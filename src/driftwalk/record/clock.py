@@ -14,7 +14,7 @@ LONGEST_INTERVAL_S = 1e4
 SHORTEST_INTERVAL_S = 1e-6
 """No camera takes a million frames a second for long."""
 USUAL_INTERVAL_S = 10.0
-"""Beyond this, milliseconds of a video are likelier than a camera that waits so long."""
+"""Beyond this, milliseconds of a video are likelier than a camera with such a long interval."""
 LAST_DAY_S = 1e10
 """Seconds since 1970 until the year 2286."""
 LONGEST_RECORDING_S = 1e12

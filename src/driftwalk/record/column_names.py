@@ -1,4 +1,4 @@
-"""What a column's name says: which quantity, of which body, in which unit."""
+"""Meaning of a column's name: which quantity, of which body, in which unit."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ _BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
 
 @dataclass(frozen=True)
 class ColumnMeaning:
-    """What a column holds."""
+    """Meaning of a column."""
 
     quantity: str
     """``"t"``, ``"frame"``, ``"x"``, ``"y"``, ``"theta"`` or ``"body"``."""

@@ -30,7 +30,7 @@ def convert_units(
     Parameters
     ----------
     raw : RawRecording
-        What a loader returned.
+        Result of a loader.
     options : ReadOptions
         Frame rate, scale and unit.
     y_axis : {"up", "down"}, optional

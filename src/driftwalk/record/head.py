@@ -1,4 +1,4 @@
-"""What the first lines of a text file tell: delimiter, header, number of columns."""
+"""Facts from the first lines of a text file: delimiter, header, number of columns."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ def load(
     max_speed : float, optional
         Samples that could only be reached faster than this [m/s] become gaps.
     sort : {"error", "sort"}
-        What to do when times go backwards.
+        Behaviour if times go backwards.
     columns : mapping, optional
         For a plain table: t, frame, x, y, theta, body to the name or number (from 1) of the
         column; ``":unit"`` may follow, such as ``{"x": "2:mm"}``.

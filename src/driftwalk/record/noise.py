@@ -23,7 +23,8 @@ MIN_WINDOWS = 50
 
 
 class NoiseEstimate(NamedTuple):
-    """White tracking noise of a recording, and the unrest of the path it was told apart from."""
+    """White tracking noise of a recording, and the random motion of the path from which it was
+    separated."""
 
     position_noise_m: float
     """Standard deviation of the position, per axis [m]; NaN with too few samples."""

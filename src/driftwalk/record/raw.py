@@ -1,4 +1,4 @@
-"""What a loader returns: the numbers of a file in the file's own units, and what they mean.
+"""Result of a loader: the numbers of a file in the file's own units, and what they mean.
 
 Units, scale, clock and the direction of y are turned into SI in one place, `record.convert_units`;
 a loader only says what the file holds.
@@ -44,12 +44,12 @@ class RawBody:
     theta: Array | None = None
     """Orientation, shape (n,), wrapped or not; None when the file has none."""
     extra: dict[str, Array] = field(default_factory=dict, kw_only=True)
-    """What else is known of each sample, shape (n, ...), by name; see `RawRecording.extra`."""
+    """Further values of each sample, shape (n, ...), by name; see `RawRecording.extra`."""
 
 
 @dataclass(frozen=True)
 class Extra:
-    """What a further variable of a recording means: it is carried along as it is."""
+    """Meaning of a further variable of a recording, which is carried along unchanged."""
 
     dims: tuple[str, ...]
     """Dimensions after (time, body)."""
@@ -87,7 +87,7 @@ class RawRecording:
     extra: dict[str, Extra] = field(default_factory=dict)
     """Further variables, which each body has in its `extra`."""
     clock_origin: int = 0
-    """What is to be added to every clock: taken off where whole numbers are beyond float64."""
+    """Offset to add to every clock, subtracted because its whole numbers are beyond float64."""
     bare_clock: str | None = None
     """Column of a clock that is taken as seconds though nothing says so, ``""`` where the format
     has no columns to name; None for any other clock."""
@@ -102,7 +102,7 @@ class RawRecording:
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """What the person who loads a recording knows and the file may not say.
+    """Facts that the person who loads a recording knows and the file may not state.
 
     A loader reads what it needs and leaves the rest to the stages after it.
     """

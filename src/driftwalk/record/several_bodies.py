@@ -58,7 +58,7 @@ def refuse_several_bodies(body: RawBody, apart: Array, columns: BodyColumns | No
     body : RawBody
         Its times in order.
     apart : array
-        What `times_in_two_places` found.
+        Result of `times_in_two_places`.
     columns : callable, optional
         Finds the columns that could name the body; None: the format has no columns to choose from.
 

@@ -28,7 +28,7 @@ from driftwalk.record.raw import Array
 BLOCK_BYTES = 4 << 20
 GZIP_MAGIC = b"\x1f\x8b"
 DAMAGED_GZIP = (gzip.BadGzipFile, EOFError, zlib.error)
-"""What reading a gzip file that is cut off or damaged raises."""
+"""Exceptions raised by reading a gzip file that is cut off or damaged."""
 BOM = b"\xef\xbb\xbf"
 HEAD_BYTES = 1 << 16
 _EXACT = 1 << 53
@@ -47,7 +47,7 @@ class Table:
     numbers: dict[int, Array]
     """Column (from 0) to its values."""
     clock_origin: int = 0
-    """What was taken off the clock, so that nanoseconds since 1970 keep every one."""
+    """Offset subtracted from the clock, so that nanoseconds since 1970 stay exact."""
     codes: dict[int, npt.NDArray[np.int32]] = field(default_factory=dict)
     """Text column to the index of each row's value in `labels`."""
     labels: dict[int, list[str]] = field(default_factory=dict)
@@ -66,7 +66,8 @@ def open_binary(path: Path) -> IO[bytes]:
 
 
 class _BoundedGzip(io.RawIOBase):
-    """What a gzip file holds, as far as text can be packed: zeros shrink by a thousand."""
+    """Contents of a gzip file, up to the size that text can unpack to: zeros shrink by a
+    thousand."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

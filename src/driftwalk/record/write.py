@@ -36,7 +36,7 @@ def save_trajectory(
     path : path-like
         Where to write. The file appears whole or not at all.
     existing : {"error", "replace"}
-        What to do when the file is there already.
+        Behaviour if the file exists already.
 
     Returns
     -------

@@ -41,7 +41,7 @@ def open_run(
     folder : Path
         The run directory.
     specification : mapping
-        What determines the numbers of the run.
+        Everything that determines the numbers of the run.
     study : Study
         For the manifest.
     seeds : mapping of str to int

@@ -37,7 +37,7 @@ def quantity_parser(unit: str, *words: str) -> Callable[[str], Any]:
     unit : str
         Unit of the result.
     *words : str
-        Words that may stand for a number.
+        Words that may replace a number.
     """
 
     def parse(text: Any) -> Any:

@@ -111,7 +111,7 @@ def require_place(path: Path, *, existing: str) -> None:
     path : Path
         The file to be written.
     existing : {"error", "replace"}
-        What to do when it is there already.
+        Behaviour if the file exists already.
 
     Raises
     ------

@@ -46,7 +46,7 @@ def cells_of(name: str) -> list[list[list[int]]]:
 
 
 def classes_section(series: dict[str, xr.Dataset], *, id: str = "classes") -> Section:
-    """Return the shares of the outcome classes, one series beside the other.
+    """Return the shares of the outcome classes, one series next to the other.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The part of a page on the flow: velocities at the nodes, measured and filled ones told apart."""
+"""The part of a page on the flow: velocities at the nodes, with measured and filled ones marked."""
 
 from __future__ import annotations
 

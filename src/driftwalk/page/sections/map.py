@@ -37,7 +37,7 @@ def map_section(calibration: xr.Dataset, recording: xr.Dataset | None = None) ->
     calibration : xarray.Dataset
         A `calibration`; one without excerpts or densities gives a map without them.
     recording : xarray.Dataset, optional
-        The `trajectory` of one body that it was made from, for an excerpt beside the simulated
+        The `trajectory` of one body that it was made from, for an excerpt next to the simulated
         ones, and for the outline of the tank.
 
     Returns
@@ -205,7 +205,7 @@ def _typical(calibration: xr.Dataset, name: str) -> Floats:
 
 
 def _recording(calibration: xr.Dataset, recording: xr.Dataset | None) -> dict[str, Any] | None:
-    """Return what stands beside a cell: the recording's density and its first seconds."""
+    """Return the data shown next to a cell: the recording's density and its first seconds."""
     if not _has(calibration, "recording_step_density", "step_length_edge", "turning_angle_edge"):
         return None
     part: dict[str, Any] = {

@@ -42,7 +42,7 @@ TIME_STEP: Final = 1e-4
 
 
 class Noise(NamedTuple):
-    """What is known of the noise of the tracking."""
+    """Estimates of the tracking noise."""
 
     position: float
     """[m]"""
@@ -172,7 +172,7 @@ def noise_of(described: Mapping[str, Any], body: str) -> Noise | None:
     Parameters
     ----------
     described : mapping
-        What `driftwalk.describe` returns.
+        Result of `driftwalk.describe`.
     body : str
         Name of the body.
     """

@@ -161,7 +161,7 @@ def by_length_section(recovery: xr.Dataset) -> Section:
 
 
 def estimates_section(recovery: xr.Dataset, name: str) -> Section:
-    """Return the estimates of a parameter with their intervals beside the truth."""
+    """Return the estimates of a parameter with their intervals next to the truth."""
     key, unit, words = PARAMETERS[name]
     require(recovery, name, f"{name}_low", f"{name}_high", "used")
     drawn = []

@@ -24,7 +24,7 @@ MOST_COUNTS: Final = 6_000_000
 
 
 def over_time_part(part: xr.Dataset, x: str, y: str) -> dict[str, Any] | None:
-    """Return the classes of every setting of a map over time, beside those of the reference.
+    """Return the classes of every setting of a map over time, next to those of the reference.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def setting_times_section(part: xr.Dataset, id: str, where: str) -> Section:
     id : str
         Name of the section in its page.
     where : str
-        What the title says of the axes that the part does not have, or nothing.
+        Words in the title for the axes that the part does not have, or nothing.
     """
     title = f"Outcome classes over time{where}"
     dims = [str(dim) for dim in part["l1_distance"].dims]

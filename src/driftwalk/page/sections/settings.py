@@ -180,7 +180,7 @@ def _lines(
 
 
 def _positions(part: xr.Dataset, name: str) -> tuple[Floats, str]:
-    """Return places along an axis, and what they stand for where it is one of words."""
+    """Return places along an axis, and their words if it is an axis of words."""
     if not is_words(part, name):
         return np.asarray(part[name].values, dtype=np.float64), ""
     values = [str(value) for value in part[name].values]

@@ -1,4 +1,5 @@
-"""What the figures of self-assembly share: classes to show, their colours, axes of a sweep."""
+"""Parts that the figures of self-assembly share: classes to show, their colours, axes of a
+sweep."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What all figures share: sizes, colours, the print style, and axes that need no display.
+"""Parts that all figures share: sizes, colours, the print style, and axes that need no display.
 
 Figures are made from `matplotlib.figure.Figure` with the Agg canvas, never through pyplot, so
 that drawing opens no window, holds no global list of figures, and leaves the reader's own style

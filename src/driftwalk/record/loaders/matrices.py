@@ -49,7 +49,7 @@ class MatricesLoader:
 
 
 def _place(name: Path, folder: Path) -> Path:
-    """Return the file beside the recording, or as it is named when there is none."""
+    """Return the file in the recording's folder, or the path as given if there is none."""
     beside = folder / name
     path = beside if beside.exists() else name
     if not path.is_file():

@@ -23,7 +23,7 @@ NAMES = [*NAMES, "area", "orientation", "compactness"]
 
 
 class SwisTrackParticlesLoader:
-    """Bodies are told apart by their order within a frame, since the file has no identities."""
+    """Bodies are distinguished by their order within a frame, since the file has no identities."""
 
     name = "swistrack-particles"
     description = "SwisTrack particles.csv (2022 and later; no identities)"
