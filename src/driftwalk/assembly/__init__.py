@@ -1,4 +1,4 @@
-"""What many blocks build, with what certainty, and how much that depends on the model."""
+"""Self-assembly of many blocks: outcomes, their uncertainty, and their dependence on the model."""
 
 from driftwalk.assembly.lattice.events import ReplayedEvents, class_at, replay_events
 from driftwalk.assembly.lattice.polyomino import polyomino_cells, polyomino_name, polyominoes

@@ -55,7 +55,7 @@ class _Moment:
 
 
 class _Wishes(NamedTuple):
-    """What a world is to be like from its next force interval on."""
+    """Settings of a world from its next force interval on."""
 
     study: Study
     flow_scale: float
@@ -222,8 +222,8 @@ class LiveTank:
         flow_scale : float
             Factor on the velocity of the water, from 0 (still water); 1 at first.
         latching : {"collision", "connector", "none"}
-            How blocks latch from then on. What is joined stays so, even with "none", unless it is
-            parted.
+            How blocks latch from then on. Joined blocks stay joined, even with "none", unless they
+            are parted.
         hidden_face_drag : {"none", "full"}
             Drag on faces that are joined.
         blocks : int

@@ -78,8 +78,8 @@ def classify(
         The same for faces that stay joined; not smaller, default: twice as large.
     min_duration : float
         Shortest duration of a join, and of coming apart [s]. With more than 0 it takes two samples
-        in a row, so that a single noisy one changes nothing. What begins later than this before the
-        end of the recording is not seen.
+        in a row, so that a single noisy one changes nothing. Joins that begin later than this
+        before the end of the recording are not seen.
     hold : float, optional
         How long a block that is not seen keeps its joins [s]; after that its state is unknown until
         it is seen again. Default: 1 s, or three sampling intervals if that is longer.

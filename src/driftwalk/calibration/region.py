@@ -1,7 +1,7 @@
 """Uncertainty of the parameters: a parametric bootstrap on a stored surface.
 
 Recordings are simulated at the optimum, with the length, gaps and camera noise of the real one, and
-each is estimated anew with the same smooth surface, against steps that were simulated once around
+each is estimated again with the same smooth surface, against steps that were simulated once around
 the optimum. (It meets two of their four replicates, in turn, so that the noise of the surface is
 part of what chance does.) For each, the truth is known: it is the optimum. How far D at the truth
 lies above the smallest D of its own surface, the excess, is what chance does; its 90 % quantile is
@@ -171,7 +171,7 @@ def run_bootstrap(
     store: Store | None = None,
     progress: Progress | None = None,
 ) -> Bootstrap:
-    """Simulate recordings at the optimum and estimate each anew.
+    """Simulate recordings at the optimum and estimate each again.
 
     Parameters
     ----------
@@ -180,13 +180,13 @@ def run_bootstrap(
     optimum : Optimum
         Where to simulate.
     surface : StoredSurface
-        What to estimate against.
+        Surface to estimate against.
     count : int
         Number of recordings, at least 2.
     store : Store, optional
         Where finished work units are kept.
     progress : callable, optional
-        Told the number of recordings done and in all.
+        Called with the number of finished recordings and the total.
     """
     recordings, to_recording = recordings_at(problem, optimum, stage="bootstrap", count=count)
     names = [parameter.name for parameter in problem.parameters]

@@ -110,7 +110,7 @@ def calibrate(
     stores : callable, optional
         Where each stage keeps finished work (`driftwalk.core.rundir`); memory when left out.
     tell : callable, optional
-        Told the stage and how much of it is done: ``tell("map", 64, 1681)``.
+        Called with the stage and its progress: ``tell("map", 64, 1681)``.
 
     Returns
     -------

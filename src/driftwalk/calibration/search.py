@@ -88,7 +88,7 @@ def run_map(
     store : Store, optional
         Where finished work units are kept.
     progress : callable, optional
-        Told the number of settings done and in all.
+        Called with the number of finished settings and the total.
     """
     names = [parameter.name for parameter in problem.parameters]
     design: Design = grid(**dict(zip(names, axes, strict=True)))

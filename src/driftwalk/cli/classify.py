@@ -18,7 +18,7 @@ from driftwalk.schema.netcdf import kind_of, open_netcdf
 if TYPE_CHECKING:
     import xarray as xr
 
-_PANEL = "What counts as joined"
+_PANEL = "Criteria of a join"
 # Centres of blocks that touch are a side apart, and noise takes off a little.
 _TOO_CLOSE = 0.8
 

@@ -43,7 +43,7 @@ QUICK = {
 FIT, CALIBRATION = "fit", "calibrate"
 """The run directories inside that of the demo, one for each command."""
 PAGE = "report.html"
-"""The page of both runs, beside them."""
+"""The page of both runs, in the same folder."""
 
 
 def demo(
@@ -114,8 +114,8 @@ def _fit(
     overwrite: bool,
     tell: Callable[[xr.Dataset], None],
 ) -> tuple[xr.Dataset, xr.Dataset]:
-    """Fit and check, or read what a finished run found; the fit is told before it is checked."""
-    from driftwalk.runs import FitWork, run_fit
+    """Fit and check, or read a finished run; the fit is printed before it is checked."""
+    from driftwalk.cli.fit_run import FitWork, run_fit
 
     if _finished(folder, overwrite):
         tell(open_netcdf(folder / "fit.nc"))

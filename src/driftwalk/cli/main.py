@@ -92,7 +92,7 @@ def load_command(name: str) -> Any:
 
 
 def _stand_in() -> None:
-    """Stand for a command in the list of commands."""
+    """Represent a command in the list of commands."""
 
 
 def _one_command_app(name: str, function: Callable[..., Any]) -> Any:

@@ -171,7 +171,7 @@ def sensitivity(
 
 
 def _flow_paths(study: Study, folder: Path) -> dict[str, Path]:
-    """Return the files of the flow fields to compare; those of a study file lie beside it."""
+    """Return the files of the flow fields; those of a study file are relative to its folder."""
     return {name: folder / name for name in study.sensitivity.flow or ()}
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 STATED: Final = ("forces.drag_coefficient", "forces.force_std_N")
-"""What has a default, but is no truth unless the file says it."""
+"""Parameters with a default that count as the truth only if the file states them."""
 
 
 def recover(

@@ -180,8 +180,7 @@ def write_video(
 
 
 class _Painter:
-    """Everything that is the same in all frames: the empty tank, the light, the poses and their
-    rates."""
+    """Parts that are the same in all frames: the empty tank, the light, the poses and rates."""
 
     def __init__(self, trajectory: xr.Dataset, settings: VideoSettings) -> None:
         self.cv2: Any = require_opencv("drawing a synthetic video")

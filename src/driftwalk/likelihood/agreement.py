@@ -34,7 +34,7 @@ def angle_given_facts(
     passes : Passes
         The filter with the angle as an input.
     mode, restricted : Mode, Restricted
-        What was found with the angle in the state; the search begins there.
+        Result with the angle in the state; the search begins there.
     study : Study
         The section [fit].
 

@@ -25,7 +25,7 @@ class Angle(NamedTuple):
 
 
 def no_angle(count: int) -> Angle:
-    """Return what stands for the orientation of a track that has none."""
+    """Return the substitute for the orientation of a track that has none."""
     return Angle(np.zeros(count), np.zeros(count), np.ones(count, dtype=bool))
 
 

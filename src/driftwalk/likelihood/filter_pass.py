@@ -30,7 +30,7 @@ Place = tuple[slice, slice]
 LARGEST_STEP_S = 0.05
 """Longest step of the filter's integrator."""
 LONGEST_GAP_S = 1.0
-"""Longest gap that is predicted over; after a longer one the motion is found anew."""
+"""Longest gap that is predicted over; after a longer one the filter restarts."""
 STEP = 1e-4
 """Relative change of a noise for the derivatives by it."""
 
@@ -113,7 +113,7 @@ class Point:
 
 
 class Sums(NamedTuple):
-    """What a pass adds up over all samples."""
+    """Sums of a pass over all samples."""
 
     deviance: float
     """Negative log likelihood, without its constant."""

@@ -52,9 +52,9 @@ def fit_motion(
     """Fit flow, drag coefficient, stochastic force and tracking noise to a recording, together.
 
     Nothing is differentiated: a Kalman filter predicts each recorded pose from the earlier ones
-    with the drag of the model, and the parameters are those that make its errors likely. C_d is the
-    minimum of the restricted likelihood, which allows for the flow being estimated along with it.
-    See docs/explanation/likelihood.md.
+    with the drag of the model, and the fit chooses the parameters that make its errors most likely.
+    C_d is the minimum of the restricted likelihood, which allows for the flow being estimated along
+    with it. See docs/explanation/likelihood.md.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def fit_motion(
     body : str, optional
         The body, where a recording has several.
     tell : callable, optional
-        Told how many steps are done, how many there are at most, and what is done.
+        Called with the number of finished steps, the largest number, and the present task.
 
     Returns
     -------
@@ -162,7 +162,7 @@ def check_fit(
     angle: AngleUse | None = None,
     body: str | None = None,
 ) -> None:
-    """Refuse recordings that `fit_motion` would refuse; takes no time worth speaking of.
+    """Refuse recordings that `fit_motion` would refuse; takes almost no time.
 
     Parameters
     ----------

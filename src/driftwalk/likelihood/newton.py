@@ -154,7 +154,7 @@ def find_mode(
     iterations : int
         Most steps.
     tell : callable
-        Told the number of steps done, the most, and what is done.
+        Called with the number of finished steps, the largest number, and the present task.
     hold_first : bool
         Whether the first steps leave C_d and some noises as they are: not where the search begins
         near its end.

@@ -53,7 +53,7 @@ class Ready(NamedTuple):
     parts: list[Track]
     """The same, cut at the switching times."""
     places: list[tuple[int, int]]
-    """Of each part: its flow and its recording."""
+    """Flow and recording of each part."""
     intervals: Intervals
     series: list[Series]
     """The parts as the filter takes them."""

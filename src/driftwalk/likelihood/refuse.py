@@ -1,4 +1,4 @@
-"""What cannot be fitted, and what to do about it: recordings too short, at rest, or at the wall."""
+"""Recordings that cannot be fitted, and the remedies: too short, at rest, or at the wall."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ KEPT: Final = 0.99
 MOST_AT_OWN_WALL: Final = 0.9
 """Share of the intervals at the wall of a tank that was fitted to the positions themselves."""
 MOST_COEFFICIENTS: Final = 4400
-"""Of all flows together where there are several: about six flows in the paper's tank."""
+"""Limit for all flows together: about six flows in the paper's tank."""
 
 
 def require_length(track: Track, study: Study, *, where: str) -> None:
@@ -122,7 +122,7 @@ def require_usable(
     longest_gap : float
         Longest interval that is predicted over [s].
     where : str
-        What it is about, to begin the message with.
+        The subject, to begin the message with.
 
     Raises
     ------

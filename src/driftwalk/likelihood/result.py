@@ -264,7 +264,7 @@ def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
     Parameters
     ----------
     fit : xarray.Dataset
-        What `fit_motion` returns.
+        Result of `fit_motion`.
     interval : int, optional
         With switching times: the interval, counted from 0, whose steady flow is wanted. Without
         it the flow that changes is returned: its frames are a microsecond before and after each
@@ -330,7 +330,7 @@ def footprint_count(
 ) -> npt.NDArray[np.float64]:
     """Return for each node how many samples have the block over it.
 
-    Without orientations the circle inside the block stands for it; samples that lack one among
+    Without orientations the circle inside the block is used; samples that lack one among
     others that have are left out.
     """
     half = 0.5 * side

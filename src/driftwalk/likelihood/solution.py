@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from driftwalk.schema import Track
 
 BREAKDOWN = (np.linalg.LinAlgError, ArithmeticError)
-"""What a search raises that has run away: a matrix that is not positive definite, a parameter that
+"""Errors of a search that diverges: a matrix that is not positive definite, a parameter that
 is no longer a number."""
 
 

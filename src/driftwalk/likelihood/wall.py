@@ -38,7 +38,7 @@ def wall_intervals(
     time, x, y : ndarray, shape (n,)
         The track [s], [m].
     theta : ndarray or None
-        Orientations [rad]; without them the circle around the block stands for its corners.
+        Orientations [rad]; without them the circle around the block replaces its corners.
     outline : Outline
         The tank.
     side : float

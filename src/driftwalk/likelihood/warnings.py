@@ -1,4 +1,4 @@
-"""What the user of a fit has to know, in sentences."""
+"""Warnings for the user of a fit, in sentences."""
 
 from __future__ import annotations
 

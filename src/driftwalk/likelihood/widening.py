@@ -1,10 +1,11 @@
 """By how much the intervals of a fit are wider than theory says.
 
 Theory takes the filter's innovations for independent normals and the smoothness of the flow for
-known. What that leaves out (the filter is a Gaussian one, flows are not drawn from the prior, a
-contact with the wall may go unseen) has been measured: the factors are those with which nine in ten
-of the 90 % intervals hold the truth, in 64 recordings of known truth with the angle in the state,
-and 32 without (`studies/likelihood`, sets synthetic and ode; another set, coverage, is the test).
+known. Theory leaves out some effects (the filter is a Gaussian one, flows are not drawn from the
+prior, a contact with the wall may go unseen) has been measured: the factors are those with which
+nine in ten of the 90 % intervals hold the truth, in 64 recordings of known truth with the angle in
+the state, and 32 without (`studies/likelihood`, sets synthetic and ode; another set, coverage, is
+the test).
 """
 
 from __future__ import annotations

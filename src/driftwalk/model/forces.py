@@ -44,6 +44,5 @@ class Forces(Section):
 
     @property
     def force_noise_intensity_N2_s(self) -> float:
-        """Noise intensity, all that a recording determines of the stochastic force: σ_F² · force
-        interval [N² s]."""
+        """Noise intensity σ_F² · force interval [N² s], all that a recording can determine."""
         return self.force_std_N**2 * self.force_interval_s

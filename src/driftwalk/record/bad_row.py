@@ -11,9 +11,6 @@ from pathlib import Path
 
 from driftwalk.core.errors import FormatError
 
-if TYPE_CHECKING:
-    from driftwalk.record.text import TableLayout
-
 MISSING = frozenset({"", "NaN", "nan", "NAN", "NA", "N/A", "null", "NULL", "None", "none", "-nan"})
 """Words that trackers write for a missing number."""
 

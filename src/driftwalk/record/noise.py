@@ -23,8 +23,7 @@ MIN_WINDOWS = 50
 
 
 class NoiseEstimate(NamedTuple):
-    """White tracking noise of a recording, and the random motion of the path from which it was
-    separated."""
+    """White tracking noise of a recording, separated from the random motion of the path."""
 
     position_noise_m: float
     """Standard deviation of the position, per axis [m]; NaN with too few samples."""

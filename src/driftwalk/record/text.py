@@ -66,8 +66,7 @@ def open_binary(path: Path) -> IO[bytes]:
 
 
 class _BoundedGzip(io.RawIOBase):
-    """Contents of a gzip file, up to the size that text can unpack to: zeros shrink by a
-    thousand."""
+    """Contents of a gzip file, as far as text can be packed: zeros shrink by a thousand."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

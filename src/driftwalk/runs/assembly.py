@@ -54,7 +54,7 @@ class AssemblyWork:
 
 @dataclass(frozen=True)
 class AssemblyResult:
-    """What came out.
+    """Results.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ def run_assembly(
     Parameters
     ----------
     work : AssemblyWork
-        What to do.
+        The work to do.
     folder : Path
         The run directory.
     film : {"gif", "mp4", "none"}

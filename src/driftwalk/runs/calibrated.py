@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Calibrated:
-    """What a finished calibration says.
+    """Results of a finished calibration.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Calibrated:
     files : dict of str to Path
         The files that were read, by their role.
     warnings : list of str
-        What the calibration warned of.
+        Warnings of the calibration.
     """
 
     study: Study

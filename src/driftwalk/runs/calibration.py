@@ -39,6 +39,8 @@ class CalibrationWork:
         The files that were read, by their role.
     threads : int or None
         Threads; the result does not depend on them.
+    remark : str or None
+        Remark for the user when the run begins.
     """
 
     recording: xr.Dataset
@@ -65,8 +67,8 @@ def run_calibration(
 
     Parameters
     ----------
-    work : CalibrationWork
-        What to do.
+    work : Work
+        The work to do.
     folder : Path
         The run directory.
     overwrite : bool

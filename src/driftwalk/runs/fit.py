@@ -32,6 +32,8 @@ class FitWork:
         The body.
     inputs : mapping of str to Path
         The files that were read, by their role.
+    remark : str or None
+        Remark for the user when the run begins.
     check : bool
         Whether the model is checked.
     """
@@ -44,7 +46,7 @@ class FitWork:
 
 
 class Fitted(NamedTuple):
-    """What a run found."""
+    """Results of a run."""
 
     fit: xr.Dataset
     check: xr.Dataset | None
@@ -69,7 +71,7 @@ def run_fit(
     Parameters
     ----------
     work : FitWork
-        What to do.
+        The work to do.
     folder : Path
         The run directory.
     overwrite : bool
@@ -77,16 +79,7 @@ def run_fit(
     begun : callable, optional
         Called when everything is checked and the work begins.
     fitted : callable, optional
-        Told the fit as soon as it is stored, before the figures and the check.
-    progress : callable, optional
-        Told how much is done: ``progress(done, total, text)``.
-    command : str, optional
-        The command line or the call, for the manifest.
-
-    Returns
-    -------
-    Fitted
-        The `fit` and its `model_check`.
+        Called with the fit as soon as it is stored, before the figures and the check.
 
     Raises
     ------

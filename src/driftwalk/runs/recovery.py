@@ -55,8 +55,8 @@ def run_recovery(
 
     Parameters
     ----------
-    work : RecoveryWork
-        What to do.
+    work : RecoverWork
+        The work to do.
     folder : Path
         The run directory.
     overwrite : bool

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 DRAWN_AXES: Final = 2
 """Axes that a figure has; a study of more has a folder of figures for each value of the others."""
 SHARD_FORM: Final = 2
-"""What a work unit keeps of a setting; in the second form also the classes over time."""
+"""Results of a setting in a work unit; the second form adds the classes over time."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class SensitivityWork:
 
 @dataclass(frozen=True)
 class SensitivityResult:
-    """What came out.
+    """Results.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ def run_sensitivity(
     Parameters
     ----------
     work : SensitivityWork
-        What to do.
+        The work to do.
     folder : Path
         The run directory.
     overwrite : bool

@@ -1,4 +1,4 @@
-"""What a stored dataset of driftwalk's own has to hold, for the readers that need all of it.
+"""Required contents of driftwalk's own stored datasets, for the readers that need all of it.
 
 A page makes do with what there is, section by section; a recording, a flow field or a calibration
 that work goes on with has no such way out. Only what its reader relies on stands here: further
@@ -40,7 +40,7 @@ _JSON_WORDS: Final[dict[Any, str]] = {dict: "object", list: "list"}
 
 
 class Contents(NamedTuple):
-    """What a kind of dataset holds."""
+    """Contents of a kind of dataset."""
 
     dims: dict[str, str]
     """Variable to its dimensions: ``[time]`` may be there."""

@@ -3,7 +3,7 @@
 Reading: their declared size first, then whole into memory.
 
 A header may declare any size. HDF5 stores a chunk that was never written as nothing at all, and
-reads it as its fill value: a file of a few kilobytes holds terabytes so. What a header declares is
+reads it as its fill value: a file of a few kilobytes holds terabytes so. The declared size is
 therefore compared with the size of the file, before anything of that size is made.
 """
 
@@ -25,7 +25,7 @@ HDF5: Final = b"\x89HDF\r\n\x1a\n"
 MAGIC: Final = (HDF5, b"CDF\x01", b"CDF\x02")
 
 ALLOWANCE_BYTES: Final = 128 * MIB
-"""What any file may hold in memory, however small it is."""
+"""Memory that any file may declare, however small the file is."""
 LARGEST_RATIO: Final = 500
 """How much more a file may hold in memory than on the disk, beyond that.
 
@@ -39,8 +39,8 @@ _WIDTH: Final = 8
 def open_netcdf(path: Path) -> xr.Dataset:
     """Read a NetCDF file into memory and close it.
 
-    Numbers stay as they are stored: a time in "s" does not become a date. What it has to hold is
-    its reader's to check, by `driftwalk.schema.contents.check_contents` where work goes on with it.
+    Numbers stay as they are stored: a time in "s" does not become a date. Each reader checks the
+    required contents, by `driftwalk.schema.contents.check_contents` where work goes on with it.
 
     Raises
     ------

@@ -2,7 +2,7 @@
 
 Dimension ``step``; coordinate ``time`` [s], the instant at which the step begins; variables
 ``step_length`` [m] and ``turning_angle`` [rad, in (-pi, pi]], the signed angle from the step before
-to this one (the paper's step angle). What was counted on the way stands in ``attrs``.
+to this one (the paper's step angle). ``attrs`` holds the counts.
 """
 
 from __future__ import annotations

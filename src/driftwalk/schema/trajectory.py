@@ -5,7 +5,7 @@ Variables ``x``, ``y`` [m] and ``theta`` [rad, in (-pi, pi], NaN when unknown], 
 sample is NaN in ``x`` and ``y``: gaps are real and are never filled. Bodies with clocks of their
 own share the union of their time stamps, each with NaN where it has no sample.
 
-What was known about the set-up stands in ``attrs``: ``kind`` = "trajectory", ``schema_version``,
+``attrs`` describes the set-up: ``kind`` = "trajectory", ``schema_version``,
 ``source`` (file name), ``format`` (loader), ``sample_rate_Hz``, ``arena`` (JSON text, see
 `driftwalk.model.tank`), ``position_quantum_m`` (resolution of the file, 0 when unknown),
 ``y_axis`` (what the loader did), ``counts`` (JSON text: what cleaning found).

@@ -31,7 +31,7 @@ MOST_NODES: Final = 50_000_000
 
 @dataclass(frozen=True)
 class Camera:
-    """What the camera does to a pose: noise per axis [m], [rad], and the file's resolution [m]."""
+    """Effect of the camera on a pose: noise per axis [m], [rad], and the file's resolution [m]."""
 
     position_noise: float = 0.0
     orientation_noise: float = 0.0

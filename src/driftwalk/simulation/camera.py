@@ -1,4 +1,4 @@
-"""What the camera of a recording did to its poses, to do the same to simulated ones."""
+"""Effect of a recording's camera on its poses, to apply it to simulated ones."""
 
 from __future__ import annotations
 

@@ -183,7 +183,7 @@ def without_gaps(time: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 
 
 def plain_camera(study: Study) -> Camera:
-    """Return the camera of a study in which "estimate" and "recording" stand for none."""
+    """Return the camera of a study in which "estimate" and "recording" mean none."""
     seen = study.observation
     values = (seen.position_noise_m, seen.orientation_noise_rad, seen.position_quantum_m)
     return Camera(*(0.0 if isinstance(value, str) else value for value in values))

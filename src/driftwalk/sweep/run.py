@@ -61,7 +61,7 @@ def run_sweep(
         Where results are kept as soon as they are there, by this process alone; memory when left
         out.
     executor : concurrent.futures.Executor, optional
-        What computes: threads, processes (the function and its results must pickle), Dask. One
+        Workers: threads, processes (the function and its results must pickle), Dask. One
         unit after the other in this thread when left out. It is not shut down.
     progress : callable, optional
         Called with the number of settings that are done and of all, at the start and after every

@@ -1,4 +1,4 @@
-"""Where a sweep keeps its results. What lies on the disk is in `driftwalk.core.shards`."""
+"""Where a sweep keeps its results. `driftwalk.core.shards` defines the files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from driftwalk.core.shards import Arrays, Unit, UnitT
 
 
 class Store(Protocol):
-    """What `run_sweep` needs of a store; `ShardStore` is the one on disk."""
+    """Interface that `run_sweep` needs of a store; `ShardStore` is the one on disk."""
 
     def missing(self, units: Iterable[UnitT]) -> list[UnitT]:
         """Return the units that have no result yet, in their order."""

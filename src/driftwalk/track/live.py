@@ -1,7 +1,7 @@
 """Live output: a TCP server that sends each frame's result to whoever is connected.
 
 Two forms: JSON, one object a line, and SwisTrack's NMEA sentences. A client that reads slowly loses
-frames and is told how many; the tracker never waits for one.
+frames, and the stream says how many; the tracker never waits for one.
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ class LiveServer:
         Parameters
         ----------
         content : object
-            What `encode` takes; a mapping that JSON can hold without `encode`.
+            Argument of `encode`; a mapping that JSON can hold without `encode`.
         image : array, optional
             The frame, for clients that asked for it.
         """

@@ -35,7 +35,7 @@ def recording_of(
     names : sequence of str
         Of the bodies.
     tracks : iterable of Track
-        What was followed.
+        The tracks followed.
     ambiguous : array, shape (frames, bodies)
         Scores.
     attrs, counts : mapping

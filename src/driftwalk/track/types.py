@@ -1,4 +1,4 @@
-"""What passes between the parts of the tracker: frames, detections, and what was turned down.
+"""Types that pass between the parts of the tracker: frames, detections, and rejected candidates.
 
 Pixels are (column, row), with pixel centres at whole numbers and rows counted downwards. The world
 is in metres, y up, angles counter-clockwise.
@@ -55,7 +55,7 @@ class Detection:
     area_px : float
         Area of what was found [px²].
     key : str or None
-        What a coded tag says; None for objects that look alike.
+        Key of a coded tag; None for objects that look alike.
     score : float
         In [0, 1]: how well it fits what was looked for.
     """
@@ -96,7 +96,7 @@ class Rejected:
 
 @dataclass(frozen=True)
 class FrameResult:
-    """What was found in one frame.
+    """Detections in one frame.
 
     Parameters
     ----------
@@ -105,9 +105,9 @@ class FrameResult:
     time : float
         Presentation time [s].
     detections : list of Detection
-        What was accepted.
+        The accepted candidates.
     rejected : list of Rejected
-        What was not, and why.
+        The rejected candidates, with reasons.
     """
 
     index: int

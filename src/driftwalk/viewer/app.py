@@ -35,11 +35,11 @@ def make_app(source: Source, gate: Gate, *, failed: Failed) -> ASGIApp:
     Parameters
     ----------
     source : Source
-        What the page shows.
+        Source of the page.
     gate : Gate
         Who may come in.
     failed : callable
-        Told the error with which the source ended.
+        Called with the error with which the source ended.
     """
     hub = Hub(source.watched)
 

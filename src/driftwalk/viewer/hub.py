@@ -15,14 +15,14 @@ Publish = Callable[[Content], None]
 
 
 class Source:
-    """What a page shows: a run, a tracker's stream, or the playground.
+    """Source of a page: a run, a tracker's stream, or the playground.
 
     Attributes
     ----------
     view : str
         Which page it is.
     title : str
-        What stands above it until the page itself has come.
+        Heading until the page itself arrives.
     """
 
     view: str
@@ -63,7 +63,7 @@ class Hub:
     Parameters
     ----------
     watched : callable
-        Told how many browsers there are, whenever that changes.
+        Called with the number of browsers whenever it changes.
     """
 
     def __init__(self, watched: Callable[[int], None]) -> None:

@@ -1,4 +1,4 @@
-"""What waits to be sent to a browser: of each kind at most one message, the newest.
+"""Queue of messages to a browser: at most one of each kind, the newest.
 
 A browser that draws slowly, or a network that is slow, must see the present and not a queue of the
 past. Frames that come many times a second are sent only after the browser has said that it has

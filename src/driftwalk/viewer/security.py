@@ -47,7 +47,7 @@ class Gate:
     port : int
         Its port.
     token : str or None
-        What has to stand in the query; None on loopback.
+        Token required in the query; None on loopback.
     """
 
     host: str
@@ -133,7 +133,7 @@ def is_loopback(host: str) -> bool:
 
 
 def is_any(host: str) -> bool:
-    """Return whether an address stands for all addresses of the machine."""
+    """Return whether an address means all addresses of the machine."""
     try:
         return ipaddress.ip_address(host).is_unspecified
     except ValueError:

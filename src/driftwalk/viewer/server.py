@@ -31,14 +31,14 @@ def serve(
     Parameters
     ----------
     source : Source
-        What the page shows: a `RunSource`, a `LiveSource` or a `PlaySource`.
+        Source of the page: a `RunSource`, a `LiveSource` or a `PlaySource`.
     host : str
         Address to listen on. Away from loopback the page's address holds a random token, and
         whoever has it sees the page.
     port : int
         Port to listen on; 0 takes a free one.
     ready : callable, optional
-        Told the page's address when it can be opened.
+        Called with the page's address when it can be opened.
 
     Raises
     ------

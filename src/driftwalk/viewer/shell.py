@@ -72,7 +72,7 @@ def html_shell(page: dict[str, Any], *, token: str | None) -> str:
     page : dict
         As of `page_frame`.
     token : str or None
-        What the browser has to say when it asks for more.
+        Token that the browser must send with its requests.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""What of a tracker's frames can be drawn: an odd body costs itself, and not its frame.
+"""Filter for a tracker's frames: a body that cannot be drawn is left out, not its frame.
 
-A stream comes from another program, and any of its values may be wrong. What is wrong is left out,
-counted, and said in one sentence that is brought up to date now and then.
+A stream comes from another program, and any of its values may be wrong. Wrong values are left out,
+counted, and reported in one sentence that is brought up to date now and then.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ KINDS: Final = {
     "event": ("event", "events"),
     "value": ("value", "values"),
 }
-"""What can be left out, one and several of it."""
+"""Names of parts that can be left out, in singular and plural."""
 FACES: Final = range(4)
 
 Fault = str | None
@@ -215,7 +215,7 @@ BODY: Final[dict[str, Check]] = {
     "y_m": _or_null(_number),
     "theta_rad": _or_null(_number),
 }
-"""What the page draws of a body."""
+"""Values of a body that the page draws."""
 EVENT: Final[dict[str, Check]] = {
     "time_s": _number,
     "kind": _text,
@@ -233,4 +233,4 @@ VALUES: Final[dict[str, Check]] = {
     "frames_lost_by_client": _or_null(_number),
     "jpeg_base64": _or_null(_text),
 }
-"""What the page shows of a frame besides, and does without."""
+"""Optional values of a frame that the page shows."""

@@ -10,14 +10,14 @@ two agree to rounding until a collision amplifies it, and in distribution after.
     contacts  blocks against blocks: overlap, impulses, shifts
     latch     which faces join, and the body that they make
 
-What the rules leave open is decided so:
+The twin decides cases that the rules leave open:
 
 * Steps of events, of the first contact and of the end count completed steps: time = step * dt.
 * A world is complete by a merge. A world of one block has none and runs to its last step; so does
-  every world that is sampled, and `end_step` is then the last step.
-* The start is taken as it is: what overlaps or stands beyond the wall is settled in the first step.
-* An overlapping pair counts as touched whether or not an impulse was needed, as at the wall. What
-  the separation alone moves keeps its drag memory: no impulse changed its motion.
+  every world that is sampled, and `end_step` is then the last step. * The start is taken as it is:
+what overlaps or stands beyond the wall is settled in the first step. * An overlapping pair counts
+as touched whether or not an impulse was needed, as at the wall. Assemblies that only the separation
+moves keep their drag memory: no impulse changed their motion.
 * Pairs collide one after another, each with both its passes of impulses, as a block at the wall.
   Of two contact points the later one, counter-clockwise on its block, comes first.
 * Further rounds at the wall, and rounds of the separation, move what is beyond their tolerance and

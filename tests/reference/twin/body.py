@@ -34,7 +34,7 @@ def wrapped(angle: float) -> float:
 
 @dataclass(frozen=True)
 class Square:
-    """What all blocks have in common: side a [m] and mass m [kg]."""
+    """Constants of all blocks: side a [m] and mass m [kg]."""
 
     side: float
     mass: float

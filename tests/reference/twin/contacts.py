@@ -149,7 +149,7 @@ def separate(wall: Wall, assemblies: list[Assembly]) -> None:
 
     A round takes the pairs in order, each as the last one left it; what was pushed is put back
     inside the wall at once, by its outermost corners. Later rounds turn what they push: a wedged
-    block has no other way out. What is jammed in the end has not moved in this step.
+    block has no other way out. Assemblies that are still jammed do not move in this step.
     """
     pairs = close_pairs(assemblies, np.inf)
     pushed: list[Assembly] = []

@@ -1,4 +1,4 @@
-"""What the events of simulated runs made: replayed on the lattice, all runs side by side.
+"""Results of the events of simulated runs, replayed on the lattice, all runs side by side.
 
 The native core gives, for each event, the two blocks and the faces that joined. Everything else
 follows: which assemblies they were, what shapes these had, and the outcome class of the world.
@@ -30,7 +30,7 @@ STEP: Final = np.array([(1, 0), (0, 1), (-1, 0), (0, -1)])
 
 
 class ReplayedEvents(NamedTuple):
-    """What the events of some runs made; -1 where a run had no such event."""
+    """Results of the events of some runs; -1 where a run had no such event."""
 
     event_assembly: npt.NDArray[np.int32]
     """Lowest block of the assembly that stayed and of the one that moved, (run, event, side)."""

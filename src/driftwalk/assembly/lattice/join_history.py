@@ -23,9 +23,9 @@ class Event(NamedTuple):
     outcome: str
     """Class of the world afterwards."""
     assemblies: tuple[int, int] = (-1, -1)
-    """Of a join: lowest block of the assembly that stayed and of the one that moved."""
+    """Lowest block of the assembly that stayed and of the one that moved."""
     shapes: tuple[str, str, str] = ("", "", "")
-    """Of a join: shapes of the two and of what they became."""
+    """Shapes of the two assemblies and of their union."""
 
 
 class JoinHistory:
@@ -36,7 +36,7 @@ class JoinHistory:
     shape : tuple of int
         Samples and blocks of the recording.
     joins : sequence of Join
-        What was joined, and when.
+        The joins and their times.
     chirality : {"merged", "distinct"}
         Whether mirror images are one shape or two.
     """

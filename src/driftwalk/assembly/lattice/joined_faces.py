@@ -29,7 +29,7 @@ ROUNDING: Final = 1e-9
 
 @dataclass(frozen=True)
 class JoinRules:
-    """What counts as joined: lengths [m], angles [rad], times [s]."""
+    """Criteria of a join: lengths [m], angles [rad], times [s]."""
 
     side: float
     join_distance: float

@@ -49,7 +49,7 @@ class LatticeWorld:
     blocks : int
         Number of blocks; at first each is alone.
     joins : iterable of Join
-        What to put in; those that fit best count first, and one that contradicts them is dropped.
+        Joins to apply; those that fit best count first, and one that contradicts them is dropped.
     """
 
     def __init__(self, blocks: int, joins: Iterable[Join] = ()) -> None:

@@ -23,7 +23,7 @@ def stream_keys(
     Parameters
     ----------
     stream : {"run", "parameters", "flow"}
-        What the numbers are for; streams of two kinds never meet.
+        Purpose of the numbers; streams of two kinds never meet.
     seed : int
         Seed of the whole work.
     trial : int

@@ -35,9 +35,9 @@ def build_assembly(plan: Plan, arrays: Arrays, *, attrs: dict[str, Any]) -> xr.D
     Parameters
     ----------
     plan : Plan
-        What was simulated.
+        The simulated plan.
     arrays : dict of ndarray
-        What `driftwalk._core.assemble` returns, by its names, one entry per run of the plan.
+        Result of `driftwalk._core.assemble`, by its names, one entry per run of the plan.
     attrs : dict
         Further attributes.
     """
@@ -83,7 +83,7 @@ def build_path(plan: Plan, samples: Arrays, *, every: int) -> xr.Dataset:
     Parameters
     ----------
     plan : Plan
-        What was simulated.
+        The simulated plan.
     samples : dict of ndarray
         ``sample_pose`` (run, time, block, 3) and ``sample_assembly`` (run, time, block).
     every : int

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 def path_recording(path: xr.Dataset, *, run: int = 0) -> xr.Dataset:
     """Return one simulated run as a recording of all its blocks.
 
-    What reads recordings can then be tried on motion whose events are known: `classify` above all.
+    Functions that read recordings can then be tried on motion whose events are known: `classify`
+    above all.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What is simulated: the study with the options over it, and every run's address and parameters."""
+"""Plan of a simulation: the study with its options, and every run's address and parameters."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ def assemble(
     store : Store, optional
         Where finished work units are kept (`driftwalk.core.rundir`); memory when left out.
     progress : callable, optional
-        Told the number of runs done and in all.
+        Called with the number of finished runs and the total.
     threads : int, optional
         Default: all processors. The result does not depend on it.
     backend : {"cpu", "reference"}

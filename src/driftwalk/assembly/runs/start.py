@@ -1,4 +1,4 @@
-"""Where the blocks of a run start: placed at random, or where they are told."""
+"""Start poses of the blocks of a run: random or given."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def sensitivity_indices(
         default: those of the study's map, with the tank's diameter where that is a list of at least
         two.
     progress : callable, optional
-        Told the number of settings done and in all.
+        Called with the number of finished settings and the total.
 
     Returns
     -------

@@ -60,7 +60,7 @@ def sensitivity_map(
     store : Store, optional
         Where finished work units are kept (`driftwalk.core.rundir`); memory when left out.
     progress : callable, optional
-        Told the number of settings done and in all.
+        Called with the number of finished settings and the total.
     threads : int, optional
         Default: all processors. The result does not depend on it.
 
@@ -122,7 +122,7 @@ def sensitivity_reference(
     flow, store, threads
         As in `sensitivity_map`.
     progress : callable, optional
-        Told the number of realisations done and in all.
+        Called with the number of finished realisations and the total.
 
     Returns
     -------

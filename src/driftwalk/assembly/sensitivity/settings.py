@@ -39,7 +39,7 @@ BLOCK_STEPS_PER_UNIT: Final = 2_000_000_000
 """Steps of single blocks in a work unit, if no run ends early: about half a minute on two
 processors, so that a kill loses no more, and enough runs at once to keep all lanes busy."""
 NUMBERS: Final = ("left_out", "first_contact_median", "completion_median")
-"""What is one number of a setting."""
+"""Variables with one number per setting."""
 BLOCKS_AT_ONCE: Final = 1_000_000
 """Blocks of one call of the native core: about 100 MB."""
 
@@ -79,7 +79,7 @@ class Settings:
 
 @dataclass(frozen=True, eq=False)
 class Outcomes:
-    """What came out, one entry per setting.
+    """Results, one entry per setting.
 
     Attributes
     ----------
@@ -159,7 +159,7 @@ def place_first(settings: Settings) -> None:
 
 
 class _Tally:
-    """What the runs of one setting came to, gathered piece by piece."""
+    """Results of the runs of one setting, gathered piece by piece."""
 
     def __init__(self) -> None:
         self.count: Counter[str] = Counter()
@@ -229,7 +229,7 @@ def _simulate(
     Returns
     -------
     found : dict of ndarray
-        What the native core returns, and ``event_class`` and ``outcome`` of every run.
+        Result of the native core, and ``event_class`` and ``outcome`` of every run.
     classes : tuple of str
         Names of the classes, into which these are indices.
     """

@@ -121,7 +121,7 @@ def sobol_indices(
     Parameters
     ----------
     design : xarray.Dataset
-        What `sobol_design` made.
+        Result of `sobol_design`.
     outputs : xarray.DataArray or array_like, shape (setting,) or (setting, output)
         Outputs of the function in the order of the design, all finite. A DataArray keeps its second
         dimension, ``class`` for example.

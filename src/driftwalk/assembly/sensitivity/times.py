@@ -55,7 +55,7 @@ def courses_of(
     classes : sequence of str
         Names of the classes, that of single blocks among them.
     plan : Plan
-        What was simulated.
+        The simulated plan.
     """
     count = class_counts(
         times_of(np.asarray(event_step), time_step=plan.study.time_step_s),

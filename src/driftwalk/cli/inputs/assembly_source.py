@@ -21,9 +21,9 @@ FOUND_BY_CALIBRATION: Final = (
     "forces.force_interval_s",
 )
 SEARCHED: Final = FOUND_BY_CALIBRATION[:2]
-"""What a calibration is there to find: a study file may hold anything for it."""
+"""Parameters that a calibration finds: a study file may hold any value for them."""
 MODEL_KEYS: Final = ("block", "tank", "water", "forces", "simulation.time_step_s")
-"""What a study file must not contradict when a calibration gives the model."""
+"""Sections that a study file must not contradict when a calibration gives the model."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Source:
     inputs : dict of str to Path
         The files that were read, by their role.
     warnings : list of str
-        What the user should know.
+        Warnings for the user.
     """
 
     study: Study

@@ -1,4 +1,4 @@
-"""What a file is that is no recording, and which command takes it."""
+"""Kinds of files that are not recordings, and the commands that take them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def what_else(path: Path) -> str | None:
     Parameters
     ----------
     path : Path
-        What no reader of recordings could read.
+        A file that no reader of recordings could read.
 
     Examples
     --------

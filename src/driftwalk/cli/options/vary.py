@@ -74,7 +74,7 @@ def vary_overrides(given: Sequence[str]) -> dict[str, Any]:
 
 
 def _values(word: str, axis: Axis) -> Iterator[Any]:
-    """Return what one word stands for: itself, a number, or the numbers of a range."""
+    """Return the values of one word: itself, a number, or the numbers of a range."""
     if not axis.unit:
         yield word
         return
@@ -89,7 +89,7 @@ def _values(word: str, axis: Axis) -> Iterator[Any]:
 
 
 def _range(first: float, last: float, step: float) -> list[float]:
-    """Return the numbers of a range, end included, rounded to the decimals that they stand for."""
+    """Return the numbers of a range, end included, rounded to the decimals of the step."""
     if not (step > 0 and last >= first):
         raise ConfigurationError(f"no value from {first:g} to {last:g} in steps of {step:g}")
     steps = (last - first) / step

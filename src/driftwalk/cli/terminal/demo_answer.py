@@ -1,4 +1,4 @@
-"""What the demo prints: the fit, then the calibration, each beside the truth."""
+"""Output of the demo: the fit, then the calibration, each next to the truth."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ STEP_REMARK: Final = (
 
 @dataclass(frozen=True)
 class Fitted:
-    """What the first half of the demo found.
+    """Results of the first half of the demo.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ def in_json(fitted: Fitted, calibration: xr.Dataset) -> dict[str, Any]:
 
 
 def print_fit(fit: xr.Dataset) -> None:
-    """Print the estimates of the fit beside the truth, as soon as they are there."""
+    """Print the estimates of the fit next to the truth, as soon as they are ready."""
     every = 1e3 * demo_truth()["force_interval_s"]
     print("This recording was simulated by another engine (ODE): the truth is known.")
     _print_estimates("likelihood fit", fit_summary(fit))
@@ -111,7 +111,7 @@ def print_next(page: Path) -> None:
 
 
 def print_calibration(calibration: xr.Dataset) -> None:
-    """Print the minimum of the map beside the truth, and what speaks against it."""
+    """Print the minimum of the map next to the truth, and its warnings."""
     search = calibration_summary(calibration)
     near = search["distance_to_floor_ratio"] < calibration.attrs["far_above_floor"]
     _print_estimates("KS map in the fitted flow", search)

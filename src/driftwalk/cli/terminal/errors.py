@@ -32,7 +32,7 @@ def exit_code_of(error: BaseException) -> int:
     Parameters
     ----------
     error : BaseException
-        What a command ended with.
+        The error that ended a command.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What a command prints on stdout: JSON for programs, a table for people."""
+"""Output of a command on stdout: JSON for programs, a table for people."""
 
 from __future__ import annotations
 

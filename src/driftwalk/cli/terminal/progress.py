@@ -18,7 +18,7 @@ class ProgressReporter:
     Parameters
     ----------
     title : str
-        What is being done.
+        The present task.
     stream : text file, optional
         Where to write; stderr when left out.
     seconds_between_lines : float

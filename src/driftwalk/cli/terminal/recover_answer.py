@@ -1,4 +1,4 @@
-"""What `driftwalk study recover` prints: a table for people, the same as JSON for programs."""
+"""Output of `driftwalk study recover`: a table for people, the same as JSON for programs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `driftwalk sensitivity` prints: one JSON object, or a page for people."""
+"""Output of `driftwalk sensitivity`: one JSON object, or a page for people."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from driftwalk.runs import SensitivityResult
 
 UNITS: Final = {"force_std": "_N", "tank_diameter": "_m"}
-"""What the names of axes lack as keys of JSON."""
+"""Suffixes that turn names of axes into keys of JSON."""
 LISTED_COMPONENTS: Final = 3
 
 

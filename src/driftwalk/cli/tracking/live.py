@@ -1,4 +1,4 @@
-"""What is sent live: the lines of JSON and the NMEA sentences of a tracking run.
+"""Live output of a tracking run: lines of JSON and NMEA sentences.
 
 Every key is described in docs/reference/live-stream.md; a change that old readers cannot take
 raises `VERSION`.
@@ -31,7 +31,7 @@ class LiveOutputs:
     options : TrackingOptions
         Which ports, and on what address.
     parts : TrackingParts
-        What the first line tells about.
+        The parts that the first line describes.
     source : str
         Name of the source.
     open_things : contextlib.ExitStack

@@ -1,4 +1,4 @@
-"""What tracking is made of, by the options: scale, detector, tracker and observer."""
+"""Parts of a tracking run, from the options: scale, detector, tracker and observer."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class TrackingRun:
     Parameters
     ----------
     options : TrackingOptions
-        What was asked for.
+        The options as given.
     parts : TrackingParts
         See `build_parts`.
     out : Path or None

@@ -51,7 +51,7 @@ class Estimate:
     point: Point
     weights: Weights
     tracks: Sequence[Track]
-    """What the series of the passes were made of: the recordings, cut at the switching times."""
+    """Sources of the series of the passes: the recordings, cut at the switching times."""
 
 
 def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str | None) -> Estimate:
@@ -205,7 +205,7 @@ class Contrast:
 
 @dataclass(frozen=True, eq=False)
 class Leverage:
-    """What fitting took out of the errors."""
+    """The part of the errors that fitting absorbed."""
 
     spread: Floats
     """A matrix whose product with standard normals has the covariance C: its root."""

@@ -155,7 +155,7 @@ def cell_of(layout: Layout, x: Floats, y: Floats) -> Integers:
 
 
 class Contrasts(NamedTuple):
-    """What is summed up in the pass with derivatives."""
+    """Sums of the pass with derivatives."""
 
     place: Contrast
     """By part of the recording, cell and component, in that order."""
@@ -232,7 +232,8 @@ def trend_of(contrast: Contrast, covariance: Floats) -> Trend:
     """Return the estimated changes of a factor, about their common mean, and their chi squared.
 
     The sums have covariance V = diag(power) - A C A', and a change d of the factor in the groups
-    moves them by V d. What the fit has taken out (the mean of the factor, mostly) cannot be seen.
+    moves them by V d. The part that the fit absorbed (the mean of the factor, mostly) cannot be
+    seen.
     """
     variance = np.diag(contrast.power) - contrast.slope @ covariance @ contrast.slope.T
     value, vector = np.linalg.eigh(variance)

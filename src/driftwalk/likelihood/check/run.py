@@ -33,8 +33,9 @@ if TYPE_CHECKING:
 SCHEMA_VERSION: Final = 1
 FEWEST_REPLICATES: Final = 4
 FEWEST_USED: Final = 300
-"""Intervals. With fewer the fitted flow takes so much out of the errors that recordings of the very
-model fail the test of their autocorrelation: 3 of 5 did with 200 samples, none of 5 with 300."""
+"""Intervals. With fewer the fitted flow takes so much out of the errors that recordings of the
+model itself fail the test of their autocorrelation: 3 of 5 did with 200 samples, none of 5 with
+300."""
 
 
 def check_model(
@@ -49,17 +50,16 @@ def check_model(
 
     Ten criteria with a p value, for the errors of prediction and the motion of simulated
     recordings, and a largest share of outliers; the model explains the recording unless a p value
-    is below 0.002. A recording of the very model fails once in 50 times by that count (Bonferroni;
-    measured: docs/explanation/likelihood.md). What
-    fitting hundreds of coefficients takes out of the errors is allowed for: their covariance at the
-    estimate is ``I - J C J'``.
+    is below 0.002. A recording of the model itself fails once in 50 times by that count
+    (Bonferroni; measured: docs/explanation/likelihood.md). The check corrects for the errors that
+    fitting hundreds of coefficients absorbs: their covariance at the estimate is ``I - J C J'``.
 
     Parameters
     ----------
     fit : xarray.Dataset
-        What `fit_motion` returns.
+        Result of `fit_motion`.
     recordings : xarray.Dataset or sequence of xarray.Dataset
-        What it was fitted to, in the same order.
+        The fitted recordings, in the same order.
     body : str, optional
         The body, where a recording has several.
     replicates : int

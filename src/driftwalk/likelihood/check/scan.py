@@ -23,7 +23,8 @@ FEWEST_IN_CELL = 5
 LONGEST_INTERVALS = 1.5
 """A velocity is taken between samples at most this many usual intervals apart."""
 LEAST_SPREAD = 0.02
-"""Of the logarithm of a difference among replicates: less is chance, with a dozen of them."""
+"""Least standard deviation of the logarithm of a difference among replicates; with a dozen
+replicates, a smaller one is chance."""
 
 
 class Scan(NamedTuple):

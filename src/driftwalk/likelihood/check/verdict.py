@@ -1,4 +1,4 @@
-"""What the check of a fit concludes: each criterion with its p value, and findings in sentences."""
+"""Conclusions of the check of a fit: each criterion with its p value, and findings in sentences."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ from driftwalk.likelihood.check.white import White
 from driftwalk.likelihood.spline import Floats
 
 LEVEL = 0.002
-"""A recording of the very model fails one criterion this often; ten of them, that is one recording
-in 50 at most. At 0.004 three of 76 failed, at the edge of the 5 % that are allowed: tails of
-distributions are known only about, so the level has a margin (docs/explanation/likelihood.md)."""
+"""A recording of the model itself fails one criterion this often; ten of them, that is one
+recording in 50 at most. At 0.004 three of 76 failed, at the edge of the 5 % that are allowed: tails
+of distributions are known only about, so the level has a margin
+(docs/explanation/likelihood.md)."""
 MOST_OUTLIERS = 1e-3
 """Share of samples. One in 5e8 is expected, but a tracker may slip now and then."""
 DRAG_CHANGE_OF_THE_FIT = 0.05
-"""Change of C_d with speed that the fit itself brings about: in ten minutes of the very model C_d
+"""Change of C_d with speed that the fit itself brings about: in ten minutes of the model itself C_d
 seems 4 % lower at the lowest speeds and 5 % higher at the highest, in half an hour 2 % each."""
 
 
@@ -32,9 +33,9 @@ class Criterion(NamedTuple):
 
     name: str
     p_value: float
-    """How often a recording of the very model is as far off; NaN where it cannot be told."""
+    """Probability that a recording of the model itself is as far off; NaN if unknown."""
     sentence: str
-    """What was found, should it fail."""
+    """The finding, if the criterion fails."""
 
     @property
     def failed(self) -> bool:

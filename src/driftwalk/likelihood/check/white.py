@@ -22,7 +22,7 @@ class White(NamedTuple):
     autocorrelation: Floats
     """At lags of 1, 2, ... samples."""
     expected: Floats
-    """What fitting the flow makes of it if the model is right."""
+    """Value after fitting the flow if the model is right."""
     std: Floats
     """Its standard deviation if the model is right."""
     portmanteau: float

@@ -1,4 +1,4 @@
-"""What a recovery study needs before it begins: a whole truth, long enough, in a flow that fits."""
+"""Requirements of a recovery study: a complete truth, long enough, in a flow that fits."""
 
 from __future__ import annotations
 

@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 STATUS: Final = {"fitted": 0, "not_fitted": 1, "not_simulated": 2}
-"""What became of a recording. Not fitted: the fit refused it, with a message."""
+"""Status of a recording. Not fitted means that the fit refused it, with a message."""
 MESSAGE: Final = 400
 """Letters of a message that are kept."""
 PARTS: Final = ("", "_low", "_high", "_sd", "_error", "_z", "_covered")
-"""What a score holds of each parameter; its name goes before."""
+"""Suffixes of a score's variables for each parameter, after its name."""
 FLOW_PARTS: Final = ("flow_error", "flow_point_error", "flow_z_rms", "flow_cells")
 FACTS: Final = ("wall_share", "samples_used", "iterations", "converged", "fit_time")
 # Streams of random numbers of one recording: the flow, the world, the gaps.
@@ -40,7 +40,7 @@ _FLOW, _WORLD, _GAPS = 0, 1, 2
 
 @dataclass(frozen=True)
 class Truth:
-    """What the recordings of a recovery study are simulated with.
+    """Parameters that simulate the recordings of a recovery study.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ def recover_one(truth: Truth, *, recording: int, duration: float, angle: str) ->
     Parameters
     ----------
     truth : Truth
-        What is simulated.
+        The truth to simulate.
     recording : int
         Its number; it gives the random numbers.
     duration : float
@@ -143,7 +143,7 @@ def simulated_recordings(
     Parameters
     ----------
     truth : Truth
-        What is simulated.
+        The truth to simulate.
     flow : xarray.Dataset
         The water.
     recording : int

@@ -63,7 +63,7 @@ def recovery_study(
         out. The numbers are the same to the rounding of the linear algebra library, and the same
         bits for any number of processes.
     tell : callable, optional
-        Told how many fits are done and how many there are.
+        Called with the number of finished fits and the total.
 
     Returns
     -------

@@ -41,12 +41,12 @@ def score_fit(
     recordings: xr.Dataset | Sequence[xr.Dataset] | None = None,
     interval: int | None = None,
 ) -> dict[str, Any]:
-    """Hold a fit beside the truth that made its recording.
+    """Compare a fit with the truth that made its recording.
 
     Parameters
     ----------
     fit : xarray.Dataset
-        What `fit_motion` returns.
+        Result of `fit_motion`.
     drag_coefficient : float
         True C_d, positive.
     force_std : float
@@ -56,8 +56,8 @@ def score_fit(
     flow : xarray.Dataset
         The true `flow_field`, without frames.
     recordings : xarray.Dataset or sequence of xarray.Dataset, optional
-        What was fitted: says where the block has been. Without them, it has been where all of the
-        circle inside it lies over measured nodes, which is a little more.
+        The fitted recordings, which show where the block has been. Without them, it has been where
+        all of the circle inside it lies over measured nodes, which is a little more.
     interval : int, optional
         With switching times: the interval, counted from 0, that the true flow belongs to.
 

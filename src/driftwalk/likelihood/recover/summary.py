@@ -1,4 +1,4 @@
-"""What a recovery study says in short: errors, coverage, and how long one must record."""
+"""Summary of a recovery study: errors, coverage, and the length to record."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Parts that the figures of self-assembly share: classes to show, their colours, axes of a
-sweep."""
+"""Shared parts of the figures of self-assembly: classes, their colours, axes of a sweep."""
 
 from __future__ import annotations
 

@@ -260,7 +260,7 @@ def save_camera(path: str | Path, camera: Camera) -> Path:
     path : path-like
         The file.
     camera : Camera
-        What is written.
+        The object to write.
 
     Returns
     -------

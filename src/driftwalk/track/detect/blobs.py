@@ -12,7 +12,7 @@ from driftwalk.core.opencv import require_opencv
 from driftwalk.track.types import Array, Detection, Image, PixelToWorld, Rejected
 
 Polarity = Literal["dark", "bright", "both"]
-"""What objects are, compared with their background."""
+"""Brightness of objects, compared with their background."""
 
 _EITHER: Final[tuple[Polarity, Polarity]] = ("dark", "bright")
 _NOISE_FACTOR: Final = 6.0
@@ -102,7 +102,7 @@ class BlobDetector:
     camera : PixelToWorld, optional
         The scale; without it detections are in pixels.
     polarity : {"dark", "bright", "both"}
-        What the objects are, compared with the background.
+        Brightness of the objects, compared with the background.
     least_area_px : float
         Smallest area of an object [px²].
     most_area_px : float, optional

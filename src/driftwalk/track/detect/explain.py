@@ -32,13 +32,13 @@ def explain_frame(
     image : array, shape (rows, columns, 3)
         The frame.
     detections : sequence of Detection
-        What was accepted.
+        The accepted candidates.
     rejected : sequence of Rejected
-        What was not.
+        The rejected candidates.
     camera : PixelToWorld, optional
         How the world lies in the image, for the arrows of orientations.
     names : sequence of str, optional
-        What to write beside each detection; its key or number when left out.
+        Label of each detection; its key or number when left out.
 
     Returns
     -------

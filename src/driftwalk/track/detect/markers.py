@@ -1,4 +1,4 @@
-"""What a marker looks like: the file `markers.toml`."""
+"""Description of a marker: the file `markers.toml`."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def save_markers(path: str | Path, marker: TwoColourMarker) -> Path:
     path : path-like
         The file.
     marker : TwoColourMarker
-        What is written.
+        The object to write.
 
     Returns
     -------

@@ -68,8 +68,8 @@ class MarkerProposal:
     Parameters
     ----------
     marker : TwoColourMarker
-        What to write to ``markers.toml``. Which disc is the first is not seen: it is the one whose
-        hue comes first, counted from red.
+        The marker to write to ``markers.toml``. Which disc is the first is not seen: it is the one
+        whose hue comes first, counted from red.
     pairs : int
         Pairs of discs from which size and spacing were measured.
     colours : list of ColourSeen

@@ -45,7 +45,7 @@ def assign(cost: Floats) -> Assignment:
     Parameters
     ----------
     cost : ndarray, shape (tracks, detections)
-        Cost of each edge, infinite where there is none. What is not assigned costs 0.
+        Cost of each edge, infinite where there is none. Unassigned detections cost 0.
 
     Returns
     -------
@@ -135,9 +135,9 @@ def _excess(cost: Floats, taken: Integers) -> Floats:
     """Return the cost of the best assignment with each edge that was not taken, less the least.
 
     Another assignment differs by cycles, in which each track takes the detection of the next one.
-    The cheapest cycle through an edge is that edge and the shortest way back. One more node stands
-    for what nobody has: a track that goes there takes a detection that was left, or none; from
-    there it costs nothing to leave a track's detection to nobody.
+    The cheapest cycle through an edge is that edge and the shortest way back. One more node
+    represents detections without a track: a track that goes there takes a detection that was left,
+    or none; from there it costs nothing to leave a track's detection to nobody.
     """
     tracks = np.arange(len(cost))
     has = taken >= 0

@@ -46,7 +46,7 @@ class Marks:
     def scores(self, frames: int, bodies: int, tracks: Iterable[Track]) -> Floats:
         """Return the score of each frame and body, shape (frames, bodies); 0 where not marked.
 
-        What is still in doubt in one of the tracks counts as marked.
+        Samples still in doubt in one of the tracks count as marked.
         """
         score = np.zeros((frames, bodies))
         still = [
@@ -86,7 +86,7 @@ class Marks:
                 lost.lost_beside[beside] = lost.company[beside]
 
     def doubt(self, tracks: Iterable[Track], parted: Sequence[Track], frame: int) -> None:
-        """Mark tracks whose assignment was a close thing, or that came back beside others."""
+        """Mark tracks whose assignment was a close thing, or that came back near others."""
         for track in parted:
             for other in track.lost_beside if track.key is None else ():
                 track.score = max(track.score, PARTED)

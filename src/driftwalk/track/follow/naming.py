@@ -46,7 +46,7 @@ class Naming:
         Parameters
         ----------
         tracks : sequence of Track
-            What is followed.
+            The tracks followed.
         times : sequence of float
             Of all frames so far [s].
 

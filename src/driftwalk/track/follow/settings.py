@@ -1,4 +1,4 @@
-"""What the tracker takes for granted about the bodies."""
+"""Assumptions of the tracker about the bodies."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class TrackerSettings:
     turn_time : float
         Time in which a body may have changed its velocity altogether [s].
     lost_after : float
-        A track that was not seen for so long ends [s].
+        Time without a detection after which a track ends [s].
     confirm_after : int
         Detections in a row of tracks that make a new one believed; one is enough for a coded tag.
     bodies : int, optional
-        How many bodies there are at most. A new track then stands for one that was lost.
+        How many bodies there are at most. A new track then continues one that was lost.
     detection_probability : float
         Chance that a body in view is detected in a frame.
     return_probability : float

@@ -1,8 +1,8 @@
 """From detections to tracks: which detection is which body, and where that is not certain.
 
 Each frame, the tracks are predicted over the time that has passed, detections are gated, and each
-connected group of the gating graph is assigned on its own. What is written is the measurement, not
-the filter's state: smoothing is for later.
+connected group of the gating graph is assigned on its own. The output is the measurement, not the
+filter's state: smoothing is for later.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Tracker:
         time : float
             Presentation time [s], later than that of the frame before.
         detections : iterable of Detection
-            What was found, with positions in metres.
+            The detections, with positions in metres.
 
         Returns
         -------
@@ -116,7 +116,7 @@ class Tracker:
         attrs : mapping, optional
             Attributes to add: source, arena.
         counts : mapping, optional
-            What the source and the detector counted.
+            Counts of the source and the detector.
 
         Returns
         -------

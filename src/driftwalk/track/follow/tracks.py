@@ -1,4 +1,4 @@
-"""What the tracker keeps of each body that it follows."""
+"""State that the tracker keeps for each body."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ class Track:
     lost_beside: dict[Track, int] = field(default_factory=dict)
     """Tracks that were near when it was seen last."""
     rival: Rival | None = None
-    """What it was before a measurement that is in doubt."""
+    """State before a measurement that is in doubt."""
 
 
 def stacked(tracks: Sequence[Track | Rival]) -> tuple[Floats, Floats]:

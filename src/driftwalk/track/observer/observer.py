@@ -49,7 +49,7 @@ class SeenEvent(NamedTuple):
 
 
 class AssemblySeen(NamedTuple):
-    """What is known at a frame."""
+    """State of knowledge at a frame."""
 
     time: float
     """Time [s]."""
@@ -63,7 +63,7 @@ class AssemblySeen(NamedTuple):
     hidden: list[str]
     """Blocks that have not been seen for longer than a gap is bridged."""
     events: list[SeenEvent]
-    """What has become known with this frame."""
+    """Events that became known with this frame."""
 
 
 class AssemblyObserver:
@@ -225,7 +225,7 @@ class AssemblyObserver:
         return SeenEvent(time, kind, (one, other), event.faces, event.outcome)
 
     def _news(self) -> list[SeenEvent]:
-        """Return the events that were not told before, in order of time."""
+        """Return the events that were not reported before, in order of time."""
         new = [item for item in self._found() if _identity(*item) not in self._told]
         self._told.update(_identity(*item) for item in new)
         return [self._seen_event(*item) for item in new]
@@ -293,7 +293,7 @@ def observe(recording: xr.Dataset, *, side: float, **rules: Any) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        What `classify` returns, with the same classes and events as a simulated run, and
+        As from `classify`, with the same classes and events as a simulated run, and
         ``possible`` (time, class): whether the class is possible, and ``hidden`` (time): how many
         blocks are hidden. With more than three no class is excluded; of more than eight blocks
         the classes are not listed then, none is marked, and that means that nothing is known.

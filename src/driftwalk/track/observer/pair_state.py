@@ -32,7 +32,7 @@ class PairState:
     blocks : tuple of int
         The blocks, the lower first.
     rules : JoinRules
-        What counts as joined.
+        Criteria of a join.
     """
 
     def __init__(self, blocks: tuple[int, int], rules: JoinRules) -> None:

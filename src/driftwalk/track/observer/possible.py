@@ -1,9 +1,9 @@
 """Which outcome classes are possible while some blocks are hidden.
 
-What is seen holds: blocks that are joined are one shape, and two shapes of seen blocks that do not
-fit on a common lattice are not one. Hidden blocks may be anywhere: alone, joined to each other, on
-any free cell beside a shape, or between two shapes that do fit. The set holds every class that can
-be, so the true one is always in it.
+Visible blocks constrain the classes: blocks that are joined are one shape, and two shapes of seen
+blocks that do not fit on a common lattice are not one. Hidden blocks may be anywhere: alone, joined
+to each other, on any free cell next to a shape, or between two shapes that do fit. The set holds
+every class that can be, so the true one is always in it.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def _enumerated(
 
 
 def _placements(lattices: Sequence[Lattice], number: int) -> Iterable[frozenset[tuple[int, Cell]]]:
-    """Return all sets of free cells that hidden blocks may stand on, each beside another block."""
+    """Return all sets of free cells that hidden blocks may occupy, each next to another block."""
     found: set[frozenset[tuple[int, Cell]]] = {frozenset()}
     for _ in range(number):
         found = {cells | {new} for cells in found for new in _free_cells(lattices, cells)}

@@ -1,7 +1,7 @@
 """Frames with the times at which they were taken: from a video, from images, from a camera.
 
-A frame's time is the stream's presentation time, never its number over a nominal rate. What the
-times tell is counted: frames that are missing, that come twice, that show nothing new.
+A frame's time is the stream's presentation time, never its number over a nominal rate. Irregular
+frames are counted: frames that are missing, that come twice, that show nothing new.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _FFMPEG_LOG: Final = "OPENCV_FFMPEG_LOGLEVEL"
 
 @dataclass
 class FrameCounts:
-    """What became of a source's frames.
+    """Counts of a source's frames.
 
     Parameters
     ----------
@@ -90,12 +90,12 @@ class FrameFilter:
     name : str
         The source, for messages.
     counts : FrameCounts
-        What is counted in.
+        The counts to update.
     keep_stale : bool
         Whether frames with exactly the image before are handed on, as a drawn video needs it in
         which nothing moves.
     gaps : FrameGaps, optional
-        What the times between frames are counted by. Left out for a camera, whose frames are
+        Counter of the gaps between frames. Left out for a camera, whose frames are
         counted where they are lost.
     """
 

@@ -10,14 +10,14 @@ _LONG: Final = 1.5
 _LEARNT: Final = 8
 """Gaps that teach the usual one: before, no frame is said to be missing."""
 _SAME: Final = 0.01
-"""Change of the usual gap, as a share of it, with which all gaps are counted anew."""
+"""Change of the usual gap, as a share of it, above which all gaps are counted again."""
 
 
 class FrameGaps:
     """The times between frames.
 
     Frames that are missing are counted with each gap, by the usual gap up to then. When the usual
-    gap turns out to be another one, all are counted anew; ``settle`` does so at the end.
+    gap turns out to be another one, all are counted again; ``settle`` does so at the end.
 
     Examples
     --------

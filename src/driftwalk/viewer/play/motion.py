@@ -1,4 +1,4 @@
-"""How the blocks of the playground move: steps of single blocks, beside those of a recording.
+"""Motion of the playground's blocks: steps of single blocks, next to those of a recording.
 
 A block counts while it is alone: the steps of an assembly are another motion. Positions are taken
 as the recording's camera would have: at its interval, with its noise and resolution.
@@ -42,11 +42,11 @@ INTERVAL_S: Final = 0.1
 FEWEST_STEPS: Final = 30
 PERMUTATIONS: Final = 19
 GROWTH: Final = 1.3
-"""The noise floor is found anew when there are so many times more steps."""
+"""Growth of the number of steps after which the noise floor is recomputed."""
 
 
 class Camera(NamedTuple):
-    """What the camera does to a position."""
+    """Effect of the camera on a position."""
 
     noise: float
     """[m]"""
@@ -92,7 +92,7 @@ class MotionWindow:
     Parameters
     ----------
     recording : Beside or None
-        What the steps are compared with.
+        The recording to compare the steps with.
     seed : int
         Of the camera's noise.
     """
@@ -159,10 +159,10 @@ class MotionWindow:
         )
 
     def message(self) -> dict[str, Any]:
-        """Return the density of the steps beside the recording's, and how far apart they are.
+        """Return the density of the steps, the recording's density, and their distance.
 
-        The noise floor is the median distance when the blocks' and the recording's steps are dealt
-        out anew: a distance as small says that nothing tells them apart.
+        The noise floor is the median distance when the blocks' and the recording's steps are
+        shuffled: a distance this small shows no difference between them.
         """
         points = self.points()
         recording = self._recording

@@ -37,7 +37,7 @@ STREAM_FRAME_S: Final = 1.0 / 30.0
 """Time between two lines of the stream [s]."""
 DENSITY_S: Final = 0.5
 SETTLED_S: Final = 0.3
-"""Time after the last change of a setting at which all browsers are told what holds [s]."""
+"""Time after the last change of a setting at which all browsers receive the values in force [s]."""
 LONGEST_ADVANCE_S: Final = 0.1
 """Longest time for which the tank is advanced at once [s]; on a slow machine it falls behind."""
 SPEED_OVER_S: Final = 1.0
@@ -53,11 +53,11 @@ ACTIONS: Final[dict[str, str]] = {
     "run": "pause",
     "clear": "clear",
 }
-"""What a browser may ask for, and which wish it replaces."""
+"""Requests of a browser, and the pending request that each replaces."""
 
 
 class Stream(Protocol):
-    """What takes the lines of a tracker's stream; `driftwalk.track.LiveServer` is one."""
+    """Receiver of the lines of a tracker's stream; `driftwalk.track.LiveServer` is one."""
 
     def publish(self, content: Any) -> None:
         """Send a line to whoever is connected."""

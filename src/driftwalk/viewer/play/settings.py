@@ -31,7 +31,7 @@ class Knob:
     Attributes
     ----------
     name, label, unit : str
-        What it is called, for programs and for people; SI.
+        Its names for programs and for people, and its SI unit.
     least, most, step : float
         Ends and steps of a range.
     whole : bool
@@ -39,7 +39,7 @@ class Knob:
     log : bool
         Whether a range is drawn with a logarithmic scale.
     choices : tuple of str
-        What a choice is made from; empty for a range.
+        The options of a choice; empty for a range.
     """
 
     name: str

@@ -59,7 +59,7 @@ def frame_line(tank: LiveTank, number: int, events: Sequence[LiveEvent]) -> dict
     number : int
         Number of the frame.
     events : sequence of LiveEvent
-        What has joined since the last frame.
+        Joins since the last frame.
     """
     x, y, theta, assembly = tank.x, tank.y, tank.theta, tank.assembly
     columns = (x, y, theta, tank.vx, tank.vy, tank.omega)

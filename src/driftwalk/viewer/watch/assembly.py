@@ -29,7 +29,7 @@ class RunningAssembly:
     folder : Path
         The run directory.
     specification : mapping
-        What determines its numbers.
+        Everything that determines its numbers.
     """
 
     title = "Self-assembly under way"

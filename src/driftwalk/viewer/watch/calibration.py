@@ -22,6 +22,12 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
     from driftwalk.viewer.watch.recording_steps import RecordedSteps
 
+STAGES: Final[dict[str, tuple[str, float, float]]] = {
+    "coarse": ("map", 0.0, 0.4),
+    "refined": ("refined map", 0.4, 0.65),
+    "bootstrap": ("bootstrap", 0.65, 0.93),
+}
+"""Name of each stage, and its share of the time: from, to."""
 DETAILS: Final = ("excerpt_x", "excerpt_y", "step_density", "ks_step_length", "ks_turning_angle")
 GRID: Final = ("drag_coefficient", "force_std")
 NO_DISTANCE: Final = 1.0
@@ -44,7 +50,7 @@ class SettingsMap:
         self.distance = np.full(self.shape, np.nan)
         self.error = np.full(self.shape, np.nan)
         self.details: dict[int, dict[str, npt.NDArray[Any]]] = {}
-        """What is kept of each setting, by its number."""
+        """Results kept for each setting, by its number."""
 
     @property
     def done(self) -> float:
@@ -75,7 +81,7 @@ class RunningCalibration:
     folder : Path
         The run directory.
     specification : mapping
-        What determines its numbers.
+        Everything that determines its numbers.
     """
 
     title = "A calibration under way"

@@ -1,4 +1,4 @@
-"""What a page shows of a run that is under way, whatever the kind of run."""
+"""Page of a run under way, for any kind of run."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ NO_CELL: Final[dict[str, Any]] = dict.fromkeys(
         "over_time",
     )
 )
-"""What is answered of a setting that has not been simulated."""
+"""Answer for a setting that has not been simulated."""
 
 
 class RunningOther:
@@ -51,7 +51,7 @@ class RunningOther:
     folder : Path
         The run directory.
     specification : mapping
-        What determines its numbers.
+        Everything that determines its numbers.
     """
 
     title = "A run under way"

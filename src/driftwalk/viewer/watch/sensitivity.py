@@ -48,7 +48,7 @@ class RunningSensitivity:
     folder : Path
         The run directory.
     specification : mapping
-        What determines its numbers.
+        Everything that determines its numbers.
     """
 
     title = "A sensitivity analysis under way"
@@ -110,7 +110,7 @@ class RunningSensitivity:
         return 0.95 * done / wanted, words
 
     def cell(self, row: int, column: int) -> dict[str, Any]:
-        """Return the classes of a setting over time, beside those of the reference so far."""
+        """Return the classes of a setting over time, next to those of the reference so far."""
         rows, columns = ([1, 1, *self._shape])[-2:]
         if not (0 <= row < rows and 0 <= column < columns):
             return dict(NO_CELL)

@@ -23,7 +23,7 @@ _UNIT: Final = re.compile(r"(\d{8,12})-(\d{8,12})", re.ASCII)
 
 
 class FinishedUnit(NamedTuple):
-    """What a work unit gave."""
+    """Result of a work unit."""
 
     start: int
     """Its first setting."""
@@ -44,7 +44,7 @@ class StoreReader:
     Attributes
     ----------
     sweep : Any
-        What determines the sweep's numbers besides the run's specification.
+        Everything that determines the sweep's numbers, in addition to the run's specification.
 
     Raises
     ------
