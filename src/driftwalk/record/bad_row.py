@@ -10,9 +10,7 @@ import re
 from pathlib import Path
 
 from driftwalk.core.errors import FormatError
-
-MISSING = frozenset({"", "NaN", "nan", "NAN", "NA", "N/A", "null", "NULL", "None", "none", "-nan"})
-"""Words that trackers write for a missing number."""
+from driftwalk.record.layout import MISSING, TableLayout
 
 DELIMITER_NAMES = {",": "a comma", "\t": "a tab", ";": "a semicolon", " ": "blanks"}
 _COMMA_DECIMAL = re.compile(r"[+-]?\d+,\d+")
