@@ -26,9 +26,9 @@ moves keep their drag memory: no impulse changed their motion.
   at most, two assemblies that the separation has just pushed apart.
 * The separation only shifts for 10 rounds; for 30 more it turns as well, by impulses of position at
   the contact points.
-* What overlaps or stands outside by more than 0.1 mm even then, or after the rounds at the wall, is
-  jammed: it is taken back to where it was before the step, at rest, and so is what overlaps with
-  that. No merge may therefore overlap a third assembly where it was before the step.
+* An assembly that overlaps or is outside by more than 0.1 mm even then, or after the rounds at the
+  wall, is jammed: it returns to its place before the step, at rest, and so do assemblies that
+  overlap it there. No merge may therefore overlap a third assembly where it was before the step.
 * Where two axes of overlap are equally deep the first of (first block's x, y, second block's x, y)
   is the normal; the face of its owner is the reference face.
 * The lattice of a merged assembly is the staying one's, cells not renumbered.

@@ -66,7 +66,7 @@ def overlapping_pairs(assemblies: list[Assembly]) -> list[Pair]:
 def overlap(pair: Pair) -> Overlap:
     """Return how two blocks overlap, by the face axis of least depth.
 
-    Of equal axes it is the first of: the first block's x, y, the second block's x, y, as their
+    Among equal axes it is the first of: the first block's x, y, the second block's x, y, as their
     assemblies have them.
     """
     first, second = pair.bodies
