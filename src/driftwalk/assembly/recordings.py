@@ -54,7 +54,7 @@ def classify(
     min_duration: float = MIN_DURATION,
     hold: float | None = None,
 ) -> xr.Dataset:
-    """Say which outcome class the blocks of a recording were in, at every time.
+    """Return the outcome class of the blocks of a recording at every time.
 
     Two blocks are joined from the first sample at which the centres of two of their faces are
     within `join_distance` and the faces look at each other within `join_angle`, if that lasts for

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def check_recording(
     recording: xr.Dataset, study: Study, *, flow: xr.Dataset, body: str | None = None
 ) -> None:
-    """Refuse a recording that `calibrate` would refuse; takes no time worth speaking of.
+    """Refuse a recording that `calibrate` would refuse; takes almost no time.
 
     Parameters
     ----------

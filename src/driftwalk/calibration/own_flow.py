@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def recording_flow(recording: xr.Dataset, study: Study, *, body: str | None = None) -> xr.Dataset:
-    """Return the flow field that a calibration without a given one takes from the recording.
+    """Return the flow field that a calibration takes from the recording if none is given.
 
     Parameters
     ----------

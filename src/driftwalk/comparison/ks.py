@@ -38,7 +38,7 @@ TIED_FRACTION = 0.05
 
 
 class KsPlace(NamedTuple):
-    """Where the largest difference sits."""
+    """Place of the largest difference."""
 
     x: float
     """First coordinate of the origin; NaN when the difference is zero everywhere."""
@@ -51,7 +51,7 @@ class KsPlace(NamedTuple):
 
 
 class KsComparison(NamedTuple):
-    """The statistic between two samples, and where it sits."""
+    """The statistic between two samples, and the place of its maximum."""
 
     distance: float
     """D, between 0 and 1."""

@@ -31,7 +31,7 @@ LARGEST_GRID = 50_000_000
 
 @dataclass(frozen=True, eq=False)
 class StepPlan:
-    """How steps are formed from a series of positions.
+    """Rule for forming steps from a series of positions.
 
     Resampled point k is ``(1 - weight[k]) p[left[k]] + weight[k] p[left[k] + 1]`` (where the weight
     is zero the right neighbour is not looked at); pair i is formed of the points ``triple[i]``,
@@ -159,7 +159,7 @@ def plan_steps(
 
 
 def apply_steps(plan: StepPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> AppliedSteps:
-    """Form the steps of a trajectory whose samples stand at the plan's time stamps.
+    """Form the steps of a trajectory with samples at the plan's time stamps.
 
     Parameters
     ----------

@@ -4,4 +4,4 @@ from __future__ import annotations
 
 
 class ComparisonWarning(UserWarning):
-    """A comparison was made, but what it says is limited by the data."""
+    """A comparison was made, but the data limit its meaning."""

@@ -82,7 +82,7 @@ def render_video(
 
 
 def video_truth(trajectory: xr.Dataset, settings: VideoSettings | None = None) -> xr.Dataset:
-    """Return the exact poses in a synthetic video, and how much of each marker can be seen.
+    """Return the exact poses in a synthetic video, and the visible share of each marker.
 
     Parameters
     ----------

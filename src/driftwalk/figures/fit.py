@@ -36,7 +36,7 @@ TITLE_WIDTH = 90
 
 
 def plot_flow_error(flow: xr.Dataset, ax: Axes | None = None) -> Axes:
-    """Draw how well a flow is known: the larger standard error of its two components.
+    """Draw the uncertainty of a flow: the larger standard error of its two components.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ Indices = npt.NDArray[np.intp]
 def bilinear(
     flow: xr.Dataset, x: npt.ArrayLike, y: npt.ArrayLike, *, time: float | None = None
 ) -> tuple[Array, Array]:
-    """Return the velocity of the water at given places.
+    """Return the velocity of the water at given positions.
 
     Bilinear between the four nodes around a place; beyond the outermost nodes the nearest value on
     their rectangle. In time, linear between frames and constant before the first and after the

@@ -20,7 +20,7 @@ def inertia_correction(
     water_density: float = 1000.0,
     flow_drag_coefficient: float = 1.05,
 ) -> Array:
-    """Return by how much the water is faster than the body that it carries.
+    """Return the velocity of the water relative to the body that it carries.
 
     A body of mass m that accelerates by a feels the force m a. If that force is the quadratic drag
     ``½ rho A C_x |w| w`` of water that passes it at w, then (Eq. 4 of the paper)

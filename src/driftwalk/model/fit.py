@@ -18,7 +18,7 @@ MOST_CELLS: Final = 24
 
 
 class Fit(Section):
-    """The likelihood fit: knots of the flow, steps of the search, what is reported.
+    """The likelihood fit: knots of the flow, steps of the search, reported quantities.
 
     Examples
     --------

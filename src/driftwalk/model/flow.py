@@ -10,7 +10,7 @@ from driftwalk.model.section import Quantity, Section
 
 
 class Flow(Section):
-    """How the flow field is taken from a recording (Eq. 4 of the paper)."""
+    """Extraction of the flow field from a recording (Eq. 4 of the paper)."""
 
     section_name: ClassVar[str] = "flow"
 

@@ -11,7 +11,7 @@ from driftwalk.model.tank import FieldOfView
 
 
 class Observation(Section):
-    """How a pose becomes a sample: noise, resolution of the file, missed samples."""
+    """From a pose to a sample: noise, resolution of the file, missed samples."""
 
     section_name: ClassVar[str] = "observation"
 

@@ -39,7 +39,7 @@ class Columns(Section):
 
 
 class Recording(Section):
-    """How a recording is read: format, body, stretch of time, units, axes, arena."""
+    """Reading of a recording: format, body, time range, units, axes, arena."""
 
     section_name: ClassVar[str] = "recording"
 

@@ -1,4 +1,4 @@
-"""How a simulation is run: time step, length, sampling, start, seed."""
+"""Settings of a simulation: time step, length, sampling, start, seed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Pose(Section):
 
 
 class Simulation(Section):
-    """How a simulation is run: time step, length, sampling, start, seed."""
+    """Settings of a simulation: time step, length, sampling, start, seed."""
 
     section_name: ClassVar[str] = "simulation"
 

@@ -10,7 +10,7 @@ from driftwalk.model.section import Quantity, Section
 
 
 class Steps(Section):
-    """How step lengths and turning angles are formed, alike for real and simulated motion."""
+    """Formation of step lengths and turning angles, the same for real and simulated motion."""
 
     section_name: ClassVar[str] = "steps"
 

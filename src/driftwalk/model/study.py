@@ -30,7 +30,7 @@ from driftwalk.model.water import Water
 
 
 class Study(Section):
-    """Everything that a simulation or calibration needs to know besides the recording itself.
+    """All parameters of a simulation or calibration, everything except the recording itself.
 
     A study is frozen, refuses unknown keys and contradictions, and survives a round trip through
     its TOML file. Sections may be given as objects or as dictionaries.
@@ -186,7 +186,7 @@ def load_study(path: str | Path) -> Study:
 
 
 def parse_study(text: str, *, source: str = "study") -> Study:
-    """Return the study that the text of a study file holds.
+    """Return the study in the text of a study file.
 
     Parameters
     ----------

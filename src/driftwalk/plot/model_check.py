@@ -97,7 +97,7 @@ def plot_innovations(check: xr.Dataset, ax: Axes | None = None) -> Axes:
 def plot_residual_map(
     check: xr.Dataset, ax: Axes | None = None, *, show: Literal["mean", "noise"] = "mean"
 ) -> Axes:
-    """Draw where in the tank the errors of prediction are not what the model says.
+    """Draw where in the tank the prediction errors disagree with the model.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def plot_residual_map(
 def plot_residual_time(
     check: xr.Dataset, ax: Axes | None = None, *, show: Literal["flow", "noise"] = "flow"
 ) -> Axes:
-    """Draw how the strength of the flow, or the noise, seems to change during the recording.
+    """Draw the apparent change of the flow's strength, or of the noise, during the recording.
 
     Parameters
     ----------

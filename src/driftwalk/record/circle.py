@@ -42,7 +42,7 @@ class CircleFit(NamedTuple):
 
 
 def fit_circle(x: npt.ArrayLike, y: npt.ArrayLike) -> CircleFit:
-    """Fit the circle that the samples fill, whatever errors lie outside it.
+    """Fit the circle that the samples fill, ignoring errors outside it.
 
     The extent of the samples in direction phi is ``h(phi) = c . u(phi) + r`` for a disc of centre
     c and radius r: linear in the three unknowns. It is taken in 72 directions, each time leaving
@@ -108,7 +108,7 @@ def fit_circle(x: npt.ArrayLike, y: npt.ArrayLike) -> CircleFit:
 
 
 def tank_radius_bound(centers_radius: float, block_side: float) -> float:
-    """Return the smallest radius of a round tank in which a square block's centre reaches so far.
+    """Return the smallest radius of a round tank in which a square block's centre reaches this far.
 
     The centre is farthest out when a face lies against the wall with both corners: then
     ``R = sqrt((r + a/2)^2 + (a/2)^2)``. Turned any other way the block needs a larger tank, so this

@@ -23,7 +23,7 @@ MIN_WINDOWS = 50
 
 
 class NoiseEstimate(NamedTuple):
-    """White tracking noise of a recording, separated from the random motion of the path."""
+    """White tracking noise of a recording, and the random motion of the path."""
 
     position_noise_m: float
     """Standard deviation of the position, per axis [m]; NaN with too few samples."""
@@ -41,7 +41,7 @@ class NoiseEstimate(NamedTuple):
 
 
 def estimate_tracking_noise(track: Track) -> NoiseEstimate:
-    """Tell white camera noise apart from the body's own unrest.
+    """Separate white camera noise from the body's own random motion.
 
     A position is modelled as a smooth path, plus an integrated Wiener process (the body's velocity
     under white accelerations of intensity q), plus white noise of variance r^2. In fourth

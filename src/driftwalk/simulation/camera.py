@@ -18,7 +18,7 @@ NEGLIGIBLE_QUANTUM: Final = 0.05
 
 
 def recorded_camera(track: Track, study: Study, *, position_quantum: float) -> Camera:
-    """Return the camera of a recording: what the study says, the rest estimated from the track.
+    """Return the camera of a recording: values of the study, the rest estimated from the track.
 
     Rounding adds q^2/12 to the variance of the noise; where positions are rounded in simulation,
     that part of the estimate is taken away again. A resolution finer than a twentieth of the noise

@@ -112,7 +112,7 @@ def simulate_like(
     seed: int | None = None,
     threads: int | None = None,
 ) -> xr.Dataset:
-    """Simulate what the camera would have recorded: start, time stamps and gaps of a recording.
+    """Simulate with the start, time stamps, gaps and camera of a recording.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Pictures of what was found and what was turned down, over the frames."""
+"""Pictures of detections and rejected candidates, over the frames."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def draw_states(image: Image, states: Iterable[TrackState], camera: PixelToWorld
 
 
 class OverlayWriter:
-    """Writes pictures as a video that plays as fast as what it shows.
+    """Writes pictures as a video that plays in real time.
 
     A video file has one rate; it is that of the first pictures. Where pictures are missing the one
     before stays, and pictures that come faster are left out.

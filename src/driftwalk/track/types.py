@@ -73,7 +73,7 @@ class Detection:
 
 @dataclass(frozen=True)
 class Rejected:
-    """A candidate that was turned down.
+    """A rejected candidate.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Rejected:
     reason : str
         Why, in words.
     kind : str
-        The reason as one word, the same for all candidates turned down for it: counted by it.
+        The reason as one word, by which rejected candidates are counted.
     """
 
     column: float
@@ -133,4 +133,4 @@ class Detector(Protocol):
     """Finds objects in one image."""
 
     def detect(self, image: Image) -> tuple[list[Detection], list[Rejected]]:
-        """Return what was found, and what was turned down with the reason."""
+        """Return the detections, and the rejected candidates with their reasons."""

@@ -130,7 +130,7 @@ def l1_noise_floor(
     samples: int = 20_000,
     seed: int = 1,
 ) -> L1NoiseFloor:
-    """Return how far apart two samples of the same distribution of outcomes are by chance.
+    """Return the l1 distance between two samples of the same distribution that chance alone gives.
 
     Pairs of multinomial samples are drawn and their l1 distances taken. A distance above the
     quantile is more than chance at that level; a distance near the mean is none.
@@ -196,7 +196,7 @@ def l1_in_floors(
     runs: npt.ArrayLike,
     reference_runs: int | None,
 ) -> Floats:
-    """Return l1 distances to a reference in units of what chance alone would give there.
+    """Return l1 distances to a reference, divided by the distance that chance alone would give.
 
     The noise makes every distance too long, and the more so the more classes share the runs, so
     a map of plain distances has no zero. Here each is divided by the mean distance of two samples

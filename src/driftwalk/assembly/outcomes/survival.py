@@ -165,7 +165,7 @@ def survival_curve(
     times: npt.ArrayLike,
     confidence: float = 0.9,
 ) -> SurvivalCurve:
-    """Return the Kaplan-Meier curve of an event that some runs ended without.
+    """Return the Kaplan-Meier curve of an event that did not occur in some runs.
 
     Parameters
     ----------

@@ -137,7 +137,7 @@ def assemble_drawn(
     progress: Progress | None = None,
     threads: int | None = None,
 ) -> xr.Dataset:
-    """Simulate self-assembly with the parameters that a calibration leaves open.
+    """Simulate self-assembly with parameters drawn from the uncertainty of a calibration.
 
     Every run has its own drag coefficient and stochastic force, drawn from the calibration's joint
     region (`draw_parameters`). Where the flow field states standard errors, every 25 runs have
@@ -274,7 +274,7 @@ def check_assembly(
     trial: int = 0,
     threads: int | None = None,
 ) -> None:
-    """Refuse what `assemble` would refuse, before any run is simulated.
+    """Raise the errors that `assemble` would raise, before any run is simulated.
 
     Parameters
     ----------

@@ -95,7 +95,7 @@ def check_indices(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     threads: int | None = None,
 ) -> int:
-    """Refuse what `sensitivity_indices` would refuse, before any run is simulated.
+    """Raise the errors that `sensitivity_indices` would raise, before any run is simulated.
 
     Parameters
     ----------

@@ -161,7 +161,7 @@ def check_sensitivity(
     axes: Mapping[str, Any] | None = None,
     threads: int | None = None,
 ) -> int:
-    """Refuse what `sensitivity_map` would refuse, before any run is simulated.
+    """Raise the errors that `sensitivity_map` would raise, before any run is simulated.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ LONG_NAMES = {
 def sobol_design(
     bounds: Mapping[str, tuple[float, float]], *, samples: int, seed: int
 ) -> xr.Dataset:
-    """Return the settings at which a function has to be known for its Sobol' indices.
+    """Return the settings at which a function must be evaluated for its Sobol' indices.
 
     Saltelli's extension of a scrambled Sobol' sequence, for first and total order:
     ``samples * (inputs + 2)`` settings, uniform within the bounds.
@@ -116,7 +116,7 @@ def sobol_indices(
     confidence: float = 0.9,
     seed: int = 1,
 ) -> xr.Dataset:
-    """Return first and total order Sobol' indices of one or more outputs, and what noise adds.
+    """Return first and total order Sobol' indices of one or more outputs, and the effect of noise.
 
     Parameters
     ----------

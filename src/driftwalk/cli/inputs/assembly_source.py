@@ -28,7 +28,7 @@ MODEL_KEYS: Final = ("block", "tank", "water", "forces", "simulation.time_step_s
 
 @dataclass(frozen=True)
 class Source:
-    """The model, and where it is from.
+    """The model and its source.
 
     Attributes
     ----------

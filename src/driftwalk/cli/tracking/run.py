@@ -150,7 +150,7 @@ class TrackingRun:
             raise InputError(f"{error}{self._what_was_there()}") from error
 
     def _what_was_there(self) -> str:
-        """Return what was turned down, most of it first, and how to look at it."""
+        """Return the rejected candidates, the most frequent first, and how to look at them."""
         kinds = [f"{kind} {number}" for kind, number in self.rejected.most_common(_MOST_KINDS)]
         turned_down = f"; rejected: {', '.join(kinds)}" if kinds else ""
         return f"{turned_down} (look at a frame with track ... --explain {self.frames // 2})"

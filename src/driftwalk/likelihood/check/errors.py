@@ -237,7 +237,7 @@ class _Part(NamedTuple):
 def collect(
     estimate: Estimate, errors: Sequence[Errors], contrasts: Sequence[Contrast], *, lags: int
 ) -> Leverage:
-    """Fill the contrasts in one pass with derivatives, and return what fitting took out."""
+    """Fill the contrasts in one pass with derivatives, and return what fitting absorbed."""
     from scipy.linalg import solve_triangular
     from scipy.linalg.blas import dsyrk
 

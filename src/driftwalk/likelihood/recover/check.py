@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def check_recovery(study: Study, flow: xr.Dataset | None = None) -> None:
-    """Refuse what `recovery_study` would refuse; takes no time worth speaking of.
+    """Raise the errors that `recovery_study` would raise; takes almost no time.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ def recovery_study(
     threads: int | None = None,
     tell: Tell | None = None,
 ) -> xr.Dataset:
-    """Simulate recordings of known truth, fit them, and say how well the truth comes back.
+    """Simulate recordings of known truth, fit them, and measure how well the fits recover it.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ DENSITY_PARTS: Final = 2000
 
 
 def map_section(calibration: xr.Dataset, recording: xr.Dataset | None = None) -> Section:
-    """Return the section on the map of KS distances, with all that a click on a cell needs.
+    """Return the section on the map of KS distances, with all the data for a click on a cell.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The part of a page on how a recording was tracked: frames, and what was turned down."""
+"""The part of a page on how a recording was tracked: frames and rejected candidates."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ def shape_cells(shape: str) -> npt.NDArray[np.int64]:
 
 
 def class_cells(name: str, *, orientation: Orientation = "wide") -> Array:
-    """Return where the squares of the sketch of an outcome class lie, in sides of a block.
+    """Return the positions of the squares in the sketch of an outcome class, in sides of a block.
 
     The shapes keep the order of the name and are packed into a compact picture, 0.6 sides apart.
 

@@ -20,7 +20,7 @@ _LEAST_IMAGES: Final = 3
 
 @dataclass(frozen=True)
 class LensCalibration:
-    """A lens, and how well it is known.
+    """A lens and its uncertainty.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class LensCalibration:
 
 
 def calibrate_lens(images: Sequence[Image], board: Board) -> LensCalibration:
-    """Find how the lens bends rays, from images of a board in several positions.
+    """Calibrate the lens from images of a board in several positions.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def calibrate_lens(images: Sequence[Image], board: Board) -> LensCalibration:
 
 
 def camera_from_board(image: Image, board: Board, lens: Lens | None = None) -> Camera:
-    """Return the camera whose plane is that of a board lying where the water's surface is.
+    """Return the camera whose plane is that of a board at the height of the water's surface.
 
     The origin is the board's middle, x along its rows of squares, y up. A chessboard looks the same
     after half a turn: its x points to the right of the image. That of a ChArUco board is its own.

@@ -24,7 +24,7 @@ Nine = tuple[float, float, float, float, float, float, float, float, float]
 
 
 class Lens(Section):
-    """How the lens bends rays: the pinhole model with radial and tangential distortion.
+    """The lens: the pinhole model with radial and tangential distortion.
 
     Examples
     --------

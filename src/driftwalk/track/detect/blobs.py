@@ -23,7 +23,7 @@ _SPECK_PX: Final = 4.0
 
 
 def median_background(images: list[Image]) -> Image:
-    """Return the median of images: what stands still.
+    """Return the median of images, which shows the still background.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A frame with what was found drawn in, and what was turned down with the reason."""
+"""A frame with the detections drawn in, and the rejected candidates with their reasons."""
 
 from __future__ import annotations
 

@@ -127,7 +127,7 @@ def colours_seen(images: Sequence[Image]) -> list[ColourSeen]:
 
 
 def missing_colours(marker: TwoColourMarker, images: Sequence[Image]) -> str | None:
-    """Say which of a marker's colours is nowhere in images, and what is seen instead.
+    """Say which of a marker's colours never appears in images, and which colours do.
 
     Parameters
     ----------

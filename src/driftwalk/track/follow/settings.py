@@ -11,7 +11,7 @@ from driftwalk.track.follow.kalman import Motion
 
 @dataclass(frozen=True)
 class TrackerSettings:
-    """How bodies move, and when a detection is theirs.
+    """Assumptions on how bodies move, and when a detection belongs to them.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ class Tracker:
     Parameters
     ----------
     settings : TrackerSettings
-        How bodies move, and when a detection is theirs.
+        Assumptions on how bodies move, and when a detection belongs to them.
 
     Examples
     --------

@@ -25,7 +25,7 @@ _FIRST_ROOM: Final = 8
 
 
 class TrackState(NamedTuple):
-    """Where the tracker believes a body to be."""
+    """Estimated state of a body."""
 
     id: str
     """Name of the body."""
@@ -130,7 +130,7 @@ class Rival:
 
 @dataclass(eq=False)
 class Track:
-    """A body that is followed, or what may become one."""
+    """A body that is followed, or a candidate for one."""
 
     mean: Floats
     """The filter's x, y [m], theta [rad] and their rates [m/s, rad/s], shape (6,)."""

@@ -67,7 +67,7 @@ class FrameCounts:
 
 
 class FrameSource(Protocol):
-    """Where frames come from; iterated once."""
+    """A source of frames; iterated once."""
 
     name: str
     counts: FrameCounts

@@ -69,7 +69,7 @@ def sample_images(
 
 
 def frame_count(source: str | Path) -> int | None:
-    """Return how many frames a source says it has; None when it does not say.
+    """Return the number of frames that a source states; None if it states none.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ Floats = npt.NDArray[np.float64]
 
 
 def hello_line(tank: LiveTank) -> dict[str, Any]:
-    """Return the first line of a tank's stream: what it takes to draw it.
+    """Return the first line of a tank's stream, with everything needed to draw the tank.
 
     Parameters
     ----------
