@@ -78,7 +78,7 @@ std::int64_t merge(const KsSortedAxis& first, std::int64_t n1, const KsSortedAxi
 }
 
 // Start of the run of equal values that each position belongs to, by point; `next` gets the same
-// starts by position, as counters to fill the runs anew.
+// starts by position, as counters to refill the runs.
 void run_starts(const std::vector<std::uint8_t>& starts, const std::int32_t* point, std::int64_t n,
                 std::vector<std::int32_t>& start_of, std::vector<std::int32_t>& next) {
   std::int32_t start = 0;

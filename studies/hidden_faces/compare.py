@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 # Shares of 1000 runs of a program on the Open Dynamics Engine, in the flow of another tank of the
-# same kind. Where its classes are not all known, "rest" stands for those that are missing.
+# same kind. Where its classes are not all known, "rest" is the sum of the missing ones.
 OTHER_ENGINE: dict[tuple[tuple[float, float], str], dict[str, float]] = {
     (CALIBRATED, "full"): {
         "I": 0.033, "O": 0.005, "T": 0.023, "S": 0.018, "L": 0.066, "I3+1": 0.203, "L3+1": 0.130,

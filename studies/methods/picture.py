@@ -42,7 +42,7 @@ STYLES = {
 """Name, colour (Okabe and Ito) and marker of each method."""
 LEAST_SAMPLES = 3
 RATIOS = (0.23, 5.0)
-"""Of an estimate to the truth; an arrow at the edge stands for one beyond."""
+"""Ratio of an estimate to the truth; an arrow at the edge marks a ratio beyond it."""
 
 
 def main() -> None:

@@ -28,7 +28,7 @@ export function set(element: Element, attributes: Attributes): void {
   }
 }
 
-/** Fills an element anew; it keeps its room until the new content stands, so that the page does not jump. */
+/** Refills an element; it keeps its size until the new content is there, so that the page does not jump. */
 export function refill(element: HTMLElement, fill: () => void): void {
   element.style.setProperty("min-height", `${element.clientHeight}px`);
   element.replaceChildren();

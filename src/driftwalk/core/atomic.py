@@ -12,8 +12,8 @@ from typing import Final
 
 from driftwalk.core.errors import InputError, RunDirectoryError
 
-# In the name of every temporary file, so that what a killed process left can be told from a file
-# of the user's.
+# In the name of every temporary file, which distinguishes the leftovers of a killed process from a
+# file of the user's.
 PARTIAL: Final = ".driftwalk-partial-"
 
 _FREE_SPACE: Final = "free some space"

@@ -127,7 +127,8 @@ def plot_distance_profile(
     ax.plot(
         [best], [distance], "D", ms=4.5, mfc=ORANGE, mec="white", mew=0.7, zorder=6, label="optimum"
     )
-    # On a logarithmic scale the optimum and the noise floor, both far below 1, can be told apart.
+    # On a logarithmic scale the optimum and the noise floor, both far below 1, can be
+    # distinguished.
     ax.set_yscale("log")
     ax.set_ylim(top=1.15)
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))

@@ -22,7 +22,7 @@ _ROOTS: dict[str, str] = {
     **dict.fromkeys(("particle", "agent", "subject", "fish", "mouse", "rat", "bot"), "body"),
     **dict.fromkeys(("particleid", "agentid", "objectid", "tagid", "uid", "tracklet"), "body"),
 }
-# These count as names of bodies beside "id" alone: an object or a tag by itself may be a class or a
+# These name bodies only together with "id": an object or a tag by itself may be a class or a
 # state, which changes while the body stays the same.
 _WITH_ID = frozenset({"object", "obj", "cell", "marker", "tag", "target", "blob", "instance"})
 _UNITS: dict[str, str] = {
@@ -42,10 +42,10 @@ _ALLOWED: dict[str, frozenset[str]] = {
     "theta": frozenset({"rad", "deg"}),
     "body": frozenset(),
 }
-# Words that stand beside x or y without naming a body. They hint at an image, so a length beside
+# Words next to x or y that do not name a body. They hint at an image, so a length next to
 # them is not taken for metres.
 _IMAGE_WORDS = frozenset({"pos", "position", "center", "centre", "centroid", "image", "coord"})
-# Words beside x or y that make it no position at all.
+# Words next to x or y that rule out a position.
 _NO_POSITION = frozenset(
     {"velocity", "vel", "speed", "acceleration", "acc", "accel", "force", "err", "error"}
     | {"std", "sigma", "var", "variance", "min", "max", "confidence", "likelihood", "score"}

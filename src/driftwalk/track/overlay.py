@@ -14,7 +14,7 @@ from driftwalk.core.opencv import require_opencv
 from driftwalk.track.follow.tracker import TrackState
 from driftwalk.track.types import Image, PixelToWorld
 
-# Blue, green, red; of Okabe and Ito, told apart with any kind of colour vision.
+# Blue, green, red; of Okabe and Ito, distinguishable with any kind of colour vision.
 _COLOURS: Final = (
     (178, 114, 0),
     (0, 94, 213),

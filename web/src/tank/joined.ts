@@ -34,7 +34,7 @@ export function shapeName(blocks: readonly string[], joins: readonly Join[]): st
   if (cells.length !== blocks.length) return `${blocks.length} blocks`;
   const turned = turns(cells);
   const mirrored = turns(cells.map(([x, y]): Cell => [-x, y]));
-  // As it is first: S and Z differ, where mirror images are told apart.
+  // As it is first: S and Z differ, where mirror images are distinct.
   for (const looks of [turned, mirrored]) {
     const found = NAMES.find((name) => looks.includes(code(cellsOfName(name)[0] ?? [])));
     if (found !== undefined) return found;

@@ -26,7 +26,7 @@ export class Trails {
 
   /** Takes where the bodies are at a time [s]. */
   add(time: number, bodies: readonly Body[]): void {
-    // What is watched has begun anew.
+    // The watched run has restarted.
     if (time < this.newest) this.clear();
     this.newest = time;
     for (const body of bodies) {

@@ -173,7 +173,7 @@ class LiveStream {
 
   /**
    * Lets a frame be drawn; blocks and the picture under them are of one frame, as long as pictures
-   * come. A frame without one waits for the next picture, not for ever.
+   * come. A frame without one waits only for the next picture.
    */
   private async schedule(frame: Frame): Promise<void> {
     const { hello } = this;

@@ -33,7 +33,7 @@ public:
   DragModel(const FloatingBlock& block, const SplineView& flow, const double* coefficients,
             double drag_coefficient, Angle angle);
 
-  // Orientations between 0 and a quarter turn that stand for an unknown angle. With eight the drag
+  // Orientations between 0 and a quarter turn that represent an unknown angle. With eight the drag
   // is within 1 % of that of many, mostly 0.1 % (cpp/tests/test_infer.cpp).
   static constexpr int orientations = 8;
 

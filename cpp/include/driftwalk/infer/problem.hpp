@@ -54,7 +54,7 @@ struct FilterProblem {
   double intensity[3]; // the variances of vx, vy, omega grow by it times dt [m^2/s^3, rad^2/s^3]
   double variance[3];  // of a sample's x, y, theta [m^2, rad^2]
   double largest_step; // [s]
-  double longest_gap;  // [s] since the last sample; beyond it the state starts anew
+  double longest_gap;  // [s] since the last sample; beyond it the state restarts
 };
 
 // What the filter knows: D coordinates, x, y and for D = 3 theta, then their D velocities.

@@ -141,8 +141,8 @@ inline const Node* flow_table_at(const Prepared<T>& run, double time, Node* scra
   return scratch;
 }
 
-// Path length of a world in the second half of its samples, before camera noise: a world at rest is
-// told by it, whatever the noise makes of its recorded steps.
+// Path length of a world in the second half of its samples, before camera noise. It reveals a
+// world at rest, whatever the noise does to its recorded steps.
 template <class Real>
 struct Motionless {
   using T = typename Numbers<Real>::Scalar;

@@ -141,7 +141,8 @@ def check_model(
         parts.append((more, at))
         attrs |= facts
     except InputError as error:
-        # A recording whose steps cannot be compared is still told whether its errors are white.
+        # If the steps of a recording cannot be compared, the check still tests whether its errors
+        # are white.
         motion, scan = None, None
         attrs |= {"ks_distance": np.nan, "ks_noise_floor": np.nan, "ks_left_out": str(error)}
     criteria = criteria_of(errors, found, motion, scan, angle=fit.attrs["angle"])

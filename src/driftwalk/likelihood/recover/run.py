@@ -92,7 +92,7 @@ def recovery_study(
     check_recovery(study, flow)
     settings = study.recover
     angles = angles_of(study)
-    # Recordings vary slowest, so that the time that is left can be told from what is done.
+    # Recordings vary slowest, so that finished work predicts the remaining time.
     design = grid(
         recording=np.arange(settings.recordings),
         duration=np.array(settings.durations_s),

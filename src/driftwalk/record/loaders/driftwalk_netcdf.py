@@ -51,7 +51,7 @@ class DriftwalkLoader:
             if key not in ("kind", "schema_version", "counts")
         }
         if dataset.attrs.get("format") == "driftwalk track":
-            # `counts` is what reading found; what the tracker counted stays beside it.
+            # `counts` is what reading found; the tracker's own counts are kept next to it.
             kept["tracking_counts"] = dataset.attrs["counts"]
         return RawRecording(
             bodies,

@@ -77,7 +77,7 @@ class PlainLoader:
             body_columns=lambda in_order: body_columns(
                 path, columns, labels, delimiter=delimiter, skip=skip, in_order=in_order
             ),
-            # Bare `x, y` beside a time in seconds is SI; beside frame numbers it may be pixels.
+            # Bare `x, y` next to a time in seconds is SI; next to frame numbers it may be pixels.
             bare_length_is_si=columns.bare and columns.clock_unit != "frame",
             rows=table.rows,
             notes=notes,

@@ -101,7 +101,7 @@ class TagDetector:
 
     def _place(self, name: str, corners: Array) -> Detection:
         pixel = _crossing(corners)
-        # In the image, y up stands for the world as long as there is no camera.
+        # In the image, y up replaces the world if there is no camera.
         up = np.array([1.0, -1.0])
         world = corners * up if self.camera is None else self.camera.to_world(corners)
         slopes = np.diag(up) if self.camera is None else self.camera.jacobian(pixel[None])[0]

@@ -15,7 +15,7 @@ Floats = npt.NDArray[np.float64]
 
 PARTED: Final = 0.5
 """Score of two that were lost sight of together: which one went on being seen, nobody can say."""
-# Measurements that tell the velocity anew, and with it whether an assignment was right.
+# Measurements that determine the velocity again, and so whether an assignment was right.
 _SETTLES_IN: Final = 3
 
 

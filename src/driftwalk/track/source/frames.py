@@ -27,7 +27,8 @@ _IMAGES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 _TIMES: Final = "times.csv"
 _LATEST_S: Final = 1e12
 """30 000 years: beyond any clock, and its gaps can still be counted in frames."""
-# A file whose pictures end so long before its stated end was cut off; sound may go on a little.
+# A file whose pictures end this long before its stated end was cut off; sound may continue a
+# little.
 _CUT_OFF_S: Final = 0.5
 _FFMPEG_LOG: Final = "OPENCV_FFMPEG_LOGLEVEL"
 
