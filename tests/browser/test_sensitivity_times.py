@@ -238,7 +238,7 @@ def test_a_running_analysis_shows_the_settings_that_are_there(
             picture(page, "sensitivity-under-way")
             click_cell(page, 2, 2)
             shown = page.locator("[data-part=l1-map]")
-            assert "are not there yet" in shown.inner_text()
+            assert "has no outcomes yet" in shown.inner_text()
             assert shown.locator("svg.classes, .setting-times svg").count() == 0
 
 

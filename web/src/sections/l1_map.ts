@@ -200,7 +200,7 @@ function settingPanel(
     if (mine !== newest) return;
     const waits = context.fetchCell !== null && !Number.isFinite(distanceAt(map, cell));
     const nothing = waits
-      ? "The outcomes of this setting are not there yet."
+      ? "This setting has no outcomes yet."
       : "There are no outcomes of this setting.";
     const some = showSetting(map, panel, grid, cell, nothing);
     refill(below, () => {

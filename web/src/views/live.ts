@@ -291,7 +291,7 @@ function countOf(shapes: readonly string[]): Map<string, number> {
 
 function outcomeText(frame: Frame): string {
   if (frame.outcome !== null) return outcomeWords(frame.outcome);
-  if (frame.joined === null) return "Who is joined is not observed.";
+  if (frame.joined === null) return "The stream does not report joins.";
   if (frame.possible === null || frame.possible.length === 0) return "not known: a block is hidden";
   return `${frame.possible.map(outcomeWords).join(" or ")}: a block is hidden`;
 }
