@@ -253,14 +253,14 @@ def test_a_calibration_that_cannot_be_used(calibrated: Path, tmp_path: Path) -> 
     shutil.copy(calibrated / "flow.nc", wrong / "calibration.nc")
     says = {
         unfinished: "holds a calibration that is not finished: run its command again",
-        empty: "is no run directory",
+        empty: "is not a run directory",
         tmp_path / "nowhere": "does not exist",
-        RECORDING: "is no run directory",
+        RECORDING: "is not a run directory",
         other: "no calibration: its calibration (calibration.nc) is not there",
         fit: f"holds a fit, not a calibration: calibrate on its flow (driftwalk calibrate "
         f"RECORDING --flow {fit / 'flow.nc'})",
         damaged: "cannot be read as NetCDF",
-        wrong: "is no calibration: its kind is 'flow_field'",
+        wrong: "is not a calibration: its kind is 'flow_field'",
     }
     for folder, words in says.items():
         line = refusal(here("assemble", folder, "-o", tmp_path / "run"))

@@ -247,7 +247,7 @@ def test_a_simulation(tmp_path: Path) -> None:
 def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
     out = tmp_path / "report.html"
     (tmp_path / "folder").mkdir()
-    assert "is no run directory" in refusal(here("report", tmp_path / "folder", "-o", out))
+    assert "is not a run directory" in refusal(here("report", tmp_path / "folder", "-o", out))
     assert "does not exist" in refusal(here("report", tmp_path / "nowhere", "-o", out))
     assert "folder" in refusal(here("report", FLOW, "-o", tmp_path / "no" / "report.html"))
     assert not out.exists()

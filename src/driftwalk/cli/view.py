@@ -96,7 +96,7 @@ def address_of(text: str) -> tuple[str, int]:
     Raises
     ------
     InputError
-        When it is no address.
+        When it is not an address.
 
     Examples
     --------

@@ -70,14 +70,14 @@ def require_motion(track: Track, study: Study, *, where: str) -> None:
         )
         raise InputError(
             f"{where}the body never moves: it stays within {1e3 * width:.2g} mm around {place}, "
-            f"{why}, and there is nothing to fit; check the units, the body (--body) and the time "
-            "that is kept (--from, --to)"
+            f"{why}, and there is nothing to fit; check the units, the body (--body) "
+            "and the selected time (--from, --to)"
         )
     if typical_speed([track]) == 0.0:
         raise InputError(
             f"{where}the body rests in 99 % of the recording, at the same position to the last "
-            "digit, and there is no motion to fit; check the body (--body) and the time that is "
-            "kept (--from, --to)"
+            "digit, and there is no motion to fit; check the body (--body) and the "
+            "selected time (--from, --to)"
         )
 
 

@@ -156,8 +156,8 @@ def _no_run(folder: Path) -> str:
         except DriftwalkError:
             continue
     if inside:
-        return f"{folder} is no run directory, but holds some: name {' or '.join(inside)} in it"
+        return f"{folder} is not a run directory, but holds some: name {' or '.join(inside)} in it"
     return (
-        f"{folder} is no run directory: give one that calibrate, fit, assemble, sensitivity or "
+        f"{folder} is not a run directory: give one that calibrate, fit, assemble, sensitivity or "
         "study recover made, or a recording"
     )

@@ -96,7 +96,7 @@ def _require_finished(folder: Path, files: dict[str, Path]) -> None:
             "continues it"
         )
     if state == "new":
-        what = "is no run directory" if folder.exists() else "does not exist"
+        what = "is not a run directory" if folder.exists() else "does not exist"
         raise InputError(
             f"{folder} {what}: give the directory that 'driftwalk calibrate --out' made, or a flow "
             "field (--flow)"
@@ -118,5 +118,5 @@ def _require_finished(folder: Path, files: dict[str, Path]) -> None:
 def _read(path: Path) -> xr.Dataset:
     found = check_contents(open_netcdf(path), path)
     if found.attrs.get("kind") != "calibration":
-        raise InputError(f"{path} is no calibration: its kind is {found.attrs.get('kind')!r}")
+        raise InputError(f"{path} is not a calibration: its kind is {found.attrs.get('kind')!r}")
     return found

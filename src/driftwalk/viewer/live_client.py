@@ -42,7 +42,7 @@ class LiveSource(Source):
     Raises
     ------
     InputError
-        When that is no address.
+        When that is not an address.
 
     Examples
     --------

@@ -212,7 +212,7 @@ def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("x", encoding="utf-8")
     with pytest.raises(InputError, match="is not a directory"):
         report_page(tmp_path / "file")
-    with pytest.raises(InputError, match="is no run directory: give one that calibrate"):
+    with pytest.raises(InputError, match="is not a run directory: give one that calibrate"):
         report_page(tmp_path)
 
 

@@ -120,7 +120,7 @@ def test_packing_is_compact() -> None:
 @pytest.mark.parametrize("name", ["", "K", "x/xx", "...", "xx-", "I3+", "4"])
 def test_other_names_are_refused(name) -> None:
     assert not is_class(name)
-    with pytest.raises(InputError, match="is no shape"):
+    with pytest.raises(InputError, match="is not a shape"):
         class_cells(name)
 
 

@@ -15,7 +15,9 @@ KINDS: Final = {
     "driftwalk report its run directory",
     "flow_field": "a flow field, and no positions: it is for --flow",
 }
-_OTHER: Final = "no recording but a result of kind '{}': driftwalk report takes its run directory"
+_OTHER: Final = (
+    "not a recording but a result of kind '{}': driftwalk report takes its run directory"
+)
 
 
 def what_else(path: Path) -> str | None:

@@ -57,7 +57,7 @@ def shape_cells(shape: str) -> npt.NDArray[np.int64]:
     cells = cells_of_shape(shape)
     if not cells:
         raise InputError(
-            f"'{shape}' is no shape: expected one of {', '.join(NAMED_SHAPES)}, or rows such as "
+            f"'{shape}' is not a shape: expected one of {', '.join(NAMED_SHAPES)}, or rows such as "
             "xxx/.x. with x for a cell"
         )
     return np.array(cells, dtype=np.int64)
