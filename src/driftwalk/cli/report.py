@@ -25,7 +25,7 @@ def report(
     ],
     how: RecordingOptions,
     out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="FILE", help="The HTML file to write.")
+        Path, typer.Option("--out", "-o", metavar="FILE", help="HTML file to write.")
     ] = Path("report.html"),
     tank_diameter: TankDiameter = None,
     overwrite: Annotated[

@@ -40,7 +40,12 @@ def recover(
     ],
     flow: Annotated[
         Path | None,
-        typer.Option("--flow", metavar="FILE", help="The true flow field.", show_default=False),
+        typer.Option(
+            "--flow",
+            metavar="FILE",
+            help="True flow field (default: that of --truth).",
+            show_default=False,
+        ),
     ] = None,
     recordings: Annotated[
         int | None,
