@@ -193,7 +193,7 @@ def test_refusals(changes: dict, words: str, flow: xr.Dataset) -> None:
 
 def test_refusals_of_flows(flow: xr.Dataset) -> None:
     with pytest.raises(InputError, match="the flow of the water is missing"):
-        dw.check_recovery(small_study())
+        dw.likelihood.check_recovery(small_study())
     with pytest.raises(InputError, match=r"flow\.nc .* has to be loaded"):
         dw.likelihood.check_recovery(small_study(flow="flow.nc"))
     frames = flow.expand_dims(time=[0.0, 1.0])

@@ -115,7 +115,7 @@ def _fit(
     tell: Callable[[xr.Dataset], None],
 ) -> tuple[xr.Dataset, xr.Dataset]:
     """Fit and check, or read a finished run; the fit is printed before it is checked."""
-    from driftwalk.cli.fit_run import FitWork, run_fit
+    from driftwalk.runs import FitWork, run_fit
 
     if _finished(folder, overwrite):
         tell(open_netcdf(folder / "fit.nc"))

@@ -32,8 +32,6 @@ class FitWork:
         The body.
     inputs : mapping of str to Path
         The files that were read, by their role.
-    remark : str or None
-        Remark for the user when the run begins.
     check : bool
         Whether the model is checked.
     """
@@ -46,7 +44,7 @@ class FitWork:
 
 
 class Fitted(NamedTuple):
-    """Results of a run."""
+    """What a run found."""
 
     fit: xr.Dataset
     check: xr.Dataset | None
@@ -71,7 +69,7 @@ def run_fit(
     Parameters
     ----------
     work : FitWork
-        The work to do.
+        What to do.
     folder : Path
         The run directory.
     overwrite : bool
@@ -79,7 +77,16 @@ def run_fit(
     begun : callable, optional
         Called when everything is checked and the work begins.
     fitted : callable, optional
-        Called with the fit as soon as it is stored, before the figures and the check.
+        Told the fit as soon as it is stored, before the figures and the check.
+    progress : callable, optional
+        Told how much is done: ``progress(done, total, text)``.
+    command : str, optional
+        The command line or the call, for the manifest.
+
+    Returns
+    -------
+    Fitted
+        The `fit` and its `model_check`.
 
     Raises
     ------
@@ -107,37 +114,36 @@ def run_fit(
         overwrite=overwrite,
         command=command,
     ) as run:
-        if work.remark is not None:
-            print_note(work.remark)
-        with ProgressReporter("fit") as progress:
-            found = fit_motion(work.recordings, work.study, body=work.body, tell=progress.update)
-            flow = fitted_flow(found)
-            run.write("fit.nc", netcdf_bytes(found))
-            run.write("flow.nc", netcdf_bytes(flow))
-            for number, recording in enumerate(work.recordings, start=1):
-                name = "recording.nc" if number == 1 else f"recording-{number}.nc"
-                run.write(name, netcdf_bytes(recording))
-            if fitted is not None:
-                fitted(found)
-            write_fit_figures(
-                run.folder("figures"),
-                flow=steady_flows(found),
-                trajectory=work.recordings[0],
-                body=work.body,
-                simulated=found.attrs["simulated_recording"] == "yes",
-            )
-            check = None
-            if work.check:
-                progress.update(found.attrs["iterations"], found.attrs["iterations"], "check")
-                try:
-                    check = check_model(found, work.recordings, body=work.body)
-                except InputError as error:
-                    # The fit is kept, with the reason why it has no check.
-                    found.attrs["check_left_out"] = str(error)
-                    run.write("fit.nc", netcdf_bytes(found))
-                else:
-                    run.write("check.nc", netcdf_bytes(check))
-                    write_check_figures(run.folder("figures"), check=check)
+        if begun is not None:
+            begun()
+        found = fit_motion(work.recordings, work.study, body=work.body, tell=progress)
+        flow = fitted_flow(found)
+        run.write("fit.nc", netcdf_bytes(found))
+        run.write("flow.nc", netcdf_bytes(flow))
+        for number, recording in enumerate(work.recordings, start=1):
+            name = "recording.nc" if number == 1 else f"recording-{number}.nc"
+            run.write(name, netcdf_bytes(recording))
+        if fitted is not None:
+            fitted(found)
+        write_fit_figures(
+            run.folder("figures"),
+            flow=steady_flows(found),
+            trajectory=work.recordings[0],
+            body=work.body,
+            simulated=found.attrs["simulated_recording"] == "yes",
+        )
+        check = None
+        if work.check:
+            progress(found.attrs["iterations"], found.attrs["iterations"], "check")
+            try:
+                check = check_model(found, work.recordings, body=work.body)
+            except InputError as error:
+                # The fit is kept, and says why nothing stands beside it.
+                found.attrs["check_left_out"] = str(error)
+                run.write("fit.nc", netcdf_bytes(found))
+            else:
+                run.write("check.nc", netcdf_bytes(check))
+                write_check_figures(run.folder("figures"), check=check)
     return Fitted(found, check)
 
 

@@ -323,6 +323,6 @@ def test_sobol_needs_two_runs_and_a_power_of_two(study: dw.Study) -> None:
     with pytest.raises(InputError, match="at least 2 runs of each setting"):
         dw.assembly.check_indices(small(sensitivity={"runs": 1}), FLOW, samples=8)
     with pytest.raises(InputError, match="a power of two"):
-        dw.check_indices(study, FLOW, samples=9)
+        dw.assembly.check_indices(study, FLOW, samples=9)
     with pytest.raises(InputError, match="there is no 'blocks'"):
         dw.sensitivity_indices(study, FLOW, samples=8, bounds={"blocks": (2, 3)})

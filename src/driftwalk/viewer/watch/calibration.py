@@ -22,12 +22,6 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
     from driftwalk.viewer.watch.recording_steps import RecordedSteps
 
-STAGES: Final[dict[str, tuple[str, float, float]]] = {
-    "coarse": ("map", 0.0, 0.4),
-    "refined": ("refined map", 0.4, 0.65),
-    "bootstrap": ("bootstrap", 0.65, 0.93),
-}
-"""Name of each stage, and its share of the time: from, to."""
 DETAILS: Final = ("excerpt_x", "excerpt_y", "step_density", "ks_step_length", "ks_turning_angle")
 GRID: Final = ("drag_coefficient", "force_std")
 NO_DISTANCE: Final = 1.0
