@@ -27,6 +27,20 @@ SMALL = {
 }
 
 
+# Settings a factor of 1.3 to 1.5 apart around the truth, and few: there is time for replicates.
+AROUND_THE_TRUTH = {
+    "calibration.drag_coefficient_min": 0.3,
+    "calibration.drag_coefficient_max": 0.6,
+    "calibration.drag_coefficient_step": 0.15,
+    "calibration.force_std_min_N": 0.3e-3,
+    "calibration.force_std_max_N": 0.9e-3,
+    "calibration.force_std_step_N": 0.3e-3,
+    "calibration.replicates": 16,
+    "calibration.refine": "none",
+    "steps.step_interval_s": 1.0,
+}
+
+
 def synthetic_recording(duration: float, seed: int = 5):
     study = apply_overrides(
         dw.Study(),
@@ -50,10 +64,28 @@ def found():
 
 
 def test_the_truth_of_a_synthetic_recording_is_found(found):
-    assert found.attrs["drag_coefficient"] == pytest.approx(TRUTH["drag_coefficient"], abs=0.04)
-    assert found.attrs["force_std_N"] == pytest.approx(TRUTH["force_std_N"], abs=1.6e-4)
-    assert found.attrs["distance_to_floor_ratio"] < 1.6
+    """Over 12 recordings C_d was 0.450 +- 0.006 and D 1.01 +- 0.09 floors: some 5 sd each.
+
+    In steps of 0.1 s, which are mostly camera noise, three replicates tell sigma_F to a third at
+    best (the 12 recordings gave 0.67 to 0.82 mN); what they tell of it is tested below.
+    """
+    assert found.attrs["drag_coefficient"] == pytest.approx(TRUTH["drag_coefficient"], abs=0.03)
+    assert found.attrs["distance_to_floor_ratio"] < 1.5
     assert json.loads(found.attrs["warnings"]) == []
+
+
+@pytest.mark.false_alarm(2e-3)
+def test_the_truth_explains_a_recording_best(fresh_seed):
+    """The lowest distance of a map is at the truth, in twenty minutes and steps of 1 s.
+
+    The nearest other force is half as large or 1.5 times it. Over 12 seeds its distance was larger
+    by 0.081 +- 0.025, and by 0.039 at least; 3.2 sd are a false alarm in some 1000.
+    """
+    study = apply_overrides(dw.Study(), {**AROUND_THE_TRUTH, "calibration.seed": fresh_seed(1)})
+    recording = synthetic_recording(1200.0, seed=fresh_seed(5))
+    found = dw.calibrate(recording, study, flow=dw.tank30_flow(), threads=2).attrs
+    assert found["drag_coefficient"] == pytest.approx(TRUTH["drag_coefficient"])
+    assert found["force_std_N"] == pytest.approx(TRUTH["force_std_N"])
 
 
 def test_sigma_f_comes_with_its_interval_and_the_intensity(found):
