@@ -97,8 +97,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             continue
         if rate is not None:
             item.user_properties.append(("false_alarm", rate))
+        # Parametrized tests share one function, and methods keep it to themselves.
         function = getattr(item, "obj", None)
-        # Parametrized tests share one function.
+        function = getattr(function, "__func__", function)
         if getattr(function, "is_hypothesis_test", False) and function not in enlarged:
             enlarged.add(function)
             # A test's own number of examples comes before the profile's, and Hypothesis has no

@@ -108,9 +108,10 @@ def test_mean_over_the_covariance_is_the_integral(coefficients):
     assert np.all(np.abs(pose_drag(coefficients)["acceleration"] / want - 1) > 0.02)
 
 
-def test_mean_over_the_covariance_is_the_mean_of_draws():
+@pytest.mark.false_alarm(2e-4)
+def test_mean_over_the_covariance_is_the_mean_of_draws(fresh_seed):
     """4 standard errors, and 0.2 % of the force that the uncertain angle turns: one in 5000."""
-    draws = np.random.default_rng(3).multivariate_normal(STATE, COVARIANCE, 20000)
+    draws = np.random.default_rng(fresh_seed(3)).multivariate_normal(STATE, COVARIANCE, 20000)
     values = np.array([pose_drag(LINEAR, draw)["acceleration"] for draw in draws])
     got = pose_drag(LINEAR, covariance=COVARIANCE)["acceleration"]
     error = values.std(axis=0) / np.sqrt(len(values))
@@ -194,13 +195,14 @@ def test_a_turned_world_turns_the_force():
         np.testing.assert_allclose(other[name], want, rtol=1e-9, atol=1e-12 * np.abs(want).max())
 
 
-def test_moments_of_the_oracle_are_those_of_draws():
-    """4 standard errors on each of sixty numbers: a false alarm in 250."""
+@pytest.mark.false_alarm(1e-4)
+def test_moments_of_the_oracle_are_those_of_draws(fresh_seed):
+    """5 standard errors on each of sixty numbers: a false alarm in 30,000, were they normal."""
     flow = SplineFlow(LINEAR, ORIGIN, SPACING)
     mean = closing_and_slip(OWN_BLOCK, flow, STATE)
     spread = spreads(OWN_BLOCK, flow, STATE, COVARIANCE)
     along, across = moments(mean, spread)
-    rng = np.random.default_rng(9)
+    rng = np.random.default_rng(fresh_seed(9))
     for k in range(mean.shape[0]):
         s, slip = rng.multivariate_normal(mean[k], spread[k], 20000).T
         for want, values in (
@@ -208,7 +210,7 @@ def test_moments_of_the_oracle_are_those_of_draws():
             (across[k], np.maximum(s, 0) * slip),
         ):
             error = values.std() / np.sqrt(values.size)
-            assert abs(values.mean() - want) < 4 * error + 1e-12
+            assert abs(values.mean() - want) < 5 * error + 1e-12
 
 
 @pytest.mark.parametrize(

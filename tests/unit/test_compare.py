@@ -61,10 +61,18 @@ class TestCompare:
         assert np.isnan(result["p_value"].item())
         assert result.attrs["permutations"] == 0
 
-    def test_another_realisation_is_near_the_noise_floor(self) -> None:
-        result = compare(random_walk(4), random_walk(5), permutations=199)
-        assert result["p_value"].item() > 0.001
-        assert 0.3 < result["ks_distance"].item() / result["noise_floor"].item() < 3
+    @pytest.mark.false_alarm(5e-3)
+    def test_another_realisation_is_near_the_noise_floor(
+        self, fresh_seed: Callable[[int], int]
+    ) -> None:
+        """The smallest p-value of 199 permutations comes once in 200 times.
+
+        Over 40 seeds the ratio was 1.05 +- 0.19, from 0.75 to 1.53: 5 sd.
+        """
+        runs = random_walk(fresh_seed(4)), random_walk(fresh_seed(5))
+        result = compare(*runs, permutations=199)
+        assert result["p_value"].item() > 1 / 200
+        assert 0.1 < result["ks_distance"].item() / result["noise_floor"].item() < 2.0
 
     def test_both_are_taken_at_the_longer_interval(self) -> None:
         result = compare(random_walk(6), random_walk(7, interval=0.2), permutations=0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
@@ -91,10 +93,11 @@ def test_chi_squared_of_a_cell_by_dense_algebra() -> None:
     assert local.samples.sum() == ROWS / COMPONENTS
 
 
-def test_residuals_of_a_fit_have_the_stated_variance() -> None:
+@pytest.mark.false_alarm(2e-5)
+def test_residuals_of_a_fit_have_the_stated_variance(fresh_seed: Callable[[int], int]) -> None:
     """A linear world whose coefficients come from the prior: 4000 fits, 5 sd of a variance each."""
     jacobian, precision, covariance = linear_world(5)
-    generator = np.random.default_rng(6)
+    generator = np.random.default_rng(fresh_seed(6))
     group = np.arange(ROWS) // 50
     matrix = np.array([group == k for k in range(8)], dtype=float)
     left = matrix @ (np.eye(ROWS) - jacobian @ covariance @ jacobian.T) @ matrix.T
@@ -168,9 +171,10 @@ def test_lags_without_a_pair_take_no_degree_of_freedom() -> None:
     assert found.p_value == pytest.approx(chi2.sf(found.portmanteau, 20))
 
 
-def test_what_fitting_puts_in_is_taken_out_again() -> None:
+@pytest.mark.false_alarm(1e-3)
+def test_what_fitting_puts_in_is_taken_out_again(fresh_seed: Callable[[int], int]) -> None:
     """Residuals of a local mean are anticorrelated; with the leverage known they count as white."""
-    generator = np.random.default_rng(9)
+    generator = np.random.default_rng(fresh_seed(9))
     white = generator.normal(size=(20_000, 2))
     jacobian = np.kron(np.eye(400), np.ones((50, 1)))
     residual = white - jacobian @ (jacobian.T @ white) / 50.0
@@ -185,8 +189,9 @@ def test_what_fitting_puts_in_is_taken_out_again() -> None:
     assert corrected.chi_squared == pytest.approx(np.full(2, 0.98), abs=0.05)
 
 
-def test_moving_average_and_tails_are_seen() -> None:
-    generator = np.random.default_rng(10)
+@pytest.mark.false_alarm(1e-3)
+def test_moving_average_and_tails_are_seen(fresh_seed: Callable[[int], int]) -> None:
+    generator = np.random.default_rng(fresh_seed(10))
     noise = generator.normal(size=(6001, 2))
     found = white_of(
         [errors_of_noise((noise[1:] + 0.5 * noise[:-1]) / np.sqrt(1.25))], nothing_fitted()
@@ -220,8 +225,9 @@ def test_layout_cells_parts_and_speeds() -> None:
     assert counts == pytest.approx(np.full(6, 1500), rel=0.05)
 
 
-def test_louder_noise_in_one_group_is_seen() -> None:
-    generator = np.random.default_rng(11)
+@pytest.mark.false_alarm(1e-4)
+def test_louder_noise_in_one_group_is_seen(fresh_seed: Callable[[int], int]) -> None:
+    generator = np.random.default_rng(fresh_seed(11))
     group = generator.integers(0, 4, 8000)
     white = generator.normal(size=(8000, 2)) * np.where(group == 2, 1.3, 1.0)[:, None]
     found = spread_of([errors_of_noise(white)], [group], 5)
@@ -271,11 +277,12 @@ def test_scan_names_the_stretch_that_differs() -> None:
     assert found.expected < 0.03
 
 
-def test_scan_of_steady_motion_is_not_alarmed() -> None:
+@pytest.mark.false_alarm(2.5e-3)
+def test_scan_of_steady_motion_is_not_alarmed(fresh_seed: Callable[[int], int]) -> None:
     """Twenty recordings at a level of 5 %: more than four alarms once in 400 such tests."""
-    simulated = [turning(seed) for seed in range(1, 17)]
+    simulated = [turning(seed) for seed in map(fresh_seed, range(1, 17))]
     p_values = []
-    for seed in range(200, 220):
+    for seed in map(fresh_seed, range(200, 220)):
         found = scan_of(turning(seed), simulated, ten_parts())
         assert found is not None
         p_values.append(found.p_value)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -34,12 +35,18 @@ of 16 ms, in which speeds fall by more than in smooth motion: in eight worlds of
 at 16 ms and +0.7 % at 2 ms, the force the same. With the angle in the state two sd are not more."""
 
 
+NAMES = ("drag_coefficient", "force_std_N", "tracking_noise_m")
+
+
+def standard_deviations(fit: xr.Dataset) -> np.ndarray:
+    """Return those of the logarithms of the parameters."""
+    return np.sqrt(np.diag(fit["covariance"].values))[:3] * (1.0, 0.5, 1.0)
+
+
 def deviations(fit: xr.Dataset) -> np.ndarray:
     """Return how far the parameters are from the truth, in their standard deviations."""
     truth = np.array([DRAG * np.exp(STEP_16_MS), FORCE_N, NOISE_M])
-    names = ("drag_coefficient", "force_std_N", "tracking_noise_m")
-    sd = np.sqrt(np.diag(fit["covariance"].values))[:3] * (1.0, 0.5, 1.0)
-    return np.log(np.array([fit.attrs[name] for name in names]) / truth) / sd
+    return np.log(np.array([fit.attrs[name] for name in NAMES]) / truth) / standard_deviations(fit)
 
 
 def test_the_truth_is_within_the_errors(fit: xr.Dataset) -> None:
@@ -93,9 +100,17 @@ def test_the_flow_is_taken_by_the_others(fit: xr.Dataset) -> None:
 
 
 @pytest.mark.slow
-def test_a_recording_with_holes_gives_the_same_within_errors(track: xr.Dataset) -> None:
-    """A fifth of the samples and 100 s are missing; the rest are the same noise, so 3 sd."""
-    generator = np.random.default_rng(7)
+@pytest.mark.false_alarm(2e-4)
+def test_a_recording_with_holes_gives_the_same_within_errors(
+    track: xr.Dataset, fit: xr.Dataset, fresh_seed: Callable[[int], int]
+) -> None:
+    """A fifth of the samples and 100 s are missing; the rest are the same motion and noise.
+
+    So the two answers are nearer to each other than either is to the truth: the estimate of a part
+    is that of the whole and an independent error, of the variance that the part has more (Hausman
+    1978). 4 sd of it for each of three: once in 5000 choices of what is missing.
+    """
+    generator = np.random.default_rng(fresh_seed(7))
     time = track["time"].values
     lost = (generator.random(time.size) < 0.2) | ((time > 200.0) & (time < 300.0))
     holes = track.copy(deep=True)
@@ -103,7 +118,10 @@ def test_a_recording_with_holes_gives_the_same_within_errors(track: xr.Dataset) 
         holes[name].values[lost] = np.nan
     holes["theta"].values[generator.random(time.size) < 0.1] = np.nan
     found = dw.fit_motion(holes, coarse_study())
-    assert np.abs(deviations(found)).max() < 4.0
+    part, whole = (np.array([one.attrs[name] for name in NAMES]) for one in (found, fit))
+    more = standard_deviations(found) ** 2 - standard_deviations(fit) ** 2
+    assert (more > 0.0).all()
+    assert np.abs(np.log(part / whole) / np.sqrt(more)).max() < 4.0
     assert found.attrs["samples"] == np.count_nonzero(~lost)
 
 
@@ -125,8 +143,12 @@ def test_without_angles_the_drag_is_averaged(track: xr.Dataset) -> None:
     found = dw.fit_motion(blind, coarse_study())
     assert found.attrs["angle"] == "none"
     assert "no orientation" in found.attrs["warnings"]
-    # A face across the water or a diagonal: the law of a square differs by some tens of percent.
-    assert 0.5 < found.attrs["drag_coefficient"] / DRAG < 2.0
+    # The mean over all orientations makes C_d up to 16 % too small (docs: what `none` costs); what
+    # its sd adds to that is 4 of them, as for the others: once in 5000 if they are right.
+    sd, off = standard_deviations(found), deviations(found)
+    assert sd[0] < 0.15
+    assert np.log(1.0 - 0.16) / sd[0] - 4.0 < off[0] < 4.0
+    assert np.abs(off[1:]).max() < 4.0
     same = dw.fit_motion(track, coarse_study(), angle="none")
     assert same.attrs["drag_coefficient"] == pytest.approx(found.attrs["drag_coefficient"])
 
@@ -202,9 +224,10 @@ def test_footprint_by_brute_force() -> None:
                 assert count[j, i] == np.count_nonzero(over & (excluded == 0))
 
 
-def test_whiteness_sees_correlated_errors() -> None:
+@pytest.mark.false_alarm(1e-5)
+def test_whiteness_sees_correlated_errors(fresh_seed: Callable[[int], int]) -> None:
     """A moving average (1, 1/2) has the autocorrelation 0.4."""
-    noise = np.random.default_rng(2).normal(size=(20_001, 2))
+    noise = np.random.default_rng(fresh_seed(2)).normal(size=(20_001, 2))
     errors = noise[1:] + 0.5 * noise[:-1]
     used = np.ones(20_000, dtype=bool)
     used[::50] = False

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline
@@ -66,9 +68,12 @@ def test_penalties_are_the_integrals_they_claim_to_be() -> None:
     )
 
 
-def test_standard_errors_are_the_spread_of_drawn_coefficients() -> None:
+@pytest.mark.false_alarm(2e-5)
+def test_standard_errors_are_the_spread_of_drawn_coefficients(
+    fresh_seed: Callable[[int], int],
+) -> None:
     """4000 draws: each of 24 spreads is off by 5 sd (5.6 %) once in 7e4 runs."""
-    generator = np.random.default_rng(8)
+    generator = np.random.default_rng(fresh_seed(8))
     root = generator.normal(size=(2 * SPLINE.size, 30)) / 30.0
     x, y = np.array([-0.04, -0.01, 0.02, 0.045]), np.array([0.025, 0.05, 0.075])
     errors = SPLINE.standard_errors(root @ root.T, x, y)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -29,10 +31,17 @@ def track_of(time: np.ndarray, paths: np.ndarray, theta: np.ndarray | None = Non
     return Track(time, paths[0], paths[1], np.full(time.size, np.nan) if theta is None else theta)
 
 
-@pytest.mark.parametrize(("ratio", "tolerance"), [(0.05, 0.065), (0.5, 0.065), (5.0, 0.08)])
-def test_noise_for_several_ratios_of_unrest_to_noise(ratio: float, tolerance: float) -> None:
-    """The ratio is q h^3 / r^2; 6000 samples. The tolerance is four standard errors."""
-    random = np.random.default_rng(11)
+@pytest.mark.false_alarm(1e-3)
+@pytest.mark.parametrize(("ratio", "tolerance"), [(0.05, 0.065), (0.5, 0.065), (5.0, 0.11)])
+def test_noise_for_several_ratios_of_unrest_to_noise(
+    ratio: float, tolerance: float, fresh_seed: Callable[[int], int]
+) -> None:
+    """The ratio is q h^3 / r^2; 6000 samples.
+
+    Over 25 seeds the sd was 1.2, 1.5 and 2.2 %; the tolerance is some 5 of them. A standard error
+    of 8 blocks makes the deviation Student's t of 7 degrees of freedom: above 8 once in 10,000.
+    """
+    random = np.random.default_rng(fresh_seed(11))
     time = np.arange(6000) * STEP_S
     noise = 3e-4
     intensity = ratio * noise**2 / STEP_S**3
@@ -40,18 +49,19 @@ def test_noise_for_several_ratios_of_unrest_to_noise(ratio: float, tolerance: fl
     found = estimate_tracking_noise(track_of(time, paths))
     assert found.position_noise_m == pytest.approx(noise, rel=tolerance)
     error = found.position_noise_m - noise
-    assert abs(error) < 4.0 * found.position_noise_standard_error_m
-    assert found.position_noise_standard_error_m < 0.6 * tolerance * noise
-    if ratio > 1.0:  # below, the unrest drowns in the noise
-        assert found.acceleration_intensity_m2_s3 == pytest.approx(intensity, rel=0.45)
+    assert abs(error) < 8.0 * found.position_noise_standard_error_m
+    assert found.position_noise_standard_error_m < 0.045 * noise
+    if ratio > 1.0:  # below, the unrest drowns in the noise; here its sd is 22 %, of which 4
+        assert found.acceleration_intensity_m2_s3 == pytest.approx(intensity, rel=0.9)
     assert np.isnan(found.orientation_noise_rad)
 
 
-def test_the_standard_error_covers() -> None:
+@pytest.mark.false_alarm(1e-4)
+def test_the_standard_error_covers(fresh_seed: Callable[[int], int]) -> None:
     """Forty recordings: the deviations in standard errors have a root mean square near one."""
     noise = 3e-4
     scores = []
-    for seed in range(40):
+    for seed in map(fresh_seed, range(40)):
         random = np.random.default_rng(seed)
         time = np.arange(3000) * STEP_S
         drift = np.stack([0.1 * np.sin(0.5 * time), 0.1 * np.cos(0.5 * time)])
@@ -63,8 +73,9 @@ def test_the_standard_error_covers() -> None:
     assert 0.6 < np.sqrt(np.mean(np.square(scores))) < 1.7
 
 
-def test_no_noise_is_none() -> None:
-    random = np.random.default_rng(5)
+@pytest.mark.false_alarm(1e-3)
+def test_no_noise_is_none(fresh_seed: Callable[[int], int]) -> None:
+    random = np.random.default_rng(fresh_seed(5))
     time = np.arange(5000) * STEP_S
     path = integrated_wiener(time, 4.5e-5, random)
     found = estimate_tracking_noise(track_of(time, path))
@@ -72,8 +83,9 @@ def test_no_noise_is_none() -> None:
     assert found.acceleration_intensity_m2_s3 == pytest.approx(4.5e-5, rel=0.1)
 
 
-def test_an_uneven_clock_needs_no_special_case() -> None:
-    random = np.random.default_rng(7)
+@pytest.mark.false_alarm(1e-3)
+def test_an_uneven_clock_needs_no_special_case(fresh_seed: Callable[[int], int]) -> None:
+    random = np.random.default_rng(fresh_seed(7))
     time = np.cumsum(random.uniform(0.065, 0.12, 6000))
     noise = 3e-4
     paths = integrated_wiener(time, 9e-5, random) + random.normal(0.0, noise, (2, time.size))
@@ -81,8 +93,9 @@ def test_an_uneven_clock_needs_no_special_case() -> None:
     assert found.position_noise_m == pytest.approx(noise, rel=0.05)
 
 
-def test_pixels_act_as_uniform_noise() -> None:
-    random = np.random.default_rng(9)
+@pytest.mark.false_alarm(1e-3)
+def test_pixels_act_as_uniform_noise(fresh_seed: Callable[[int], int]) -> None:
+    random = np.random.default_rng(fresh_seed(9))
     time = np.arange(6000) * STEP_S
     pixel = 1e-3
     paths = np.stack([0.1 * np.sin(0.6 * time), 0.1 * np.cos(0.6 * time)])
@@ -91,8 +104,11 @@ def test_pixels_act_as_uniform_noise() -> None:
     assert found.position_noise_m == pytest.approx(pixel / np.sqrt(12.0), rel=0.05)
 
 
-def test_wall_hits_gaps_and_glitches_do_not_pass_for_noise() -> None:
-    random = np.random.default_rng(13)
+@pytest.mark.false_alarm(1e-3)
+def test_wall_hits_gaps_and_glitches_do_not_pass_for_noise(
+    fresh_seed: Callable[[int], int],
+) -> None:
+    random = np.random.default_rng(fresh_seed(13))
     time = np.arange(8000) * STEP_S
     noise = 3e-4
     paths = np.stack([0.02 * time, 0.01 * time])

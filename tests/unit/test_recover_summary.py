@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from recovery_worlds import synthetic_recovery
@@ -59,9 +61,12 @@ def test_a_length_with_one_recording_does_not_count() -> None:
     assert np.isnan(error_scale(np.array([100.0]), np.array([np.nan]), np.array([1]))).all()
 
 
-def test_the_interval_of_the_law_holds_as_often_as_it_says() -> None:
+@pytest.mark.false_alarm(6e-5)
+def test_the_interval_of_the_law_holds_as_often_as_it_says(
+    fresh_seed: Callable[[int], int],
+) -> None:
     """2000 studies of 8 recordings: 90 +- 0.67 %; 4 sd, once in 16,000 if it is right."""
-    generator = np.random.default_rng(5)
+    generator = np.random.default_rng(fresh_seed(5))
     draws = generator.normal(0.0, 0.2, (2000, 8))
     draws = np.sqrt((draws**2).mean(axis=1))
     scales = [error_scale(np.array([100.0]), np.array([one]), np.array([8])) for one in draws]

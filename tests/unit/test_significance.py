@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -22,17 +24,25 @@ def autoregressive(rng: np.random.Generator, n: int, phi: float) -> np.ndarray:
     return np.asarray(lfilter([1.0], [1.0, -phi], noise, axis=0))[500:]
 
 
-@pytest.mark.parametrize(("phi", "tau"), [(0.0, 1.0), (0.5, 3.0), (0.9, 19.0)])
-def test_autocorrelation_time_of_ar1(phi: float, tau: float) -> None:
-    series = autoregressive(np.random.default_rng(1), 200_000, phi)[:, 0]
-    assert autocorrelation_time(series) == pytest.approx(tau, rel=0.1)
+@pytest.mark.false_alarm(1e-5)
+@pytest.mark.parametrize(
+    ("phi", "tau", "tolerance"), [(0.0, 1.0, 0.02), (0.5, 3.0, 0.055), (0.9, 19.0, 0.13)]
+)
+def test_autocorrelation_time_of_ar1(
+    phi: float, tau: float, tolerance: float, fresh_seed: Callable[[int], int]
+) -> None:
+    """Over 25 seeds the sd was 0.3, 1.0 and 2.5 %, the mean 0.2 %, -0.3 % and -0.7 % off; 5 sd."""
+    series = autoregressive(np.random.default_rng(fresh_seed(1)), 200_000, phi)[:, 0]
+    assert autocorrelation_time(series) == pytest.approx(tau, rel=tolerance)
 
 
-def test_noise_hides_memory_from_the_integrated_time_only() -> None:
-    rng = np.random.default_rng(2)
+@pytest.mark.false_alarm(1e-5)
+def test_noise_hides_memory_from_the_integrated_time_only(fresh_seed: Callable[[int], int]) -> None:
+    """Over 25 seeds: 5.2 +- 0.15, and 20.9 +- 0.92, of which 5 are 0.22."""
+    rng = np.random.default_rng(fresh_seed(2))
     series = autoregressive(rng, 100_000, 0.9)[:, 0] + rng.normal(size=100_000) * 1.5
-    assert autocorrelation_time(series) < 8
-    assert memory_time(series) == pytest.approx(21, rel=0.2)
+    assert autocorrelation_time(series) < 6
+    assert memory_time(series) == pytest.approx(21, rel=0.22)
 
 
 @pytest.mark.parametrize("series", [[], [1.0], [1.0, 2.0, 3.0], [4.0] * 50])
@@ -81,13 +91,14 @@ def test_the_seed_decides() -> None:
     assert permuted(1) != permuted(2)
 
 
-def test_a_true_null_is_rejected_about_as_often_as_stated() -> None:
+@pytest.mark.false_alarm(1e-5)
+def test_a_true_null_is_rejected_about_as_often_as_stated(fresh_seed: Callable[[int], int]) -> None:
     """AR(1) of autocorrelation time 19, 120 pairs at the 5 % level.
 
     A test of level 8 % passes this with probability 1 - 1e-5; single-step permutation, which
     rejects nearly all, never does. (Measured over 2,000 such pairs: 5.8 %.)
     """
-    rng = np.random.default_rng(6)
+    rng = np.random.default_rng(fresh_seed(6))
     pairs, rejected, rejected_single = 120, 0, 0
     for seed in range(pairs):
         a, b = autoregressive(rng, 2500, 0.9), autoregressive(rng, 2500, 0.9)
@@ -99,8 +110,9 @@ def test_a_true_null_is_rejected_about_as_often_as_stated() -> None:
     assert rejected_single >= 5
 
 
-def test_a_difference_is_found() -> None:
-    rng = np.random.default_rng(7)
+@pytest.mark.false_alarm(1e-3)
+def test_a_difference_is_found(fresh_seed: Callable[[int], int]) -> None:
+    rng = np.random.default_rng(fresh_seed(7))
     a, b = autoregressive(rng, 6000, 0.9), 1.8 * autoregressive(rng, 6000, 0.9)
     result = block_permutation_test(a, b, permutations=199, seed=1)
     assert result.p_value == 1 / 200

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -22,9 +24,12 @@ def flow() -> xr.Dataset:
     return field.assign(u_standard_error=error, v_standard_error=error)
 
 
-def test_each_measured_node_moves_by_its_standard_error(flow: xr.Dataset) -> None:
+@pytest.mark.false_alarm(1.2e-3)
+def test_each_measured_node_moves_by_its_standard_error(
+    flow: xr.Dataset, fresh_seed: Callable[[int], int]
+) -> None:
     """Normal with the stated width at 2 x 1250 nodes; false alarm 1e-3."""
-    drawn = draw_flow(flow, seed=1, trial=1, draw=0)
+    drawn = draw_flow(flow, seed=fresh_seed(1), trial=1, draw=0)
     moves = []
     for name in ("u", "v"):
         error = flow[f"{name}_standard_error"].values

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -101,72 +103,56 @@ def test_the_estimators_by_hand() -> None:
     assert float(found["noise_share"]) == pytest.approx(share)
 
 
-def by_hand(a: np.ndarray, ab: np.ndarray, b: np.ndarray) -> tuple[float, float]:
-    both = np.r_[a, b]
-    first = ((b - both.mean()) * (ab - a)).mean() / both.var()
-    total = ((a - ab) ** 2).mean() / 2 / both.var()
-    return float(first), float(total)
-
-
-def test_the_half_widths_by_hand() -> None:
-    """200 resamples of the groups: 1.6449 times the standard deviation of their indices."""
-    design = sobol_design(BOUNDS, samples=32, seed=2)
-    y = ishigami(design["value"].values)
-    found = sobol_indices(design, y, seed=5)
-    group = y.reshape(32, 5)
-    draws = np.random.default_rng(6).integers(32, size=(32, 200))
-    for i in range(3):
-        drawn = [by_hand(*group[draws[:, k]][:, [0, i + 1, 4]].T) for k in range(200)]
-        first, total = 1.6448536 * np.std(drawn, axis=0, ddof=1)
-        assert float(found["first_order_half_width"][i]) == pytest.approx(first)
-        assert float(found["total_order_half_width"][i]) == pytest.approx(total)
-
-
-def test_noise_is_taken_out_again() -> None:
+@pytest.mark.false_alarm(1e-4)
+def test_noise_is_taken_out_again(fresh_seed: Callable[[int], int]) -> None:
     """As much noise as signal: the plain total indices are far off, the corrected ones are not.
 
-    Over ten seeds the corrected indices were off by 0.09 at most, the plain ones by 0.05.
+    Over 25 seeds the sd was 0.006 (share), 0.017 (plain) and 0.036 (corrected) at most; the limits
+    are 5 of them. Indices that are not corrected are 0.22 to 0.38 off.
     """
-    design = sobol_design(BOUNDS, samples=4096, seed=1)
+    design = sobol_design(BOUNDS, samples=4096, seed=fresh_seed(1))
     exact = ishigami(design["value"].values)
     variance, first, total = ishigami_indices()
-    noisy = exact + np.random.default_rng(1).normal(0, np.sqrt(variance), exact.size)
+    noisy = exact + np.random.default_rng(fresh_seed(1)).normal(0, np.sqrt(variance), exact.size)
     found = sobol_indices(design, noisy, noise_variance=variance)
     assert float(found["noise_share"]) == pytest.approx(0.5, abs=0.03)
-    np.testing.assert_allclose(found["total_order"], 0.5 * total + 0.5, atol=0.05)
-    np.testing.assert_allclose(found["first_order"], 0.5 * first, atol=0.06)
-    np.testing.assert_allclose(found["first_order_corrected"], first, atol=0.12)
-    np.testing.assert_allclose(found["total_order_corrected"], total, atol=0.12)
+    np.testing.assert_allclose(found["total_order"], 0.5 * total + 0.5, atol=0.085)
+    np.testing.assert_allclose(found["first_order"], 0.5 * first, atol=0.085)
+    np.testing.assert_allclose(found["first_order_corrected"], first, atol=0.18)
+    np.testing.assert_allclose(found["total_order_corrected"], total, atol=0.18)
 
 
-def test_pure_noise_shows_what_is_stated() -> None:
+@pytest.mark.false_alarm(1e-4)
+def test_pure_noise_shows_what_is_stated(fresh_seed: Callable[[int], int]) -> None:
     """200 outputs of noise in two inputs; scatter of first order sqrt(2/256) = 0.088, total 1.
 
-    Over six seeds the scatter was off by 11 % at most and the mean by 0.11 of it; 86 to 93 % lay
-    within the half width, and the mean total index was 1 to within 0.011.
+    Over 25 seeds the sd was 3.5 % (scatter), 0.006 (mean), 1.6 % (share within the half width) and
+    0.005 (mean total index and share of noise, with means 0.003 and 0.006 above 1): the limits are
+    5 of them.
     """
     bounds = {"a": (0.0, 1.0), "b": (0.0, 1.0)}
-    design = sobol_design(bounds, samples=256, seed=5)
-    noise = np.random.default_rng(6).normal(size=(1024, 200))
+    design = sobol_design(bounds, samples=256, seed=fresh_seed(5))
+    noise = np.random.default_rng(fresh_seed(6)).normal(size=(1024, 200))
     found = sobol_indices(design, noise, noise_variance=1.0, confidence=0.9)
     first, total = found["first_order"].values, found["total_order"].values
     assert found.attrs["pure_noise_first_order_half_width"] == pytest.approx(
         1.6449 * 0.08839, rel=1e-3
     )
-    assert first.std() == pytest.approx(np.sqrt(2 / 256), rel=0.15)
+    assert first.std() == pytest.approx(np.sqrt(2 / 256), rel=0.18)
     assert abs(first.mean()) < 5 * np.sqrt(2 / 256 / 400) * np.sqrt(2)
     inside = np.abs(first) <= found.attrs["pure_noise_first_order_half_width"]
     assert inside.mean() == pytest.approx(0.9, abs=0.08)
-    assert total.mean() == pytest.approx(found.attrs["pure_noise_total_order"], abs=0.02)
-    assert found["noise_share"].values.mean() == pytest.approx(1.0, abs=0.02)
+    assert total.mean() == pytest.approx(found.attrs["pure_noise_total_order"], abs=0.03)
+    assert found["noise_share"].values.mean() == pytest.approx(1.0, abs=0.03)
 
 
-def test_proportions_of_finitely_many_runs() -> None:
+@pytest.mark.false_alarm(1e-3)
+def test_proportions_of_finitely_many_runs(fresh_seed: Callable[[int], int]) -> None:
     """A proportion that depends on one of two inputs, each setting estimated from 50 runs."""
-    design = sobol_design({"a": (0.2, 0.6), "b": (0.0, 1.0)}, samples=1024, seed=7)
+    design = sobol_design({"a": (0.2, 0.6), "b": (0.0, 1.0)}, samples=1024, seed=fresh_seed(7))
     true = design["value"].values[:, 0]
     runs = 50
-    seen = np.random.default_rng(8).binomial(runs, true) / runs
+    seen = np.random.default_rng(fresh_seed(8)).binomial(runs, true) / runs
     outputs = xr.DataArray(
         np.stack([seen, 1 - seen, np.zeros_like(seen)], axis=1),
         dims=("setting", "class"),
@@ -206,12 +192,13 @@ def test_a_class_that_occurs_once_gives_no_warning() -> None:
     assert np.isnan(found["total_order"].values[~seen]).all()
 
 
-def test_the_half_width_covers_the_error() -> None:
+@pytest.mark.false_alarm(1e-5)
+def test_the_half_width_covers_the_error(fresh_seed: Callable[[int], int]) -> None:
     """Twenty designs of 256 samples: of 60 first indices at 90 %, fewer than 43 within is chance
     once in 1e5. (Measured over 100 designs: 93 %.)"""
     _, first, _ = ishigami_indices()
     held = 0
-    for seed in range(20):
+    for seed in map(fresh_seed, range(20)):
         design = sobol_design(BOUNDS, samples=256, seed=seed)
         found = sobol_indices(design, ishigami(design["value"].values), seed=seed)
         error = np.abs(found["first_order"].values - first)

@@ -6,6 +6,7 @@ import itertools
 import json
 import math
 import time as clock
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -159,8 +160,9 @@ def test_four_blocks_with_clutter_and_gaps_never_swap(seed: int) -> None:
     assert not of_nothing(recording, world).any()
 
 
+@pytest.mark.false_alarm(3e-4)
 @pytest.mark.slow
-def test_worlds_that_no_setting_was_chosen_on() -> None:
+def test_worlds_that_no_setting_was_chosen_on(fresh_seed: Callable[[int], int]) -> None:
     """The same in twenty worlds whose seeds were used for nothing else.
 
     There is no swap. Of some 6000 detections of nothing, those that lie within a few millimetres of
@@ -168,7 +170,7 @@ def test_worlds_that_no_setting_was_chosen_on() -> None:
     taken without a mark. 10 in 20 worlds come once in 3500 times from that rate.
     """
     nothing = 0
-    for seed in range(600, 620):
+    for seed in map(fresh_seed, range(600, 620)):
         world, lost = with_gaps(seed)
         settings = TrackerSettings(max_speed=0.3, bodies=4)
         recording = follow(world, settings, seed, lost=lost, false=0.5)

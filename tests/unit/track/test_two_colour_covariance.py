@@ -39,14 +39,17 @@ def scores(level: str, frames: int, seed: int) -> np.ndarray:
     return np.array(rows)
 
 
+@pytest.mark.false_alarm(1e-3)
 @pytest.mark.parametrize("level", ["moderate", "heavy"])
-def test_errors_have_the_spread_that_is_stated(level: str) -> None:
+def test_errors_have_the_spread_that_is_stated(
+    level: str, fresh_seed: Callable[[int], int]
+) -> None:
     """Half the distance between the quantiles of one standard deviation, x, y and theta together.
 
     Of n independent numbers it is known to 0.96 / sqrt(n), here at worst 0.062: a true spread of 1
     leaves 0.8 to 1.3 once in 1500 times.
     """
-    standard = scores(level, 25, seed=902)
+    standard = scores(level, 25, seed=fresh_seed(902))
     assert standard.size >= 240
     low, high = np.quantile(standard, [0.1587, 0.8413])
     assert 0.8 <= (high - low) / 2 <= 1.3
