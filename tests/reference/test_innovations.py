@@ -274,7 +274,11 @@ def test_without_drag_it_is_the_normal_law_of_all_samples_at_once():
 
 @pytest.mark.false_alarm(2e-3)
 def test_whitened_innovations_of_a_linear_world_are_standard_normal(fresh_seed):
-    """False alarm in 500; a force too large by a fifth, or 10 % more camera noise, is caught."""
+    """False alarm in 500; a force too large by a fifth, or 10 % more camera noise, is caught.
+
+    Of the same draws these make the sum of squares 0.901 +- 0.002 and 0.875 +- 0.001 times what it
+    is (8 seeds), whatever it is by chance.
+    """
     rng = np.random.default_rng(fresh_seed(20))
     count, dt = 6000, 0.1
     root = np.linalg.cholesky(NOISE_INTENSITY * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]]))
@@ -299,7 +303,7 @@ def test_whitened_innovations_of_a_linear_world_are_standard_normal(fresh_seed):
         {"noise_intensity": 1.44 * NOISE_INTENSITY},
         {"position_noise": 1.1 * POSITION_NOISE},
     ):
-        assert np.sum(values(**wrong) ** 2) < low
+        assert np.sum(values(**wrong) ** 2) < 0.95 * np.sum(whitened**2)
 
 
 # --- what it refuses -----------------------------------------------------------------------------

@@ -285,6 +285,9 @@ def test_without_drag_it_is_the_normal_law_of_all_samples_at_once():
 def test_whitened_innovations_of_a_linear_world_are_standard_normal(fresh_seed):
     """False alarm in 500; a lever too large by a fifth, or 10 % more noise of the angle, is caught.
 
+    Of the same draws these make the sum of squares 0.927 +- 0.002 and 0.862 +- 0.001 times what it
+    is (8 seeds), whatever it is by chance.
+
     A fifth of the angles is missing: their whitened innovations are none.
     """
     rng = np.random.default_rng(fresh_seed(21))
@@ -315,7 +318,7 @@ def test_whitened_innovations_of_a_linear_world_are_standard_normal(fresh_seed):
     low, high = scipy.stats.chi2.ppf([0.0005, 0.9995], whitened.size)
     assert low < np.sum(whitened**2) < high
     for wrong in ({"force_lever": 1.2 * FORCE_LEVER}, {"angle_noise": 1.1 * ANGLE_NOISE}):
-        assert np.sum(angles(**wrong) ** 2) < low
+        assert np.sum(angles(**wrong) ** 2) < 0.95 * np.sum(whitened**2)
 
 
 # --- what it refuses -----------------------------------------------------------------------------
