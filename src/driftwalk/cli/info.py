@@ -6,6 +6,7 @@ from typing import Any
 
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json, Side, TankDiameter
+from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_json, print_note, print_table
 
 SIDE_BY_SIDE = 5
@@ -164,7 +165,7 @@ def _print_tracking(tracking: dict[str, Any]) -> None:
     rows += [[label, tracking[key]] for key, label in _TRACKING.items() if key in tracking]
     rows.append(["complete", "yes" if tracking["complete"] else "no"])
     if tracking["interrupted"] is not None:
-        rows.append(["ended because", tracking["interrupted"]])
+        rows.append(["ended because", to_options(tracking["interrupted"])])
     print_table(rows)
 
 

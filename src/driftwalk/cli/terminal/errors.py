@@ -13,6 +13,7 @@ import sys
 
 import typer
 
+from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.core.errors import DriftwalkError
 
 EXIT_USER_ERROR = 2
@@ -65,7 +66,7 @@ def exit_code_of(error: BaseException) -> int:
 def one_line(error: BaseException) -> str | None:
     """Return the message of an error that is the user's to mend, on one line; else None."""
     if isinstance(error, DriftwalkError):
-        return _joined(str(error))
+        return _joined(to_options(str(error)))
     if hasattr(error, "format_message"):  # what typer raises for a mistake in the options
         return _usage_message(error)
     if isinstance(error, MemoryError):
@@ -76,7 +77,8 @@ def one_line(error: BaseException) -> str | None:
 
 
 def _usage_message(error: BaseException) -> str:
-    message = _joined(error.format_message()) if hasattr(error, "format_message") else str(error)
+    text = error.format_message() if hasattr(error, "format_message") else str(error)
+    message = _joined(to_options(text))
     context = getattr(error, "ctx", None)
     if context is None:
         return message

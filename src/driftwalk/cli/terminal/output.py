@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from driftwalk.cli.terminal.argument_names import in_options, to_options
 from driftwalk.core.atomic import require_free
 from driftwalk.core.errors import InputError
 from driftwalk.core.json_text import json_value
@@ -26,6 +27,7 @@ def print_json(values: Mapping[str, Any]) -> None:
     values : mapping
         Keys with units in their names; numbers, text, lists, mappings, numpy scalars and arrays.
         The order of the keys is kept; a number that is not finite becomes null, which JSON lacks.
+        Warnings name options where the library names arguments, see `in_options`.
 
     Examples
     --------
@@ -39,7 +41,7 @@ def print_json(values: Mapping[str, Any]) -> None:
 
 def to_json(values: Mapping[str, Any]) -> str:
     """Return the text that `print_json` prints."""
-    return json.dumps(json_value(values), indent=2, allow_nan=False, ensure_ascii=True)
+    return json.dumps(in_options(plain(values)), indent=2, allow_nan=False, ensure_ascii=True)
 
 
 def save_dataset(dataset: xr.Dataset, path: Path) -> None:
@@ -83,8 +85,11 @@ def print_table(
 
 
 def print_note(text: str) -> None:
-    """Print a remark or warning on stderr, where it does not disturb the output."""
-    print(f"driftwalk: {' '.join(text.split())}", file=sys.stderr)
+    """Print a remark or warning on stderr, where it does not disturb the output.
+
+    It may be one of the library: options take the place of arguments, see `to_options`.
+    """
+    print(f"driftwalk: {' '.join(to_options(text).split())}", file=sys.stderr)
 
 
 def report_command(folder: Path) -> str:

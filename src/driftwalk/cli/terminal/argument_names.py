@@ -1,0 +1,144 @@
+"""From the arguments that a message of the library names to the options of the command line.
+
+A message names an argument in backquotes, as in Python: `body`, `columns={"t": "time:ms"}`,
+`start` of `load`, `assembly.blocks` for a key of the study.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+from collections.abc import Mapping
+from typing import Any, Final
+
+OPTIONS: Final[dict[str, str | None]] = {
+    "angle": "--angle",
+    "area": None,
+    "arena": "--arena",
+    "block": "--side",
+    "body": "--body",
+    "cell_size": "--cell-size",
+    "cells": "--cells",
+    "columns": "--columns",
+    "diameter": "--tank-diameter",
+    "flow": "--flow",
+    "format": "--format",
+    "frame_rate": "--frame-rate",
+    "host": "--host",
+    "inertia": "--inertia",
+    "keypoint": "--keypoint",
+    "length_unit": "--length-unit",
+    "mass": "--mass",
+    "max_speed": "--max-speed",
+    "metres_per_pixel": "--metres-per-pixel",
+    "min_count": "--min-count",
+    "port": "--port",
+    "rate": "--image-rate",
+    "side": "--side",
+    "start": "--from",
+    "step_interval": "--step-interval",
+    "stop": "--to",
+    "tank": "--arena",
+    "theta": "--theta",
+    "window": "--window",
+    "x": "--x",
+    "y": "--y",
+    "y_axis": "--y-axis",
+    "assembly.blocks": "--blocks",
+    "assembly.duration_s": "--duration",
+    "calibration.bootstrap": "--bootstrap",
+    "fit.flow_labels": "--flow-labels",
+    "fit.spline_spacing_m": "--spline-spacing",
+    "fit.switching_times_s": "--switching-times",
+    "forces.drag_coefficient": "--drag-coefficient",
+    "forces.force_interval_s": "--force-interval",
+    "forces.force_std_N": "--force-std",
+    "sensitivity.runs": "--runs",
+    "simulation.time_step_s": "--time-step",
+    "steps.step_interval_s": "--step-interval",
+    "tank.diameter_m": "--tank-diameter",
+}
+"""From an argument, or a key of the study, to its option; None where there is no option."""
+
+WHOLE: Final[dict[str, str]] = {
+    'arena={"shape": "circle", "diameter_m": 0.3}': "--tank-diameter",
+    'existing="replace"': "--overwrite",
+    "overwrite=True": "--overwrite",
+    'sort="sort"': "--sort",
+}
+"""From an argument with its value to an option, where the option does not take that value."""
+
+MESSAGES: Final = frozenset({"findings", "interrupted", "warning", "warnings"})
+"""Keys of JSON whose values are messages of the library."""
+
+# A command has one list of options: it need not say of which function the argument is.
+_ARGUMENT: Final = re.compile(r"`(([a-z_]+(?:\.[A-Za-z_]+)?)(?:=([^`]*))?)`(?: of `[a-z_]+`)?")
+
+
+def to_options(message: str) -> str:
+    """Return a message with options in place of the arguments that it names.
+
+    Parameters
+    ----------
+    message : str
+        A message of the library. What is in backquotes and no argument stays as it is.
+
+    Examples
+    --------
+    >>> to_options('name one with `columns={"body": "NAME"}`, or keep a part (`start` of `load`)')
+    'name one with --columns body=NAME, or keep a part (--from)'
+    """
+    return _ARGUMENT.sub(_option, message)
+
+
+def in_options(values: Any) -> Any:
+    """Return what a command prints as JSON, with options in its messages.
+
+    Parameters
+    ----------
+    values : mapping, list or another value of JSON
+        Messages are the texts under the keys `MESSAGES`, at any depth; everything else is data and
+        stays as it is.
+
+    Examples
+    --------
+    >>> in_options({"body": "`x`", "warnings": ["give `frame_rate`"]})
+    {'body': '`x`', 'warnings': ['give --frame-rate']}
+    """
+    if isinstance(values, Mapping):
+        return {
+            key: _messages(value) if key in MESSAGES else in_options(value)
+            for key, value in values.items()
+        }
+    return [in_options(value) for value in values] if isinstance(values, list) else values
+
+
+def _messages(value: Any) -> Any:
+    if isinstance(value, str):
+        return to_options(value)
+    return [_messages(one) for one in value] if isinstance(value, list) else value
+
+
+def _option(match: re.Match[str]) -> str:
+    whole, name, value = match.groups()
+    if whole in WHOLE:
+        return WHOLE[whole]
+    if name not in OPTIONS:
+        return match[0]
+    option = OPTIONS[name]
+    if option is None:
+        return str(whole)
+    if value is None:
+        return option
+    try:
+        return f"{option} {shlex.quote(_words(json.loads(value)))}"
+    except json.JSONDecodeError:
+        return match[0]
+
+
+def _words(value: Any) -> str:
+    """Return the value of an argument as it is written behind its option."""
+    if isinstance(value, Mapping):
+        return ",".join(f"{key}={part}" for key, part in value.items())
+    return str(value)
