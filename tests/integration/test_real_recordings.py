@@ -199,9 +199,9 @@ def test_the_same_mouse_through_three_trackers(shared_data: SharedData) -> None:
 
 def test_what_the_files_do_not_hold_is_asked_for(shared_data: SharedData) -> None:
     fish = shared_data("rummynose-single-epfl") / "rummy_single_seven_trajectories.txt"
-    with pytest.raises(InputError, match="--frame-rate"):
+    with pytest.raises(InputError, match="`frame_rate`"):
         load(fish, metres_per_pixel=1e-3)
-    with pytest.raises(InputError, match="--metres-per-pixel"):
+    with pytest.raises(InputError, match="`metres_per_pixel`"):
         load(fish, frame_rate=25.0)
     walk = load(shared_data("trajr-walks") / "3537.csv")
     assert any("is the unit" in text for text in describe(walk)["warnings"])

@@ -134,7 +134,7 @@ def test_a_polygon_is_shifted_to_its_centroid(tmp_path: Path) -> None:
     "text", ["", "disc:3", "circle", "circle:", "circle:-1", "circle:a", "rect:1", "circle:1@2"]
 )
 def test_an_arena_that_cannot_be_read(text: str) -> None:
-    with pytest.raises(InputError, match="--arena"):
+    with pytest.raises(InputError, match="`tank"):
         place_arena(text, *disc(100))
 
 

@@ -30,7 +30,9 @@ def test_of_duplicate_times_the_last_row_is_kept() -> None:
 
 
 def test_unsorted_times_are_an_error_unless_sorting_is_asked_for() -> None:
-    with pytest.raises(InputError, match=r"row 3 of body '0': 2 s is followed by 1 s.*--sort"):
+    with pytest.raises(
+        InputError, match=r"row 3 of body '0': 2 s is followed by 1 s.*`sort=\"sort\"`"
+    ):
         clean_body(body([0, 2, 1, 3], [0, 2, 1, 3]))
     cleaned, counts = clean_body(body([0, 2, 1, 3], [0, 2, 1, 3]), sort="sort")
     np.testing.assert_array_equal(cleaned.x, [0, 1, 2, 3])
@@ -89,7 +91,7 @@ def test_a_jump_becomes_a_gap_and_an_excursion_is_removed_whole() -> None:
     np.testing.assert_array_equal(np.flatnonzero(np.isnan(cleaned.x)), [3, 4, 5])
     assert counts.jumps_removed == 3
     assert counts.missing == 0
-    with pytest.raises(InputError, match="--max-speed must be above zero"):
+    with pytest.raises(InputError, match="`max_speed` must be above zero"):
         clean_body(body(range(8), x), max_speed=0.0)
 
 
@@ -121,7 +123,7 @@ def test_everything_is_counted_in_the_dataset(tmp_path: Path) -> None:
     assert {key: counts[key] for key in expected} == expected
     assert counts["per_body"]["0"]["jumps_removed"] == 1
     np.testing.assert_array_equal(body_track(dataset).x, [0.0, 1.5, 2.0, 5.0])
-    with pytest.raises(InputError, match="--from and --to"):
+    with pytest.raises(InputError, match="`start` and `stop`"):
         load(path, sort="sort", start=100.0)
 
 

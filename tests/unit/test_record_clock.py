@@ -43,9 +43,9 @@ def test_what_cannot_be_seconds(case: str, tmp_path: Path) -> None:
     times, units = REFUSED[case]
     with pytest.raises(InputError, match="column 'timestamp' names no unit, and as seco") as caught:
         load(write(tmp_path, "timestamp", times))
-    offered = re.findall(r"--columns t=timestamp:(\w+)(?: makes|,)", str(caught.value))
+    offered = re.findall(r"`columns={\"t\": \"timestamp:(\w+)\"}`(?: makes|,)", str(caught.value))
     assert offered == units
-    assert str(caught.value).endswith("if it is seconds, --columns t=timestamp:s")
+    assert str(caught.value).endswith('if it is seconds, `columns={"t": "timestamp:s"}`')
 
 
 PASS = {
@@ -74,7 +74,7 @@ def test_what_can_be_seconds(case: str, tmp_path: Path) -> None:
 def test_what_may_be_milliseconds_is_said_and_not_converted(step: float, tmp_path: Path) -> None:
     dataset = load(write(tmp_path, "time", [step * i for i in range(50)]))
     warning, *_ = json.loads(dataset.attrs["counts"])["warnings"]
-    assert warning.endswith("if it is ms, --columns t=time:ms")
+    assert warning.endswith('if it is ms, `columns={"t": "time:ms"}`')
     assert body_track(dataset).time[-1] == pytest.approx(step * 49)
     named = load(write(tmp_path, "time", [step * i for i in range(50)]), columns={"t": "time:ms"})
     assert body_track(named).time[-1] == pytest.approx(step * 49 / 1000)
@@ -154,7 +154,7 @@ def test_angles_that_are_hardly_radians(angles: list[float], said: bool, tmp_pat
     path = tmp_path / "synthetic.csv"
     path.write_text("\n".join(["t,x,y,theta", *rows, ""]))
     warnings = json.loads(load(path).attrs["counts"])["warnings"]
-    assert any("--columns theta=NAME:deg" in warning for warning in warnings) == said
+    assert any('`columns={"theta": "NAME:deg"}`' in warning for warning in warnings) == said
     named = load(path, columns={"theta": "theta:deg"})
     assert json.loads(named.attrs["counts"])["warnings"] == []
 

@@ -96,9 +96,9 @@ def test_swistrack_track_without_valid_time_or_calibration(tmp_path: Path) -> No
         "5\t100\t200\t0\t0\t50\t0.5\t0.1\t -1",
         "6\t110\t210\t0\t0\t50\t0.5\t0.1\t -1",
     )
-    with pytest.raises(InputError, match="--metres-per-pixel"):
+    with pytest.raises(InputError, match="`metres_per_pixel`"):
         load(path, frame_rate=10.0)
-    with pytest.raises(InputError, match="--frame-rate"):
+    with pytest.raises(InputError, match="`frame_rate`"):
         load(path, **PIXELS)
     np.testing.assert_allclose(body_track(load(path, **FRAMES)).x, [1.0, 1.1])
 
@@ -320,9 +320,9 @@ def test_one_matrix_per_coordinate(tmp_path: Path) -> None:
         np.testing.assert_array_equal(dataset["x"].values, [[0.1, 0.2], [0.3, 0.4]])
         np.testing.assert_allclose(dataset["theta"].values, [[0.5, 0.6], [0.7, 0.8]])
     write(tmp_path, "short.csv", "1,2")
-    with pytest.raises(InputError, match="--x has 2 rows and 2 columns, --y has 1 rows"):
+    with pytest.raises(InputError, match="`x` has 2 rows and 2 columns, `y` has 1 rows"):
         load(tmp_path, x="x.csv", y="short.csv", frame_rate=10.0)
-    with pytest.raises(InputError, match="--x and --y"):
+    with pytest.raises(InputError, match="`x` and `y`"):
         load(tmp_path, y="y.csv", frame_rate=10.0)
 
 
@@ -341,7 +341,7 @@ def test_movement(tmp_path: Path, plural: str, unit: str) -> None:
         },
         attrs={"time_unit": unit, "fps": 10.0, "ds_type": "poses", "source_software": "synthetic"},
     ).to_netcdf(path, engine="h5netcdf")
-    with pytest.raises(InputError, match="--keypoint: nose, tail"):
+    with pytest.raises(InputError, match="`keypoint`: nose, tail"):
         load(path, **PIXELS)
     dataset = load(path, keypoint="tail", **PIXELS)
     assert (dataset.attrs["format"], body_names(dataset)) == ("movement", ["a", "b"])

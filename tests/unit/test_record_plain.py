@@ -112,7 +112,7 @@ def test_bodies_stacked_have_clocks_of_their_own(tmp_path: Path) -> None:
     np.testing.assert_array_equal(body_track(dataset, "right").x, [3.0, 7.0])
     assert body_names(load(path, body="right")) == ["right"]
     assert body_names(load(path, body="all")) == ["left", "right"]
-    with pytest.raises(InputError, match=r"--body 'middle'.*left, right"):
+    with pytest.raises(InputError, match=r"`body` 'middle'.*left, right"):
         load(path, body="middle")
 
 
@@ -126,7 +126,7 @@ def test_column_map_by_name_number_and_unit(tmp_path: Path) -> None:
 
 def test_without_a_header_the_columns_have_to_be_named(tmp_path: Path) -> None:
     path = write(tmp_path, "0,1,2\n1,3,4\n")
-    with pytest.raises(FormatError, match=r"no header.*--columns t=1"):
+    with pytest.raises(FormatError, match=r'no header.*`columns=\{"t": "1"'):
         load(path)
     track = body_track(load(path, columns={"t": "1", "x": "2:m", "y": "3:m"}))
     np.testing.assert_array_equal(track.x, [1.0, 3.0])
@@ -134,9 +134,9 @@ def test_without_a_header_the_columns_have_to_be_named(tmp_path: Path) -> None:
 
 def test_frames_need_a_rate_and_pixels_a_scale(tmp_path: Path) -> None:
     path = write(tmp_path, "frame,x_px,y_px\n0,100,200\n3,110,210\n")
-    with pytest.raises(InputError, match="--metres-per-pixel"):
+    with pytest.raises(InputError, match="`metres_per_pixel`"):
         load(path, frame_rate=25.0)
-    with pytest.raises(InputError, match="--frame-rate"):
+    with pytest.raises(InputError, match="`frame_rate`"):
         load(path, metres_per_pixel=0.01)
     track = body_track(load(path, frame_rate=25.0, metres_per_pixel=0.01))
     np.testing.assert_allclose(track.time, [0.0, 3 / 25], rtol=1e-15)
@@ -147,7 +147,7 @@ def test_frames_need_a_rate_and_pixels_a_scale(tmp_path: Path) -> None:
 def test_a_length_that_may_be_pixels_is_not_taken_for_metres(tmp_path: Path, header: str) -> None:
     path = write(tmp_path, f"{header}\n0,1,2\n1,3,4\n")
     rate = 1.0 if header.startswith("frame") else None
-    with pytest.raises(InputError, match=r"--metres-per-pixel.*--length-unit"):
+    with pytest.raises(InputError, match=r"`metres_per_pixel`.*`length_unit`"):
         load(path, frame_rate=rate)
     assert body_track(load(path, frame_rate=rate, length_unit="cm")).x[0] == pytest.approx(0.01)
 
@@ -156,7 +156,7 @@ def test_what_contradicts_the_file_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path, "t_s,x_m,y_m\n0,1,2\n1,3,4\n")
     with pytest.raises(InputError, match="leave it out"):
         load(path, metres_per_pixel=0.01)
-    with pytest.raises(InputError, match="leave --frame-rate out"):
+    with pytest.raises(InputError, match="leave `frame_rate` out"):
         load(path, frame_rate=25.0)
     with pytest.raises(InputError, match="contradicts"):
         load(path, length_unit="mm")
@@ -196,7 +196,7 @@ BAD = {
     "open quote": (b't,x,y\n0,1,"2\n1,3,4\n', "line 2"),
     "two columns of x": (b"t,x,pos_x,y\n0,1,2,3\n", "could both be x"),
     "two units": (b"t,x_mm,y_cm\n0,1,2\n", "different units"),
-    "backwards": (b"t,x,y\n0,1,2\n2,3,4\n1,5,6\n", "goes backwards.*--sort"),
+    "backwards": (b"t,x,y\n0,1,2\n2,3,4\n1,5,6\n", 'goes backwards.*`sort="sort"`'),
     "no time at all": (b"t,x,y\n,1,2\n", "no row with a time"),
     "damaged gzip": (gzip.compress(b"t,x,y\n" + b"0,1,2\n" * 999)[:-20], "gzip|read to its end"),
 }
@@ -214,7 +214,7 @@ def test_bad_input_is_an_error_that_says_where(tmp_path: Path, case: str) -> Non
 def test_missing_file_and_unknown_format(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="no such file"):
         load(tmp_path / "absent.csv")
-    with pytest.raises(InputError, match=r"unknown --format 'swisstrack'.*idtracker"):
+    with pytest.raises(InputError, match=r"unknown `format` 'swisstrack'.*idtracker"):
         load(write(tmp_path, "t,x,y\n0,1,2\n"), format="swisstrack")
 
 
@@ -229,7 +229,9 @@ def test_a_bad_row_far_into_a_large_file_is_located(tmp_path: Path) -> None:
 
 def test_the_header_of_a_column_that_does_not_exist(tmp_path: Path) -> None:
     path = write(tmp_path, "t,x,y\n0,1,2\n")
-    with pytest.raises(FormatError, match=r"--columns x=east: no such column.*'t', 'x', 'y'"):
+    with pytest.raises(
+        FormatError, match=r"`columns=\{\"x\": \"east\"\}`: no such column.*'t', 'x', 'y'"
+    ):
         load(path, columns={"x": "east"})
     with pytest.raises(FormatError, match="unknown quantity"):
         load(path, columns={"z": "x"})
@@ -285,7 +287,7 @@ FOREIGN = (
 def test_a_clock_of_unknown_name_that_skips_rows_is_named(tmp_path: Path) -> None:
     """Counting its rows as frames would close the gaps."""
     path = write(tmp_path, FOREIGN)
-    with pytest.raises(FormatError, match=r"'Bild' counts up .*--columns frame=Bild"):
+    with pytest.raises(FormatError, match=r"'Bild' counts up .*`columns=\{\"frame\": \"Bild\"\}`"):
         load(path, frame_rate=25.0)
     track = body_track(load(path, frame_rate=25.0, columns={"frame": "Bild"}))
     np.testing.assert_allclose(track.time, np.array([0, 1, 2, 5, 6, 7]) / 25.0)
@@ -308,7 +310,7 @@ def test_what_is_no_clock_with_missing_rows_is_passed_over(tmp_path: Path, last:
 
 
 def test_a_table_without_a_clock_says_how_to_name_one(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=r"--columns t=NAME:s or frame=NAME.*--frame-rate"):
+    with pytest.raises(FormatError, match=r"\"t\": \"NAME:s\".*\"frame\": \"NAME\".*`frame_rate`"):
         load(write(tmp_path, "x_mm,y_mm\n1,2\n3,4\n"))
 
 
@@ -325,5 +327,5 @@ def test_an_angle_of_unknown_name_is_pointed_out(tmp_path: Path) -> None:
     dataset = load(write(tmp_path, FOREIGN), frame_rate=25.0, columns={"frame": "Bild"})
     (warning,) = json.loads(dataset.attrs["counts"])["warnings"]
     assert warning == (
-        "no orientation is read: add --columns 'theta=Winkel [°]' if that column holds it"
+        'no orientation is read: add `columns={"theta": "Winkel [°]"}` if that column holds it'
     )

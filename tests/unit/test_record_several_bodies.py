@@ -47,7 +47,7 @@ def test_the_error_names_the_column_that_tells_bodies_apart(
     with pytest.raises(InputError, match=r"body '0' is in several places at 200 of 200") as caught:
         load(path)
     assert str(caught.value).endswith(
-        f"the column '{column}' could name the body: add --columns body={column}"
+        f'the column \'{column}\' could name the body: add `columns={{"body": "{column}"}}`'
     )
     named = load(path, columns={"body": column})
     assert body_names(named) == [str(name) for name in names]
@@ -99,11 +99,11 @@ def test_what_is_no_position_is_no_body(name: str) -> None:
 
 
 def test_frames_that_begin_anew_for_each_body(tmp_path: Path) -> None:
-    """--sort would take all for one body."""
+    """Sorting would take all for one body."""
     rows = sorted(circles(50, "ab"), key=lambda row: str(row[3]))
     path = write(tmp_path, "t,x,y,who", rows)
     with pytest.raises(
-        InputError, match=r"row 51 .*'who' could name the body: .*body=who, or --so"
+        InputError, match=r"row 51 .*'who' could name the body: .*\"who\"}`, or `sort"
     ):
         load(path)
     with pytest.raises(InputError, match=r"at 50 of 50 times.*'who' could name the body"):
@@ -113,7 +113,7 @@ def test_frames_that_begin_anew_for_each_body(tmp_path: Path) -> None:
 
 def test_without_such_a_column_the_error_says_what_to_do(tmp_path: Path) -> None:
     path = write(tmp_path, "t,x,y", [row[:3] for row in circles(50, "ab")])
-    with pytest.raises(InputError, match=r"--columns body=NAME.*--columns frame=NAME --frame-rate"):
+    with pytest.raises(InputError, match=r"\"body\": \"NAME\".*\"frame\": \"NAME\".*`frame_rate`"):
         load(path)
 
 
@@ -240,5 +240,5 @@ def test_the_table_of_trackpy_itself(shared_data: Callable[[str], Path], tmp_pat
     )
     renamed = tmp_path / "renamed.csv"
     renamed.write_text(path.read_text().replace("particle", "Teilchen"))
-    with pytest.raises(InputError, match=r"at 5 of 5 times.*'Teilchen'.*body=Teilchen"):
+    with pytest.raises(InputError, match=r"at 5 of 5 times.*'Teilchen'.*\"body\": \"Teilchen\""):
         load(renamed, **PIXELS)

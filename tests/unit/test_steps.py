@@ -247,7 +247,7 @@ class TestDataset:
         trajectory = build_trajectory(np.arange(30.0), x, y, body=["left", "right"])
         expected = apply_steps(plan_steps(np.arange(30.0)), x[:, 1], y[:, 1]).step_length
         np.testing.assert_array_equal(steps(trajectory, body="right")["step_length"], expected)
-        with pytest.raises(InputError, match="name one with --body"):
+        with pytest.raises(InputError, match="name one with `body`"):
             steps(trajectory)
 
     def test_many_steps_of_zero_length_name_a_longer_interval(self) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.circle import fit_circle, tank_radius_bound
 from driftwalk.record.raw import Array
@@ -32,7 +33,7 @@ class PlacedArena:
 
 
 def place_arena(text: str, x: Array, y: Array, *, block_side: float | None = None) -> PlacedArena:
-    """Read ``--arena`` and place it over the positions.
+    """Read the outline of a tank and place it over the positions.
 
     Parameters
     ----------
@@ -69,7 +70,7 @@ def place_arena(text: str, x: Array, y: Array, *, block_side: float | None = Non
         return _rectangle(width, height, x, y, center=_center(center, text))
     if kind == "polygon" and rest:
         return _polygon(Path(rest))
-    raise InputError(f"--arena is circle:D, rect:WxH, polygon:FILE or fit; got '{text}'")
+    raise InputError(f"`tank` is circle:D, rect:WxH, polygon:FILE or fit; got '{text}'")
 
 
 def _length(text: str, whole: str) -> float:
@@ -78,9 +79,11 @@ def _length(text: str, whole: str) -> float:
     try:
         value = parse_quantity(text, "m")
     except ValueError as error:
-        raise InputError(f"--arena {whole}: '{text}' is not a length ({error})") from error
+        raise InputError(
+            f"{argument_text('tank', whole)}: '{text}' is not a length ({error})"
+        ) from error
     if not (np.isfinite(value) and value > 0):
-        raise InputError(f"--arena {whole}: a size must be above zero")
+        raise InputError(f"{argument_text('tank', whole)}: a size must be above zero")
     return value
 
 
@@ -90,7 +93,9 @@ def _center(text: str, whole: str) -> tuple[float, float] | None:
     try:
         x, y = (float(part) for part in text.split(","))
     except ValueError as error:
-        raise InputError(f"--arena {whole}: '@{text}' is not a centre @X,Y in metres") from error
+        raise InputError(
+            f"{argument_text('tank', whole)}: '@{text}' is not a centre @X,Y in metres"
+        ) from error
     return x, y
 
 
@@ -109,7 +114,7 @@ def _fitted(x: Array, y: Array, *, block_side: float | None) -> PlacedArena:
     if block_side is None:
         notes = [
             f"the fitted circle (radius {fit.radius:.4g} m) is that of the body's centre, which "
-            "never reaches the rim: the tank is larger; state it with --arena circle:D if you "
+            'never reaches the rim: the tank is larger; state it with `tank="circle:D"` if you '
             "know it"
         ]
     else:

@@ -32,9 +32,9 @@ class Counts:
     times_in_two_places: int = 0
     """Times whose rows lie in different places; the last is kept."""
     outside_window: int = 0
-    """Rows before ``--from`` or after ``--to``, dropped."""
+    """Rows before `start` or after `stop`, dropped."""
     jumps_removed: int = 0
-    """Samples beyond ``--max-speed``, turned into gaps."""
+    """Samples beyond `max_speed`, turned into gaps."""
     missing: int = 0
     """Rows without a position, before jumps were removed."""
     samples: int = 0
@@ -110,7 +110,7 @@ def clean_body(
         body.theta = np.where(np.isfinite(body.theta), body.theta, np.nan)
     if max_speed is not None:
         if not max_speed > 0:
-            raise InputError(f"--max-speed must be above zero, got {max_speed} m/s")
+            raise InputError(f"`max_speed` must be above zero, got {max_speed} m/s")
         jumps = find_jumps(body, max_speed)
         counts.jumps_removed = int(jumps.size)
         body = _without(body, jumps)
@@ -132,9 +132,9 @@ def _in_order(body: RawBody, counts: Counts, *, sort: str, columns: BodyColumns 
         at = int(backwards[0])
         found = [] if columns is None else columns(True)
         remedy = (
-            f"{name_the_body(found)}, or --sort if it is one body"
+            f'{name_the_body(found)}, or `sort="sort"` if it is one body'
             if found
-            else "add --sort to sort them"
+            else 'add `sort="sort"` to sort them'
         )
         raise InputError(
             f"time goes backwards in row {at + 2} of body '{body.name}': {body.clock[at]:.6g} s is "

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import shlex
-
 import numpy as np
 
+from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import InputError
 from driftwalk.record.raw import CLOCK_UNITS, Array, RawRecording
 
@@ -114,4 +113,4 @@ def _likely(ticks: float, first: float, interval: float) -> bool:
 
 
 def _option(column: str, unit: str) -> str:
-    return f"--columns {shlex.quote(f't={column}:{unit}')}"
+    return argument_text("columns", {"t": f"{column}:{unit}"})

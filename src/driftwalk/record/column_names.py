@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
+from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import InputError
 
 _ROOTS: dict[str, str] = {
@@ -191,7 +192,8 @@ def map_columns(names: list[str], chosen: dict[str, str], *, use_frames: bool) -
         index, unit = _find(reference, names, quantity)
         if unit and unit not in _ALLOWED[quantity]:
             raise InputError(
-                f"--columns {quantity}={reference}: '{unit}' is not a unit of {quantity}"
+                f"{argument_text('columns', {quantity: reference})}: '{unit}' is not a unit of "
+                f"{quantity}"
             )
         known = meanings.get(index)
         meanings = {
@@ -208,7 +210,8 @@ def map_columns(names: list[str], chosen: dict[str, str], *, use_frames: bool) -
 def _find(reference: str, names: list[str], quantity: str) -> tuple[int, str]:
     if quantity not in _ALLOWED:
         raise InputError(
-            f"--columns {quantity}={reference}: unknown quantity; name {', '.join(_ALLOWED)}"
+            f"{argument_text('columns', {quantity: reference})}: unknown quantity; name "
+            f"{', '.join(_ALLOWED)}"
         )
     for text, unit in ((reference, ""), reference.rpartition(":")[::2]):
         if text in names:
@@ -217,7 +220,8 @@ def _find(reference: str, names: list[str], quantity: str) -> tuple[int, str]:
             return int(text) - 1, _UNITS.get(unit.lower(), unit)
     shown = ", ".join(repr(name) for name in names[:12]) + (", …" if len(names) > 12 else "")
     raise InputError(
-        f"--columns {quantity}={reference}: no such column; the file has {len(names)}: {shown}"
+        f"{argument_text('columns', {quantity: reference})}: no such column; the file has "
+        f"{len(names)}: {shown}"
     )
 
 
@@ -235,7 +239,8 @@ def _collect(
         if meaning.quantity in place:
             raise InputError(
                 f"columns '{names[place[meaning.quantity]]}' and '{names[index]}' could both be "
-                f"{meaning.quantity}: name one with --columns {meaning.quantity}=NAME"
+                f"{meaning.quantity}: name one with "
+                f"{argument_text('columns', {meaning.quantity: 'NAME'})}"
             )
         place[meaning.quantity] = index
     _require_positions(result, names)
@@ -261,8 +266,8 @@ def _require_positions(result: ColumnMap, names: list[str]) -> None:
     if not bodies:
         shown = ", ".join(repr(name) for name in names[:12]) + (", …" if len(names) > 12 else "")
         raise InputError(
-            f"no columns of x and y among {shown}: name them with --columns x=NAME,y=NAME "
-            "(or their numbers, from 1)"
+            f"no columns of x and y among {shown}: name them with "
+            '`columns={"x": "NAME", "y": "NAME"}` (or their numbers, from 1)'
         )
     if len(bodies) == 1:
         # "x1, y1, heading": an orientation without the body's number belongs to the only body.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import InputError
 from driftwalk.record.quantum import common_quantum
 from driftwalk.record.raw import (
@@ -39,11 +40,11 @@ def convert_units(
     Raises
     ------
     InputError
-        When scale or frame rate are neither in the file nor given (the message names the option),
+        When scale or frame rate are neither in the file nor given (the message names the argument),
         or are given though the file holds them.
     """
     if y_axis not in (None, "up", "down"):
-        raise InputError(f"--y-axis is 'up' or 'down', got '{y_axis}'")
+        raise InputError(f"`y_axis` is 'up' or 'down', got '{y_axis}'")
     scale, in_pixels = _length_scale(raw, options)
     ticks, rate = _ticks(raw, options)
     flip, flip_theta = _flips(raw, y_axis=y_axis, in_pixels=in_pixels)
@@ -74,10 +75,11 @@ def _length_scale(raw: RawRecording, options: ReadOptions) -> tuple[float, bool]
     """Return (metres per unit of the file, whether that unit is the pixel)."""
     unit = options.length_unit
     if unit is not None and unit not in (*LENGTH_UNITS, "px"):
-        raise InputError(f"--length-unit is one of {', '.join(LENGTH_UNITS)}, px; got '{unit}'")
+        raise InputError(f"`length_unit` is one of {', '.join(LENGTH_UNITS)}, px; got '{unit}'")
     if unit is not None and raw.length_unit not in ("", "px", unit):
         raise InputError(
-            f"--length-unit {unit} contradicts the file, whose positions are in {raw.length_unit}"
+            f"{argument_text('length_unit', unit)} contradicts the file, whose positions are in "
+            f"{raw.length_unit}"
         )
     unit = unit or raw.length_unit
     if not unit and options.metres_per_pixel is not None:
@@ -86,16 +88,16 @@ def _length_scale(raw: RawRecording, options: ReadOptions) -> tuple[float, bool]
         unit = "m"
     if unit == "px":
         if options.metres_per_pixel is None:
-            raise InputError("the positions are in pixels: give the scale with --metres-per-pixel")
-        return _positive(options.metres_per_pixel, "--metres-per-pixel"), True
+            raise InputError("the positions are in pixels: give the scale with `metres_per_pixel`")
+        return _positive(options.metres_per_pixel, "metres_per_pixel"), True
     if not unit:
         raise InputError(
-            "the file does not name the unit of its positions: give --metres-per-pixel for pixels, "
-            "or --length-unit m, cm or mm"
+            "the file does not name the unit of its positions: give `metres_per_pixel` for pixels, "
+            "or `length_unit` m, cm or mm"
         )
     if options.metres_per_pixel is not None:
         raise InputError(
-            f"--metres-per-pixel is for positions in pixels, and these are in {unit}: leave it out"
+            f"`metres_per_pixel` is for positions in pixels, and these are in {unit}: leave it out"
         )
     return LENGTH_UNITS[unit], False
 
@@ -104,17 +106,17 @@ def _ticks(raw: RawRecording, options: ReadOptions) -> tuple[float, float | None
     """Return (units of the clock per second, frame rate if the clock counts frames)."""
     if raw.clock_unit != "frame":
         if options.frame_rate_hz is not None:
-            raise InputError("the file has its own clock: leave --frame-rate out")
+            raise InputError("the file has its own clock: leave `frame_rate` out")
         return CLOCK_UNITS[raw.clock_unit], None
     rate = options.frame_rate_hz if options.frame_rate_hz is not None else raw.frame_rate_hz
     if rate is None:
-        raise InputError("the file counts frames: give their rate in Hz with --frame-rate")
-    return _positive(rate, "--frame-rate"), rate
+        raise InputError("the file counts frames: give their rate in Hz with `frame_rate`")
+    return _positive(rate, "frame_rate"), rate
 
 
-def _positive(value: float, option: str) -> float:
+def _positive(value: float, argument: str) -> float:
     if not (np.isfinite(value) and value > 0):
-        raise InputError(f"{option} must be a number above zero, got {value}")
+        raise InputError(f"`{argument}` must be a number above zero, got {value}")
     return float(value)
 
 

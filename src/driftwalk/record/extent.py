@@ -55,6 +55,6 @@ def refuse_sparse(time: Array, bodies: list[RawBody]) -> None:
     if places > EMPTY_PLACES + PLACES_PER_SAMPLE * samples:
         raise FormatError(
             f"has {len(bodies)} bodies at {time.size} different times, which is a table of "
-            f"{3 * 8 * places / 1e9:.3g} GB for {samples} samples: choose bodies (--body) or a "
-            "part of the time (--from, --to)"
+            f"{3 * 8 * places / 1e9:.3g} GB for {samples} samples: choose bodies (`body`) or a "
+            "part of the time (`start`, `stop`)"
         )

@@ -56,7 +56,7 @@ def load(
     """Load a recording as a `trajectory` dataset in SI units, y up.
 
     The format is recognised by content. Scale, frame rate and arena are never guessed: what the
-    file does not hold has to be given, and the error names the option.
+    file does not hold has to be given, and the error names the argument.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def load(
     FormatError
         When the file cannot be read; with line and column.
     InputError
-        When an option is missing, wrong, or contradicts the file.
+        When an argument is missing, wrong, or contradicts the file.
 
     Examples
     --------
@@ -149,7 +149,7 @@ def load(
         del bodies
         if not any(body.clock.size for body in cleaned):
             if start is not None or stop is not None:
-                raise InputError("no sample lies between --from and --to")
+                raise InputError("no sample lies between `start` and `stop`")
             raise InputError("the recording has no row with a time")
         attrs |= {"source": text_of_name(source.name), "format": loader.name}
         return _assemble(cleaned, counts, attrs, raw, tank=tank, block_side=block_side)
@@ -194,7 +194,7 @@ def _select(bodies: list[RawBody], wanted: str | None) -> list[RawBody]:
     if not chosen:
         names = [body.name for body in bodies]
         shown = ", ".join(names[:20]) + (", …" if len(names) > 20 else "")
-        raise InputError(f"--body '{wanted}': no such body in the recording; it has {shown}")
+        raise InputError(f"`body` '{wanted}': no such body in the recording; it has {shown}")
     return chosen
 
 

@@ -21,7 +21,7 @@ class Loader(Protocol):
 
     @property
     def name(self) -> str:
-        """Word for ``--format``."""
+        """Name of the format, as `load` takes it."""
 
     @property
     def description(self) -> str:
@@ -76,7 +76,7 @@ def find_loader(path: Path, *, format: str | None = None) -> Loader:
     """
     known = loaders()
     if format is not None and format not in known:
-        raise InputError(f"unknown --format '{format}'; readable: {', '.join(known)}")
+        raise InputError(f"unknown `format` '{format}'; readable: {', '.join(known)}")
     if not path.exists():
         raise FormatError("there is no such file", path=path)
     if format is not None:
@@ -89,7 +89,7 @@ def find_loader(path: Path, *, format: str | None = None) -> Loader:
     best = max(confidence, key=lambda name: confidence[name])
     if confidence[best] <= 0.0:
         raise FormatError(
-            f"the format is not recognised; name it with --format (readable: {', '.join(known)})",
+            f"the format is not recognised; name it with `format` (readable: {', '.join(known)})",
             path=path,
         )
     return known[best]

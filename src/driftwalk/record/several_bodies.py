@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable
 
 import numpy as np
 
+from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import InputError
 from driftwalk.record.raw import Array, RawBody
 
@@ -86,8 +86,9 @@ def _advice(columns: BodyColumns | None) -> str:
     if found:
         return name_the_body(found)
     return (
-        "if these are several bodies, add a column that names them (--columns body=NAME); if the "
-        "clock is coarser than the frames, count frames (--columns frame=NAME --frame-rate)"
+        'if these are several bodies, add a column that names them (`columns={"body": "NAME"}`); '
+        "if the clock is coarser than the frames, count frames "
+        '(`columns={"frame": "NAME"}` and `frame_rate`)'
     )
 
 
@@ -96,11 +97,11 @@ def name_the_body(columns: list[str]) -> str:
 
     Examples
     --------
-    >>> name_the_body(["particle"])
-    "the column 'particle' could name the body: add --columns body=particle"
+    >>> print(name_the_body(["particle"]))
+    the column 'particle' could name the body: add `columns={"body": "particle"}`
     """
-    option = f"--columns {shlex.quote(f'body={columns[0]}')}"
+    argument = argument_text("columns", {"body": columns[0]})
     if len(columns) == 1:
-        return f"the column '{columns[0]}' could name the body: add {option}"
+        return f"the column '{columns[0]}' could name the body: add {argument}"
     shown = " or ".join(f"'{name}'" for name in columns)
-    return f"the column {shown} could name the body: add {option} or the like"
+    return f"the column {shown} could name the body: add {argument} or the like"

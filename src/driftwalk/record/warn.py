@@ -82,7 +82,7 @@ def angle_warnings(raw: RawRecording) -> list[str]:
             low, high = float(theta.min()), float(theta.max())
             return [
                 f"angles from {low:.4g} to {high:.4g} are read as radians: if they are degrees, "
-                "name the unit, as in --columns theta=NAME:deg"
+                'name the unit, as in `columns={"theta": "NAME:deg"}`'
             ]
     return []
 

@@ -166,7 +166,7 @@ def body_track(dataset: xr.Dataset, body: str | None = None) -> Track:
         if len(names) != 1:
             raise InputError(
                 f"the recording has {len(names)} bodies ({', '.join(names[:8])}"
-                f"{', …' if len(names) > 8 else ''}): name one with --body"
+                f"{', …' if len(names) > 8 else ''}): name one with `body`"
             )
         body = names[0]
     if body not in names:

@@ -46,7 +46,9 @@ class DltdvLoader:
             )
             for point in points
         ]
-        notes = ["DLTdv versions differ in the direction of y: if yours counts up, add --y-axis up"]
+        notes = [
+            'DLTdv versions differ in the direction of y: if yours counts up, add `y_axis="up"`'
+        ]
         return RawRecording(bodies, length_unit="px", rows=table.rows, notes=notes)
 
 

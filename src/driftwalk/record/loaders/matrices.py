@@ -17,10 +17,10 @@ class MatricesLoader:
     """Metres and radians unless another unit is given; the frame rate has to be given."""
 
     name = "matrices"
-    description = "one matrix per coordinate (--x x.csv --y y.csv [--theta theta.csv]); metres"
+    description = "one matrix per coordinate (`x`, `y` and, if there is one, `theta`); metres"
 
     def sniff(self, _head: bytes, _path: Path) -> float:
-        """Never claim a file: ``--x`` and ``--y`` choose this format."""
+        """Never claim a file: `x` and `y` choose this format."""
         return 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
@@ -29,16 +29,16 @@ class MatricesLoader:
         x_file = options.x or (None if path.is_dir() else path)
         if x_file is None or options.y is None:
             raise InputError(
-                "one matrix per coordinate needs --x and --y (and --theta if there is)"
+                "one matrix per coordinate needs `x` and `y` (and `theta` if there is)"
             )
         x, names = _matrix(_place(x_file, folder))
         y, _ = _matrix(_place(options.y, folder))
         theta = None if options.theta is None else _matrix(_place(options.theta, folder))[0]
-        for option, values in (("--y", y), ("--theta", theta)):
+        for name, values in (("y", y), ("theta", theta)):
             if values is not None and [v.size for v in values] != [v.size for v in x]:
                 raise InputError(
-                    f"the matrices disagree: --x has {x[0].size} rows and {len(x)} columns, "
-                    f"{option} has {values[0].size} rows and {len(values)} columns"
+                    f"the matrices disagree: `x` has {x[0].size} rows and {len(x)} columns, "
+                    f"`{name}` has {values[0].size} rows and {len(values)} columns"
                 )
         frame = np.arange(x[0].size, dtype=np.float64)
         bodies = [

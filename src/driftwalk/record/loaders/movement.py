@@ -86,7 +86,7 @@ def _choose_keypoint(position: xr.DataArray, keypoint: str | None) -> xr.DataArr
         return position.isel({dimension: 0}, drop=True)
     if keypoint not in names:
         got = "" if keypoint is None else f" (got '{keypoint}')"
-        raise InputError(f"name the body's keypoint with --keypoint{got}: {', '.join(names)}")
+        raise InputError(f"name the body's keypoint with `keypoint`{got}: {', '.join(names)}")
     return position.isel({dimension: names.index(keypoint)}, drop=True)
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 
 import numpy as np
 
+from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.body_columns import body_columns
 from driftwalk.record.clock_columns import uneven_clock
@@ -19,8 +19,9 @@ from driftwalk.record.text import Table, read_table
 
 NO_CLOCK = "the table has no column of times or frames: every row counts as a frame"
 NAME_THE_CLOCK = (
-    "no column is known to hold times or frames: name it with --columns t=NAME:s or frame=NAME; "
-    "if there is none, give --frame-rate, and every row counts as a frame"
+    'no column is known to hold times or frames: name it with `columns={"t": "NAME:s"}` or '
+    '`columns={"frame": "NAME"}`; if there is none, give `frame_rate`, and every row counts as '
+    "a frame"
 )
 
 
@@ -29,7 +30,7 @@ class PlainLoader:
 
     name = "csv"
     description = (
-        "plain CSV, TSV or blank-separated table, columns recognised or named by --columns"
+        "plain CSV, TSV or blank-separated table, columns recognised or named by `columns`"
     )
 
     def sniff(self, head: bytes, _path: Path) -> float:
@@ -38,12 +39,12 @@ class PlainLoader:
         return 0.1 if lines and not lines[0].lstrip().startswith(("[", "{", "$", "<")) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
-        """Read the table as its header and ``--columns`` describe it."""
+        """Read the table as its header and `columns` describe it."""
         names, delimiter, skip, has_header = read_header(path, delimiter=options.delimiter)
         if not has_header and not options.columns:
             raise FormatError(
-                f"the file has {len(names)} columns and no header: name them with --columns, "
-                "such as --columns t=1,x=2,y=3",
+                f"the file has {len(names)} columns and no header: name them with `columns`, "
+                'such as `columns={"t": "1", "x": "2", "y": "3"}`',
                 path=path,
             )
         try:
@@ -95,10 +96,10 @@ def _require_rows_are_frames(
     """Refuse a table without a known clock whose rows cannot, or need not, be frames."""
     found = uneven_clock(path, columns, labels, delimiter=delimiter, skip=skip)
     if found is not None:
-        frame, time = (shlex.quote(f"{what}={found}") for what in ("frame", "t"))
+        frame, time = (argument_text("columns", {what: found}) for what in ("frame", "t"))
         raise FormatError(
             f"no column is known to hold times or frames, but '{found}' counts up and skips some: "
-            f"add --columns {frame} if it counts frames, --columns {time} if it holds times",
+            f"add {frame} if it counts frames, {time} if it holds times",
             path=path,
         )
     if options.frame_rate_hz is None:
@@ -112,8 +113,8 @@ def _unread_angles(columns: ColumnMap, labels: list[str]) -> list[str]:
     angles = [name for name in labels if unit_of_name(name) in ANGLE_UNITS]
     if len(angles) != 1:
         return []
-    option = shlex.quote(f"theta={angles[0]}")
-    return [f"no orientation is read: add --columns {option} if that column holds it"]
+    argument = argument_text("columns", {"theta": angles[0]})
+    return [f"no orientation is read: add {argument} if that column holds it"]
 
 
 def _bare_clock(columns: ColumnMap, labels: list[str]) -> str | None:
@@ -163,7 +164,7 @@ def _bodies(table: Table, columns: ColumnMap, clock: Array, *, path: Path) -> li
     if len(columns.bodies) > 1:
         raise FormatError(
             "has several columns of x and also a column that names the body: choose one layout "
-            "with --columns",
+            "with `columns`",
             path=path,
         )
     places = next(iter(columns.bodies.values()))

@@ -72,7 +72,7 @@ def _times(table: Table, path: Path) -> Array:
         stamps = np.array([_since_1970(label) for label in table.labels[1]], dtype=np.float64)
     except (ValueError, OverflowError) as error:
         raise FormatError(
-            f"a time stamp is not an ISO date ({error}); give --frame-rate to use frame numbers",
+            f"a time stamp is not an ISO date ({error}); give `frame_rate` to use frame numbers",
             path=path,
         ) from error
     seconds: Array = stamps[table.codes[1]]

@@ -39,7 +39,7 @@ class SwisTrackTracksLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read one track, or every track of a folder.
 
-        World coordinates are used when the run was calibrated, unless ``--metres-per-pixel`` asks
+        World coordinates are used when the run was calibrated, unless `metres_per_pixel` asks
         for the image. Angles are measured in the image in either case.
         """
         files = _track_files(path) if path.is_dir() else [path]
