@@ -98,7 +98,7 @@ def test_comparison_is_written(
         (["{recording}", "{recording}", "--body", "z"], "no such body"),
         (["{simulation}", "{simulation}", "--replicate", "2"], "no replicate 2; it has 2"),
         (["{recording}", "/nowhere.csv", "--body", "p"], "/nowhere.csv: there is no such file"),
-        (["{simulation}", "{simulation}", "--step-interval", "2h"], "choose another step_interval"),
+        (["{simulation}", "{simulation}", "--step-interval", "2h"], "choose another step interval"),
         (["{simulation}", "{simulation}", "--ties", "loose"], "--ties"),
     ],
 )

@@ -115,7 +115,9 @@ def test_a_fitted_arena_that_excludes_its_own_positions_is_an_error() -> None:
     arena = {"shape": "circle", "diameter_m": 0.008}
     track = track.assign_attrs(arena=json.dumps(arena), arena_found=json.dumps(found))
     study = apply_overrides(Study(), {"tank.diameter_m": 0.008, "block.side_m": 0.005})
-    with pytest.raises(InputError, match="--arena fit found a tank 8 mm across, in which a block"):
+    with pytest.raises(
+        InputError, match=r"`tank=\"fit\"` found a tank 8 mm across, in which a block"
+    ):
         dw.fit_motion(track, study)
     # The same tank, stated: what it leaves is the subject then.
     with pytest.raises(InputError, match="all 599 intervals are at the wall of the tank"):

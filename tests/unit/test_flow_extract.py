@@ -257,15 +257,15 @@ def refuse(message: str, track: xr.Dataset | None = None, **options: Any) -> Non
 
 
 def test_refuses_with_the_name_of_the_option() -> None:
-    refuse("--mass", mass=None)
-    refuse("--side", side=None)
+    refuse("`mass`", mass=None)
+    refuse("`side`", side=None)
     refuse("keep one", area=1e-4)
-    refuse("--inertia", inertia="full")
-    refuse("--min-count", min_count=0)
-    refuse("--cells", cells=1)
+    refuse("`inertia`", inertia="full")
+    refuse("`min_count`", min_count=0)
+    refuse("`cells`", cells=1)
     refuse("no cell has 1000 samples", min_count=1000)
     refuse("window must be", window=-1.0)
-    refuse("--window", window=0.2)
+    refuse("`window`", window=0.2)
     refuse("no body 'z'", body="z")
     refuse("mass must be a positive", mass=-1.0)
     refuse("not JSON", arena="circle")
@@ -273,7 +273,7 @@ def test_refuses_with_the_name_of_the_option() -> None:
 
 def test_refuses_without_arena_or_body() -> None:
     x = np.linspace(-0.1, 0.1, 50)
-    refuse("--tank-diameter", track=synthetic_track(x, x, attrs={}))
+    refuse("`tank` of `load`", track=synthetic_track(x, x, attrs={}))
     pair = np.column_stack([x, x])
-    refuse("--body", track=synthetic_track(pair, pair))
+    refuse("`body`", track=synthetic_track(pair, pair))
     refuse("no sample lies in the tank", track=synthetic_track(x + 10.0, x))

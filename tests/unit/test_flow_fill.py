@@ -152,5 +152,5 @@ def test_says_so_when_the_solver_gives_up(monkeypatch: pytest.MonkeyPatch) -> No
     grid = make_grid(outline_of(CIRCLE), cells=20)
     known = np.zeros(grid.shape, dtype=bool)
     known[10, 10] = True
-    with pytest.raises(InputError, match="--cells"):
+    with pytest.raises(InputError, match="`cells`"):
         fill_velocity(grid, np.ones((20, 20, 2)), known=known, outline=outline_of(CIRCLE))

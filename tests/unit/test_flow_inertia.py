@@ -40,7 +40,7 @@ def test_cross_section() -> None:
     assert cross_section(2e-4, None, None) == 2e-4
     assert cross_section(None, 0.03, None) == pytest.approx(9e-4)
     assert cross_section(None, 0.03, 0.0129) == pytest.approx(3.87e-4)
-    with pytest.raises(InputError, match="--side"):
+    with pytest.raises(InputError, match="`side`"):
         cross_section(None, None, 0.01)
     with pytest.raises(InputError, match="keep one"):
         cross_section(1e-4, 0.03, None)

@@ -142,8 +142,8 @@ def plan_steps(
     if triple.size == 0:
         raise InputError(
             f"no three positions are {wanted:.6g} s apart (usual sampling interval "
-            f"{sampling:.6g} s, {stamps.size} samples): choose another step_interval "
-            "(--step-interval)"
+            f"{sampling:.6g} s, {stamps.size} samples): choose another step interval "
+            "(`step_interval`)"
         )
     return StepPlan(
         left=left.astype(np.int32),
@@ -245,8 +245,9 @@ def _interpolate(
     steps = (stamps[-1] - stamps[0]) / wanted
     if steps > LARGEST_GRID:
         raise InputError(
-            f"a step_interval of {wanted:.6g} s divides the {stamps[-1] - stamps[0]:.6g} s of the "
-            f"recording into more than {LARGEST_GRID} steps: choose a longer one (--step-interval)"
+            f"a step interval of {wanted:.6g} s divides the {stamps[-1] - stamps[0]:.6g} s of "
+            f"the recording into more than {LARGEST_GRID} steps: choose a longer one "
+            "(`step_interval`)"
         )
     index = np.arange(int(np.floor(steps + ROUNDING)) + 1)
     grid = stamps[0] + index * wanted

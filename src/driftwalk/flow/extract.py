@@ -167,17 +167,17 @@ def extract_flow(
 
 def _check_options(inertia: str, min_count: int) -> None:
     if inertia not in ("corrected", "none"):
-        raise InputError(f"inertia must be 'corrected' or 'none' (--inertia), got {inertia!r}")
+        raise InputError(f"`inertia` must be 'corrected' or 'none', got {inertia!r}")
     if min_count < 1:
-        raise InputError(f"min_count must be at least 1 (--min-count), got {min_count}")
+        raise InputError(f"`min_count` must be at least 1, got {min_count}")
 
 
 def _arena_of(trajectory: xr.Dataset, arena: Mapping[str, Any] | str | None) -> dict[str, Any]:
     described = trajectory.attrs.get("arena") if arena is None else arena
     if not described:
         raise InputError(
-            "the recording does not contain the size of the tank: give its outline "
-            "with --arena, or --tank-diameter for a circle"
+            "the recording does not contain the size of the tank: give its outline with `tank` of "
+            '`load`, or `arena={"shape": "circle", "diameter_m": 0.3}` for a circle'
         )
     return read_arena(described)
 
@@ -185,7 +185,7 @@ def _arena_of(trajectory: xr.Dataset, arena: Mapping[str, Any] | str | None) -> 
 def _required(value: float | None, name: str) -> float:
     if value is None:
         raise InputError(
-            f"the inertia correction needs the body's {name} (--{name}); "
+            f"the inertia correction needs the body's {name} (`{name}`); "
             'give it, or choose inertia "none" for a body without inertia'
         )
     return value
@@ -234,7 +234,7 @@ def _nothing_measured(smoothed: _Smoothed, inside: Samples, min_count: int, wind
     if smoothed.samples.time.size == 0:
         return (
             f"none of {smoothed.without_derivative} samples has enough neighbours within "
-            f"{window} s for a velocity: give a longer window (--window)"
+            f"{window} s for a velocity: give a longer window (`window`)"
         )
     if inside.time.size == 0:
         low, high = smoothed.position.min(axis=0), smoothed.position.max(axis=0)
@@ -242,7 +242,7 @@ def _nothing_measured(smoothed: _Smoothed, inside: Samples, min_count: int, wind
             f"no sample lies in the tank: the track covers x from {low[0]:.4g} to {high[0]:.4g} m, "
             f"y from {low[1]:.4g} to {high[1]:.4g} m; check the scale, the origin and the arena"
         )
-    return f"no cell has {min_count} samples: lower --min-count or give larger cells (--cells)"
+    return f"no cell has {min_count} samples: lower `min_count` or give larger cells (`cells`)"
 
 
 def _dataset(

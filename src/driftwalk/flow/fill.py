@@ -155,6 +155,6 @@ def _solve(pairs: npt.NDArray[np.intp], blocks: Array, right: Array) -> Array:
     if unfinished:
         raise InputError(
             f"the empty cells could not be filled in {_MAX_ITERATIONS} iterations: the grid is too "
-            "fine for the recording; use fewer cells (--cells)"
+            "fine for the recording; use fewer cells (`cells`)"
         )
     return np.asarray(solution).reshape(size, 2)

@@ -94,13 +94,13 @@ def make_grid(outline: Outline, *, cells: int = 50, cell_size: float | None = No
     longer = max(x_max - x_min, y_max - y_min)
     if cell_size is None:
         if not 2 <= cells <= MAX_CELLS:
-            raise InputError(f"cells must be from 2 to {MAX_CELLS} (--cells), got {cells}")
+            raise InputError(f"`cells` must be from 2 to {MAX_CELLS}, got {cells}")
         size = longer / cells
     else:
         if not (math.isfinite(cell_size) and longer / MAX_CELLS <= cell_size <= longer / 2.0):
             raise InputError(
-                f"cell_size must be from {longer / MAX_CELLS:g} to {longer / 2.0:g} m in a tank of "
-                f"{longer:g} m (--cell-size), got {cell_size}"
+                f"`cell_size` must be from {longer / MAX_CELLS:g} to {longer / 2.0:g} m in a tank "
+                f"of {longer:g} m, got {cell_size}"
             )
         size = cell_size
     return Grid(_centres(x_min, x_max, size), _centres(y_min, y_max, size), size)

@@ -91,7 +91,7 @@ def cross_section(area: float | None, side: float | None, depth: float | None) -
         return area
     if side is None:
         raise InputError(
-            "the inertia correction needs the body's cross-section: give side (--side) or area, "
+            "the inertia correction needs the body's cross-section: give `side` or `area`, "
             'or choose inertia "none"'
         )
     return side * (side if depth is None else depth)

@@ -130,7 +130,7 @@ def cut_track(track: Track, intervals: Intervals, *, fewest: int, where: str) ->
             raise InputError(
                 f"{where}the switching time {time:g} s is outside the recording, which goes from "
                 f"{first:g} s to {last:g} s: switching times are those of its own clock "
-                "([fit] switching_times_s, --switching-times)"
+                "(`fit.switching_times_s`)"
             )
     index = intervals.index_of(track.time)
     parts = [Track(*(column[index == one] for column in track)) for one in range(index[-1] + 1)]
@@ -141,7 +141,7 @@ def cut_track(track: Track, intervals: Intervals, *, fewest: int, where: str) ->
                 f"{where}the interval from {intervals.describe(one)} has {part.time.size} "
                 f"positions; the fit needs {fewest} at least ({fewest * usual:.3g} s at this "
                 "rate), and ten minutes to be of use: leave out a switching time, or what is "
-                "before or after it (--from, --to)"
+                "before or after it (`start`, `stop` of `load`)"
             )
     return parts
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
+from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import Outline, outline_of, read_arena
 from driftwalk.likelihood.angle import no_angle, smooth_angle
@@ -129,7 +130,7 @@ def use_angle(many: Sequence[xr.Dataset], tracks: Sequence[Track], wanted: str) 
         where = _name_of(many[shares.index(seen)])
         raise InputError(
             f"{where}the recording has no orientations, or the same in every row: leave out "
-            f"angle = {wanted!r} (--angle), or read the column that holds them"
+            f"{argument_text('angle', wanted)}, or read the column that holds them"
         )
     if wanted == "auto":
         return "state" if seen >= ORIENTED_SHARE else "none"

@@ -70,14 +70,14 @@ def require_motion(track: Track, study: Study, *, where: str) -> None:
         )
         raise InputError(
             f"{where}the body never moves: it stays within {1e3 * width:.2g} mm around {place}, "
-            f"{why}, and there is nothing to fit; check the units, the body (--body) "
-            "and the selected time (--from, --to)"
+            f"{why}, and there is nothing to fit; check the units, the body (`body`) and the time "
+            "that is kept (`start`, `stop` of `load`)"
         )
     if typical_speed([track]) == 0.0:
         raise InputError(
             f"{where}the body rests in 99 % of the recording, at the same position to the last "
-            "digit, and there is no motion to fit; check the body (--body) and the "
-            "selected time (--from, --to)"
+            "digit, and there is no motion to fit; check the body (`body`) and the time that is "
+            "kept (`start`, `stop` of `load`)"
         )
 
 
@@ -101,10 +101,10 @@ def require_own_arena(study: Study, *, intervals: int, near_wall: int, where: st
     if near_wall <= MOST_AT_OWN_WALL * intervals:
         return
     raise InputError(
-        f"{where}--arena fit found a tank {1e3 * max(study.tank.extent_m):.3g} mm across, in "
+        f'{where}`tank="fit"` found a tank {1e3 * max(study.tank.extent_m):.3g} mm across, in '
         f"which a block of {1e3 * study.block.side_m:.3g} mm is at the wall in {near_wall} of "
         f"{intervals} intervals: the body stays in a region too small to find the tank from. State "
-        "the tank with --arena circle:D, and check the scale and the side of the block"
+        'the tank with `tank="circle:D"`, and check the scale and the side of the block'
     )
 
 
@@ -171,6 +171,7 @@ def require_size(flows: int, coefficients: int) -> None:
     raise InputError(
         f"{flows} flows of {coefficients} coefficients are too many to fit together: they would "
         f"take about {memory:.1f} GB and {minutes:.0f} min, {MOST_COEFFICIENTS // coefficients} "
-        "can be fitted; set knots further apart (--spline-spacing), give flows that come back the "
-        "same name (--flow-labels), or fit parts of the recording (--from, --to)"
+        "can be fitted; set knots further apart (`fit.spline_spacing_m`), give flows that come "
+        "back the same name (`fit.flow_labels`), or fit parts of the recording (`start`, `stop` "
+        "of `load`)"
     )

@@ -100,6 +100,6 @@ def resolve_time_step(time_step_s: float | Literal["auto"], *, force_interval_s:
         raise ConfigurationError(
             f"time_step_s = {time_step_s:g} does not divide force_interval_s = "
             f"{force_interval_s:g}: {ratio:.6g} steps in an interval; use a whole divisor or "
-            '"auto" (--time-step auto)'
+            '"auto" (`simulation.time_step_s="auto"`)'
         )
     return force_interval_s / parts
