@@ -257,8 +257,7 @@ def test_a_calibration_that_cannot_be_used(calibrated: Path, tmp_path: Path) -> 
         tmp_path / "nowhere": "does not exist",
         RECORDING: "is not a run directory",
         other: "no calibration: its calibration (calibration.nc) is not there",
-        fit: f"holds a fit, not a calibration: calibrate on its flow (driftwalk calibrate "
-        f"RECORDING --flow {fit / 'flow.nc'})",
+        fit: f"holds a fit, not a calibration: calibrate on its flow {fit / 'flow.nc'} (--flow)",
         damaged: "cannot be read as NetCDF",
         wrong: "is not a calibration: its kind is 'flow_field'",
     }

@@ -56,7 +56,7 @@ def test_nothing_is_overwritten_silently(tmp_path: Path) -> None:
     path = tmp_path / "flow.nc"
     save_flow(uniform_flow(0.1, 0.0), path)
     before = path.read_bytes()
-    with pytest.raises(InputError, match="--overwrite"):
+    with pytest.raises(InputError, match='`existing="replace"`'):
         save_flow(uniform_flow(0.2, 0.0), path)
     assert path.read_bytes() == before
     save_flow(uniform_flow(0.2, 0.0), path, existing="replace")

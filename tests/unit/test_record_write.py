@@ -48,7 +48,7 @@ def test_csv_round_trip_is_exact(tmp_path: Path) -> None:
 def test_nothing_is_overwritten_silently(tmp_path: Path) -> None:
     path = save_trajectory(example(), tmp_path / "a.csv")
     before = path.read_bytes()
-    with pytest.raises(InputError, match=r"exists already.*--overwrite"):
+    with pytest.raises(InputError, match=r'exists already.*`existing="replace"`'):
         save_trajectory(example().isel(time=[0]), path)
     assert path.read_bytes() == before
     save_trajectory(example().isel(time=[0]), path, existing="replace")

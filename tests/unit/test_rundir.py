@@ -81,7 +81,7 @@ def test_unfinished_run_of_another_study_is_refused_by_key(tmp_path: Path) -> No
     leave_unfinished(tmp_path / "run")
     before = visible(tmp_path / "run")
     with (
-        pytest.raises(RunDirectoryError, match=r"study\.tank\.diameter_m; .*--overwrite"),
+        pytest.raises(RunDirectoryError, match=r"study\.tank\.diameter_m; .*`overwrite=True`"),
         RunDirectory(tmp_path / "run", specification=OTHER),
     ):
         pass
@@ -95,7 +95,7 @@ def test_finished_run_is_refused(tmp_path: Path, mode: OnExisting) -> None:
     finish(tmp_path / "run")
     before = visible(tmp_path / "run")
     with (
-        pytest.raises(RunDirectoryError, match=r"holds a finished run; .*--overwrite"),
+        pytest.raises(RunDirectoryError, match=r"holds a finished run; .*`overwrite=True`"),
         RunDirectory(tmp_path / "run", specification=SPECIFICATION, on_existing=mode),
     ):
         pass

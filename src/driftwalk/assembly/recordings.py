@@ -141,8 +141,8 @@ def _checked_poses(recording: xr.Dataset) -> Poses:
     if len(blind) == len(names):
         raise InputError(
             "the recording has no orientation: without the angle of each block the "
-            "joined faces cannot be found (--theta or --columns theta=NAME if the "
-            "file has it)"
+            "joined faces cannot be found "
+            '(`theta` or `columns={"theta": "NAME"}` of `load` if the file has it)'
         )
     if blind:
         raise InputError(

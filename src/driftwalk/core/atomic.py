@@ -211,4 +211,4 @@ def require_free(path: Path, *, existing: str) -> None:
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist")
     if path.exists() and existing == "error":
-        raise InputError(f"{path} exists already: name another file, or add --overwrite")
+        raise InputError(f'{path} exists already: name another file, or add `existing="replace"`')

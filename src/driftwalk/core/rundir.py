@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from filelock import BaseFileLock
 
 OnExisting = Literal["resume", "refuse", "overwrite"]
-_OVERWRITE: Final = f"--overwrite, which moves what is there into {PREVIOUS_FOLDER}/"
+_OVERWRITE: Final = f"`overwrite=True`, which moves what is there into {PREVIOUS_FOLDER}/"
 
 
 class RunDirectory:

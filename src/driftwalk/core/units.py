@@ -160,7 +160,7 @@ def _lookup(symbol: str, text: str, unit: str) -> _Unit:
     if prefix in _PREFIXES and base in _PREFIXABLE:
         return _Unit(_PREFIXES[prefix] * _PREFIXABLE[base].scale, _PREFIXABLE[base].dimension)
     if symbol.lower() in ("px", "pixel", "pixels"):
-        advice = "; give its size in metres (metres_per_pixel, --metres-per-pixel)"
+        advice = "; give its size in metres (`metres_per_pixel`)"
         raise ConfigurationError(
             f"expected {_expected(unit)}, got '{text}': a pixel is not a unit"
             f"{advice if unit == 'm' else ''}"

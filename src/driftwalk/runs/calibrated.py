@@ -98,14 +98,15 @@ def _require_finished(folder: Path, files: dict[str, Path]) -> None:
     if state == "new":
         what = "is not a run directory" if folder.exists() else "does not exist"
         raise InputError(
-            f"{folder} {what}: give the directory that 'driftwalk calibrate --out' made, or a flow "
-            "field (--flow)"
+            f"{folder} {what}: give the directory of a finished calibration, or a flow "
+            "field (`flow`)"
         )
     if (folder / "fit.nc").is_file() and not files["calibration"].is_file():
         raise InputError(
-            f"{folder} holds a fit, not a calibration: calibrate on its flow (driftwalk calibrate "
-            f"RECORDING --flow {files['flow']}) and give that run, or give the fit's own flow and "
-            f"numbers (--flow {files['flow']} --drag-coefficient --force-std --force-interval)"
+            f"{folder} holds a fit, not a calibration: calibrate on its flow {files['flow']} "
+            "(`flow` of `calibrate`) and give that run, or give that flow (`flow`) and the fit's "
+            "own numbers (`forces.drag_coefficient`, `forces.force_std_N`, "
+            "`forces.force_interval_s`)"
         )
     for role, path in files.items():
         if not path.is_file():

@@ -122,7 +122,7 @@ def _listen(host: str, port: int) -> socket.socket:
         raise InputError(f"a port is a number from 0 to {LAST_PORT}, got {port}")
     if not host:
         # The system would take it for all addresses of the machine.
-        raise InputError("an address to serve on is empty: leave --host out, or give one (0.0.0.0)")
+        raise InputError("an address to serve on is empty: leave `host` out, or give one (0.0.0.0)")
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     both = family == socket.AF_INET6 and is_any(host) and socket.has_dualstack_ipv6()
     try:
@@ -130,7 +130,7 @@ def _listen(host: str, port: int) -> socket.socket:
     except OSError as error:
         if error.errno == errno.EADDRINUSE:
             raise InputError(
-                f"port {port} on {host} is in use: choose another one (--port), or 0 "
+                f"port {port} on {host} is in use: choose another one (`port`), or 0 "
                 "for a free port"
             ) from error
         reason = (error.strerror or str(error)).partition(" (while")[0]

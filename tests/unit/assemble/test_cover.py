@@ -43,7 +43,7 @@ def test_a_grid_that_ends_before_the_wall(field: xr.Dataset, tank: Tank) -> None
     ) as caught:
         require_cover(field, tank)
     assert tank.describe() in str(caught.value)
-    assert "--tank-diameter" in str(caught.value)
+    assert "`tank.diameter_m`" in str(caught.value)
 
 
 def test_the_bundled_flow_covers_its_own_tank_only() -> None:

@@ -98,7 +98,7 @@ def test_a_calibration_without_a_region_is_refused(name: str) -> None:
     assert has_region(known)
     lacking = known.drop_vars(name)
     assert not has_region(lacking)
-    with pytest.raises(InputError, match=r"no joint region .* --bootstrap"):
+    with pytest.raises(InputError, match=r"no joint region .*`calibration.bootstrap=200`"):
         draw_parameters(lacking, runs=3)
 
 

@@ -190,7 +190,7 @@ def test_drawn_flows_reach_their_runs(flow: xr.Dataset) -> None:
         (
             {"blocks": 70, "runs": 2},
             r"run 0: \d+ of 70 blocks found a place in the tank, a circle of diameter 0.3 m; use "
-            r"fewer blocks \(--blocks\)",
+            r"fewer blocks \(`assembly.blocks`\)",
         ),
         ({"backend": "gpu"}, "backend must be one of cpu, reference, got 'gpu'"),
         ({"trial": -1}, "trial: expected a whole number from 0"),

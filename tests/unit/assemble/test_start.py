@@ -32,7 +32,9 @@ def test_area_of_a_tank(tank: Tank, area: float) -> None:
 def test_more_blocks_than_the_tank_has_area_for() -> None:
     """78 squares of 9 cm2 cover 702 cm2, the tank has 706.9; 79 cover 711."""
     require_room(Study(assembly={"blocks": 78}))
-    with pytest.raises(InputError, match=r"79 blocks of 0.03 m do not fit .* \(--blocks\)"):
+    with pytest.raises(
+        InputError, match=r"79 blocks of 0.03 m do not fit .* \(`assembly.blocks`\)"
+    ):
         require_room(Study(assembly={"blocks": 79}))
 
 

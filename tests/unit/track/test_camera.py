@@ -44,7 +44,7 @@ def test_jacobian_and_inverse_agree_with_the_map() -> None:
 
 
 def test_there_is_no_default_scale() -> None:
-    with pytest.raises(InputError, match="--tank-diameter"):
+    with pytest.raises(InputError, match="`diameter` of `camera_from_rim`"):
         dw.track.Camera(width_px=640, height_px=480).to_world(np.zeros((1, 2)))
     with pytest.raises(InputError, match="640 x 480"):
         dw.track.Camera(width_px=640, height_px=480).check_size(320, 240)

@@ -37,7 +37,7 @@ def require_cover(flow: xr.Dataset, tank: Tank) -> None:
             raise InputError(
                 f"the flow field does not cover the tank, a {tank.describe()} that reaches "
                 f"{_range(*np.stack([low, high], axis=1))}: it spans {_range(x, y)}; give the "
-                "field of this tank, or the tank of this field (--tank-diameter, [tank])"
+                "field of this tank, or the tank of this field (`tank.diameter_m`, [tank])"
             )
     if "flag" not in flow:
         return
@@ -50,7 +50,7 @@ def require_cover(flow: xr.Dataset, tank: Tank) -> None:
             f"the flow field does not cover the tank, a {tank.describe()}: {lacking} of its "
             f"{np.count_nonzero(inner)} nodes in there are flagged as outside of the tank that it "
             "was made for; give the field of this tank, or the tank of this field "
-            "(--tank-diameter, [tank])"
+            "(`tank.diameter_m`, [tank])"
         )
 
 

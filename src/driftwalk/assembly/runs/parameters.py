@@ -102,7 +102,7 @@ def _region_of(calibration: xr.Dataset) -> _Region:
     if not has_region(calibration):
         raise InputError(
             "the calibration has no joint region to draw parameters from: it was made without a "
-            "bootstrap or without its refined map; calibrate with --bootstrap 200"
+            "bootstrap or without its refined map; calibrate with `calibration.bootstrap=200`"
         )
     surface = calibration["refined_surface"].values
     low, level = float(surface.min()), float(calibration.attrs["region_level"])

@@ -118,7 +118,8 @@ def whole_steps(study: Study) -> int:
     if steps > MOST_STEPS:
         raise InputError(
             f"a run of {study.assembly.duration_s:g} s has {steps} time steps of "
-            f"{study.time_step_s:g} s, at most {MOST_STEPS} are possible: shorten it (--duration)"
+            f"{study.time_step_s:g} s, at most {MOST_STEPS} are possible: shorten it "
+            "(`assembly.duration_s`)"
         )
     return steps
 

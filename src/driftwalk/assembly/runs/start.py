@@ -34,8 +34,8 @@ def require_room(study: Study) -> None:
     if count * side**2 > room:
         raise InputError(
             f"{count} blocks of {side:g} m do not fit into the tank, a {tank.describe()}: they "
-            f"cover {count * side**2:.4g} m2, the tank {room:.4g} m2; use fewer blocks (--blocks) "
-            "or a larger tank"
+            f"cover {count * side**2:.4g} m2, the tank {room:.4g} m2; use fewer blocks "
+            "(`assembly.blocks`) or a larger tank"
         )
 
 
@@ -64,7 +64,7 @@ def place_blocks(
         run = int(short[0])
         raise InputError(
             f"run {run}: {int(placed[run])} of {count} blocks found a place in the tank, a "
-            f"{study.tank.describe()}; use fewer blocks (--blocks) or a larger tank"
+            f"{study.tank.describe()}; use fewer blocks (`assembly.blocks`) or a larger tank"
         )
     return np.asarray(start)
 

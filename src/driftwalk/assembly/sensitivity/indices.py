@@ -120,7 +120,9 @@ def check_indices(
     """
     settings = _settings(study, flow, _design(study, samples, bounds), threads)
     if study.sensitivity.runs < 2:
-        raise InputError("Sobol' indices need at least 2 runs of each setting, got 1 (--runs)")
+        raise InputError(
+            "Sobol' indices need at least 2 runs of each setting, got 1 (`sensitivity.runs`)"
+        )
     place_first(settings)
     return settings.size
 
@@ -187,7 +189,8 @@ def _indices(study: Study, design: xr.Dataset, outcomes: Outcomes) -> xr.Dataset
     if short.size:
         raise InputError(
             f"setting {int(short[0])} of the Sobol' design has {int(runs[short[0]])} runs with an "
-            "outcome, at least 2 are needed; use more runs (--runs) or a smaller time step"
+            "outcome, at least 2 are needed; use more runs (`sensitivity.runs`) or a "
+            "smaller time step"
         )
     share = count / runs[:, None]
     complete = share[:, is_complete(list(names))].sum(axis=1)

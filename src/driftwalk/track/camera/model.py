@@ -212,8 +212,8 @@ class Camera(Section):
     def _plane(self) -> Array:
         if self.homography_px_to_m is None:
             raise InputError(
-                "the camera has no scale: give the tank's diameter with --tank-diameter, or "
-                "calibrate with a board that lies on the plane of the water"
+                "the camera has no scale: give the tank's diameter with `diameter` of "
+                "`camera_from_rim`, or calibrate with a board that lies on the plane of the water"
             )
         return np.array(self.homography_px_to_m).reshape(3, 3)
 

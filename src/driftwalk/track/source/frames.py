@@ -298,7 +298,7 @@ def _timed_images(folder: Path, rate: float | None) -> list[tuple[Path, float]]:
         raise InputError(f"{folder}: no images ({', '.join(_IMAGES)}) in this folder")
     if rate is None:
         raise InputError(
-            f"{folder}: images have no times: state their rate in Hz (--image-rate), "
+            f"{folder}: images have no times: state their rate in Hz (`rate`), "
             f"or put a {_TIMES} with the columns file, time_s in the folder"
         )
     if not (math.isfinite(rate) and rate > 0):
