@@ -133,15 +133,8 @@ def prepare_problem(
         )
     chosen = StepDistance() if statistic is None else statistic
     interval = study.steps.step_interval_s
-    plan = plan_steps(time, step_interval=None if interval == "auto" else interval)
-    found = apply_steps(plan, track.x, track.y)
-    steps = np.ascontiguousarray(np.column_stack([found.step_length, found.turning_angle]))
-    if len(steps) < FEWEST_PAIRS:
-        raise InputError(
-            f"the recording gives {len(steps)} pairs of steps, at least {FEWEST_PAIRS} are needed: "
-            "it hardly moves, is too short, or its clock does not suit the step interval "
-            "(`steps.step_interval_s`)"
-        )
+    reference = chosen.prepare(track, step_interval=None if interval == "auto" else interval)
+    like = recorded_conditions(track, study, camera=camera, flow=flow, threads=threads)
     # Without the recording's gaps the worlds have time stamps, and so a plan, of their own.
     if study.observation.gaps == "none":
         plan = plan_steps(like.sample_time, step_interval=reference.plan.step_interval)

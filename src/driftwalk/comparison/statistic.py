@@ -135,7 +135,7 @@ class StepDistance:
             raise InputError(
                 f"the recording gives {len(steps)} pairs of steps, at least {FEWEST_PAIRS} are "
                 "needed: it hardly moves, is too short, or its clock does not suit the step "
-                "interval (--step-interval)"
+                "interval (`steps.step_interval_s`)"
             )
         return StepReference(
             plan,

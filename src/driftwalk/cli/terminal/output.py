@@ -41,7 +41,7 @@ def print_json(values: Mapping[str, Any]) -> None:
 
 def to_json(values: Mapping[str, Any]) -> str:
     """Return the text that `print_json` prints."""
-    return json.dumps(in_options(plain(values)), indent=2, allow_nan=False, ensure_ascii=True)
+    return json.dumps(in_options(json_value(values)), indent=2, allow_nan=False, ensure_ascii=True)
 
 
 def save_dataset(dataset: xr.Dataset, path: Path) -> None:
