@@ -30,7 +30,7 @@ WORLDS = 7
 
 
 class MotionModelContract:
-    """What every motion model has to keep: the promises of `driftwalk.motion.protocol`.
+    """Contract of every motion model: the promises of `driftwalk.motion.protocol`.
 
     Override `model`, and `conditions` where the model needs others: a flow, another tank.
     """

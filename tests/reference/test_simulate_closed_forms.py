@@ -53,7 +53,7 @@ def test_relaxation_through_the_public_door_in_single_precision() -> None:
         study(forces={"force_std_N": 0.0, "drag_coefficient": DRAG}, tank={"diameter_m": 1.0}),
         dw.uniform_flow(0.05, 0.0, arena={"shape": "circle", "diameter_m": 1.0}),
         sample_time=time,
-        start=dw.simulate.Start(0.0, 0.0, 0.0),
+        start=dw.simulation.Start(0.0, 0.0, 0.0),
         replicates=3,
     )
     way = run_["x"].values[:, :, 0]

@@ -133,9 +133,9 @@ def test_single_and_double_have_the_same_steps(fresh_seed: Callable[[int], int])
 
     def steps(precision: str) -> np.ndarray:
         paths = run(native, worlds, seed=fresh_seed(1), precision=precision)
-        plan = dw.compare.plan_steps(np.arange(601) * 0.1)
+        plan = dw.comparison.plan_steps(np.arange(601) * 0.1)
         found = [
-            dw.compare.apply_steps(plan, x, y) for x, y in zip(paths[0], paths[1], strict=True)
+            dw.comparison.apply_steps(plan, x, y) for x, y in zip(paths[0], paths[1], strict=True)
         ]
         return np.concatenate([np.column_stack([f.step_length, f.turning_angle]) for f in found])
 

@@ -157,7 +157,7 @@ def test_what_cannot_be_fitted_is_data() -> None:
 def test_a_simulation_that_breaks_is_data(
     flow: xr.Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    sound = dw.simulate.simulate
+    sound = dw.simulation.simulate
 
     def broken(*arguments: object, **options: object) -> xr.Dataset:
         run = sound(*arguments, **options)

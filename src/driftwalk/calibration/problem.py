@@ -1,4 +1,4 @@
-"""What a calibration compares: one recording, made ready once, and the worlds that answer it."""
+"""The problem of a calibration: one recording, made ready once, and the worlds that answer it."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Problem:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """What is searched, in the order of the dimensions."""
+        """Parameters to search, in the order of the dimensions."""
         return self.model.parameters
 
     @property

@@ -25,7 +25,7 @@ MOST_REFINED_WORLDS = 7056
 BANDWIDTH_STEPS = 2.0
 """Bandwidth of the surface in refined steps."""
 ROUNDING = 1e-12
-"""What rounding may leave between two coordinates that are the same."""
+"""Largest difference that rounding leaves between two coordinates that are the same."""
 
 
 class Map(NamedTuple):

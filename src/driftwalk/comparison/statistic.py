@@ -1,4 +1,4 @@
-"""What a calibration makes small: the distance of simulated steps from the recording's.
+"""The quantity that a calibration minimises: the distance of simulated steps from the recording's.
 
 A statistic is prepared once with the recording and is then given tables of steps, one row per
 simulated world. `StepDistance` is the paper's: the two-dimensional Kolmogorov-Smirnov distance of

@@ -1,4 +1,4 @@
-"""What a simulation or a fit takes over from a recording: the tank, reconciled with the study."""
+"""Facts that a simulation or a fit takes from a recording: the tank and the block."""
 
 from driftwalk.conditions.study import study_for
 from driftwalk.conditions.tank import require_inside, study_in_arena

@@ -91,5 +91,5 @@ def require_inside(study: Study, recording: xr.Dataset, body: str | None) -> Non
             f"{outside.mean():.0%} of the positions lie outside the tank, a {tank.describe()} "
             f"about the origin: the recording spans x {track.x.min():.3g} to "
             f"{track.x.max():.3g} m, y {track.y.min():.3g} to {track.y.max():.3g} m; "
-            "state the tank with --tank-diameter, --arena or [tank] in a study file"
+            "state the tank with `tank.diameter_m`, `tank` of `load` or [tank] in a study file"
         )

@@ -9,7 +9,7 @@ class Stage(NamedTuple):
     """A stage of a calibration."""
 
     words: str
-    """What people call it."""
+    """Name for people."""
     begin: float
     end: float
     """Its share of the time of the calibration: from, to [%]."""

@@ -56,7 +56,7 @@ def write_figures(
     Parameters
     ----------
     calibration : xarray.Dataset
-        Result of `driftwalk.calibrate.calibrate`.
+        Result of `driftwalk.calibration.calibrate`.
     flow : xarray.Dataset
         The `flow_field` that was used.
     trajectory : xarray.Dataset

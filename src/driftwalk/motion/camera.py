@@ -1,4 +1,4 @@
-"""What the camera of a recording makes of simulated positions."""
+"""Simulated positions as the camera of a recording would have seen them."""
 
 from __future__ import annotations
 

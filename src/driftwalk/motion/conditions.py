@@ -1,4 +1,4 @@
-"""What a simulation takes over from a recording: times and gaps, start, camera, tank and flow."""
+"""The conditions that a simulation takes over: times and gaps, start, camera, tank and flow."""
 
 from __future__ import annotations
 

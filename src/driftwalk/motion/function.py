@@ -36,7 +36,7 @@ SAMPLES_PER_CALL: Final = 4_000_000
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What a function is given besides its parameters: the conditions of a batch of worlds.
+    """Everything a function gets besides its parameters: the conditions of a batch of worlds.
 
     Attributes
     ----------

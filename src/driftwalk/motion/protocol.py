@@ -1,4 +1,4 @@
-"""What a motion model is: parameters, and worlds simulated under the conditions of a recording.
+"""The protocol of a motion model: parameters, and worlds under the conditions of a recording.
 
 Anything with these attributes and methods can be calibrated; nothing is inherited. A model keeps
 four promises, to which `driftwalk.testing.MotionModelContract` holds it:
@@ -28,7 +28,7 @@ Floats = npt.NDArray[np.float64]
 Keys = npt.NDArray[np.uint64]
 Values = Mapping[str, Floats]
 Details = Literal["none", "steps", "all"]
-"""What is kept of a world besides its distance: nothing, its steps, or its density and excerpt."""
+"""Results kept of a world besides its distance: nothing, its steps, or its density and excerpt."""
 Scores = dict[str, npt.NDArray[Any]]
 """Arrays by name with one entry per world each; see `driftwalk.motion.score_worlds`."""
 
@@ -52,11 +52,11 @@ class MotionModel(Protocol):
 
     @property
     def name(self) -> str:
-        """What the model is called in results and messages."""
+        """Name of the model in results and messages."""
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """What it can be tuned by; the names are the dimensions of every map."""
+        """Its parameters; the names are the dimensions of every map."""
 
     @property
     def needs_flow(self) -> bool:

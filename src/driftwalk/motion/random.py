@@ -12,7 +12,7 @@ Keys = npt.NDArray[np.uint64]
 
 MOTION: Final = 1
 CAMERA: Final = 2
-"""What a stream is for; part of its address. A new purpose gets a new number."""
+"""Purpose of a stream; part of its address. A new purpose gets a new number."""
 
 
 class WorldRandom:

@@ -43,7 +43,7 @@ def assemble(
     threads : int, optional
         Default: all processors. The result does not depend on it.
     progress : callable, optional
-        Told how much is done: ``progress(done, total, text)``.
+        Called as ``progress(done, total, text)`` while the work goes on.
     **settings
         Keys of the study by their short names: ``blocks=4``, ``runs=1000``, ``duration="10min"``.
 

@@ -49,7 +49,7 @@ def calibrate(
     threads : int, optional
         Default: all processors. The result does not depend on it.
     progress : callable, optional
-        Told how much is done: ``progress(done, total, text)``.
+        Called as ``progress(done, total, text)`` while the work goes on.
     **settings
         Keys of the study by their short names: ``force_interval="16ms"``, ``bootstrap=50``.
 

@@ -45,7 +45,7 @@ def fit(
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
     progress : callable, optional
-        Told how much is done: ``progress(done, total, text)``.
+        Called as ``progress(done, total, text)`` while the work goes on.
     **settings
         Keys of the study by their short names, numbers in SI units or texts with a unit:
         ``force_interval="16ms"``.

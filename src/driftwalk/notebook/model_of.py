@@ -80,7 +80,7 @@ def _flow(flow: xr.Dataset | None) -> xr.Dataset:
 
 
 def _stored_flow(calibration: xr.Dataset, study: Study) -> xr.Dataset:
-    """Return the flow field that lies beside a calibration in its run directory."""
+    """Return the flow field that is stored with a calibration in its run directory."""
     from driftwalk.flow import load_flow
 
     folder = run_folder(calibration)

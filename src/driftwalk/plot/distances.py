@@ -57,7 +57,7 @@ def plot_ks_map(
     Parameters
     ----------
     calibration : xarray.Dataset
-        Result of `driftwalk.calibrate.calibrate`.
+        Result of `driftwalk.calibration.calibrate`.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure when left out.
     colorbar : {"beside", "none"}
@@ -105,7 +105,7 @@ def plot_refined_map(
     Parameters
     ----------
     calibration : xarray.Dataset
-        Result of `driftwalk.calibrate.calibrate`.
+        Result of `driftwalk.calibration.calibrate`.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure when left out.
     colorbar : {"beside", "none"}

@@ -58,7 +58,7 @@ def plot_density_panels(
     Parameters
     ----------
     calibration : xarray.Dataset
-        Result of `driftwalk.calibrate.calibrate`.
+        Result of `driftwalk.calibration.calibrate`.
     axes : sequence of 4 matplotlib.axes.Axes, optional
         Where to draw, in one row or two; a new figure with one row when left out.
     parameter : {"drag_coefficient", "force_std"}

@@ -40,7 +40,7 @@ def plot_validation(calibration: xr.Dataset, axes: Any = None) -> list[Axes]:
     Parameters
     ----------
     calibration : xarray.Dataset
-        Result of `driftwalk.calibrate.calibrate`.
+        Result of `driftwalk.calibration.calibrate`.
     axes : sequence of 3 matplotlib.axes.Axes, optional
         Where to draw; a new figure with one row when left out.
 
@@ -77,7 +77,7 @@ def plot_distance_profile(
     Parameters
     ----------
     calibration : xarray.Dataset
-        Result of `driftwalk.calibrate.calibrate`.
+        Result of `driftwalk.calibration.calibrate`.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure when left out.
     parameter : {"drag_coefficient", "force_std"}
@@ -146,7 +146,7 @@ def plot_bootstrap(calibration: xr.Dataset, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     calibration : xarray.Dataset
-        Result of `driftwalk.calibrate.calibrate`.
+        Result of `driftwalk.calibration.calibrate`.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure when left out.
 

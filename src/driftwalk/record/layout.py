@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 MISSING = frozenset({"", "NaN", "nan", "NAN", "NA", "N/A", "null", "NULL", "None", "none", "-nan"})
-"""What a tracker writes for a number that it does not have."""
+"""Words that trackers write for a missing number."""
 
 
 @dataclass(frozen=True)

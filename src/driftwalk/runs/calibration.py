@@ -76,7 +76,7 @@ def run_calibration(
     begun : callable, optional
         Called when everything is checked and the work begins.
     progress : callable, optional
-        Told how much is done: ``progress(done, total, text)``.
+        Called as ``progress(done, total, text)`` while the work goes on.
     command : str, optional
         The command line or the call, for the manifest.
 

@@ -44,7 +44,7 @@ class FitWork:
 
 
 class Fitted(NamedTuple):
-    """What a run found."""
+    """Results of a run."""
 
     fit: xr.Dataset
     check: xr.Dataset | None
@@ -77,9 +77,9 @@ def run_fit(
     begun : callable, optional
         Called when everything is checked and the work begins.
     fitted : callable, optional
-        Told the fit as soon as it is stored, before the figures and the check.
+        Called with the fit as soon as it is stored, before the figures and the check.
     progress : callable, optional
-        Told how much is done: ``progress(done, total, text)``.
+        Called as ``progress(done, total, text)`` while the work goes on.
     command : str, optional
         The command line or the call, for the manifest.
 

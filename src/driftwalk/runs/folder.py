@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Progress(Protocol):
-    """Is told how much of a run is done."""
+    """Takes note of how much of a run is done."""
 
     def __call__(self, done: int, total: int, text: str = "") -> None:
         """Take note that `done` of `total` parts are complete, and what is under way."""

@@ -105,7 +105,7 @@ def run_sensitivity(
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
     progress : callable, optional
-        Told how much is done: ``progress(done, total, text)``.
+        Called as ``progress(done, total, text)`` while the work goes on.
     command : str, optional
         The command line or the call, for the manifest.
 

@@ -1,4 +1,4 @@
-"""What tells two datasets of a run directory apart."""
+"""Hashes that tell two datasets of a run directory apart."""
 
 from __future__ import annotations
 

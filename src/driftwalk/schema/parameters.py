@@ -1,4 +1,4 @@
-"""What a motion model can be tuned by: names, units, ranges and scales of its parameters.
+"""The parameters of a motion model: names, units, ranges and scales of its parameters.
 
 Grids, surfaces and regions are computed in the *coordinate* of a parameter: its value on a linear
 scale, the decimal logarithm of its value on a logarithmic one. On a linear scale the two are the

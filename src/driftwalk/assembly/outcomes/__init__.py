@@ -1,1 +1,1 @@
-"""What was built, how often and when: classes, distributions, distances, survival."""
+"""Outcomes of assembly, how often and when: classes, distributions, distances, survival."""

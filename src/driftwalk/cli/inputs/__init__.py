@@ -1,1 +1,1 @@
-"""What the arguments of a command name: recordings, studies, runs and flows, read and checked."""
+"""Inputs that the arguments of a command name: recordings, studies and flows, read and checked."""

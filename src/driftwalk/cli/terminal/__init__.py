@@ -1,1 +1,1 @@
-"""What a command prints: answers, progress, errors."""
+"""Everything that a command prints: answers, progress, errors."""

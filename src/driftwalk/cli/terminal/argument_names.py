@@ -17,17 +17,21 @@ OPTIONS: Final[dict[str, str | None]] = {
     "area": None,
     "arena": "--arena",
     "block": "--side",
+    "block_length": None,
     "body": "--body",
+    "body_b": None,
     "cell_size": "--cell-size",
     "cells": "--cells",
     "columns": "--columns",
     "diameter": "--tank-diameter",
     "flow": "--flow",
+    "folder": None,
     "format": "--format",
     "frame_rate": "--frame-rate",
     "host": "--host",
     "inertia": "--inertia",
     "keypoint": "--keypoint",
+    "like": None,
     "length_unit": "--length-unit",
     "mass": "--mass",
     "max_speed": "--max-speed",
@@ -82,7 +86,7 @@ def to_options(message: str) -> str:
     Parameters
     ----------
     message : str
-        A message of the library. What is in backquotes and no argument stays as it is.
+        A message of the library. Words in backquotes that are no argument stay as they are.
 
     Examples
     --------

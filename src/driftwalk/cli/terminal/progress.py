@@ -106,7 +106,7 @@ class ProgressReporter:
 
 @contextmanager
 def reported(title: str) -> Iterator[dict[str, Any]]:
-    """Give what a run of `driftwalk.runs` is told by a command: whom to report to, and its name.
+    """Give a run of `driftwalk.runs` its progress bar and the command line for its manifest.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""What the figures share: style, labels in readable units, the tank's outline, shapes of blocks."""
+"""Parts that the figures share: style, labels with units, the tank's outline, shapes of blocks."""

@@ -1,1 +1,1 @@
-"""What is seen in one frame: two-colour markers, tags and blobs."""
+"""Detectors of objects in one frame: two-colour markers, tags and blobs."""

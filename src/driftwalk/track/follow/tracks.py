@@ -105,7 +105,7 @@ class Samples:
 
 @dataclass
 class Rival:
-    """What a track would be without its last measurements."""
+    """State of a track without its last measurements."""
 
     mean: Floats
     covariance: Floats
