@@ -26,11 +26,11 @@ def _mesh(ax) -> QuadMesh:
 def test_settings_are_the_nearest_of_the_grid(calibration) -> None:
     # Optimum 0.39 and 0.61 mN on grids of 0.1 and 0.125 mN.
     settings = choose_settings(calibration, parameter="drag_coefficient")
-    assert [s.drag_coefficient for s in settings] == pytest.approx([0.1, 0.4, 0.7])
-    assert [s.force_std for s in settings] == pytest.approx([0.625e-3] * 3)
+    assert [s.values["drag_coefficient"] for s in settings] == pytest.approx([0.1, 0.4, 0.7])
+    assert [s.values["force_std"] for s in settings] == pytest.approx([0.625e-3] * 3)
     settings = choose_settings(calibration, parameter="force_std", low=0.0, high=1e-3)
-    assert [s.force_std for s in settings] == pytest.approx([0.0, 0.625e-3, 1e-3])
-    assert [s.drag_coefficient for s in settings] == pytest.approx([0.4] * 3)
+    assert [s.values["force_std"] for s in settings] == pytest.approx([0.0, 0.625e-3, 1e-3])
+    assert [s.values["drag_coefficient"] for s in settings] == pytest.approx([0.4] * 3)
 
 
 def test_panels_hold_the_stored_densities_on_one_scale(calibration) -> None:

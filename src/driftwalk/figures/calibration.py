@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.plot.distances import LEGEND_ORDER, plot_ks_map, plot_refined_map
 from driftwalk.plot.flow_field import COMPONENTS, SPEED_LABEL, plot_flow, velocity_of
 from driftwalk.plot.panels import plot_density_panels, shared_setting_text
+from driftwalk.plot.parts.parameters import plot_parameters
 from driftwalk.plot.parts.style import (
     DOUBLE_COLUMN_MM,
     SINGLE_COLUMN_MM,
@@ -43,7 +45,7 @@ METADATA: dict[str, dict[str, Any]] = {
 def write_figures(
     calibration: xr.Dataset,
     *,
-    flow: xr.Dataset,
+    flow: xr.Dataset | None,
     trajectory: xr.Dataset,
     folder: str | Path,
     body: str | None = None,
@@ -56,9 +58,9 @@ def write_figures(
     Parameters
     ----------
     calibration : xarray.Dataset
-        Result of `driftwalk.calibration.calibrate`.
-    flow : xarray.Dataset
-        The `flow_field` that was used.
+        What `driftwalk.calibration.calibrate` returns.
+    flow : xarray.Dataset or None
+        The `flow_field` that was used, None where the model uses none.
     trajectory : xarray.Dataset
         The recording.
     folder : path-like
@@ -71,8 +73,9 @@ def write_figures(
     Returns
     -------
     list of pathlib.Path
-        The files: ``flow``, ``trajectory``, ``steps``, ``ks_map``, ``drag_coefficient_panels``,
-        ``force_std_panels`` and ``validation``, each in every format.
+        The files: ``flow``, ``trajectory``, ``steps``, ``ks_map``, ``<parameter>_panels`` (for the
+        block ``drag_coefficient_panels`` and ``force_std_panels``) and ``validation``, each in
+        every format.
 
     Raises
     ------
@@ -86,12 +89,14 @@ def write_figures(
     ``write_figures(calibration, flow=flow, trajectory=recording, folder="run/figures")``
     """
     makers: dict[str, Callable[[], Figure]] = {
-        "flow": lambda: flow_figure(flow),
+        **({} if flow is None else {"flow": lambda: flow_figure(flow)}),
         "trajectory": lambda: trajectory_figure(trajectory, body=body),
         "steps": lambda: steps_figure(calibration),
         "ks_map": lambda: ks_map_figure(calibration),
-        "drag_coefficient_panels": lambda: panels_figure(calibration, "drag_coefficient"),
-        "force_std_panels": lambda: panels_figure(calibration, "force_std"),
+        **{
+            f"{one.name}_panels": partial(panels_figure, calibration, one.name)
+            for one in plot_parameters(calibration)
+        },
         "validation": lambda: validation_figure(calibration),
     }
     footer = FOOTER if calibration.attrs.get("simulated_recording") == "yes" else ""
@@ -156,7 +161,12 @@ def steps_figure(calibration: xr.Dataset) -> Figure:
 
 
 def ks_map_figure(calibration: xr.Dataset) -> Figure:
-    """Return Fig. 6: the whole map next to the refined one, or the whole map alone."""
+    """Return Fig. 6: the whole map beside the refined one, or the whole map alone.
+
+    With one parameter the distance along it is the map.
+    """
+    if len(plot_parameters(calibration)) == 1:
+        return _profiles_figure(calibration)
     if "refined_ks_distance" not in calibration:
         figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=80.0)
         _legend_above(plot_ks_map(calibration, figure.add_subplot()))
@@ -177,24 +187,27 @@ def ks_map_figure(calibration: xr.Dataset) -> Figure:
     return figure
 
 
-def panels_figure(calibration: xr.Dataset, parameter: Any) -> Figure:
-    """Return Fig. 7 (drag coefficient) or Fig. 8 (stochastic force)."""
+def panels_figure(calibration: xr.Dataset, parameter: str) -> Figure:
+    """Return the densities along a parameter: Fig. 7 (drag coefficient), Fig. 8 (force)."""
     figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=62.0)
     row = list(figure.subplots(1, 4, sharex=True, sharey=True))
     plot_density_panels(calibration, row, parameter=parameter)
-    figure.suptitle(f"simulated with {shared_setting_text(calibration, parameter=parameter)}")
+    shared = shared_setting_text(calibration, parameter=parameter)
+    if shared:
+        figure.suptitle(f"simulated with {shared}")
     return figure
 
 
 def validation_figure(calibration: xr.Dataset) -> Figure:
     """Return the distance around the optimum and, where there are any, the bootstrap estimates."""
-    if "bootstrap_drag_coefficient" not in calibration:
+    parameters = plot_parameters(calibration)
+    if any(f"bootstrap_{one.name}" not in calibration for one in parameters):
         return _profiles_figure(calibration)
     figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=68.0)
-    row = plot_validation(calibration, list(figure.subplots(1, 3)))
-    letter_panels(row, ["along $C_d$", r"along $\sigma_F$", "estimates"])
+    row = plot_validation(calibration, list(figure.subplots(1, len(parameters) + 1)))
+    letter_panels(row, [*(f"along {one.symbol}" for one in parameters), "estimates"])
     handles, labels = row[0].get_legend_handles_labels()
-    more = zip(*row[2].get_legend_handles_labels(), strict=True)
+    more = zip(*row[-1].get_legend_handles_labels(), strict=True)
     for handle, label in more:
         if label not in labels and not label.startswith("optimum"):
             handles.append(handle)
@@ -204,11 +217,12 @@ def validation_figure(calibration: xr.Dataset) -> Figure:
 
 
 def _profiles_figure(calibration: xr.Dataset) -> Figure:
+    parameters = plot_parameters(calibration)
     figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=68.0)
-    row = list(figure.subplots(1, 2))
-    plot_distance_profile(calibration, row[0], parameter="drag_coefficient")
-    plot_distance_profile(calibration, row[1], parameter="force_std")
-    letter_panels(row, ["along $C_d$", r"along $\sigma_F$"])
+    row = list(figure.subplots(1, len(parameters), squeeze=False)[0])
+    for parameter, ax in zip(parameters, row, strict=True):
+        plot_distance_profile(calibration, ax, parameter=parameter.name)
+    letter_panels(row, [f"along {one.symbol}" for one in parameters])
     figure.legend(*row[0].get_legend_handles_labels(), loc="outside upper center", ncols=7)
     return figure
 

@@ -1,4 +1,4 @@
-"""The score 1 − D over drag coefficient and stochastic force, and its optimum (Fig. 6)."""
+"""The score 1 − D over two parameters, and its optimum (the paper's Fig. 6 for the block)."""
 
 from __future__ import annotations
 
@@ -7,16 +7,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.plot.parts.labels import (
-    DRAG_LABEL,
-    MN_PER_N,
-    force_label,
-    in_unit,
-    interval_of,
-    number_attribute,
-    require_variables,
-    required_attribute,
-)
+from driftwalk.plot.parts.labels import interval_of, number_attribute, require_variables
+from driftwalk.plot.parts.parameters import PlotParameter, plane_of
 from driftwalk.plot.parts.style import INK, SCORE_COLORMAP, add_colorbar, axes_or_new
 
 if TYPE_CHECKING:
@@ -71,20 +63,22 @@ def plot_ks_map(
     Raises
     ------
     InputError
-        When the dataset lacks the map, the optimum or the force interval.
+        When the dataset lacks the map, the optimum or, of the block, the force interval; when it
+        has not two parameters.
 
     Examples
     --------
     ``plot_ks_map(calibration).figure.savefig("ks_map.png")``
     """
-    require_variables(calibration, "ks_distance", "status", "drag_coefficient", "force_std")
-    drag, force = axes_of(calibration, prefix="")
-    dims = ("force_std", "drag_coefficient")
+    across, up = plane_of(calibration)
+    require_variables(calibration, "ks_distance", "status", across.name, up.name)
+    dims = (up.name, across.name)
     score = 1.0 - calibration["ks_distance"].transpose(*dims).values
     status = _status(calibration, "status", dims)
     ax = axes_or_new(ax)
-    mesh = _score_mesh(ax, drag, force, score, bottom=0.0, top=1.0)
-    _hatch_causes(ax, drag, force, status, np.isfinite(score))
+    edges = edges_of(calibration, prefix="")
+    mesh = _score_mesh(ax, edges, score, bottom=0.0, top=1.0)
+    _hatch_causes(ax, edges, status, np.isfinite(score))
     _draw_region(ax, calibration)
     draw_optimum(ax, calibration)
     _finish(ax, calibration, mesh, colorbar)
@@ -126,38 +120,48 @@ def plot_refined_map(
     ``plot_refined_map(calibration).figure.savefig("refined.png")``
     """
     require_variables(calibration, "refined_ks_distance", "refined_surface")
-    drag, force = axes_of(calibration, prefix="refined_")
-    dims = ("refined_force_std", "refined_drag_coefficient")
+    across, up = plane_of(calibration)
+    dims = (f"refined_{up.name}", f"refined_{across.name}")
     score, surface = (
         1.0 - calibration[name].transpose(*dims).values
         for name in ("refined_ks_distance", "refined_surface")
     )
     ax = axes_or_new(ax)
-    mesh = _score_mesh(ax, drag, force, score, bottom=None, top=None)
+    edges = edges_of(calibration, prefix="refined_")
+    mesh = _score_mesh(ax, edges, score, bottom=None, top=None)
     if np.isfinite(score).any():
         low, high = np.nanquantile(score, [0.02, 1.0])
         floor = 1.0 - number_attribute(calibration, "noise_floor")
         high = np.nanmax([high, floor])
         mesh.set_clim(low, high + 0.06 * (high - low))
     status = _status(calibration, "refined_status", dims)
-    _hatch_causes(ax, drag, force, status, np.isfinite(score))
+    _hatch_causes(ax, edges, status, np.isfinite(score))
     lines = None
     if min(surface.shape) >= 2 and np.isfinite(surface).any():
-        lines = ax.contour(drag, force, surface, levels=6, colors="white", linewidths=0.6)
+        places = [one.values(calibration, "refined_") for one in (across, up)]
+        lines = ax.contour(*places, surface, levels=6, colors="white", linewidths=0.6)
     _draw_region(ax, calibration)
     draw_optimum(ax, calibration)
-    ax.set_xlim(*cell_edges(drag)[[0, -1]])
-    ax.set_ylim(*cell_edges(force)[[0, -1]])
+    ax.set_xlim(*edges[0][[0, -1]])
+    ax.set_ylim(*edges[1][[0, -1]])
     bar = _finish(ax, calibration, mesh, colorbar)
     if bar is not None and lines is not None:
         bar.add_lines(lines)
     return ax
 
 
-def axes_of(calibration: xr.Dataset, *, prefix: str) -> tuple[Array, Array]:
-    """Return the drag coefficients [1] and the forces [mN] of the coarse or refined map."""
-    drag = np.asarray(calibration[f"{prefix}drag_coefficient"].values, dtype=np.float64)
-    return drag, in_unit(calibration[f"{prefix}force_std"], "mN", stored="N")
+def edges_of(calibration: xr.Dataset, *, prefix: str) -> tuple[Array, Array]:
+    """Return the edges of the cells of the coarse or refined map, in the figure's units."""
+    across, up = (
+        _parameter_edges(one, one.values(calibration, prefix)) for one in plane_of(calibration)
+    )
+    return across, up
+
+
+def _parameter_edges(parameter: PlotParameter, center: Array) -> Array:
+    if parameter.stored.is_log:
+        return np.power(10.0, cell_edges(np.log10(center)))
+    return cell_edges(center)
 
 
 def cell_edges(center: Array) -> Array:
@@ -177,17 +181,14 @@ def cell_edges(center: Array) -> Array:
 
 
 def draw_optimum(ax: Axes, calibration: xr.Dataset, *, color: str = "white") -> None:
-    """Mark the estimate with bars of its intervals in a plane of C_d and σ_F [mN]."""
+    """Mark the estimate with bars of its intervals in the plane of the parameters."""
     from matplotlib.patheffects import Normal, Stroke
 
-    drag = float(required_attribute(calibration, "drag_coefficient"))
-    force = MN_PER_N * float(required_attribute(calibration, "force_std_N"))
-    bars = []
-    for best, name, factor in (
-        (drag, "drag_coefficient_interval", 1.0),
-        (force, "force_std_N_interval", MN_PER_N),
-    ):
-        ends = interval_of(calibration, name)
+    places, bars = [], []
+    for parameter in plane_of(calibration):
+        best, factor = parameter.best(calibration), parameter.factor
+        ends = interval_of(calibration, f"{parameter.key}_interval")
+        places.append([best])
         # An estimate may lie on the end of its interval: rounding must not make a bar negative.
         bars.append(
             None
@@ -196,8 +197,8 @@ def draw_optimum(ax: Axes, calibration: xr.Dataset, *, color: str = "white") -> 
         )
     outline = [Stroke(linewidth=2.2, foreground=INK if color == "white" else "white"), Normal()]
     ax.errorbar(
-        [drag], [force], xerr=bars[0], yerr=bars[1], fmt="o", ms=3.5, color=color, elinewidth=1.0,
-        capsize=0.0, zorder=6, label=OPTIMUM_LABEL, path_effects=outline,
+        places[0], places[1], xerr=bars[0], yerr=bars[1], fmt="o", ms=3.5, color=color,
+        elinewidth=1.0, capsize=0.0, zorder=6, label=OPTIMUM_LABEL, path_effects=outline,
     )  # fmt: skip
 
 
@@ -218,15 +219,11 @@ def _draw_region(ax: Axes, calibration: xr.Dataset) -> None:
 
 
 def region_of(calibration: xr.Dataset) -> Array | None:
-    """Return the vertices (C_d, σ_F [mN]) of the 90 % region, None when there is none."""
-    if "region_force_std" not in calibration or "region_drag_coefficient" not in calibration:
+    """Return the vertices of the 90 % region in the figure's units, None when there is none."""
+    plane = plane_of(calibration)
+    if any(f"region_{one.name}" not in calibration for one in plane):
         return None
-    vertices = np.column_stack(
-        [
-            calibration["region_drag_coefficient"].values,
-            in_unit(calibration["region_force_std"], "mN", stored="N"),
-        ]
-    )
+    vertices = np.column_stack([one.values(calibration, "region_") for one in plane])
     vertices = vertices[np.isfinite(vertices).all(axis=1)]
     return vertices if len(vertices) >= 3 else None
 
@@ -240,36 +237,39 @@ def _status(calibration: xr.Dataset, name: str, dims: tuple[str, str]) -> npt.ND
 
 
 def _score_mesh(
-    ax: Axes, drag: Array, force: Array, score: Array, *, bottom: float | None, top: float | None
+    ax: Axes,
+    edges: tuple[Array, Array],
+    score: Array,
+    *,
+    bottom: float | None,
+    top: float | None,
 ) -> QuadMesh:
     mesh = ax.pcolormesh(
-        cell_edges(drag), cell_edges(force), np.ma.masked_invalid(score),
-        cmap=SCORE_COLORMAP, vmin=bottom, vmax=top,
-    )  # fmt: skip
+        *edges, np.ma.masked_invalid(score), cmap=SCORE_COLORMAP, vmin=bottom, vmax=top
+    )
     mesh.set_rasterized(True)
     return mesh
 
 
 def _hatch_causes(
     ax: Axes,
-    drag: Array,
-    force: Array,
+    edges: tuple[Array, Array],
     status: npt.NDArray[np.int64],
     known: npt.NDArray[np.bool_],
 ) -> None:
     """Cover every cell that has a cause, or no distance, by a hatched rectangle."""
     from matplotlib.patches import Rectangle
 
-    drag_edge, force_edge = cell_edges(drag), cell_edges(force)
+    across, up = edges
     named: set[str] = set()
     for row, column in zip(*np.nonzero((status != 0) | ~known), strict=True):
         causes = [cause for bit, cause in CAUSES.items() if status[row, column] & bit]
         name, hatch = causes[0] if causes else UNKNOWN_CAUSE
         ax.add_patch(
             Rectangle(
-                (drag_edge[column], force_edge[row]),
-                drag_edge[column + 1] - drag_edge[column],
-                force_edge[row + 1] - force_edge[row],
+                (across[column], up[row]),
+                across[column + 1] - across[column],
+                up[row + 1] - up[row],
                 facecolor="white", edgecolor=INK, linewidth=0.0, hatch=hatch,
                 label="" if name in named else name, gid=name,
             )
@@ -279,8 +279,11 @@ def _hatch_causes(
 
 def _finish(ax: Axes, calibration: xr.Dataset, mesh: QuadMesh, colorbar: str) -> Colorbar | None:
     """Label the axes and add the colour bar with the line of the noise floor."""
-    ax.set_xlabel(DRAG_LABEL)
-    ax.set_ylabel(force_label(calibration))
+    across, up = plane_of(calibration)
+    ax.set_xlabel(across.label(calibration))
+    ax.set_ylabel(up.label(calibration))
+    across.scale(ax, "x")
+    up.scale(ax, "y")
     if colorbar == "none":
         return None
     floor = number_attribute(calibration, "noise_floor")

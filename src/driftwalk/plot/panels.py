@@ -7,16 +7,20 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import InputError
 from driftwalk.plot.distances import CAUSES
 from driftwalk.plot.parts.labels import (
     ANGLE_LABEL,
     FACTORS,
     LENGTH_LABEL,
-    MN_PER_N,
-    force_interval_text,
     require_variables,
     required_attribute,
+)
+from driftwalk.plot.parts.parameters import (
+    FORCE,
+    PlotParameter,
+    drawn_anew,
+    parameter_named,
+    plot_parameters,
 )
 from driftwalk.plot.parts.style import MUTED, add_colorbar, axes_row_or_new, letter_panels
 from driftwalk.plot.step_density import DENSITY_LABEL, density_mesh, density_of, filled_range
@@ -26,7 +30,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = npt.NDArray[np.float64]
-Parameter = Literal["drag_coefficient", "force_std"]
 # Where "low" and "high" lie, as multiples of the optimum, unless the caller says.
 LOW_FACTOR, HIGH_FACTOR = 0.25, 1.8
 
@@ -34,8 +37,8 @@ LOW_FACTOR, HIGH_FACTOR = 0.25, 1.8
 class Setting(NamedTuple):
     """One setting of the coarse map that a panel shows."""
 
-    drag_coefficient: float
-    force_std: float
+    values: dict[str, float]
+    """Its parameters by name, in the dataset's units."""
     density: Array
     status: int
 
@@ -44,14 +47,14 @@ def plot_density_panels(
     calibration: xr.Dataset,
     axes: Any = None,
     *,
-    parameter: Parameter = "drag_coefficient",
+    parameter: str | None = None,
     low: float | None = None,
     high: float | None = None,
     colorbar: Literal["beside", "none"] = "beside",
 ) -> list[Axes]:
     """Draw four densities: recording, low, best and high value of one parameter.
 
-    The other parameter stays at its optimum. Simulated panels show the settings of the coarse map
+    Other parameters stay at their optimum. Simulated panels show the settings of the coarse map
     nearest to the values asked for, and their titles name the values shown. All four share their
     axes and their colour scale.
 
@@ -61,10 +64,10 @@ def plot_density_panels(
         Result of `driftwalk.calibration.calibrate`.
     axes : sequence of 4 matplotlib.axes.Axes, optional
         Where to draw, in one row or two; a new figure with one row when left out.
-    parameter : {"drag_coefficient", "force_std"}
-        The parameter that differs between the panels.
+    parameter : str, optional
+        Name of the parameter that differs between the panels; default: the first.
     low, high : float, optional
-        Its low and high value [1, or N]; default: 0.25 and 1.8 times the optimum.
+        Its low and high value, in its SI unit; default: 0.25 and 1.8 times the optimum.
     colorbar : {"beside", "none"}
         Whether to add the common colour bar.
 
@@ -76,7 +79,7 @@ def plot_density_panels(
     Raises
     ------
     InputError
-        When the parameter is neither of the two, or the dataset lacks the densities.
+        When the calibration has no such parameter, or lacks the densities.
 
     Examples
     --------
@@ -84,7 +87,8 @@ def plot_density_panels(
     """
     from matplotlib.ticker import MaxNLocator
 
-    settings = choose_settings(calibration, parameter=parameter, low=low, high=high)
+    along = parameter_named(calibration, parameter)
+    settings = choose_settings(calibration, parameter=along.name, low=low, high=high)
     recorded = np.nan_to_num(calibration["recording_step_density"].values.astype(np.float64))
     length_mm = FACTORS["m", "mm"] * calibration["step_length_edge"].values
     angle_deg = FACTORS["rad", "°"] * calibration["turning_angle_edge"].values
@@ -104,7 +108,9 @@ def plot_density_panels(
         ax.label_outer()
     for ax, setting in zip(row[1:], settings, strict=True):
         _mark_cause(ax, setting)
-    letter_panels(row, ["recording", *(_title(setting, parameter) for setting in settings)])
+    letter_panels(
+        row, ["recording", *(along.title(setting.values[along.name]) for setting in settings)]
+    )
     if colorbar == "beside":
         add_colorbar(mesh, row, DENSITY_LABEL)
     return row
@@ -113,53 +119,54 @@ def plot_density_panels(
 def choose_settings(
     calibration: xr.Dataset,
     *,
-    parameter: Parameter,
+    parameter: str,
     low: float | None = None,
     high: float | None = None,
 ) -> list[Setting]:
     """Return the low, best and high setting of the coarse map nearest to the values wanted."""
     require_variables(
         calibration, "step_density", "recording_step_density", "step_length_edge",
-        "turning_angle_edge", "drag_coefficient", "force_std",
+        "turning_angle_edge", *(one.name for one in plot_parameters(calibration)),
     )  # fmt: skip
+    along = parameter_named(calibration, parameter)
     best = {
-        "drag_coefficient": float(required_attribute(calibration, "drag_coefficient")),
-        "force_std": float(required_attribute(calibration, "force_std_N")),
+        one.name: float(required_attribute(calibration, one.key))
+        for one in plot_parameters(calibration)
     }
-    if parameter not in best:
-        raise InputError(f"parameter='{parameter}': choose one of {', '.join(best)}")
     wanted = (
-        LOW_FACTOR * best[parameter] if low is None else low,
-        best[parameter],
-        HIGH_FACTOR * best[parameter] if high is None else high,
+        LOW_FACTOR * best[along.name] if low is None else low,
+        best[along.name],
+        HIGH_FACTOR * best[along.name] if high is None else high,
     )
-    return [_nearest(calibration, {**best, parameter: value}) for value in wanted]
+    return [_nearest(calibration, {**best, along.name: value}) for value in wanted]
 
 
 def _nearest(calibration: xr.Dataset, values: dict[str, float]) -> Setting:
     cell = calibration.sel(values, method="nearest")
     density = cell["step_density"].transpose("density_step_length", "density_turning_angle")
     return Setting(
-        drag_coefficient=float(cell["drag_coefficient"]),
-        force_std=float(cell["force_std"]),
+        values={name: float(cell[name]) for name in values},
         density=np.nan_to_num(density.values.astype(np.float64)),
         status=int(cell["status"]) if "status" in cell else 0,
     )
 
 
-def _title(setting: Setting, parameter: Parameter) -> str:
-    if parameter == "drag_coefficient":
-        return rf"$C_d$ = {setting.drag_coefficient:.3g}"
-    return rf"$\sigma_F$ = {MN_PER_N * setting.force_std:.3g} mN"
+def shared_setting_text(calibration: xr.Dataset, *, parameter: str) -> str:
+    """Return what stays the same in the simulated panels: "σ_F = 0.55 mN, new every 16 ms".
+
+    Empty for a model of one parameter.
+    """
+    along = parameter_named(calibration, parameter)
+    setting = choose_settings(calibration, parameter=along.name)[1]
+    others = [one for one in plot_parameters(calibration) if one.name != along.name]
+    words = [_with_interval(one, calibration, setting.values[one.name]) for one in others]
+    if along == FORCE:
+        words.append(f"{FORCE.symbol} {drawn_anew(calibration)}")
+    return "; ".join(words)
 
 
-def shared_setting_text(calibration: xr.Dataset, *, parameter: Parameter) -> str:
-    """Return what stays the same in the simulated panels: "σ_F = 0.55 mN, new every 16 ms"."""
-    setting = choose_settings(calibration, parameter=parameter)[1]
-    interval = force_interval_text(calibration)
-    if parameter == "drag_coefficient":
-        return rf"{_title(setting, 'force_std')} ({interval})"
-    return rf"{_title(setting, 'drag_coefficient')}; $\sigma_F$ {interval}"
+def _with_interval(one: PlotParameter, calibration: xr.Dataset, value: float) -> str:
+    return f"{one.words(value)} ({drawn_anew(calibration)})" if one == FORCE else one.words(value)
 
 
 def _common_limits(

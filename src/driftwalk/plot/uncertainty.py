@@ -7,18 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import InputError
 from driftwalk.plot.distances import REGION_LABEL, draw_optimum, region_of
-from driftwalk.plot.panels import Parameter
-from driftwalk.plot.parts.labels import (
-    DRAG_LABEL,
-    MN_PER_N,
-    force_label,
-    in_unit,
-    interval_of,
-    number_attribute,
-    require_variables,
-    required_attribute,
+from driftwalk.plot.parts.labels import interval_of, number_attribute, require_variables
+from driftwalk.plot.parts.parameters import (
+    PlotParameter,
+    parameter_named,
+    plane_of,
+    plot_parameters,
 )
 from driftwalk.plot.parts.style import BLUE, INK, MUTED, ORANGE, PALE, axes_or_new, axes_row_or_new
 
@@ -27,27 +22,24 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = npt.NDArray[np.float64]
-# parameter -> attribute of its estimate, factor to the unit of the figure
-ESTIMATES: dict[str, tuple[str, float]] = {
-    "drag_coefficient": ("drag_coefficient", 1.0),
-    "force_std": ("force_std_N", MN_PER_N),
-}
+ESTIMATES_LABEL = "bootstrap estimates"
 
 
 def plot_validation(calibration: xr.Dataset, axes: Any = None) -> list[Axes]:
-    """Draw the distance along either parameter, and the bootstrap estimates, in three panels.
+    """Draw the distance along every parameter, and the bootstrap estimates, a panel each.
 
     Parameters
     ----------
     calibration : xarray.Dataset
-        Result of `driftwalk.calibration.calibrate`.
-    axes : sequence of 3 matplotlib.axes.Axes, optional
-        Where to draw; a new figure with one row when left out.
+        What `driftwalk.calibration.calibrate` returns.
+    axes : sequence of matplotlib.axes.Axes, optional
+        Where to draw, one for every parameter and one more; a new figure with one row when left
+        out.
 
     Returns
     -------
     list of matplotlib.axes.Axes
-        The three axes.
+        The axes: three for the block.
 
     Raises
     ------
@@ -58,21 +50,23 @@ def plot_validation(calibration: xr.Dataset, axes: Any = None) -> list[Axes]:
     --------
     ``plot_validation(calibration)[0].figure.savefig("validation.png")``
     """
-    row = axes_row_or_new(axes, count=3)
-    plot_distance_profile(calibration, row[0], parameter="drag_coefficient")
-    plot_distance_profile(calibration, row[1], parameter="force_std")
-    plot_bootstrap(calibration, row[2])
+    parameters = plot_parameters(calibration)
+    row = axes_row_or_new(axes, count=len(parameters) + 1)
+    for parameter, ax in zip(parameters, row, strict=False):
+        plot_distance_profile(calibration, ax, parameter=parameter.name)
+    plot_bootstrap(calibration, row[-1])
     return row
 
 
 def plot_distance_profile(
-    calibration: xr.Dataset, ax: Axes | None = None, *, parameter: Parameter = "drag_coefficient"
+    calibration: xr.Dataset, ax: Axes | None = None, *, parameter: str | None = None
 ) -> Axes:
-    """Draw the KS distance along one parameter, the other at the grid value next to its optimum.
+    """Draw the KS distance along one parameter, the others at the grid value next to the optimum.
 
     Dots are the replicates, the line joins their means with one standard error either way. The
     diamond is the distance at the optimum, the dashed line the noise floor: the distance between
-    two runs of the same model. The shaded band is the interval of the parameter.
+    two runs of one and the same model. The shaded band is the interval of the parameter. With a
+    single parameter the curve fitted to the refined map is there too.
 
     Parameters
     ----------
@@ -80,8 +74,8 @@ def plot_distance_profile(
         Result of `driftwalk.calibration.calibrate`.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure when left out.
-    parameter : {"drag_coefficient", "force_std"}
-        The parameter along the axis.
+    parameter : str, optional
+        Name of the parameter along the axis; default: the first.
 
     Returns
     -------
@@ -91,7 +85,7 @@ def plot_distance_profile(
     Raises
     ------
     InputError
-        When the parameter is neither of the two, or the dataset lacks the map.
+        When the calibration has no such parameter, or lacks the map.
 
     Examples
     --------
@@ -99,18 +93,16 @@ def plot_distance_profile(
     """
     from matplotlib.ticker import LogLocator, NullLocator
 
-    if parameter not in ESTIMATES:
-        raise InputError(f"parameter='{parameter}': choose one of {', '.join(ESTIMATES)}")
-    require_variables(calibration, "ks_distance", "ks_distance_replicate", parameter)
-    attribute, factor = ESTIMATES[parameter]
-    best = factor * float(required_attribute(calibration, attribute))
-    line = _through_optimum(calibration, parameter)
-    values = factor * np.asarray(line[parameter].values, dtype=np.float64)
+    along = parameter_named(calibration, parameter)
+    require_variables(calibration, "ks_distance", "ks_distance_replicate", along.name)
+    best, factor = along.best(calibration), along.factor
+    line = _through_optimum(calibration, along)
+    values = factor * np.asarray(line[along.name].values, dtype=np.float64)
     ax = axes_or_new(ax)
-    interval = interval_of(calibration, f"{attribute}_interval")
+    interval = interval_of(calibration, f"{along.key}_interval")
     if interval is not None:
         ax.axvspan(factor * interval[0], factor * interval[1], color=PALE, lw=0, label="interval")
-    replicates = line["ks_distance_replicate"].transpose(parameter, ...).values
+    replicates = line["ks_distance_replicate"].transpose(along.name, ...).values
     ax.plot(
         np.repeat(values, replicates.shape[1]), replicates.ravel(), "o", ms=2.2, mew=0.0,
         color=MUTED, alpha=0.6, label="replicates",
@@ -120,6 +112,10 @@ def plot_distance_profile(
         values, line["ks_distance"].values, yerr=None if error is None else error.values,
         color=BLUE, lw=1.0, elinewidth=0.8, label="mean ± standard error",
     )  # fmt: skip
+    if len(plot_parameters(calibration)) == 1 and "refined_surface" in calibration:
+        fine = along.values(calibration, "refined_")
+        fitted = calibration["refined_surface"].values
+        ax.plot(fine, fitted, color=ORANGE, lw=1.0, label="fitted curve", zorder=5)
     floor = number_attribute(calibration, "noise_floor")
     if np.isfinite(floor):
         ax.axhline(floor, color=INK, lw=0.8, dashes=(4, 2.5), label="noise floor")
@@ -134,14 +130,18 @@ def plot_distance_profile(
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     ax.yaxis.set_major_formatter("{x:g}")
     ax.yaxis.set_minor_locator(NullLocator())
-    ax.set_xlabel(DRAG_LABEL if parameter == "drag_coefficient" else force_label(calibration))
+    along.scale(ax, "x")
+    ax.set_xlabel(along.label(calibration))
     ax.set_ylabel("KS distance D")
     ax.spines[["top", "right"]].set_visible(False)
     return ax
 
 
 def plot_bootstrap(calibration: xr.Dataset, ax: Axes | None = None) -> Axes:
-    """Draw the bootstrap estimates in the plane of the parameters, with optimum and 90 % region.
+    """Draw the bootstrap estimates: in the plane of two parameters, as a histogram of one.
+
+    The plane has the optimum and the 90 % region as well, the histogram the optimum and its
+    interval.
 
     Parameters
     ----------
@@ -164,13 +164,25 @@ def plot_bootstrap(calibration: xr.Dataset, ax: Axes | None = None) -> Axes:
     --------
     ``plot_bootstrap(calibration).figure.savefig("bootstrap.png")``
     """
+    parameters = plot_parameters(calibration)
+    require_variables(calibration, *(f"bootstrap_{one.name}" for one in parameters))
+    ax = axes_or_new(ax)
+    if len(parameters) == 1:
+        _histogram(calibration, ax, parameters[0])
+    else:
+        _cloud(calibration, ax)
+    ax.spines[["top", "right"]].set_visible(False)
+    return ax
+
+
+def _cloud(calibration: xr.Dataset, ax: Axes) -> None:
     from matplotlib.patches import Polygon
 
-    require_variables(calibration, "bootstrap_drag_coefficient", "bootstrap_force_std")
-    ax = axes_or_new(ax)
-    drag = np.asarray(calibration["bootstrap_drag_coefficient"].values, dtype=np.float64)
-    force = in_unit(calibration["bootstrap_force_std"], "mN", stored="N")
-    ax.plot(drag, force, "o", ms=2.6, mew=0.0, color=BLUE, alpha=0.45, label="bootstrap estimates")
+    across, up = plane_of(calibration)
+    ax.plot(
+        across.values(calibration, "bootstrap_"), up.values(calibration, "bootstrap_"), "o",
+        ms=2.6, mew=0.0, color=BLUE, alpha=0.45, label=ESTIMATES_LABEL,
+    )  # fmt: skip
     region = region_of(calibration)
     if region is not None:
         ax.add_patch(
@@ -180,20 +192,37 @@ def plot_bootstrap(calibration: xr.Dataset, ax: Axes | None = None) -> Axes:
         )
     draw_optimum(ax, calibration, color=ORANGE)
     ax.autoscale_view()
-    ax.set_xlabel(DRAG_LABEL)
-    ax.set_ylabel(force_label(calibration))
-    ax.spines[["top", "right"]].set_visible(False)
-    return ax
+    across.scale(ax, "x")
+    up.scale(ax, "y")
+    ax.set_xlabel(across.label(calibration))
+    ax.set_ylabel(up.label(calibration))
 
 
-def _through_optimum(calibration: xr.Dataset, parameter: Parameter) -> xr.Dataset:
-    """Return the row of the coarse map next to the optimum in the other parameter."""
-    other = next(name for name in ESTIMATES if name != parameter)
-    best = float(required_attribute(calibration, ESTIMATES[other][0]))
+def _histogram(calibration: xr.Dataset, ax: Axes, parameter: PlotParameter) -> None:
+    values = parameter.values(calibration, "bootstrap_")
+    ends = interval_of(calibration, f"{parameter.key}_interval")
+    if ends is not None:
+        low, high = (parameter.factor * end for end in ends)
+        ax.axvspan(low, high, color=PALE, lw=0, label="interval")
+    is_log = parameter.stored.is_log
+    # Counted on the scale of the axis: an edge that was raised to a power may leave its value out.
+    counts, bins = np.histogram(np.log10(values) if is_log else values, "auto")
+    edges = np.power(10.0, bins) if is_log else bins
+    ax.stairs(counts, edges, fill=True, color=BLUE, alpha=0.6, label=ESTIMATES_LABEL)
+    ax.axvline(parameter.best(calibration), color=ORANGE, lw=1.4, label="optimum")
+    parameter.scale(ax, "x")
+    ax.set_xlabel(parameter.label(calibration))
+    ax.set_ylabel("recordings")
+
+
+def _through_optimum(calibration: xr.Dataset, along: PlotParameter) -> xr.Dataset:
+    """Return the line of the coarse map next to the optimum in the other parameters."""
+    others = [one for one in plot_parameters(calibration) if one.name != along.name]
+    best = {one.name: one.best(calibration) / one.factor for one in others}
     wanted = [
         name
         for name in ("ks_distance", "ks_distance_standard_error", "ks_distance_replicate")
         if name in calibration
     ]
-    line: xr.Dataset = calibration[wanted].sel({other: best}, method="nearest")
+    line: xr.Dataset = calibration[wanted].sel(best, method="nearest")
     return line

@@ -1,0 +1,78 @@
+"""Which parameters a stored calibration is about: their names, units and scales.
+
+They are the dimensions of its map. What a coordinate says of itself is believed; a calibration of
+the block that says nothing, of an early version, has the block's units.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from driftwalk.schema.parameters import unit_suffix
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+BLOCK: Final = ("drag_coefficient", "force_std")
+"""The parameters of the block in their order."""
+_UNITS: Final = {"force_std": "N"}
+
+
+class StoredParameter(NamedTuple):
+    """A parameter of a stored calibration."""
+
+    name: str
+    unit: str
+    label: str
+    scale: str
+    """"linear" or "log"."""
+
+    @property
+    def key(self) -> str:
+        """Attribute of its estimate: its name with the unit."""
+        suffix = unit_suffix(self.unit)
+        return f"{self.name}_{suffix}" if suffix else self.name
+
+    @property
+    def is_log(self) -> bool:
+        """Whether equal steps along it are equal ratios."""
+        return self.scale == "log"
+
+
+def stored_parameters(calibration: xr.Dataset) -> tuple[StoredParameter, ...]:
+    """Return the parameters of a calibration, in the order of its dimensions.
+
+    Parameters
+    ----------
+    calibration : xarray.Dataset
+        A `calibration`; one without a map is taken for the block's.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> speed = ("speed", [0.1, 0.2], {"units": "m/s", "long_name": "speed"})
+    >>> found = xr.Dataset({"ks_distance": ("speed", [0.3, 0.2])}, {"speed": speed})
+    >>> [one.key for one in stored_parameters(found)]
+    ['speed_m_s']
+    """
+    names: tuple[str, ...] = BLOCK
+    if "ks_distance" in calibration.variables:
+        dims = tuple(str(dim) for dim in calibration["ks_distance"].dims)
+        # The order of the block's dimensions is known, however they were turned.
+        names = dims if dims and set(dims) != set(BLOCK) else BLOCK
+    return tuple(_parameter(calibration, name) for name in names)
+
+
+def is_block(calibration: xr.Dataset) -> bool:
+    """Return whether a calibration is about the block in a stirred tank."""
+    return tuple(one.name for one in stored_parameters(calibration)) == BLOCK
+
+
+def _parameter(calibration: xr.Dataset, name: str) -> StoredParameter:
+    facts = calibration.variables[name].attrs if name in calibration.variables else {}
+    return StoredParameter(
+        name,
+        str(facts.get("units", _UNITS.get(name, "1"))),
+        str(facts.get("long_name", name.replace("_", " "))),
+        str(facts.get("scale", "linear")),
+    )
