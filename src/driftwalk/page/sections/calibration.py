@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.page.chart import chart, label, mark, series
+from driftwalk.page.parameters import FORCE, PageParameter, page_parameters
 from driftwalk.page.parts import (
     SIMULATED,
     Section,
@@ -24,7 +25,7 @@ from driftwalk.page.parts import (
     value_of,
 )
 from driftwalk.page.sections.flow import flow_sections
-from driftwalk.page.sections.map import PLANE, drag_axis, force_axis, map_section, region_part
+from driftwalk.page.sections.map import map_section, region_part
 from driftwalk.page.sections.recording import Noise, recording_sections
 from driftwalk.page.words import count, quantity, with_interval
 from driftwalk.plot.parts.labels import interval_of
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
 
 FAR: Final = 2.0
 """From this ratio of distance to floor on a fit is far off, where the dataset does not say."""
-_ATTRIBUTE: Final = {"drag_coefficient": "drag_coefficient", "force_std": "force_std_N"}
 
 
 def calibration_sections(
@@ -81,7 +81,8 @@ def calibration_sections(
         made += flow_sections(flow)
     if calibration is not None:
         one = _one_body(recording, body)
-        made += attempt("map", "The map", lambda: map_section(calibration, one))
+        if len(page_parameters(calibration)) != 1:
+            made += attempt("map", "The map", lambda: map_section(calibration, one))
         made += attempt("profiles", "Along the optimum", lambda: profile_sections(calibration))
         made += attempt("bootstrap", "The bootstrap", lambda: bootstrap_section(calibration))
         made += attempt("validation", "Validation", lambda: validation_section(calibration))
@@ -92,16 +93,10 @@ def calibration_summary(calibration: xr.Dataset) -> Section:
     """Return the answer of a calibration in words and numbers."""
     require(calibration, "ks_distance")
     facts = calibration.attrs
-    every = quantity(required(calibration, "force_interval_s"), "s")
     paragraphs = [SIMULATED] if is_simulated(calibration) else []
     paragraphs += [_what_was_done(calibration), _what_was_found(calibration)]
     shown = [
-        estimate(calibration, "drag_coefficient", label="drag coefficient", symbol="C_d", unit="1"),
-        estimate(
-            calibration, "force_std_N", label="stochastic force", symbol="σ_F", unit="N",
-            note=f"redrawn every {every}",
-        ),
-        figure("noise intensity", facts.get("force_noise_intensity_N2_s"), "N²·s", symbol="σ_F²·τ"),
+        *_estimates(calibration),
         figure("KS distance at the optimum", facts.get("ks_distance"), symbol="D"),
         figure(
             "noise floor", facts.get("noise_floor"),
@@ -112,34 +107,77 @@ def calibration_summary(calibration: xr.Dataset) -> Section:
     return section("summary", "summary", "Method and results", paragraphs=paragraphs, numbers=shown)
 
 
+def _estimates(calibration: xr.Dataset) -> list[dict[str, Any]]:
+    """Return the estimates; of the block the noise intensity as well."""
+    shown, intensity = [], []
+    for one in page_parameters(calibration):
+        note = None
+        if one == FORCE:
+            note = f"drawn anew every {quantity(required(calibration, 'force_interval_s'), 's')}"
+            found = calibration.attrs.get("force_noise_intensity_N2_s")
+            intensity = [figure("noise intensity", found, "N²·s", symbol="σ_F²·τ")]
+        shown.append(
+            estimate(
+                calibration, one.key, label=one.label, symbol=one.symbol, unit=one.unit, note=note
+            )
+        )
+    return [*shown, *intensity]
+
+
 def profile_sections(calibration: xr.Dataset) -> list[Section]:
-    """Return the KS distance along either parameter, the other next to its optimum."""
-    require(calibration, "ks_distance", *PLANE)
-    return [_profile(calibration, along) for along in PLANE]
+    """Return the KS distance along every parameter, the others next to the optimum."""
+    parameters = page_parameters(calibration)
+    require(calibration, "ks_distance", *(one.name for one in parameters))
+    return [_profile(calibration, along) for along in parameters]
 
 
 def bootstrap_section(calibration: xr.Dataset) -> Section:
     """Return the estimates from simulated recordings, with the joint region."""
-    names = ("bootstrap_force_std", "bootstrap_drag_coefficient")
-    title = "Uncertainty of the parameters"
-    if any(name not in calibration for name in names):
+    parameters = page_parameters(calibration)
+    title = "How well the parameters are known"
+    if any(f"bootstrap_{one.name}" not in calibration for one in parameters):
         reason = "The calibration was made without a bootstrap: no interval, no region."
         return empty_section("bootstrap", title, reason)
-    x, y = (calibration[name].values for name in names)
+    estimates = [calibration[f"bootstrap_{one.name}"].values for one in parameters]
+    note = (
+        f"{count(int(estimates[0].size), 'recording')} simulated at the optimum, each calibrated "
+        "like the real one."
+    )
+    if len(parameters) == 1:
+        return _shares(calibration, parameters[0], title, note)
+    y, x = estimates
     drawn = [series("estimates from simulated recordings", x, y, style="points")]
     region = region_part(calibration)
     if region is not None:
         drawn.append(series("joint region", *([*region[n], region[n][0]] for n in "xy")))
-    best = [value_of(calibration, name) for name in ("force_std_N", "drag_coefficient")]
+    up, across = parameters
+    best = [value_of(calibration, one.key) for one in (across, up)]
     return chart(
         "bootstrap",
         title,
-        f"{count(int(x.size), 'recording')} simulated at the optimum, each calibrated like the "
-        "real one.",
-        x=force_axis(calibration),
-        y=drag_axis(calibration),
+        note,
+        x=across.axis(calibration),
+        y=up.axis(calibration),
         series=drawn,
         marks=[mark("estimate", *best)],
+    )
+
+
+def _shares(calibration: xr.Dataset, one: PageParameter, title: str, note: str) -> Section:
+    """Return the distribution of the estimates of a single parameter."""
+    values = np.sort(calibration[f"bootstrap_{one.name}"].values)
+    share = np.arange(1, values.size + 1) / values.size
+    marks = [mark("estimate", value_of(calibration, one.key))]
+    for end in interval_of(calibration, f"{one.key}_interval") or ():
+        marks.append(mark("end of the interval", end))
+    return chart(
+        "bootstrap",
+        title,
+        note,
+        x=one.axis(calibration),
+        y=label("share of the estimates up to here"),
+        series=[series("estimates from simulated recordings", values, share)],
+        marks=marks,
     )
 
 
@@ -148,19 +186,25 @@ def validation_section(calibration: xr.Dataset) -> Section:
     title = "Fitted on the first half, tested on the second"
     if "second_half_ks_distance" not in calibration.attrs:
         return empty_section("validation", title, "The recording was not split into halves.")
-    keys = (
-        ("C_d, whole recording", "drag_coefficient", 1.0),
-        ("C_d, first half", "first_half_drag_coefficient", 1.0),
-        ("σ_F [mN], whole recording", "force_std_N", 1e3),
-        ("σ_F [mN], first half", "first_half_force_std_N", 1e3),
+    keys = [
+        (f"{_with_unit(one)}, {part}", f"{prefix}{one.key}", 1e3 if one == FORCE else 1.0)
+        for one in page_parameters(calibration)
+        for part, prefix in (("whole recording", ""), ("first half", "first_half_"))
+    ]
+    keys += [
         ("KS distance to the second half", "second_half_ks_distance", 1.0),
         ("noise floor there", "second_half_noise_floor", 1.0),
-    )
+    ]
     rows = [
         [label, None if (value := value_of(calibration, key)) is None else scale * value]
         for label, key, scale in keys
     ]
     return section("validation", "table", title, columns=["", "value"], rows=rows)
+
+
+def _with_unit(one: PageParameter) -> str:
+    unit = "mN" if one == FORCE else one.unit
+    return one.short_symbol if unit == "1" else f"{one.short_symbol} [{unit}]"
 
 
 def _what_was_done(calibration: xr.Dataset) -> str:
@@ -172,7 +216,8 @@ def _what_was_done(calibration: xr.Dataset) -> str:
         each = "" if step is None else f" of {quantity(step, 's')}"
         words += f" ({quantity(duration, 's')}, {count(int(pairs), 'pair')} of steps{each})"
     settings = calibration["ks_distance"].size
-    words += f" with simulations of {settings} settings of drag and stochastic force"
+    searched = " and ".join(one.short for one in page_parameters(calibration))
+    words += f" with simulations of {settings} settings of {searched}"
     if "replicate" in calibration.sizes:
         words += f", {count(calibration.sizes['replicate'], 'run')} each"
     if "refined_ks_distance" in calibration:
@@ -183,15 +228,20 @@ def _what_was_done(calibration: xr.Dataset) -> str:
 
 def _what_was_found(calibration: xr.Dataset) -> str:
     confidence = value_of(calibration, "confidence")
-    drag, force = (
+    parameters = page_parameters(calibration)
+    found = [
         with_interval(
-            required(calibration, name),
-            interval_of(calibration, f"{name}_interval"),
-            unit,
+            required(calibration, one.key),
+            interval_of(calibration, f"{one.key}_interval"),
+            one.unit,
             confidence,
         )
-        for name, unit in (("drag_coefficient", "1"), ("force_std_N", "N"))
-    )
+        for one in parameters
+    ]
+    if FORCE not in parameters:
+        words = [f"{one.label} = {value}" for one, value in zip(parameters, found, strict=True)]
+        return f"The best agreement is at {' and '.join(words)}."
+    drag, force = found
     every = quantity(required(calibration, "force_interval_s"), "s")
     intensity = quantity(required(calibration, "force_noise_intensity_N2_s"), "N² s")
     return (
@@ -230,31 +280,33 @@ def _how_good(calibration: xr.Dataset) -> list[str]:
     ]
 
 
-def _profile(calibration: xr.Dataset, along: str) -> Section:
-    other = next(name for name in PLANE if name != along)
-    best = float(required(calibration, _ATTRIBUTE[other]))
-    nearest = int(np.argmin(np.abs(calibration[other].values - best)))
-    line = calibration.isel({other: nearest})
+def _profile(calibration: xr.Dataset, along: PageParameter) -> Section:
+    others = [one for one in page_parameters(calibration) if one.name != along.name]
+    line, fixed = calibration, []
+    for other in others:
+        best = float(required(calibration, other.key))
+        nearest = int(np.argmin(np.abs(calibration[other.name].values - best)))
+        line = line.isel({other.name: nearest})
+        at = quantity(float(line[other.name]), other.unit)
+        fixed.append(f"{other.short_symbol} = {at}")
     marks = [
-        mark(
-            "optimum",
-            value_of(calibration, _ATTRIBUTE[along]),
-            value_of(calibration, "ks_distance"),
-        )
+        mark("optimum", value_of(calibration, along.key), value_of(calibration, "ks_distance"))
     ]
     floor = value_of(calibration, "noise_floor")
     if floor is not None:
         marks.append(mark("noise floor", y=floor))
-    drag = along == "drag_coefficient"
-    at = float(line[other])
-    fixed = f"σ_F = {quantity(at, 'N')}" if drag else f"C_d = {quantity(at)}"
+    where = "At " + ", ".join(fixed) + ", the setting of the map next to the optimum."
+    drawn = _profile_series(line, along.name)
+    if not others and "refined_surface" in calibration:
+        fine = calibration["refined_surface"]
+        drawn.append(series("fitted curve", calibration[f"refined_{along.name}"].values, fine))
     return chart(
-        f"profile-{along.replace('_', '-')}",
-        f"Distance along the {'drag coefficient' if drag else 'stochastic force'}",
-        f"At {fixed}, the setting of the map next to the optimum.",
-        x=drag_axis(calibration) if drag else force_axis(calibration),
+        f"profile-{along.name.replace('_', '-')}",
+        f"Distance along the {along.label}",
+        where if fixed else "Every setting that was simulated.",
+        x=along.axis(calibration),
         y=label("KS distance D", log=True),
-        series=_profile_series(line, along),
+        series=drawn,
         marks=marks,
     )
 

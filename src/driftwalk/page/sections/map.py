@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.errors import InputError
 from driftwalk.page.arrays import encode_array, nice_step, numbers, plain_list
-from driftwalk.page.parts import Section, arena_part, axis, require, section, value_of
+from driftwalk.page.parameters import PageParameter, page_parameters
+from driftwalk.page.parts import Section, arena_part, require, section, value_of
 from driftwalk.page.words import percent, quantity
 from driftwalk.plot.distances import CAUSES, UNKNOWN_CAUSE
-from driftwalk.plot.parts.labels import force_interval_text
 from driftwalk.schema import body_track
 
 if TYPE_CHECKING:
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-PLANE: Final = ("drag_coefficient", "force_std")
-"""Rows and columns of every map of a calibration."""
 NOT_COMPUTED: Final = 8
 """Status of a setting without a distance and without a cause."""
 EXCERPT_PARTS: Final = 5000
@@ -43,25 +42,27 @@ def map_section(calibration: xr.Dataset, recording: xr.Dataset | None = None) ->
     Returns
     -------
     dict
-        A section of kind "map": x is the stochastic force, y the drag coefficient.
+        A section of kind "map": y is the first parameter, x the second; of the block the drag
+        coefficient and the stochastic force.
 
     Raises
     ------
     InputError
-        When the dataset holds no map.
+        When the dataset holds no map of two parameters.
 
     Examples
     --------
     ``map_section(calibration, recording)["value"]``
     """
-    require(calibration, "ks_distance", *PLANE)
+    up, across = plane_of(calibration)
+    require(calibration, "ks_distance", up.name, across.name)
     distance = _plane(calibration, "ks_distance")
     status, causes = _status(calibration, distance)
     cells = _cells(calibration)
     return section(
-        "map", "map", "Agreement of each setting with the recording", _note(calibration, cells),
-        x=force_axis(calibration),
-        y=drag_axis(calibration),
+        "map", "map", "How well each setting explains the recording", _note(calibration, cells),
+        x=across.axis(calibration),
+        y=up.axis(calibration),
         value=encode_array(distance, dtype="f8"),
         standard_error=encode_array(_plane(calibration, "ks_distance_standard_error"))
         if "ks_distance_standard_error" in calibration
@@ -80,22 +81,24 @@ def map_section(calibration: xr.Dataset, recording: xr.Dataset | None = None) ->
     )  # fmt: skip
 
 
-def force_axis(dataset: xr.Dataset, name: str = "force_std") -> dict[str, Any]:
-    """Return the axis of the stochastic force, which means nothing without its interval."""
-    every = ""
-    if "force_interval_s" in dataset.attrs:
-        every = f", {force_interval_text(dataset)}"
-    return axis("force_std", f"stochastic force σ_F{every}", "N", dataset[name].values)
+def plane_of(calibration: xr.Dataset) -> tuple[PageParameter, PageParameter]:
+    """Return the parameters along the rows and the columns of every map of a calibration.
 
-
-def drag_axis(dataset: xr.Dataset, name: str = "drag_coefficient") -> dict[str, Any]:
-    """Return the axis of the drag coefficient."""
-    return axis("drag_coefficient", "drag coefficient C_d", "1", dataset[name].values)
+    Raises
+    ------
+    InputError
+        When it has not two.
+    """
+    found = page_parameters(calibration)
+    if len(found) != 2:
+        raise InputError(f"a map shows two parameters, and the calibration has {len(found)}")
+    return found[0], found[1]
 
 
 def region_part(calibration: xr.Dataset) -> dict[str, Any] | None:
     """Return the border of the joint region, None when there is none."""
-    names = ("region_force_std", "region_drag_coefficient")
+    up, across = plane_of(calibration)
+    names = (f"region_{across.name}", f"region_{up.name}")
     if not _has(calibration, *names):
         return None
     x, y = (calibration[name].values for name in names)
@@ -114,7 +117,7 @@ def _has(calibration: xr.Dataset, *names: str) -> bool:
 
 
 def _plane(calibration: xr.Dataset, name: str, prefix: str = "") -> Floats:
-    rows = [f"{prefix}{dim}" for dim in PLANE]
+    rows = [f"{prefix}{one.name}" for one in plane_of(calibration)]
     return np.asarray(calibration[name].transpose(*rows, ...).values, dtype=np.float64)
 
 
@@ -142,24 +145,26 @@ def _lowest(
     if not np.isfinite(sound).any():
         return None
     row, column = np.unravel_index(int(np.nanargmin(sound)), sound.shape)
+    up, across = plane_of(calibration)
     return {
-        "x": float(calibration["force_std"].values[column]),
-        "y": float(calibration["drag_coefficient"].values[row]),
+        "x": float(calibration[across.name].values[column]),
+        "y": float(calibration[up.name].values[row]),
         "value": float(sound[row, column]),
     }
 
 
 def _found(calibration: xr.Dataset) -> dict[str, Any] | None:
-    x, y = (value_of(calibration, name) for name in ("force_std_N", "drag_coefficient"))
+    y, x = (value_of(calibration, one.key) for one in plane_of(calibration))
     return None if x is None or y is None else {"x": x, "y": y}
 
 
 def _refined(calibration: xr.Dataset) -> dict[str, Any] | None:
-    if not _has(calibration, "refined_ks_distance", *(f"refined_{name}" for name in PLANE)):
+    up, across = (f"refined_{one.name}" for one in plane_of(calibration))
+    if not _has(calibration, "refined_ks_distance", up, across):
         return None
     return {
-        "x": plain_list(calibration["refined_force_std"].values),
-        "y": plain_list(calibration["refined_drag_coefficient"].values),
+        "x": plain_list(calibration[across].values),
+        "y": plain_list(calibration[up].values),
         "value": encode_array(_plane(calibration, "refined_ks_distance", "refined_")),
     }
 
