@@ -4,7 +4,11 @@ from driftwalk.page.arrays import decode_array, encode_array
 from driftwalk.page.html import report_html, write_report
 from driftwalk.page.run_page import dataset_page, joined_page, recording_page, report_page
 from driftwalk.page.sections.assembly import assembly_sections
-from driftwalk.page.sections.calibration import calibration_sections
+from driftwalk.page.sections.calibration import (
+    bootstrap_section,
+    calibration_sections,
+    profile_sections,
+)
 from driftwalk.page.sections.fit import fit_sections
 from driftwalk.page.sections.flow import flow_section
 from driftwalk.page.sections.manifest import manifest_section
@@ -15,6 +19,7 @@ from driftwalk.page.sections.sensitivity import sensitivity_sections
 
 __all__ = [
     "assembly_sections",
+    "bootstrap_section",
     "calibration_sections",
     "dataset_page",
     "decode_array",
@@ -24,6 +29,7 @@ __all__ = [
     "joined_page",
     "manifest_section",
     "map_section",
+    "profile_sections",
     "recording_page",
     "recovery_sections",
     "report_html",

@@ -10,7 +10,7 @@ from __future__ import annotations
 import keyword
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
@@ -123,9 +123,8 @@ class Parameter:
         return np.power(10.0, coordinates) if self.scale == "log" else coordinates
 
     def describe(self) -> dict[str, Any]:
-        """Return what determines the numbers of a search, for a specification in JSON."""
-        names = ("name", "unit", "low", "high", "step", "scale", "refined_step")
-        return {name: getattr(self, name) for name in names}
+        """Return it as JSON values: ``Parameter(**described)`` is the same parameter."""
+        return asdict(self)
 
     @property
     def _bottom(self) -> float:

@@ -19,6 +19,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.rundir import RunDirectory
 from driftwalk.core.shards import ShardStore
 from driftwalk.model import Study
+from driftwalk.schema import Parameter
 from driftwalk.sweep import grid
 from driftwalk.viewer.shell import page_frame
 from driftwalk.viewer.watch.run import RunSource
@@ -178,9 +179,52 @@ def test_refined_map_and_bootstrap(run: RunDirectory) -> None:
     # A section more: the page is sent anew.
     assert [content["type"] for content in source.look()] == ["page"]
     lines = next(s for s in page(source)["sections"] if s["id"] == "bootstrap")
-    assert lines["series"][0]["y"] == [0.3, 0.4]
-    assert lines["series"][0]["x"] == [1e-4, 2e-4]
+    cloud = lines["series"][0]
+    assert cloud["y"] == pytest.approx([0.3, 0.4])
+    assert cloud["x"] == pytest.approx([1e-4, 2e-4])
     assert page(source)["state"]["progress"] == pytest.approx(0.65 + 0.28 * 0.5)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_the_map_of_a_users_model_fills_under_its_own_names(tmp_path: Path, count: int) -> None:
+    parameters = (
+        Parameter("tumble_rate", "1/s", 0.1, 10.0, step=1.0, scale="log"),
+        Parameter("speed", "m/s", 0.0, 0.2, step=0.1, label="speed of a run"),
+    )[:count]
+    described = [parameter.describe() for parameter in parameters]
+    specification = {
+        "study": Study().to_dict(),
+        "body": None,
+        "recording_sha256": "0" * 64,
+        "flow_sha256": None,
+        "model": {"name": "tumble", "parameters": described},
+    }
+    axes = {parameter.name: parameter.coordinates for parameter in parameters}
+    unit = grid(**axes).units(2)[0]
+    with RunDirectory(tmp_path / "run", specification=specification) as opened:
+        source = RunSource(opened.path)
+        assert the_map(source)["kind"] == ("lines" if count == 1 else "map")
+        found = opened.store(
+            "coarse-x", fingerprint={"axes": list(map(list, axes.values())), "replicates": 2}
+        )
+        found.write(unit, {"ks_distance": np.array([[0.1, 0.3], [0.5, 0.7]])})
+        repeats = opened.store("bootstrap-x", fingerprint={"count": 4})
+        estimates = {parameter.name: np.array([-0.5, 0.1]) for parameter in parameters}
+        again = grid(recording=np.arange(4)).units(2)[0]
+        repeats.write(again, {**estimates, "excess": np.zeros((2, 1 + count))})
+        source.look()
+        part = the_map(source)
+        lines = next(s for s in page(source)["sections"] if s["id"] == "bootstrap")
+    if count == 1:
+        assert part["x"] == {"label": "tumble rate", "unit": "1/s", "log": True}
+        assert part["series"][0]["x"] == pytest.approx([0.1, 1.0, 10.0])
+        assert part["series"][0]["y"][:2] == pytest.approx([0.2, 0.6])
+        assert lines["series"][0]["x"] == pytest.approx([10**-0.5, 10**0.1])
+    else:
+        assert (part["y"]["label"], part["x"]["label"]) == ("tumble rate", "speed of a run")
+        assert part["y"]["values"] == pytest.approx([0.1, 1.0, 10.0])
+        assert dw.decode_array(part["value"]).ravel()[:2] == pytest.approx([0.2, 0.6])
+        assert lines["series"][0]["y"] == pytest.approx([10**-0.5, 10**0.1])
 
 
 def test_damaged_and_foreign_shards_are_no_units(run: RunDirectory) -> None:

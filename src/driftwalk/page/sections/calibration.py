@@ -125,14 +125,41 @@ def _estimates(calibration: xr.Dataset) -> list[dict[str, Any]]:
 
 
 def profile_sections(calibration: xr.Dataset) -> list[Section]:
-    """Return the KS distance along every parameter, the others next to the optimum."""
+    """Return the KS distance along every parameter, the others next to the optimum.
+
+    Parameters
+    ----------
+    calibration : xarray.Dataset
+        A `calibration`; one that is still being made has to have a single parameter.
+
+    Raises
+    ------
+    InputError
+        When the dataset holds no map, or not the estimates of the other parameters.
+
+    Examples
+    --------
+    ``profile_sections(calibration)[0]["series"]``
+    """
     parameters = page_parameters(calibration)
     require(calibration, "ks_distance", *(one.name for one in parameters))
     return [_profile(calibration, along) for along in parameters]
 
 
 def bootstrap_section(calibration: xr.Dataset) -> Section:
-    """Return the estimates from simulated recordings, with the joint region."""
+    """Return the estimates from simulated recordings, with the joint region.
+
+    Two parameters have their plane, a single one the distribution of its estimates.
+
+    Parameters
+    ----------
+    calibration : xarray.Dataset
+        A `calibration`; without a bootstrap the section is an empty one that says so.
+
+    Examples
+    --------
+    ``bootstrap_section(calibration)["series"]``
+    """
     parameters = page_parameters(calibration)
     title = "How well the parameters are known"
     if any(f"bootstrap_{one.name}" not in calibration for one in parameters):

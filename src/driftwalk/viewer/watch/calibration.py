@@ -11,8 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import DriftwalkError
-from driftwalk.core.run_stages import CALIBRATION_STAGES
-from driftwalk.page import encode_array, map_section
+from driftwalk.page import bootstrap_section, encode_array, map_section, profile_sections
+from driftwalk.schema import Parameter
+from driftwalk.schema.calibration import BLOCK
 from driftwalk.viewer.watch.running import NO_CELL, Section
 from driftwalk.viewer.watch.shards import FinishedUnit, RunReader
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from driftwalk.viewer.watch.recording_steps import RecordedSteps
 
 DETAILS: Final = ("excerpt_x", "excerpt_y", "step_density", "ks_step_length", "ks_turning_angle")
-GRID: Final = ("drag_coefficient", "force_std")
 NO_DISTANCE: Final = 1.0
 """A setting that lost its numbers is as far as can be, as in the finished map."""
 
@@ -34,13 +34,12 @@ class SettingsMap:
     Parameters
     ----------
     axes : sequence of sequence of float
-        Drag coefficients, standard deviations of the force [N].
+        Coordinates of the grid, one list per parameter.
     """
 
     def __init__(self, axes: Any) -> None:
-        drag, force = (np.asarray(values, dtype=np.float64) for values in axes)
-        self.axes = (drag, force)
-        self.shape = (drag.size, force.size)
+        self.axes = tuple(np.asarray(values, dtype=np.float64) for values in axes)
+        self.shape = tuple(axis.size for axis in self.axes)
         self.distance = np.full(self.shape, np.nan)
         self.error = np.full(self.shape, np.nan)
         self.details: dict[int, dict[str, npt.NDArray[Any]]] = {}
@@ -86,6 +85,7 @@ class RunningCalibration:
         self._folder = folder
         self._study: Study = Study(**specification["study"])
         self._body: str | None = specification.get("body")
+        self._parameters = _parameters(specification, self._study)
         self._reader = RunReader(folder)
         self._maps: dict[str, SettingsMap] = {}
         self._bootstrap: list[FinishedUnit] = []
@@ -130,7 +130,9 @@ class RunningCalibration:
     def cell(self, row: int, column: int) -> dict[str, Any]:
         """Return the kept excerpt and step density of a setting."""
         found = self._coarse
-        if found is None or not (0 <= row < found.shape[0] and 0 <= column < found.shape[1]):
+        if found is None or len(found.shape) != 2:
+            return dict(NO_CELL)
+        if not (0 <= row < found.shape[0] and 0 <= column < found.shape[1]):
             return dict(NO_CELL)
         kept = found.details.get(row * found.shape[1] + column)
         if not kept or "excerpt_x" not in kept:
@@ -202,10 +204,12 @@ class RunningCalibration:
         return list(self._still.values())
 
     def _map_section(self) -> Section:
-        section = map_section(self._dataset(), self._one_body())
-        waiting = (
-            "Settings appear as they are simulated; nothing is final until the run is finished."
-        )
+        found = self._dataset()
+        if len(self._parameters) == 1:
+            section = {**profile_sections(found)[0], "id": "map"}
+        else:
+            section = map_section(found, self._one_body())
+        waiting = "Settings appear as they are simulated; nothing is final before the run is."
         return {**section, "note": f"{section['note']} {waiting}"}
 
     def _one_body(self) -> xr.Dataset | None:
@@ -218,53 +222,75 @@ class RunningCalibration:
         """Return what is there of the calibration that is being made, in its own form."""
         import xarray as xr
 
-        search = self._study.calibration
-        coarse = self._coarse or SettingsMap((search.drag_coefficients, search.force_stds_N))
+        names = tuple(one.name for one in self._parameters)
+        waiting = [one.coordinates for one in self._parameters]
+        coarse = self._coarse or SettingsMap(waiting)
         variables: dict[str, Any] = {
-            "ks_distance": (GRID, coarse.distance),
-            "ks_distance_standard_error": (GRID, coarse.error),
+            "ks_distance": (names, coarse.distance),
+            "ks_distance_standard_error": (names, coarse.error),
         }
-        coordinates: dict[str, Any] = dict(zip(GRID, coarse.axes, strict=True))
+        coordinates = self._axes(coarse, "")
         refined = self._maps.get(self._refined)
         if refined is not None:
-            names = [f"refined_{name}" for name in GRID]
-            variables["refined_ks_distance"] = (names, refined.distance)
-            coordinates |= dict(zip(names, refined.axes, strict=True))
+            dims = [f"refined_{name}" for name in names]
+            variables["refined_ks_distance"] = (dims, refined.distance)
+            coordinates |= self._axes(refined, "refined_")
         if self._recorded is not None:
             bins = ("density_step_length", "density_turning_angle")
             variables["recording_step_density"] = (bins, self._recorded.density())
             variables["excerpt_time"] = ("excerpt_sample", self._recorded.excerpt_time)
             coordinates["step_length_edge"] = self._recorded.length_edge
             coordinates["turning_angle_edge"] = self._recorded.angle_edge
-        facts = {
-            "kind": "calibration",
-            "force_interval_s": self._study.forces.force_interval_s,
-        }
+        facts: dict[str, Any] = {"kind": "calibration"}
+        if names == BLOCK:
+            facts["force_interval_s"] = self._study.forces.force_interval_s
         return xr.Dataset(variables, coordinates, facts)
+
+    def _axes(self, found: SettingsMap, prefix: str) -> dict[str, Any]:
+        """Return the coordinates of a map in the units of the parameters."""
+        return {
+            f"{prefix}{one.name}": (
+                f"{prefix}{one.name}",
+                one.to_value(axis),
+                {"units": one.unit, "long_name": one.label, "scale": one.scale},
+            )
+            for one, axis in zip(self._parameters, found.axes, strict=True)
+        }
 
     def _bootstrap_section(self) -> Section:
         units = sorted(self._bootstrap, key=lambda unit: unit.start)
-        drag, force = (
-            np.concatenate([unit.arrays[name] for unit in units] or [np.empty(0)])
-            for name in ("drag_coefficient", "force_std")
-        )
-        points = {
-            "name": "estimates",
-            "x": force.tolist(),
-            "y": drag.tolist(),
-            "low": None,
-            "high": None,
-            "style": "points",
+        estimates = {
+            f"bootstrap_{one.name}": (
+                "bootstrap",
+                one.to_value(
+                    np.concatenate([unit.arrays[one.name] for unit in units] or [np.empty(0)])
+                ),
+            )
+            for one in self._parameters
         }
+        section = bootstrap_section(self._dataset().assign(estimates))
         return {
-            "id": "bootstrap",
-            "kind": "lines",
+            **section,
             "title": "Bootstrap",
-            "note": "Estimates from recordings simulated at the optimum: their "
-            "scatter shows how well the parameters are known.",
-            "x": {"label": "stochastic force σ_F", "unit": "N"},
-            "y": {"label": "drag coefficient C_d", "unit": "1"},
-            "series": [points],
-            "marks": [],
+            "note": "Estimates from recordings that were simulated at the optimum: how far they "
+            "scatter is how well the parameters are known.",
             "after": "map",
         }
+
+
+def _parameters(specification: Mapping[str, Any], study: Study) -> tuple[Parameter, ...]:
+    """Return what a run searches: the parameters of its model, without one those of the block."""
+    model = specification.get("model")
+    if model is not None:
+        return tuple(Parameter(**described) for described in model["parameters"])
+    search = study.calibration
+    drag, force = BLOCK
+    return (
+        Parameter(
+            drag, "1", search.drag_coefficient_min, search.drag_coefficient_max,
+            search.drag_coefficient_step,
+        ),
+        Parameter(
+            force, "N", search.force_std_min_N, search.force_std_max_N, search.force_std_step_N
+        ),
+    )  # fmt: skip
