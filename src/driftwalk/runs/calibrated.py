@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from driftwalk.core.errors import InputError
 from driftwalk.core.json_text import parse_json
 from driftwalk.core.run_layout import state_of
+from driftwalk.schema.calibration import is_block
 from driftwalk.schema.contents import check_contents
 from driftwalk.schema.netcdf import open_netcdf
 
@@ -76,6 +77,11 @@ def read_calibrated(folder: Path) -> Calibrated:
     _require_finished(folder, files)
     found = _read(files["calibration"])
     facts = found.attrs
+    if not is_block(found):
+        raise InputError(
+            f"{files['calibration']} is about the model {facts.get('model', 'of a user')}, and "
+            "self-assembly simulates blocks: give a calibration of the block"
+        )
     study = apply_overrides(
         parse_study(facts["study"], source=f"{files['calibration']}: its study"),
         {

@@ -14,6 +14,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.core.json_text import parse_json
+from driftwalk.schema.calibration import StoredParameter, stored_parameters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 TEXT_VARIABLES: Final = frozenset({"body"})
 """Variables that hold names; all others hold numbers."""
 TEXT_ATTRIBUTES: Final = frozenset(
-    {"complete", "format", "interrupted", "source", "study", "tracked_from", "y_axis"}
+    {"complete", "format", "interrupted", "model", "source", "study", "tracked_from", "y_axis"}
 )
 NUMBER_ATTRIBUTES: Final = frozenset(
     {"block_side_m", "drag_coefficient", "force_interval_s", "force_std_N", "metres_per_pixel"}
@@ -106,6 +107,20 @@ KINDS: Final[dict[str, Contents]] = {
 }
 
 
+def _calibration_of(parameters: tuple[StoredParameter, ...]) -> Contents:
+    """Return what a calibration of a model of the user holds: the same, under its own names."""
+    names = " ".join(one.name for one in parameters)
+    refined = " ".join(f"refined_{one.name}" for one in parameters)
+    return _contents(
+        f"ks_distance status: {names}",
+        *(f"{one}: {one}" for one in (*names.split(), *refined.split())),
+        f"refined_surface: {refined}",
+        " ".join(f"region_{one.name}" for one in parameters) + ": region_vertex",
+        needed=f"ks_distance {names}",
+        attributes=" ".join(one.key for one in parameters) + " study warnings",
+    )
+
+
 def check_contents(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     """Return a dataset that holds what its kind needs; one of no kind of driftwalk's as it is.
 
@@ -117,6 +132,8 @@ def check_contents(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     """
     kind = dataset.attrs.get("kind")
     contents = KINDS.get(kind) if isinstance(kind, str) else None
+    if kind == "calibration" and "model" in dataset.attrs:
+        contents = _calibration_of(stored_parameters(dataset))
     if contents is None:
         return dataset
     for name in contents.needed:
