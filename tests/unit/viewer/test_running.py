@@ -223,7 +223,7 @@ def test_the_map_of_a_users_model_fills_under_its_own_names(tmp_path: Path, coun
     else:
         assert (part["y"]["label"], part["x"]["label"]) == ("tumble rate", "speed of a run")
         assert part["y"]["values"] == pytest.approx([0.1, 1.0, 10.0])
-        assert dw.decode_array(part["value"]).ravel()[:2] == pytest.approx([0.2, 0.6])
+        assert dw.page.decode_array(part["value"]).ravel()[:2] == pytest.approx([0.2, 0.6])
         assert lines["series"][0]["y"] == pytest.approx([10**-0.5, 10**0.1])
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import DriftwalkError
+from driftwalk.core.run_stages import CALIBRATION_STAGES
 from driftwalk.page import bootstrap_section, encode_array, map_section, profile_sections
 from driftwalk.schema import Parameter
 from driftwalk.schema.calibration import BLOCK
