@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,7 @@ import numpy.typing as npt
 from driftwalk.comparison import Statistic, StepDistance, StepReference, plan_steps
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
+from driftwalk.core.streams import trial_in
 from driftwalk.motion import (
     BlockModel,
     Conditions,
@@ -33,19 +34,6 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 Axes = tuple[Floats, ...]
 """One array per parameter, in its coordinate."""
-
-STAGES: Final[dict[str, int]] = {
-    "coarse": 1,
-    "refined": 2,
-    "surface": 3,
-    "bootstrap": 4,
-    "floor": 5,
-    "first_half": 6,
-    "first_half_refined": 7,
-    "second_half": 8,
-    "coverage": 9,
-}
-"""Each stage of a calibration has random streams of its own; a number is never used twice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,9 +162,7 @@ def score_settings(
         One entry per world each, replicates fastest.
     """
     columns = [np.atleast_1d(np.asarray(column, dtype=np.float64)) for column in settings]
-    trial = (np.uint64(STAGES[stage]) << np.uint64(40)) + np.arange(
-        first, first + columns[0].size, dtype=np.uint64
-    )
+    trial = trial_in(stage, np.arange(first, first + columns[0].size))
     keys = world_keys(
         problem.study.calibration.seed,
         trial=trial[:, None],

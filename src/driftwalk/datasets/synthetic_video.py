@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.opencv import require_opencv
+from driftwalk.core.streams import VideoStream
 from driftwalk.datasets.synthetic_video_bars import Bars, marker_points, place_bars
 from driftwalk.datasets.synthetic_video_camera import image_to_world, local_scale, world_to_image
 from driftwalk.datasets.synthetic_video_light import Glare, ripples, shading
@@ -30,7 +31,6 @@ Image = npt.NDArray[np.uint8]
 
 _FINE: Final = 3
 """Points along each side of a pixel at which coverage is found."""
-_STREAM: Final = 3
 _STEP_PX: Final = 0.4
 _MOST_EXPOSURES: Final = 16
 _NOISE_FRAMES: Final = 4
@@ -200,7 +200,7 @@ class _Painter:
         self.tank = self._empty_tank()
         self.light = np.repeat(shading(settings)[..., None], 3, axis=2)
         # Drawing new noise for each frame would take longer than all the rest.
-        generator = np.random.default_rng([settings.seed, _STREAM])
+        generator = np.random.default_rng([settings.seed, VideoStream.IMAGE])
         count = _NOISE_FRAMES * self.tank.size if settings.noise_std > 0.0 else 0
         self.noise: Grid = generator.standard_normal(count, dtype=np.float32)
         self.noise *= np.float32(settings.noise_std)
@@ -229,7 +229,7 @@ class _Painter:
     def _noise_of(self, index: int) -> Grid:
         """Return the noise of a frame: a stretch of the drawn noise, from a place of its own."""
         size = self.tank.size
-        generator = np.random.default_rng([self.settings.seed, _STREAM, index])
+        generator = np.random.default_rng([self.settings.seed, VideoStream.IMAGE, index])
         start = int(generator.integers(self.noise.size - size))
         return self.noise[start : start + size].reshape(self.tank.shape)
 

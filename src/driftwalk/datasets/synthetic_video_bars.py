@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.streams import VideoStream
 from driftwalk.datasets.synthetic_video_settings import VideoSettings
 
 Array = npt.NDArray[np.float64]
 _OFFSETS = 512
-_STREAM = 1
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def place_bars(settings: VideoSettings, time: Array, bodies: int) -> Bars:
     if settings.bar_share > 0.0 and settings.bar_time_share > 0.0:
         points = marker_points(settings)
         for body in range(bodies):
-            generator = np.random.default_rng([settings.seed, _STREAM, body])
+            generator = np.random.default_rng([settings.seed, VideoStream.BARS, body])
             for start, stop in _spells(settings, time, generator):
                 angle[start:stop, body] = generator.uniform(-np.pi, np.pi)
                 offset[start:stop, body] = _offset(

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.streams import VideoStream
 from driftwalk.datasets.synthetic_video_settings import VideoSettings
 
 Array = npt.NDArray[np.float64]
 Grid = npt.NDArray[np.float32]
 
-_STREAM = 2
 _WAVES = 48
 _COARSE = 4
 # For a Gaussian field of wave number k, cut where 5 % of the area is above, a patch has the area
@@ -27,7 +27,7 @@ class Glare:
     def __init__(self, settings: VideoSettings) -> None:
         from scipy.stats import norm
 
-        generator = np.random.default_rng([settings.seed, _STREAM])
+        generator = np.random.default_rng([settings.seed, VideoStream.GLARE])
         direction = generator.uniform(0.0, 2 * np.pi, _WAVES)
         number = _RADIUS_TIMES_WAVE_NUMBER / settings.glare_radius_px
         self._kx, self._ky = number * np.cos(direction), number * np.sin(direction)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.streams import MotionStream
 from driftwalk.motion.protocol import Keys, Worlds
-from driftwalk.motion.random import CAMERA, WorldRandom
+from driftwalk.motion.random import WorldRandom
 from driftwalk.schema.trajectory import wrap_angle
 from driftwalk.simulation.backend import STATUS, wall_edges
 
@@ -64,7 +65,7 @@ def observe_worlds(
     angle = np.full(x.shape, np.nan) if theta is None else theta
     camera = like.camera
     if camera.position_noise > 0.0 or camera.orientation_noise > 0.0:
-        noise = WorldRandom(keys, CAMERA).normal(3, x.shape[1])
+        noise = WorldRandom(keys, MotionStream.CAMERA).normal(3, x.shape[1])
         x = x + camera.position_noise * noise[:, 0]
         y = y + camera.position_noise * noise[:, 1]
         angle = angle + camera.orientation_noise * noise[:, 2]

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.streams import MotionStream
+
 Floats = npt.NDArray[np.float64]
 Keys = npt.NDArray[np.uint64]
-
-MOTION: Final = 1
-CAMERA: Final = 2
-"""Purpose of a stream; part of its address. A new purpose gets a new number."""
 
 
 class WorldRandom:
@@ -25,8 +21,8 @@ class WorldRandom:
     ----------
     keys : ndarray of uint64, shape (worlds,)
         The address of every world.
-    purpose : int
-        What the numbers are for.
+    purpose : MotionStream
+        Purpose of the numbers.
 
     Attributes
     ----------
@@ -41,7 +37,7 @@ class WorldRandom:
     True
     """
 
-    def __init__(self, keys: Keys, purpose: int = MOTION) -> None:
+    def __init__(self, keys: Keys, purpose: MotionStream = MotionStream.MOTION) -> None:
         self.generators = tuple(
             np.random.Generator(np.random.Philox(key=np.array([key, purpose], dtype=np.uint64)))
             for key in keys

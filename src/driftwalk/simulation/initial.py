@@ -10,13 +10,11 @@ import numpy.typing as npt
 from driftwalk import _core
 from driftwalk.core.errors import InputError
 from driftwalk.core.smoothing import local_quadratic
+from driftwalk.core.streams import Purpose
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
     from driftwalk.schema import Track
-
-START_PURPOSE = 3
-"""Purpose of the start pose's random numbers, see cpp/include/driftwalk/random/purpose.hpp."""
 
 
 class Start(NamedTuple):
@@ -60,7 +58,7 @@ def _draw_pose(study: Study, key: int) -> tuple[float, float, float]:
     )
     low, high = corners.min(axis=0), corners.max(axis=0)
     for draw in range(1000):
-        words = np.array(_core.philox(key, [0, draw, 0, START_PURPOSE]), dtype=np.float64)
+        words = np.array(_core.philox(key, [0, draw, 0, Purpose.START]), dtype=np.float64)
         across, up, turn = words[:3] * 2.0**-32
         pose = Pose(
             x_m=low[0] + across * (high[0] - low[0]),
@@ -126,6 +124,6 @@ def world_orientations(
     """Return the start orientation of every world [rad]: the given one, or a random one for NaN."""
     given = np.broadcast_to(np.asarray(theta, dtype=np.float64), keys.shape).copy()
     for index in np.flatnonzero(np.isnan(given)):
-        word = _core.philox(int(keys[index]), [0, 0, 0, START_PURPOSE])[0]
+        word = _core.philox(int(keys[index]), [0, 0, 0, Purpose.START])[0]
         given[index] = (word * 2.0**-31 - 1.0) * np.pi
     return given

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.streams import Purpose
+
 Floats = npt.NDArray[np.float64]
 
-FORCE_PURPOSE = 1
 _MULTIPLIERS = (np.uint64(0xD2511F53), np.uint64(0xCD9E8D57))
 _WEYL = (np.uint64(0x9E3779B9), np.uint64(0xBB67AE85))
 _LOW = np.uint64(0xFFFFFFFF)
@@ -83,7 +84,7 @@ def force_normals(
 
     `body` is the block's number within its world, one for all keys or one for each.
     """
-    words = philox(key, (interval >> 1 & 0xFFFFFFFF, body, interval >> 33, FORCE_PURPOSE))
+    words = philox(key, (interval >> 1 & 0xFFFFFFFF, body, interval >> 33, Purpose.FORCE))
     half = 2 * (interval & 1)
     return normal_pair(words[half], words[half + 1])
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Final, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.seeds import world_keys
+from driftwalk.core.streams import trial_in
 
 Stream = Literal["run", "parameters", "flow"]
-
-# The numbers continue those of the stages of a calibration: no stream is shared with them.
-_STREAMS: Final[dict[Stream, int]] = {"run": 32, "parameters": 33, "flow": 34}
 
 
 def stream_keys(
@@ -37,4 +35,4 @@ def stream_keys(
     >>> bool((keys == stream_keys("run", seed=1, trial=0, index=[1, 0])[::-1]).all())
     True
     """
-    return world_keys(seed, trial=(_STREAMS[stream] << 40) + trial, replicate=index)
+    return world_keys(seed, trial=trial_in(stream, trial), replicate=index)

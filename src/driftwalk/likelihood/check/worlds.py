@@ -15,6 +15,7 @@ from driftwalk.calibration.problem import Problem, prepare_problem
 from driftwalk.comparison import apply_steps, plan_steps
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
+from driftwalk.core.streams import CheckStream
 from driftwalk.likelihood.check.errors import Estimate
 from driftwalk.likelihood.filter_pass import Series
 from driftwalk.likelihood.intervals import fitted_intervals
@@ -31,9 +32,6 @@ if TYPE_CHECKING:
 Keys = npt.NDArray[np.uint64]
 FLOWS = 8
 """Flow fields that are drawn; a world on its own takes as long as eight together."""
-ESTIMATE, DRAWN = 0, 1
-"""Numbers of the two sets in the addresses of their random numbers."""
-DRAW_STREAM = 2
 MOST_LOG_STD = math.log(10.0)
 """Standard deviation of the logarithm of a parameter, beyond which draws of it mean nothing."""
 
@@ -109,7 +107,7 @@ def replicates_at_estimate(
     drag, force = fit.attrs["drag_coefficient"], fit.attrs["force_std_N"]
     parts = []
     for index, problem in enumerate(problems):
-        keys = _keys(seed, ESTIMATE, index, count)
+        keys = _keys(seed, CheckStream.ESTIMATE, index, count)
         parts.append(_simulated(problem, keys, drag, force))
     return _joined(parts, np.zeros(count, dtype=np.int64))
 
@@ -143,7 +141,7 @@ def replicates_drawn(
     force = fit.attrs["force_std_N"] * factors[:, 1]
     parts: list[list[_World]] = []
     for index, problem in enumerate(problems):
-        keys = _keys(seed, DRAWN, index, count)
+        keys = _keys(seed, CheckStream.DRAWN, index, count)
         series = estimate.passes.series[index]
 
         def simulated(
@@ -175,7 +173,7 @@ def _draws(
     C_d has the variance of the restricted likelihood; the flow follows it as far as the two are
     correlated.
     """
-    generator = np.random.default_rng([seed, DRAW_STREAM])
+    generator = np.random.default_rng([seed, CheckStream.PARAMETERS])
     size = estimate.point.coefficients.size
     found = fit["covariance"].values[:3, :3]
     widest = float(np.sqrt(np.diag(found).max()))

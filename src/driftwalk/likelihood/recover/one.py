@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
+from driftwalk.core.streams import RecoveryStream
 from driftwalk.flow import random_tank_flow
 from driftwalk.likelihood.fit import fit_motion
 from driftwalk.likelihood.recover.score import SCORED, score_fit
@@ -34,8 +35,6 @@ PARTS: Final = ("", "_low", "_high", "_sd", "_error", "_z", "_covered")
 """Suffixes of a score's variables for each parameter, after its name."""
 FLOW_PARTS: Final = ("flow_error", "flow_point_error", "flow_z_rms", "flow_cells")
 FACTS: Final = ("wall_share", "samples_used", "iterations", "converged", "fit_time")
-# Streams of random numbers of one recording: the flow, the world, the gaps.
-_FLOW, _WORLD, _GAPS = 0, 1, 2
 
 
 @dataclass(frozen=True)
@@ -66,13 +65,13 @@ class Truth:
             return self.flow
         settings = self.study.recover
         return random_tank_flow(
-            self.seed_of(recording, _FLOW),
+            self.seed_of(recording, RecoveryStream.FLOW),
             family=settings.flow_family,
             arena=self.study.tank.to_arena(),
             speed=settings.flow_speed_m_s,
         )
 
-    def seed_of(self, recording: int, stream: int) -> int:
+    def seed_of(self, recording: int, stream: RecoveryStream) -> int:
         """Return the seed of a stream of random numbers of a recording."""
         seed = self.study.recover.seed
         return int(world_keys(seed, trial=recording, replicate=stream)[0] >> np.uint64(1))
@@ -164,13 +163,13 @@ def simulated_recordings(
         flow,
         sample_time=settings.settling_s + clock,
         replicates=settings.recordings_per_fit,
-        seed=truth.seed_of(recording, _WORLD),
+        seed=truth.seed_of(recording, RecoveryStream.WORLD),
         backend="reference",
         threads=1,
     )
     if np.any(run["status"].values):
         return None
-    generator = np.random.default_rng(truth.seed_of(recording, _GAPS))
+    generator = np.random.default_rng(truth.seed_of(recording, RecoveryStream.GAPS))
     # By columns, so that a longer recording misses the same samples at first.
     lost = generator.random((samples, settings.recordings_per_fit)) < settings.missing_share
     poses = {name: run[name].values[:, :, 0].astype(np.float64) for name in ("x", "y", "theta")}
