@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from driftwalk.comparison import StepDistance, step_table
+from driftwalk.conditions import Conditions
 from driftwalk.core.seeds import world_keys
-from driftwalk.motion import Conditions, MotionModel, ScoresItself, Worlds, score_worlds
+from driftwalk.motion import MotionModel, ScoresItself, Worlds, score_worlds
 from driftwalk.motion.protocol import Floats, Keys
 from driftwalk.schema.trajectory import Track
 from driftwalk.simulation.backend import STATUS, Camera

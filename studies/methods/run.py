@@ -109,7 +109,7 @@ def lines_of(known: Known, out: Path, done: set[tuple[str, str]]) -> Iterator[di
         answer = by_likelihood(known, fits[angle], seconds[angle])
         yield line_of(known, f"fit, angle {angle}", answer, fits["state"], out)
     flows: dict[str, Callable[[], xr.Dataset]] = {
-        "own": lambda: dw.calibration.recording_flow(known.recording, known.study),
+        "own": lambda: dw.conditions.recording_flow(known.recording, known.study),
         "fitted": lambda: dw.fitted_flow(fits["state"]),
         "true": lambda: known.flow,
     }

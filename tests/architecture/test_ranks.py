@@ -23,12 +23,14 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "sweep": GROUND,
     # `record` for the tracking noise of a recording, which is what "estimate" stands for.
     "simulation": GROUND | {"model", "record"},
-    "conditions": GROUND | {"model"},
-    "motion": GROUND | {"simulation", "comparison", "model"},
-    "calibration": GROUND | {"motion", "simulation", "comparison", "flow", "model", "sweep"},
+    "conditions": GROUND | {"model", "flow", "simulation"},
+    "motion": GROUND | {"conditions", "simulation", "comparison", "model"},
+    "calibration": GROUND
+    | {"conditions", "motion", "simulation", "comparison", "flow", "model", "sweep"},
     # `calibration` for the check of a fit: how far simulated steps are from the recording's.
     "likelihood": GROUND
-    | {"motion", "simulation", "comparison", "flow", "model", "sweep", "calibration"},
+    | {"conditions", "motion", "simulation", "comparison", "flow", "model", "sweep"}
+    | {"calibration"},
     "assembly": GROUND | {"simulation", "comparison", "flow", "model", "sweep"},
     # `assemble` for the observer: what is seen is classified by the rules of simulated runs.
     "track": GROUND | {"record", "model", "assembly"},
@@ -37,7 +39,8 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "figures": GROUND | {"plot"},
     "page": GROUND | {"plot"},
     "runs": GROUND
-    | {"flow", "model", "sweep", "calibration", "likelihood", "assembly", "plot", "figures"},
+    | {"flow", "model", "sweep", "conditions", "calibration", "likelihood", "assembly"}
+    | {"plot", "figures"},
     "notebook": GROUND
     | {"record", "flow", "model", "comparison", "simulation", "motion", "conditions"}
     | {"assembly", "calibration", "likelihood", "page", "runs"},

@@ -183,7 +183,7 @@ def test_a_coarse_map_alone_is_possible():
 def test_without_a_given_flow_it_is_extracted_from_the_recording():
     study = apply_overrides(dw.Study(), {**SMALL, "calibration.refine": "none"})
     recording = dw.tank30_recording().isel(time=slice(0, 3000))
-    flows = None, dw.calibration.recording_flow(recording, study), dw.tank30_flow()
+    flows = None, dw.conditions.recording_flow(recording, study), dw.tank30_flow()
     own, extracted, true = (dw.calibrate(recording, study, flow=flow) for flow in flows)
     assert own["ks_distance"].identical(extracted["ks_distance"])
     assert (own["ks_distance"] != true["ks_distance"]).all()

@@ -15,10 +15,11 @@ import pytest
 from walkers import diffuse, tumble
 
 import driftwalk as dw
+from driftwalk.conditions import Conditions
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.model import apply_overrides
-from driftwalk.motion import Conditions, Parameter, motion_model
+from driftwalk.motion import Parameter, motion_model
 from driftwalk.schema import build_trajectory
 from driftwalk.simulation import Start
 from driftwalk.simulation.backend import Camera

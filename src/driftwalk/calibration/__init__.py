@@ -1,7 +1,6 @@
 """The paper's calibration: the settings of a model whose simulated steps match the recording's."""
 
 from driftwalk.calibration.check import check_recording
-from driftwalk.calibration.own_flow import recording_flow
 from driftwalk.calibration.run import calibrate
 
-__all__ = ["calibrate", "check_recording", "recording_flow"]
+__all__ = ["calibrate", "check_recording"]

@@ -10,19 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.comparison import Statistic, StepDistance, StepReference, plan_steps
+from driftwalk.conditions import Conditions, recorded_conditions
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.core.streams import trial_in
-from driftwalk.motion import (
-    BlockModel,
-    Conditions,
-    Details,
-    MotionModel,
-    Parameter,
-    Scores,
-    recorded_conditions,
-    score_worlds,
-)
+from driftwalk.motion import BlockModel, Details, MotionModel, Parameter, Scores, score_worlds
 from driftwalk.simulation.backend import Camera
 
 if TYPE_CHECKING:

@@ -45,7 +45,7 @@ WORK: Final[dict[str, int]] = {
 
 
 class CheckStream(IntEnum):
-    """Streams of the check of a fit: the two sets of its recordings, and what is drawn for the second."""
+    """Streams of the check of a fit: its two sets of recordings, and the draws for the second."""
 
     ESTIMATE = 0
     DRAWN = 1

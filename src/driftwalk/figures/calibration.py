@@ -161,7 +161,7 @@ def steps_figure(calibration: xr.Dataset) -> Figure:
 
 
 def ks_map_figure(calibration: xr.Dataset) -> Figure:
-    """Return Fig. 6: the whole map beside the refined one, or the whole map alone.
+    """Return Fig. 6: the whole map next to the refined one, or the whole map alone.
 
     With one parameter the distance along it is the map.
     """

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from driftwalk.calibration.own_flow import flow_from_track
+from driftwalk.conditions.own_flow import flow_from_track
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.filter_pass import Point
 from driftwalk.likelihood.newton import PRIOR_DRAG, PRIOR_LEVER, Weights

@@ -2,7 +2,6 @@
 
 from driftwalk.motion.block import BlockModel
 from driftwalk.motion.camera import observe_worlds
-from driftwalk.motion.conditions import Conditions, recorded_conditions
 from driftwalk.motion.function import FunctionModel, Scene, motion_model
 from driftwalk.motion.protocol import Details, MotionModel, Scores, ScoresItself, Worlds
 from driftwalk.motion.random import WorldRandom
@@ -11,7 +10,6 @@ from driftwalk.schema import Parameter
 
 __all__ = [
     "BlockModel",
-    "Conditions",
     "Details",
     "FunctionModel",
     "MotionModel",
@@ -23,6 +21,5 @@ __all__ = [
     "Worlds",
     "motion_model",
     "observe_worlds",
-    "recorded_conditions",
     "score_worlds",
 ]

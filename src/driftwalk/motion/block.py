@@ -9,8 +9,8 @@ import numpy as np
 
 from driftwalk import _core
 from driftwalk.comparison import StepReference
+from driftwalk.conditions.recorded import Conditions
 from driftwalk.core.errors import InputError
-from driftwalk.motion.conditions import Conditions
 from driftwalk.motion.protocol import Details, Floats, Keys, Scores, Values, Worlds
 from driftwalk.motion.score import DENSITY_BINS, excerpt_samples
 from driftwalk.schema import Parameter

@@ -14,8 +14,8 @@ from driftwalk.schema.trajectory import wrap_angle
 from driftwalk.simulation.backend import STATUS, wall_edges
 
 if TYPE_CHECKING:
+    from driftwalk.conditions.recorded import Conditions
     from driftwalk.model import FieldOfView
-    from driftwalk.motion.conditions import Conditions
 
 Floats = npt.NDArray[np.float64]
 
@@ -55,7 +55,8 @@ def observe_worlds(
     >>> from driftwalk.simulation.backend import Camera
     >>> time = np.arange(40) / 20
     >>> track = Track(time, 0.05 * time, 0.0 * time, 0.0 * time)
-    >>> like = dw.motion.recorded_conditions(track, dw.Study(), camera=Camera(position_noise=1e-3))
+    >>> camera = Camera(position_noise=1e-3)
+    >>> like = dw.conditions.recorded_conditions(track, dw.Study(), camera=camera)
     >>> keys = np.array([1], dtype=np.uint64)
     >>> seen = dw.motion.observe_worlds(track.x[None], track.y[None], None, like, keys)
     >>> float(np.abs(seen.x - track.x).max()) < 5e-3

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.conditions.recorded import Conditions
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.motion.camera import observe_worlds
-from driftwalk.motion.conditions import Conditions
 from driftwalk.motion.protocol import Floats, Keys, Values, Worlds
 from driftwalk.motion.random import WorldRandom
 from driftwalk.schema import Parameter

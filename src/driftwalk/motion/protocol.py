@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 if TYPE_CHECKING:
     from driftwalk.comparison import StepReference
-    from driftwalk.motion.conditions import Conditions
+    from driftwalk.conditions.recorded import Conditions
     from driftwalk.schema import Parameter
 
 Floats = npt.NDArray[np.float64]

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.comparison import Statistic, StepDistance, StepReference, StepTable, step_table
-from driftwalk.motion.conditions import Conditions
+from driftwalk.conditions.recorded import Conditions
 from driftwalk.motion.protocol import Details, Keys, MotionModel, Scores, ScoresItself, Values
 from driftwalk.simulation.backend import BROKEN
 
@@ -62,7 +62,7 @@ def score_worlds(
     >>> track = body_track(dw.tank30_recording().isel(time=slice(0, 600)))
     >>> block = dw.motion.BlockModel(dw.Study())
     >>> camera = Camera(position_noise=3e-4)
-    >>> like = dw.motion.recorded_conditions(
+    >>> like = dw.conditions.recorded_conditions(
     ...     track, dw.Study(), camera=camera, flow=dw.tank30_flow()
     ... )
     >>> values = {"drag_coefficient": np.array([0.4]), "force_std": np.array([6e-4])}

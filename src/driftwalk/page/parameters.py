@@ -23,10 +23,10 @@ class PageParameter(NamedTuple):
     unit: str
     label: str
     symbol: str
-    """What formulas call it; empty for a model of the user."""
+    """Symbol in formulas; empty for a model of the user."""
     scale: str
     short: str
-    """What a sentence on the search calls it."""
+    """Name in a sentence on the search."""
 
     @property
     def words(self) -> str:

@@ -138,7 +138,8 @@ def run_calibration(
 
 def _checked_flow(work: CalibrationWork) -> xr.Dataset:
     """Return the flow field of a run; refuse a recording before anything is written for it."""
-    from driftwalk.calibration import check_recording, recording_flow
+    from driftwalk.calibration import check_recording
+    from driftwalk.conditions import recording_flow
 
     try:
         flow = work.flow

@@ -60,5 +60,5 @@ def test_which_fields_state_an_error(flow: xr.Dataset) -> None:
     assert has_standard_error(flow)
     assert not has_standard_error(dw.tank30_flow())
     assert not has_standard_error(flow.assign(v_standard_error=flow["u"] * np.nan))
-    extracted = dw.calibration.recording_flow(dw.tank30_recording(), dw.Study())
+    extracted = dw.conditions.recording_flow(dw.tank30_recording(), dw.Study())
     assert has_standard_error(extracted)

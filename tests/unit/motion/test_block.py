@@ -7,10 +7,11 @@ import pytest
 
 import driftwalk as dw
 from driftwalk.comparison import StepDistance
+from driftwalk.conditions import recorded_conditions
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.model import apply_overrides
-from driftwalk.motion import BlockModel, recorded_conditions, score_worlds
+from driftwalk.motion import BlockModel, score_worlds
 from driftwalk.schema import body_track
 from driftwalk.simulation.backend import Camera
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import driftwalk as dw
+from driftwalk.conditions import Conditions
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.seeds import world_keys
-from driftwalk.motion import Conditions, motion_model, observe_worlds
+from driftwalk.motion import motion_model, observe_worlds
 from driftwalk.simulation import Start
 from driftwalk.simulation.backend import STATUS, Camera
 

@@ -113,7 +113,7 @@ def _estimates(calibration: xr.Dataset) -> list[dict[str, Any]]:
     for one in page_parameters(calibration):
         note = None
         if one == FORCE:
-            note = f"drawn anew every {quantity(required(calibration, 'force_interval_s'), 's')}"
+            note = f"redrawn every {quantity(required(calibration, 'force_interval_s'), 's')}"
             found = calibration.attrs.get("force_noise_intensity_N2_s")
             intensity = [figure("noise intensity", found, "N²·s", symbol="σ_F²·τ")]
         shown.append(

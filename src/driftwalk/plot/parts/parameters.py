@@ -146,7 +146,7 @@ def plane_of(calibration: xr.Dataset) -> tuple[PlotParameter, PlotParameter]:
 
 
 def drawn_anew(calibration: xr.Dataset) -> str:
-    """Return "drawn anew every 16 ms" for the block's force, "" for other models."""
+    """Return "redrawn every 16 ms" for the block's force, "" for other models."""
     if not np.isfinite(number_attribute(calibration, "force_interval_s")):
         return ""
     return force_interval_text(calibration)

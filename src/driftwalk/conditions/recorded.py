@@ -88,7 +88,7 @@ def recorded_conditions(
     >>> from driftwalk.schema import body_track
     >>> track = body_track(dw.tank30_recording())
     >>> camera = dw.simulation.recorded_camera(track, dw.Study(), position_quantum=0.0)
-    >>> dw.motion.recorded_conditions(track, dw.Study(), camera=camera).sample_time.size
+    >>> dw.conditions.recorded_conditions(track, dw.Study(), camera=camera).sample_time.size
     18001
     """
     start = recorded_start(track, window=study.flow.smoothing_window_s)

@@ -38,7 +38,7 @@ def recording_flow(recording: xr.Dataset, study: Study, *, body: str | None = No
     Examples
     --------
     >>> import driftwalk as dw
-    >>> int(dw.calibration.recording_flow(dw.tank30_recording(), dw.Study()).sizes["x"])
+    >>> int(dw.conditions.recording_flow(dw.tank30_recording(), dw.Study()).sizes["x"])
     50
     """
     return flow_from_track(body_track(recording, body), study)
