@@ -16,8 +16,6 @@ import pytest
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 PACKAGE: Final = ROOT / "src" / "driftwalk"
-NOT_YET: Final = {"ARCHITECTURE.md"}
-"""Pages whose language has not been revised."""
 PAGES: Final = sorted(
     page
     for page in (
@@ -26,7 +24,6 @@ PAGES: Final = sorted(
         *(ROOT / "studies").glob("*/README.md"),
         *(ROOT / "benchmarks").rglob("*.md"),
     )
-    if page.name not in NOT_YET
 )
 WORDS: Final = {
     "anew": "again",
