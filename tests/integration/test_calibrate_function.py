@@ -141,6 +141,21 @@ def test_the_block_is_a_model_among_others():
     assert dw.calibrate(recording, study=study, flow=flow).identical(as_study)
 
 
+def test_without_a_study_the_tank_is_the_arena_of_the_recording():
+    radii = set()
+
+    def told(scene, *, diffusivity):
+        radii.add(scene.tank.radius_m)
+        return diffuse(scene, diffusivity=diffusivity)
+
+    model = motion_model(told, Parameter("diffusivity", "m2/s", 1e-5, 2e-5, step=1e-5))
+    arena = json.dumps({"shape": "circle", "diameter_m": 0.08, "center_m": [0.0, 0.0]})
+    recording = synthetic_recording(DIFFUSE, duration=20.0, diffusivity=DIFFUSIVITY)
+    found = dw.calibrate(recording.assign_attrs(arena=arena), model, threads=1)
+    assert radii == {0.04}
+    assert dw.parse_study(found.attrs["study"]).tank.diameter_m == 0.08
+
+
 def still(scene, *, a, b=0.0, c=0.0):
     return (np.zeros((scene.worlds, scene.times.size)),) * 2
 

@@ -97,8 +97,8 @@ def calibrate(
     model : MotionModel or Study, optional
         What is calibrated: a `motion_model`, or the block of a study.
     study : Study, optional
-        Tank, observation, step interval and search; default: that of `model`, else the paper's.
-        The ranges of the parameters are the model's.
+        Tank, observation, step interval and search; default: that of `model`, else the paper's,
+        for a `motion_model` in the arena of the recording. The ranges are the model's.
     statistic : Statistic, optional
         The distance that is made small; default: `StepDistance`.
     flow : xarray.Dataset, optional
@@ -138,7 +138,7 @@ def calibrate(
     >>> found.attrs["drag_coefficient"]  # doctest: +SKIP
     0.39
     """
-    chosen, searched = _study_and_model(model, study)
+    chosen, searched = _study_and_model(model, study, recording)
     require_searchable(searched)
     track = body_track(recording, body)
     quantum = float(recording.attrs.get("position_quantum_m", 0.0))
@@ -161,10 +161,10 @@ def calibrate(
 
 
 def _study_and_model(
-    model: MotionModel | Study | None, study: Study | None
+    model: MotionModel | Study | None, study: Study | None, recording: xr.Dataset
 ) -> tuple[Study, MotionModel]:
     """Return the conditions and the search, and what is searched."""
-    from driftwalk.model import Study
+    from driftwalk.model import Study, Tank
 
     if isinstance(model, Study):
         if study is not None:
@@ -178,9 +178,14 @@ def _study_and_model(
             f"expected a motion model or a study, got {type(model).__name__}: a function becomes "
             "one by motion_model(function, speed=(0, 0.1, 'm/s'))"
         )
-    if study is None:
-        study = model.study if isinstance(model, BlockModel) else Study()
-    return study, model
+    if study is not None:
+        return study, model
+    if isinstance(model, BlockModel):
+        return model.study, model
+    # Nothing but the recording says in which tank a model without a study moves.
+    arena = recording.attrs.get("arena")
+    tank = {} if arena is None else {"tank": Tank.from_arena(arena)}
+    return Study().model_copy(update=tank), model
 
 
 def _in_memory(name: str, fingerprint: dict[str, Any]) -> Store | None:  # noqa: ARG001
