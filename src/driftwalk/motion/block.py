@@ -55,6 +55,8 @@ class BlockModel:
                 refined_step=search.refined_force_std_step_N,
             ),
         )  # fmt: skip
+        # Of the latest conditions: made once for all work units of a map.
+        self._ready: tuple[Conditions, _core.Model] | None = None
 
     def simulate(self, values: Values, like: Conditions, keys: Keys) -> Worlds:
         """Return one world per key; see `MotionModel.simulate`.
@@ -130,9 +132,17 @@ class BlockModel:
         InputError
             When the conditions have no flow, or its grid is too fine for the tank.
         """
-        if like.flow is None:
-            raise InputError("a block drifts in water: its conditions need a flow field")
-        return native_model(self.study, like.flow, like.sample_time, like.camera)
+        ready = self._ready
+        if ready is None or ready[0] is not like:
+            if like.flow is None:
+                raise InputError("a block drifts in water: its conditions need a flow field")
+            ready = like, native_model(self.study, like.flow, like.sample_time, like.camera)
+            self._ready = ready
+        return ready[1]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave the core's form out: it is made again where the model is used."""
+        return {**self.__dict__, "_ready": None}
 
 
 def _table(values: Values, like: Conditions, keys: Keys) -> Floats:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -63,3 +65,17 @@ def test_a_block_without_water_is_refused(track):
     like = recorded_conditions(track, dw.Study(), camera=Camera())
     with pytest.raises(InputError, match="need a flow field"):
         BlockModel(dw.Study()).simulate(VALUES, like, KEYS)
+
+
+def test_other_conditions_get_a_core_of_their_own(track):
+    study = dw.Study()
+    likes = [
+        recorded_conditions(track, study, camera=Camera(noise), flow=dw.tank30_flow(), threads=1)
+        for noise in (0.0, 1e-3, 0.0)
+    ]
+    block = BlockModel(study)
+    first, noisy, again = (block.simulate(VALUES, like, KEYS).x for like in likes)
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, noisy)
+    copied = pickle.loads(pickle.dumps(block))
+    np.testing.assert_array_equal(copied.simulate(VALUES, likes[0], KEYS).x, first)
