@@ -153,7 +153,7 @@ def test_without_a_study_the_tank_is_the_arena_of_the_recording():
     recording = synthetic_recording(DIFFUSE, duration=20.0, diffusivity=DIFFUSIVITY)
     found = dw.calibrate(recording.assign_attrs(arena=arena), model, threads=1)
     assert radii == {0.04}
-    assert dw.parse_study(found.attrs["study"]).tank.diameter_m == 0.08
+    assert dw.model.parse_study(found.attrs["study"]).tank.diameter_m == 0.08
 
 
 def still(scene, *, a, b=0.0, c=0.0):
