@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping
 from typing import Any, Final
+
+from driftwalk.core.errors import ConfigurationError
 
 STUDY_KEYS: Final[dict[str, str]] = {
     "tank_diameter": "tank.diameter_m",
@@ -92,11 +95,21 @@ def study_overrides(*, keys: Mapping[str, str] = STUDY_KEYS, **options: Any) -> 
     **options
         Values by the names in `keys`.
 
+    Raises
+    ------
+    ConfigurationError
+        When a name is not in the table.
+
     Examples
     --------
     >>> study_overrides(tank_diameter=0.5, seed=None)
     {'tank.diameter_m': 0.5}
     """
+    unknown = [name for name in options if name not in keys]
+    if unknown:
+        close = difflib.get_close_matches(unknown[0], keys, n=1)
+        advice = f"; did you mean '{close[0]}'?" if close else f"; there are {', '.join(keys)}"
+        raise ConfigurationError(f"there is no argument '{unknown[0]}'{advice}")
     overrides = {keys[name]: value for name, value in options.items() if value is not None}
     depth = overrides.get("block.depth")
     if depth is not None and depth not in ("immersed", "archimedes"):
