@@ -180,7 +180,7 @@ def print_reference(realisations: int) -> None:
     wall, processor = time.perf_counter(), time.process_time()
     found = [
         dw.outcome_distribution(
-            dw.assemble(
+            dw.assembly.assemble(
                 study,
                 flow,
                 runs=REFERENCE_RUNS,

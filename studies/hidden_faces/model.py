@@ -41,7 +41,7 @@ def simulate(
 ) -> xr.Dataset:
     """Return the distribution of outcomes, with some of the study's values changed."""
     flow = dw.tank30_flow()
-    assembly = dw.assemble(
+    assembly = dw.assembly.assemble(
         study_of(hidden_face_drag, changes),
         flow.assign({name: flow_factor * flow[name] for name in "uv"}),
         runs=runs,

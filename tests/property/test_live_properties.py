@@ -84,7 +84,7 @@ def test_poses_and_classes_are_those_of_the_public_functions() -> None:
     path = dw.assembly_path(
         model, flow, duration=20.0, sample_interval=0.5, seed=4, backend="reference"
     )
-    run = dw.assemble(model, flow, duration=20.0, runs=1, seed=4, backend="reference")
+    run = dw.assembly.assemble(model, flow, duration=20.0, runs=1, seed=4, backend="reference")
     tank = dw.LiveTank(model, flow, seed=4)
     for sample in range(path.sizes["time"]):
         assert tank.time == path["time"].values[sample]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from driftwalk.calibration.problem import prepare_problem
-from driftwalk.motion import BlockModel
+from driftwalk.motion import BlockModel, MotionModel
 from driftwalk.schema import body_track
 from driftwalk.simulation import recorded_camera
 
@@ -16,7 +16,12 @@ if TYPE_CHECKING:
 
 
 def check_recording(
-    recording: xr.Dataset, study: Study, *, flow: xr.Dataset, body: str | None = None
+    recording: xr.Dataset,
+    study: Study,
+    *,
+    flow: xr.Dataset | None,
+    body: str | None = None,
+    model: MotionModel | None = None,
 ) -> None:
     """Refuse a recording that `calibrate` would refuse; takes almost no time.
 
@@ -26,10 +31,12 @@ def check_recording(
         A `trajectory`.
     study : Study
         Model and step interval.
-    flow : xarray.Dataset
-        A `flow_field`.
+    flow : xarray.Dataset or None
+        A `flow_field`; None for a model that needs none.
     body : str, optional
         The body, where there are several.
+    model : MotionModel, optional
+        Default: the block of the study.
 
     Raises
     ------
@@ -43,5 +50,6 @@ def check_recording(
     """
     track = body_track(recording, body)
     camera = recorded_camera(track, study, position_quantum=0.0)
-    problem = prepare_problem(track, study, flow, camera=camera)
-    BlockModel(study).native(problem.like)
+    problem = prepare_problem(track, study, flow, camera=camera, model=model)
+    if isinstance(problem.model, BlockModel):
+        problem.model.native(problem.like)

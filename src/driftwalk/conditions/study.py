@@ -58,19 +58,23 @@ def study_for(
     """
     from driftwalk.model import Study, apply_overrides
 
-    stated = apply_overrides(study if study is not None else Study(), overrides or {})
-    chosen = stated
+    chosen = apply_overrides(study if study is not None else Study(), overrides or {})
+    # A fact that is stated already, by the study or by an earlier recording, has to be the same.
+    tank = not chosen.tank.model_fields_set.isdisjoint(_OUTLINE)
+    block = "side_m" in chosen.block.model_fields_set
     for recording in recordings:
-        chosen = _with_block(_with_tank(chosen, recording, stated), recording, stated)
+        chosen = _with_tank(chosen, recording, is_stated=tank)
+        chosen = _with_block(chosen, recording, is_stated=block)
+        tank = tank or "arena" in recording.attrs
+        block = block or "block_side_m" in recording.attrs
     for recording in recordings:
         require_inside(chosen, recording, body)
     return chosen
 
 
-def _with_tank(study: Study, recording: xr.Dataset, stated: Study) -> Study:
+def _with_tank(study: Study, recording: xr.Dataset, *, is_stated: bool) -> Study:
     """Return the study in the tank of a recording; refuse one that is not the stated tank."""
     own = study_in_arena(study, recording)
-    is_stated = _says_tank(stated) or _outline(study) != _outline(stated)
     if is_stated and _outline(own) != _outline(study):
         raise InputError(
             f"{_name_of(recording)}the recording is in a {own.tank.describe()}, and the study says "
@@ -79,14 +83,14 @@ def _with_tank(study: Study, recording: xr.Dataset, stated: Study) -> Study:
     return own
 
 
-def _with_block(study: Study, recording: xr.Dataset, stated: Study) -> Study:
+def _with_block(study: Study, recording: xr.Dataset, *, is_stated: bool) -> Study:
     """Return the study with the block of a recording; refuse one that is not the stated block."""
     from driftwalk.model import apply_overrides
 
     side = recording.attrs.get("block_side_m")
     if side is None or abs(float(side) - study.block.side_m) <= _SAME * study.block.side_m:
         return study
-    if "side_m" in stated.block.model_fields_set or study.block.side_m != stated.block.side_m:
+    if is_stated:
         raise InputError(
             f"{_name_of(recording)}the recording is of a block of {float(side):g} m, and the study "
             f"says {study.block.side_m:g} m: state the side once, `block` when the recording is "
@@ -97,10 +101,6 @@ def _with_block(study: Study, recording: xr.Dataset, stated: Study) -> Study:
 
 def _outline(study: Study) -> tuple[Any, ...]:
     return tuple(getattr(study.tank, key) for key in _OUTLINE)
-
-
-def _says_tank(study: Study) -> bool:
-    return not study.tank.model_fields_set.isdisjoint(_OUTLINE)
 
 
 def _name_of(recording: xr.Dataset) -> str:

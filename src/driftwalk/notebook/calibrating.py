@@ -7,20 +7,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from driftwalk.conditions import study_for
+from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import CALIBRATION_KEYS, study_overrides
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
+    from driftwalk.motion import MotionModel
     from driftwalk.notebook.settings import CalibrationSettings
     from driftwalk.runs import Progress
 
 
 def calibrate(
     recording: xr.Dataset,
-    study: Study | None = None,
+    model: MotionModel | Study | None = None,
     *,
+    study: Study | None = None,
     flow: xr.Dataset | None = None,
     body: str | None = None,
     folder: str | PathLike[str] | None = None,
@@ -29,17 +32,20 @@ def calibrate(
     progress: Progress | None = None,
     **settings: Unpack[CalibrationSettings],
 ) -> xr.Dataset:
-    """Calibrate drag coefficient and stochastic force on a recording.
+    """Find the parameters of a motion model that explain a recording.
 
     Parameters
     ----------
     recording : xarray.Dataset
         A `trajectory` as `load` returns it; tank and block are those it was loaded with.
+    model : MotionModel or Study, optional
+        A `motion_model`, or the block of a study; default: the paper's block, whose drag
+        coefficient and stochastic force are searched.
     study : Study, optional
-        Model and search; default: the paper's.
+        Tank, camera, step interval and search, with a `motion_model`; default: the paper's.
     flow : xarray.Dataset, optional
-        The water's velocity: a `flow_field` or a `fit`. Without it the field is extracted from the
-        recording.
+        The water's velocity: a `flow_field` or a `fit`. For the block it is extracted from the
+        recording when left out.
     body : str, optional
         The body, where the recording has several.
     folder : path-like, optional
@@ -70,28 +76,37 @@ def calibrate(
     >>> import driftwalk as dw
     >>> found = dw.calibrate(dw.tank30_recording(), flow=dw.tank30_flow())  # doctest: +SKIP
     """
-    from driftwalk.calibration import calibrate as calibrate_study
+    from driftwalk.calibration import calibrate as calibrate_model
     from driftwalk.likelihood import fitted_flow
+    from driftwalk.model import Study
+    from driftwalk.motion import BlockModel
     from driftwalk.runs import CalibrationWork, run_calibration
     from driftwalk.runs.folder import silent
     from driftwalk.schema.netcdf import open_netcdf
 
     given: dict[str, Any] = dict(settings)
+    if isinstance(model, Study):
+        if study is not None:
+            raise InputError("two studies are given: give one, or a motion model and a study")
+        model, study = None, model
+    if isinstance(model, BlockModel) and study is None:
+        study = model.study
     overrides = study_overrides(keys=CALIBRATION_KEYS, **given)
     chosen = study_for([recording], study, overrides, body=body)
     field = fitted_flow(flow) if flow is not None and flow.attrs.get("kind") == "fit" else flow
     say = progress or silent
     if folder is None:
-        return calibrate_study(
+        return calibrate_model(
             recording,
-            chosen,
+            model,
+            study=chosen,
             flow=field,
             body=body,
             threads=threads,
             tell=lambda stage, done, total: say(done, total, stage),
         )
     place = Path(folder)
-    work = CalibrationWork(recording, chosen, field, body, {}, threads)
+    work = CalibrationWork(recording, chosen, field, body, {}, threads, model)
     run_calibration(
         work,
         place,

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from driftwalk.core.rundir import RunDirectory
     from driftwalk.model import Study
+    from driftwalk.motion import MotionModel
     from driftwalk.sweep import Store
 
 
@@ -39,8 +40,8 @@ class CalibrationWork:
         The files that were read, by their role.
     threads : int or None
         Threads; the result does not depend on them.
-    remark : str or None
-        Remark for the user when the run begins.
+    model : MotionModel or None
+        The model to calibrate; None for the block of the study.
     """
 
     recording: xr.Dataset
@@ -49,6 +50,7 @@ class CalibrationWork:
     body: str | None
     inputs: Mapping[str, Path]
     threads: int | None = None
+    model: MotionModel | None = None
 
 
 def run_calibration(
@@ -67,7 +69,7 @@ def run_calibration(
 
     Parameters
     ----------
-    work : Work
+    work : CalibrationWork
         The work to do.
     folder : Path
         The run directory.
@@ -113,11 +115,13 @@ def run_calibration(
     ) as run:
         if begun is not None:
             begun()
-        run.write("flow.nc", netcdf_bytes(flow))
+        if flow is not None:
+            run.write("flow.nc", netcdf_bytes(flow))
         run.write("recording.nc", netcdf_bytes(work.recording))
         found = calibrate(
             work.recording,
-            work.study,
+            work.model,
+            study=work.study,
             flow=work.flow,
             body=work.body,
             threads=work.threads,
@@ -136,17 +140,22 @@ def run_calibration(
     return found
 
 
-def _checked_flow(work: CalibrationWork) -> xr.Dataset:
-    """Return the flow field of a run; refuse a recording before anything is written for it."""
+def _checked_flow(work: CalibrationWork) -> xr.Dataset | None:
+    """Return the flow field of a run; refuse a recording before anything is written for it.
+
+    A model that needs no flow has one only if it was given.
+    """
     from driftwalk.calibration import check_recording
     from driftwalk.conditions import recording_flow
 
     try:
         flow = work.flow
-        if flow is None:
+        if flow is None and (work.model is None or work.model.needs_flow):
             flow = recording_flow(work.recording, work.study, body=work.body)
-        check_recording(work.recording, work.study, flow=flow, body=work.body)
+        check_recording(work.recording, work.study, flow=flow, body=work.body, model=work.model)
     except InputError as error:
+        if "recording" not in work.inputs:
+            raise
         raise InputError(f"{work.inputs['recording']}: {error}") from error
     return flow
 
@@ -158,6 +167,8 @@ def _specification(work: CalibrationWork) -> dict[str, Any]:
         "body": work.body,
         "recording_sha256": dataset_hash(work.recording, ("x", "y", "theta")),
         "flow_sha256": None if work.flow is None else dataset_hash(work.flow, ("u", "v")),
+        # Runs of the block have no such entry: those begun by earlier versions go on.
+        **({} if work.model is None else {"model": work.model.describe()}),
     }
 
 

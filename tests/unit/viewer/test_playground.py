@@ -372,7 +372,7 @@ def test_latching_off_parts_what_is_joined_and_says_so() -> None:
     source = PlaySource(dw.apply_overrides(exact(), {"forces.force_std_N": 1e-3}), STILL, blocks=12)
     while source.tank.outcome.count("+") > 8:
         source.tank.advance(1.0)
-    assert "parts" in source._controls()["note"]
+    assert "separate" in source._controls()["note"]
     source._set("latching", "none")
     source._fulfil(lambda content: pytest.fail(str(content)))
     source._advance(0.5, until=math.inf)
