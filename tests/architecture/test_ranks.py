@@ -39,7 +39,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "figures": GROUND | {"plot"},
     "page": GROUND | {"plot"},
     "runs": GROUND
-    | {"flow", "model", "sweep", "conditions", "calibration", "likelihood", "assembly"}
+    | {"flow", "model", "sweep", "conditions", "motion", "calibration", "likelihood", "assembly"}
     | {"plot", "figures"},
     "notebook": GROUND
     | {"record", "flow", "model", "comparison", "simulation", "motion", "conditions"}
