@@ -1,4 +1,4 @@
-"""Fit a recording: flow, drag, stochastic force and tracking noise together, and the check."""
+"""Fit a recording: flow, drag, stochastic force and tracking noise together."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def fit(
     progress: Progress | None = None,
     **settings: Unpack[FitSettings],
 ) -> xr.Dataset:
-    """Fit flow, drag coefficient, stochastic force and tracking noise, and check the model.
+    """Fit flow, drag coefficient, stochastic force and tracking noise to recordings, together.
 
     Parameters
     ----------
@@ -41,7 +41,8 @@ def fit(
         The body, where a recording has several.
     folder : path-like, optional
         Run directory to make or continue, the same as that of ``driftwalk fit``: fit, flow,
-        recording, check, figures and manifest.
+        recording, check of the model, figures and manifest. Without it the model is not checked;
+        `check_model` does that.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
     progress : callable, optional
