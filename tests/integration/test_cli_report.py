@@ -19,8 +19,7 @@ import xarray as xr
 from command_line import FLOW, GRID, RECORDING, calibration, contents, here, refusal
 from page_reading import page_in, part_of, values
 
-from driftwalk import decode_array
-from driftwalk.page import report_html
+from driftwalk.page import decode_array, report_html
 
 TANK = ("--tank-diameter", "30cm")
 DOCS = Path(__file__).parents[2] / "docs"

@@ -76,31 +76,31 @@ REAL: list[tuple[str, str, dict[str, Any], dict[str, Any]]] = [
     (
         "rummynose-single-epfl",
         "rummy_single_seven_trajectories.txt",
-        {"frame_rate": 25.0, "metres_per_pixel": 0.00075, "arena": "fit", "max_speed": 2.0},
+        {"frame_rate": 25.0, "metres_per_pixel": 0.00075, "tank": "fit", "max_speed": 2.0},
         {"inertia": "none"},
     ),
     (
         "hexbug-gatech",
         "training_video1-centroid_data",
-        {"frame_rate": 30.0, "metres_per_pixel": 0.001, "arena": "rect:0.9x0.42@0.422,-0.268"},
+        {"frame_rate": 30.0, "metres_per_pixel": 0.001, "tank": "rect:0.9x0.42@0.422,-0.268"},
         {"inertia": "none"},
     ),
     (
         "smarticles-rattling",
         "destab_driveA_100pc_0_noisevar_10_randdur_600.csv",
-        {"metres_per_pixel": 0.001, "arena": "fit"},
+        {"metres_per_pixel": 0.001, "tank": "fit"},
         {"inertia": "none", "body": "all"},
     ),
     (
         "tracktor-mouse-termite",
         "mouse_video_tracked.csv",
-        {"frame_rate": 30.0, "metres_per_pixel": 0.001, "arena": "fit"},
+        {"frame_rate": 30.0, "metres_per_pixel": 0.001, "tank": "fit"},
         {"inertia": "none"},
     ),
     (
         "tracktor-mouse-termite",
         "termite_video_tracked.csv",
-        {"frame_rate": 60.0, "metres_per_pixel": 0.0001, "arena": "fit"},
+        {"frame_rate": 60.0, "metres_per_pixel": 0.0001, "tank": "fit"},
         {"inertia": "none", "body": "all"},
     ),
 ]

@@ -49,7 +49,7 @@ def test_the_block_is_known_however_its_dimensions_are_turned():
             lambda found: found.assign(refined_surface=("refined_speed", np.zeros(13))),
             "'refined_surface' lies on",
         ),
-        (lambda found: found.assign_attrs(model=3), "'model' is no text"),
+        (lambda found: found.assign_attrs(model=3), "'model' is not text"),
     ],
 )  # fmt: skip
 def test_damage_is_named(damage, message):

@@ -24,6 +24,7 @@ def study_for(
     overrides: Mapping[str, Any] | None = None,
     *,
     body: str | None = None,
+    needs_tank: bool = True,
 ) -> Study:
     """Return the study that work on recordings is done with; each fact is stated once.
 
@@ -38,6 +39,9 @@ def study_for(
         Over the study, from ``"section.key"`` to the value.
     body : str, optional
         The body, where there are several.
+    needs_tank : bool
+        Whether the work takes place in the tank, so that a default one has to hold the positions,
+        too. A tank that is stated always has to.
 
     Returns
     -------
@@ -67,7 +71,7 @@ def study_for(
         chosen = _with_block(chosen, recording, is_stated=block)
         tank = tank or "arena" in recording.attrs
         block = block or "block_side_m" in recording.attrs
-    for recording in recordings:
+    for recording in recordings if tank or needs_tank else ():
         require_inside(chosen, recording, body)
     return chosen
 

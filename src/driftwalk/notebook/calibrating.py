@@ -91,8 +91,9 @@ def calibrate(
         model, study = None, model
     if isinstance(model, BlockModel) and study is None:
         study = model.study
+    is_block = model is None or isinstance(model, BlockModel)
     overrides = study_overrides(keys=CALIBRATION_KEYS, **given)
-    chosen = study_for([recording], study, overrides, body=body)
+    chosen = study_for([recording], study, overrides, body=body, needs_tank=is_block)
     field = fitted_flow(flow) if flow is not None and flow.attrs.get("kind") == "fit" else flow
     say = progress or silent
     if folder is None:
