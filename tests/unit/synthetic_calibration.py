@@ -108,15 +108,16 @@ def synthetic_calibration(*, simulated: str = "yes", points: int = 17) -> xr.Dat
     boot_drag, boot_force = BEST_DRAG + 0.03 * cloud[:, 0], BEST_FORCE + 0.05e-3 * cloud[:, 1]
     region_drag, region_force = _region(boot_drag, boot_force)
     plane = ("drag_coefficient", "force_std")
-    place = random.uniform(0.0, 0.01, (points, points))
+    place = random.uniform(0.0, 0.01, (points, points))[..., None].repeat(4, axis=-1)
+    each = (*plane, "replicate")
     return xr.Dataset(
         {
             **coarse,
             **refined,
             "status": (plane, status),
-            "ks_step_length": (plane, place, {"units": "m"}),
-            "ks_turning_angle": (plane, place, {"units": "rad"}),
-            "ks_quadrant": (plane, np.ones((points, points), np.int8)),
+            "ks_step_length": (each, place, {"units": "m"}),
+            "ks_turning_angle": (each, place, {"units": "rad"}),
+            "ks_quadrant": (each, np.ones(place.shape, np.int8)),
             "step_density": ((*plane, "density_step_length", "density_turning_angle"), density),
             "recording_step_length": ("recording_step", length, {"units": "m"}),
             "recording_turning_angle": ("recording_step", angle, {"units": "rad"}),

@@ -14,7 +14,7 @@ from user_calibration import one_parameter, two_parameters
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.provenance import MANIFEST_KIND
 from driftwalk.model import Study
-from driftwalk.runs import read_calibrated
+from driftwalk.runs.calibrated import read_calibrated
 from driftwalk.schema.calibration import is_block, stored_parameters
 from driftwalk.schema.contents import check_contents
 

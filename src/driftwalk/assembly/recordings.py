@@ -23,11 +23,11 @@ from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
 from driftwalk.assembly.outcomes.classes import listed_classes, listed_shapes
 from driftwalk.core.errors import InputError
 from driftwalk.schema import body_names, check_trajectory
+from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
 
-SCHEMA_VERSION: Final = 1
 JOIN_DISTANCE: Final = 0.1
 """Default distance of faces that are joined, in sides."""
 JOIN_ANGLE: Final = math.radians(10.0)
@@ -188,36 +188,30 @@ def _shares(outcome: npt.NDArray[np.int32], lasts: Floats, classes: int) -> Floa
 def _dataset(
     recording: xr.Dataset, poses: Poses, rules: JoinRules, history: JoinHistory
 ) -> xr.Dataset:
-    import xarray as xr
-
     classes, shapes = _listed(history, poses.x.shape[1])
     known = ~_unknown_blocks(poses, rules.hold)
     sound: Booleans = np.logical_and.reduce(known, axis=1)
     outcome = np.where(sound, _places(history.outcome, classes), UNKNOWN).astype(np.int32)
     assembly = np.where(known, history.assembly, UNKNOWN).astype(np.int32)
     lasts = _known_time(poses.time, sound, rules.hold)
-    share = {"units": "1", "long_name": "share of the time in which the class is known"}
     data: dict[str, Any] = {
-        "outcome": ("time", outcome, {"long_name": "outcome class, -1 unknown"}),
-        "assembly": (
-            ("time", "body"),
-            assembly,
-            {"long_name": "lowest body of the assembly, -1 unknown"},
-        ),
-        "proportion": ("class", _shares(outcome, lasts, len(classes)), share),
+        "outcome": ("time", outcome),
+        "assembly": (("time", "body"), assembly),
+        "proportion": ("class", _shares(outcome, lasts, len(classes))),
         **_event_variables("event", history.joined, poses.time, classes),
         **_event_variables("split", history.split, poses.time, classes),
         **_assembly_variables(history.joined, shapes),
     }
-    return xr.Dataset(
+    return build_dataset(
+        "classification",
         data,
-        coords={
+        {
             "time": recording["time"],
             "body": recording["body"],
-            "class": ("class", np.array(classes, dtype=object), {"long_name": "outcome class"}),
-            "shape": ("shape", np.array(shapes, dtype=object), {"long_name": "shape"}),
+            "class": ("class", np.array(classes, dtype=object)),
+            "shape": ("shape", np.array(shapes, dtype=object)),
         },
-        attrs=_attributes(recording, poses, rules, history)
+        _attributes(recording, poses, rules, history)
         | {"unknown_samples": int((~sound).sum()), "known_s": float(lasts.sum())},
     )
 
@@ -246,7 +240,7 @@ def _event_variables(
     after = _places([event.outcome for event in events], classes) or [UNKNOWN]
     return {
         f"{kind}_count": ((), np.int32(len(events))),
-        f"{kind}_time": (kind, np.array(clock, dtype=np.float64), {"units": "s"}),
+        f"{kind}_time": (kind, np.array(clock, dtype=np.float64)),
         f"{kind}_block": ((kind, "side"), _padded([event.blocks for event in events], 2)),
         f"{kind}_face": ((kind, "side"), _padded([event.faces for event in events], 2)),
         f"{kind}_class": (kind, np.array(after, dtype=np.int32)),
@@ -272,8 +266,6 @@ def _attributes(
 ) -> dict[str, Any]:
     kept = ("source", "arena")
     return {
-        "kind": "classification",
-        "schema_version": SCHEMA_VERSION,
         **{name: recording.attrs[name] for name in kept if name in recording.attrs},
         "blocks": poses.x.shape[1],
         "chirality": history.chirality,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,14 +19,15 @@ from driftwalk.calibration.problem import Floats, Problem
 from driftwalk.calibration.search import Map
 from driftwalk.motion.score import DENSITY_BINS, broken_worlds, excerpt_samples
 from driftwalk.schema import Parameter
+from driftwalk.schema.kinds import KINDS
+from driftwalk.schema.kinds.calibration import CELL_STATUS
 from driftwalk.simulation.backend import STATUS
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.calibration.region import Bootstrap, Region
-SCHEMA_VERSION: Final = 1
-CELL_STATUS: Final[dict[str, int]] = {"no_motion": 1, "non_finite": 2, "too_few_steps": 4}
+
 
 _Variable = tuple[tuple[str, ...], npt.NDArray[Any], dict[str, Any]]
 
@@ -87,7 +88,9 @@ def build_calibration(
         )
         coords.update(_axes(parameters, refined.axes, "refined_"))
     return xr.Dataset(
-        data, coords, {"kind": "calibration", "schema_version": SCHEMA_VERSION, **attrs}
+        data,
+        coords,
+        {"kind": "calibration", "schema_version": KINDS["calibration"].version, **attrs},
     )
 
 

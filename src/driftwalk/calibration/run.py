@@ -46,6 +46,7 @@ from driftwalk.comparison import Statistic
 from driftwalk.core.errors import InputError
 from driftwalk.motion import BlockModel, Details, MotionModel
 from driftwalk.schema import Track, body_track
+from driftwalk.schema.check import check_dataset
 from driftwalk.simulation import recorded_camera
 
 if TYPE_CHECKING:
@@ -407,4 +408,4 @@ def _finish(
         dataset.attrs.update(interval_attrs(problem, found.region))
         dataset.attrs["confidence"] = study.calibration.confidence
     dataset.attrs["warnings"] = as_json(found.warnings)
-    return dataset
+    return check_dataset(dataset)

@@ -15,11 +15,10 @@ from driftwalk.comparison.walk import steps
 from driftwalk.core.errors import InputError
 from driftwalk.core.json_text import parse_json
 from driftwalk.schema import body_track
+from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
-
-SCHEMA_VERSION = 1
 
 
 def compare(
@@ -133,26 +132,20 @@ def _points(walk: xr.Dataset) -> Points:
 
 def _numbers(result: KsComparison, test: PermutationTest | None) -> dict[str, Any]:
     """Return the scalar variables."""
-    metre, radian = {"units": "m"}, {"units": "rad"}
-    one = {"units": "1"}
     place = result.place
     return {
-        "ks_distance": ((), result.distance, {**one, "long_name": "KS distance"}),
-        "ks_distance_a": ((), result.distance_a, {**one, "long_name": "origins in a"}),
-        "ks_distance_b": ((), result.distance_b, {**one, "long_name": "origins in b"}),
-        "score": ((), 1.0 - result.distance, {**one, "long_name": "1 - KS distance"}),
-        "ks_step_length": ((), place.x, metre),
-        "ks_turning_angle": ((), place.y, radian),
-        "ks_quadrant": ((), np.int8(place.quadrant), {"long_name": "quadrant of the maximum"}),
-        "tied_fraction": ((), result.tied_fraction, one),
-        "p_value": ((), test.p_value if test else np.nan, one),
-        "noise_floor": (
-            (),
-            test.noise_floor if test else np.nan,
-            {**one, "long_name": "median KS distance of the permutations"},
-        ),
-        "block_length": ((), test.block_length if test else 0, one),
-        "autocorrelation_time": ((), test.autocorrelation_time if test else np.nan, one),
+        "ks_distance": ((), result.distance),
+        "ks_distance_a": ((), result.distance_a),
+        "ks_distance_b": ((), result.distance_b),
+        "score": ((), 1.0 - result.distance),
+        "ks_step_length": ((), place.x),
+        "ks_turning_angle": ((), place.y),
+        "ks_quadrant": ((), np.int8(place.quadrant)),
+        "tied_fraction": ((), result.tied_fraction),
+        "p_value": ((), test.p_value if test else np.nan),
+        "noise_floor": ((), test.noise_floor if test else np.nan),
+        "block_length": ((), test.block_length if test else 0),
+        "autocorrelation_time": ((), test.autocorrelation_time if test else np.nan),
     }
 
 
@@ -163,8 +156,6 @@ def _dataset(
     *,
     attrs: dict[str, Any],
 ) -> xr.Dataset:
-    import xarray as xr
-
     lengths = [walk["step_length"].values for walk in walks]
     angles = [walk["turning_angle"].values for walk in walks]
     length_edge, angle_edge = step_length_edges(*lengths), turning_angle_edges()
@@ -178,21 +169,21 @@ def _dataset(
     }
     by_motion["mode"] = ("motion", np.array([walk.attrs["mode"] for walk in walks], dtype=object))
     by_motion |= {
-        "mean_step_length": ("motion", [length.mean() for length in lengths], {"units": "m"}),
-        "median_step_length": ("motion", [np.median(length) for length in lengths], {"units": "m"}),
-        "std_turning_angle": ("motion", [angle.std() for angle in angles], {"units": "rad"}),
+        "mean_step_length": ("motion", [length.mean() for length in lengths]),
+        "median_step_length": ("motion", [np.median(length) for length in lengths]),
+        "std_turning_angle": ("motion", [angle.std() for angle in angles]),
         "step_density": (
             ("motion", "density_step_length", "density_turning_angle"),
             np.stack(density),
-            {"units": "1", "long_name": "fraction of steps"},
         ),
     }
-    return xr.Dataset(
+    return build_dataset(
+        "comparison",
         {**_numbers(result, test), **by_motion},
-        coords={
+        {
             "motion": ("motion", np.array(["a", "b"], dtype=object)),
-            "step_length_edge": ("step_length_edge", length_edge, {"units": "m"}),
-            "turning_angle_edge": ("turning_angle_edge", angle_edge, {"units": "rad"}),
+            "step_length_edge": ("step_length_edge", length_edge),
+            "turning_angle_edge": ("turning_angle_edge", angle_edge),
         },
-        attrs={"kind": "comparison", "schema_version": SCHEMA_VERSION, **attrs},
+        attrs,
     )

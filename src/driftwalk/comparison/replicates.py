@@ -11,11 +11,10 @@ import numpy.typing as npt
 from driftwalk.comparison.ks import Ties, ks_distance
 from driftwalk.comparison.motion import sampling_interval, step_points
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
-
-SCHEMA_VERSION = 1
 
 
 def compare_replicates(
@@ -68,8 +67,6 @@ def compare_replicates(
     >>> dw.comparison.compare_replicates(recording, run)["ks_distance"].sizes["replicate"]
     3
     """
-    import xarray as xr
-
     count = simulation.sizes.get("replicate", 0)
     if count < 2:
         raise InputError(f"at least two replicates are needed, got {count}: simulate more")
@@ -82,40 +79,16 @@ def compare_replicates(
     distance = _pairwise(motions, ties)
     mean = distance.sum(axis=1) / count
     among = distance[1:, 1:][np.triu_indices(count, k=1)]
-    one = {"units": "1"}
-    return xr.Dataset(
+    return build_dataset(
+        "replicate_comparison",
         {
-            "ks_distance": (
-                "replicate",
-                distance[0, 1:],
-                {**one, "long_name": "KS distance of a replicate to the recording"},
-            ),
-            "mean_ks_distance": (
-                (),
-                mean[0],
-                {**one, "long_name": "mean KS distance of the replicates to the recording"},
-            ),
-            "noise_floor": (
-                (),
-                among.mean(),
-                {**one, "long_name": "mean KS distance of two replicates"},
-            ),
-            "p_value": (
-                (),
-                np.mean(mean >= mean[0]),
-                {
-                    **one,
-                    "long_name": "share of motions as far from the others as the recording",
-                },
-            ),
+            "ks_distance": ("replicate", distance[0, 1:]),
+            "mean_ks_distance": ((), mean[0]),
+            "noise_floor": ((), among.mean()),
+            "p_value": ((), np.mean(mean >= mean[0])),
         },
-        coords={"replicate": simulation["replicate"]},
-        attrs={
-            "kind": "replicate_comparison",
-            "schema_version": SCHEMA_VERSION,
-            "step_interval_s": interval,
-            "ties": ties,
-        },
+        {"replicate": simulation["replicate"]},
+        {"step_interval_s": interval, "ties": ties},
     )
 
 

@@ -34,6 +34,7 @@ from driftwalk.likelihood.solution import require_noise_below_motion, solved
 from driftwalk.likelihood.start import first_point, first_weights
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema import Track
+from driftwalk.schema.check import described
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -152,7 +153,7 @@ def fit_motion(
     fit.attrs["visited_share"] = min(shares)
     warnings = warnings_of(fit.attrs, whiteness, shares, intervals, side_m=chosen.block.side_m)
     fit.attrs["warnings"] = json.dumps(warnings)
-    return fit
+    return described(fit)
 
 
 def check_fit(

@@ -26,13 +26,13 @@ from driftwalk.likelihood.reml import Restricted
 from driftwalk.likelihood.spline import Floats, Spline
 from driftwalk.likelihood.widening import widened
 from driftwalk.schema import FLAGS, build_flow_field
+from driftwalk.schema.kinds import KINDS
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
 
-SCHEMA_VERSION: Final = 1
 MOST_LOG_WIDTH: Final = 300.0
 """Beyond this an interval has no upper end: exp would not fit a double for long."""
 LEAST_COUNT: Final = 3
@@ -184,7 +184,7 @@ def build_fit(
     }
     facts = {
         "kind": "fit",
-        "schema_version": SCHEMA_VERSION,
+        "schema_version": KINDS["fit"].version,
         "spline_origin_m": [spline.origin_x, spline.origin_y],
         "spline_spacing_m": spline.spacing,
         "cell_size_m": grid.cell_size,

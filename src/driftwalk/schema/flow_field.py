@@ -9,28 +9,19 @@ unvisited), ``count`` (samples), ``u_standard_error``, ``v_standard_error`` [m/s
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import build_dataset
+from driftwalk.schema.kinds.flow import ORIGIN
 
 if TYPE_CHECKING:
     import xarray as xr
 
-SCHEMA_VERSION = 1
-FLAGS: dict[str, int] = {"outside": 0, "measured": 1, "filled": 2}
-VARIABLES: dict[str, dict[str, str]] = {
-    "u": {"units": "m s-1", "long_name": "flow velocity x"},
-    "v": {"units": "m s-1", "long_name": "flow velocity y"},
-    "u_block": {"units": "m s-1", "long_name": "mean block velocity x"},
-    "v_block": {"units": "m s-1", "long_name": "mean block velocity y"},
-    "count": {"units": "1", "long_name": "samples in the cell"},
-    "u_standard_error": {"units": "m s-1", "long_name": "standard error of flow velocity x"},
-    "v_standard_error": {"units": "m s-1", "long_name": "standard error of flow velocity y"},
-    "flag": {"long_name": "origin of the node's value"},
-}
+FLAGS: Final[dict[str, int]] = ORIGIN
 
 
 def build_flow_field(
@@ -66,32 +57,20 @@ def build_flow_field(
     InputError
         When shapes disagree, the spacing is uneven, or a velocity is not finite.
     """
-    import xarray as xr
-
     dims = ("y", "x") if time is None else ("time", "y", "x")
     fields = {"u": u, "v": v, **variables}
     data: dict[str, Any] = {
-        name: (dims, np.asarray(values, dtype=np.float64), VARIABLES[name])
-        for name, values in fields.items()
+        name: (dims, np.asarray(values, dtype=np.float64)) for name, values in fields.items()
     }
-    flag_attrs = {
-        **VARIABLES["flag"],
-        "flag_values": np.array(list(FLAGS.values()), dtype=np.int8),
-        "flag_meanings": " ".join(FLAGS),
-    }
-    data["flag"] = (dims, np.asarray(flag, dtype=np.int8), flag_attrs)
+    data["flag"] = (dims, np.asarray(flag, dtype=np.int8))
     coords: dict[str, Any] = {
-        "y": ("y", np.asarray(y, dtype=np.float64), {"units": "m", "long_name": "y"}),
-        "x": ("x", np.asarray(x, dtype=np.float64), {"units": "m", "long_name": "x"}),
+        "y": ("y", np.asarray(y, dtype=np.float64)),
+        "x": ("x", np.asarray(x, dtype=np.float64)),
     }
     if time is not None:
-        coords["time"] = ("time", np.asarray(time, dtype=np.float64), {"units": "s"})
+        coords["time"] = ("time", np.asarray(time, dtype=np.float64))
     try:
-        dataset = xr.Dataset(
-            data,
-            coords=coords,
-            attrs={"kind": "flow_field", "schema_version": SCHEMA_VERSION, **(attrs or {})},
-        )
+        dataset = build_dataset("flow_field", data, coords, attrs or {})
     except ValueError as error:
         raise InputError(f"not a flow field: {error}") from error
     return check_flow_field(dataset)

@@ -7,21 +7,18 @@ to this one (the paper's step angle). ``attrs`` holds the counts.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
 
-SCHEMA_VERSION = 1
-VARIABLES: dict[str, dict[str, str]] = {
-    "step_length": {"units": "m", "long_name": "step length"},
-    "turning_angle": {"units": "rad", "long_name": "turning angle"},
-}
+STEP: Final = ("step_length", "turning_angle")
 
 
 def build_steps(
@@ -54,19 +51,13 @@ def build_steps(
     >>> build_steps([0.01], [0.2], time=[0.1]).sizes["step"]
     1
     """
-    import xarray as xr
-
     values = {"step_length": step_length, "turning_angle": turning_angle}
     try:
-        dataset = xr.Dataset(
-            {
-                name: ("step", np.asarray(array, dtype=np.float64), VARIABLES[name])
-                for name, array in values.items()
-            },
-            coords={
-                "time": ("step", np.asarray(time, dtype=np.float64), {"units": "s"}),
-            },
-            attrs={"kind": "steps", "schema_version": SCHEMA_VERSION, **(attrs or {})},
+        dataset = build_dataset(
+            "steps",
+            {name: ("step", np.asarray(array, dtype=np.float64)) for name, array in values.items()},
+            {"time": ("step", np.asarray(time, dtype=np.float64))},
+            attrs or {},
         )
     except ValueError as error:
         raise InputError(f"not a steps dataset: {error}") from error
@@ -75,12 +66,12 @@ def build_steps(
 
 def check_steps(dataset: xr.Dataset) -> xr.Dataset:
     """Return the dataset if it is a valid `steps` dataset, else raise `InputError`."""
-    for name in VARIABLES:
+    for name in STEP:
         if name not in dataset or dataset[name].dims != ("step",):
             raise InputError(
                 f"not a steps dataset: variable '{name}' with dimension (step) is missing"
             )
-    length, angle = (dataset[name].values for name in VARIABLES)
+    length, angle = (dataset[name].values for name in STEP)
     if not (np.isfinite(length) & (length > 0)).all():
         raise InputError("not a steps dataset: a step_length is not a positive number")
     if not ((angle > -np.pi) & (angle <= np.pi)).all():

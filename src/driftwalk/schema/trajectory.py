@@ -13,22 +13,18 @@ own share the union of their time stamps, each with NaN where it has no sample.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
 
-SCHEMA_VERSION = 1
-VARIABLES: dict[str, dict[str, str]] = {
-    "x": {"units": "m", "long_name": "position x"},
-    "y": {"units": "m", "long_name": "position y"},
-    "theta": {"units": "rad", "long_name": "orientation"},
-}
+POSE: Final = ("x", "y", "theta")
 
 
 class Track(NamedTuple):
@@ -88,8 +84,6 @@ def build_trajectory(
     >>> build_trajectory([0.0, 0.1], [0.0, 0.01], [0.0, 0.0]).sizes["time"]
     2
     """
-    import xarray as xr
-
     time_s = np.asarray(time, dtype=np.float64)
     x_m, y_m = (_columns(values) for values in (x, y))
     theta_rad = np.full_like(x_m, np.nan) if theta is None else wrap_angle(_columns(theta))
@@ -99,16 +93,14 @@ def build_trajectory(
             "do not have the same number of samples"
         )
     names = body if body is not None else [str(index) for index in range(x_m.shape[1])]
-    dataset = xr.Dataset(
+    dataset = build_dataset(
+        "trajectory",
         {
-            name: (("time", "body"), values, VARIABLES[name])
-            for name, values in (("x", x_m), ("y", y_m), ("theta", theta_rad))
+            name: (("time", "body"), values)
+            for name, values in zip(POSE, (x_m, y_m, theta_rad), strict=True)
         },
-        coords={
-            "time": ("time", time_s, {"units": "s", "long_name": "time"}),
-            "body": ("body", np.asarray(names, dtype=object), {"long_name": "body"}),
-        },
-        attrs={"kind": "trajectory", "schema_version": SCHEMA_VERSION, **(attrs or {})},
+        {"time": ("time", time_s), "body": ("body", np.asarray(names, dtype=object))},
+        attrs or {},
     )
     return check_trajectory(dataset)
 
@@ -124,7 +116,7 @@ def wrap_angle(theta: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 
 def check_trajectory(dataset: xr.Dataset) -> xr.Dataset:
     """Return the dataset if it is a valid `trajectory`, else raise `InputError`."""
-    for name in VARIABLES:
+    for name in POSE:
         if name not in dataset or dataset[name].dims != ("time", "body"):
             raise InputError(
                 f"not a trajectory dataset: no variable '{name}' with dimensions (time, body)"
@@ -172,7 +164,7 @@ def body_track(dataset: xr.Dataset, body: str | None = None) -> Track:
     if body not in names:
         raise InputError(f"no body '{body}' in the recording; it has {', '.join(names)}")
     index = names.index(body)
-    x, y, theta = (dataset[name].values[:, index] for name in VARIABLES)
+    x, y, theta = (dataset[name].values[:, index] for name in POSE)
     present = np.isfinite(x) & np.isfinite(y)
     time = dataset["time"].values
     return Track(time[present], x[present], y[present], theta[present])

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from driftwalk import _core
 from driftwalk.core.errors import InputError
 from driftwalk.schema import check_flow_field
+from driftwalk.schema.kinds.motion import WORLD_STATUS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-STATUS: Final[dict[str, int]] = {"non_finite": 1, "escaped": 2, "no_motion": 4}
+STATUS: Final[dict[str, int]] = WORLD_STATUS
 """Bits of a world's status; 0 is sound."""
 BROKEN: Final = STATUS["non_finite"] | STATUS["escaped"]
 """Bits of a world that lost its numbers: it has no distance and no outcome."""

@@ -11,7 +11,9 @@ from driftwalk import _core
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import default_threads
 from driftwalk.core.seeds import world_keys
-from driftwalk.simulation.backend import STATUS, Camera, native_model, world_table
+from driftwalk.schema.check import build_dataset
+from driftwalk.schema.trajectory import POSE
+from driftwalk.simulation.backend import Camera, native_model, world_table
 from driftwalk.simulation.initial import Start, random_start, recorded_start, world_orientations
 
 if TYPE_CHECKING:
@@ -207,32 +209,21 @@ def _study_start(study: Study, keys: npt.NDArray[np.uint64]) -> Start:
 def _dataset(
     study: Study, times: Any, poses: tuple[Any, Any, Any], status: Any, attrs: dict[str, Any]
 ) -> xr.Dataset:
-    import xarray as xr
-
-    from driftwalk.schema.trajectory import VARIABLES
-
     dims = ("replicate", "time", "body")
     forces = study.forces
     data: dict[str, Any] = {
-        name: (dims, values[:, :, None], VARIABLES[name])
-        for name, values in zip(("x", "y", "theta"), poses, strict=True)
+        name: (dims, values[:, :, None]) for name, values in zip(POSE, poses, strict=True)
     }
-    flags = {
-        "long_name": "problems in a world",
-        "flag_masks": np.array(list(STATUS.values()), dtype=np.int32),
-        "flag_meanings": " ".join(STATUS),
-    }
-    data["status"] = ("replicate", status.astype(np.int32), flags)
-    return xr.Dataset(
+    data["status"] = ("replicate", status.astype(np.int32))
+    return build_dataset(
+        "simulation",
         data,
-        coords={
-            "time": ("time", times, {"units": "s", "long_name": "time"}),
-            "body": ("body", np.array(["block"], dtype=object), {"long_name": "body"}),
-            "replicate": np.arange(status.size),
+        {
+            "time": ("time", times),
+            "body": ("body", np.array(["block"], dtype=object)),
+            "replicate": ("replicate", np.arange(status.size)),
         },
-        attrs={
-            "kind": "simulation",
-            "schema_version": 1,
+        {
             "arena": study.tank.to_arena_json(),
             "drag_coefficient": forces.drag_coefficient,
             "force_std_N": forces.force_std_N,

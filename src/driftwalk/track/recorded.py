@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.schema.check import described
 from driftwalk.track.follow.tracks import COVARIANCE, Track
 
 if TYPE_CHECKING:
@@ -62,8 +63,6 @@ def recording_of(
             "counts": json.dumps({"frames": len(times), **counts}),
         },
     )
-    score = {"units": "1", "long_name": "score of the best other assignment of identities"}
-    parts = {"long_name": "covariance of the measurement", "units": "m, m, rad"}
-    recording["ambiguous"] = (("time", "body"), ambiguous, score)
-    recording["covariance"] = (("time", "body", "part"), values[..., 3:], parts)
-    return recording.assign_coords(part=("part", np.array(COVARIANCE, dtype=object)))
+    recording["ambiguous"] = (("time", "body"), ambiguous)
+    recording["covariance"] = (("time", "body", "part"), values[..., 3:])
+    return described(recording.assign_coords(part=("part", np.array(COVARIANCE, dtype=object))))

@@ -15,13 +15,13 @@ import numpy.typing as npt
 
 from driftwalk.assembly.outcomes.distribution import is_complete, sampling_variance
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
 
 Floats = npt.NDArray[np.float64]
 
-SCHEMA_VERSION = 1
 # Singular values below this part of the largest are rounding.
 RANK_TOLERANCE = 1e-9
 
@@ -288,33 +288,20 @@ def _dataset(
     correlation: Floats,
     attrs: dict[str, Any],
 ) -> xr.Dataset:
-    import xarray as xr
-
     axes = proportion.dims[:-1]
     shape = (*proportion.shape[:-1], found.ratio.size)
-    return xr.Dataset(
+    return build_dataset(
+        "components",
         {
-            "score": ((*axes, "component"), score.reshape(shape), _one("score of the setting")),
-            "loading": (("class", "component"), found.loading, _one("loading of the class")),
-            "explained_variance_ratio": (
-                "component",
-                found.ratio,
-                _one("share of the variance over settings"),
-            ),
-            "complete_correlation": (
-                "component",
-                correlation,
-                _one("correlation of the score with the share of complete runs"),
-            ),
-            "mean": ("class", found.mean, _one("mean proportion over settings")),
+            "score": ((*axes, "component"), score.reshape(shape)),
+            "loading": (("class", "component"), found.loading),
+            "explained_variance_ratio": ("component", found.ratio),
+            "complete_correlation": ("component", correlation),
+            "mean": ("class", found.mean),
         },
-        coords={
-            **proportion.coords,
+        {
+            **{str(name): one for name, one in proportion.coords.items()},
             "component": ("component", np.arange(1, found.ratio.size + 1)),
         },
-        attrs={**attrs, "kind": "components", "schema_version": SCHEMA_VERSION},
+        attrs,
     )
-
-
-def _one(long_name: str) -> dict[str, str]:
-    return {"units": "1", "long_name": long_name}

@@ -16,6 +16,7 @@ from driftwalk.assembly.lattice.events import classes_at
 from driftwalk.assembly.lattice.polyomino import shape_size
 from driftwalk.assembly.outcomes.classes import class_shapes
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
-SCHEMA_VERSION = 1
 METHOD = "Clopper-Pearson, Bonferroni over the classes; `complete` on its own"
 NOT_COPIED = ("kind", "schema_version", "runs")
 
@@ -305,27 +305,23 @@ def _blocks(names: list[str]) -> int:
 def _dataset(
     names: list[str], count: Integers, confidence: float, attrs: dict[str, Any]
 ) -> xr.Dataset:
-    import xarray as xr
-
     runs = int(count.sum())
     if runs == 0:
         raise InputError("there is no run with an outcome: proportions need at least one")
     low, high = proportion_interval(count, runs, confidence=1 - (1 - confidence) / len(names))
     complete = int(count[is_complete(names)].sum())
     complete_low, complete_high = proportion_interval(complete, runs, confidence=confidence)
-    limit = "limit of the simultaneous confidence interval"
-    return xr.Dataset(
+    return build_dataset(
+        "outcome_distribution",
         {
-            "count": ("class", count, {"units": "1", "long_name": "runs of this class"}),
-            "proportion": ("class", count / runs, {"units": "1", "long_name": "share of runs"}),
-            "interval_low": ("class", low, {"units": "1", "long_name": f"lower {limit}"}),
-            "interval_high": ("class", high, {"units": "1", "long_name": f"upper {limit}"}),
+            "count": ("class", count),
+            "proportion": ("class", count / runs),
+            "interval_low": ("class", low),
+            "interval_high": ("class", high),
         },
-        coords={"class": ("class", np.array(names, dtype=object), {"long_name": "outcome class"})},
-        attrs={
+        {"class": ("class", np.array(names, dtype=object))},
+        {
             **attrs,
-            "kind": "outcome_distribution",
-            "schema_version": SCHEMA_VERSION,
             "runs": runs,
             "confidence": confidence,
             "complete": complete / runs,

@@ -22,13 +22,13 @@ from driftwalk.assembly.outcomes.distribution import (
     require_assembly,
 )
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
 
 Floats = npt.NDArray[np.float64]
 
-SCHEMA_VERSION = 1
 TIMES = 201
 # A product of shares like 2/3 * 3/4 may miss one half by rounding.
 HALF = 0.5 + 1e-12
@@ -310,13 +310,9 @@ def _share(long_name: str) -> dict[str, str]:
 def _dataset(
     data: dict[str, Any], time: Floats, names: list[str], attrs: dict[str, Any]
 ) -> xr.Dataset:
-    import xarray as xr
-
-    return xr.Dataset(
+    return build_dataset(
+        "class_times",
         data,
-        coords={
-            "time": ("time", time, {"units": "s", "long_name": "time from the start of the run"}),
-            "class": ("class", np.array(names, dtype=object), {"long_name": "outcome class"}),
-        },
-        attrs={**attrs, "kind": "class_times", "schema_version": SCHEMA_VERSION},
+        {"time": ("time", time), "class": ("class", np.array(names, dtype=object))},
+        attrs,
     )

@@ -14,7 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
-from driftwalk.simulation.backend import BROKEN, STATUS
+from driftwalk.schema.check import build_dataset
+from driftwalk.schema.trajectory import POSE
+from driftwalk.simulation.backend import BROKEN
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,7 +26,6 @@ if TYPE_CHECKING:
 Arrays = dict[str, npt.NDArray[Any]]
 Floats = npt.NDArray[np.float64]
 
-SCHEMA_VERSION: Final = 1
 DECIMALS: Final = 9
 """Times are kept to a nanosecond."""
 
@@ -41,8 +42,6 @@ def build_assembly(plan: Plan, arrays: Arrays, *, attrs: dict[str, Any]) -> xr.D
     attrs : dict
         Further attributes.
     """
-    import xarray as xr
-
     study = plan.study
     replayed = replay_events(
         *(arrays[f"event_{name}"] for name in ("count", "block", "face")),
@@ -57,23 +56,19 @@ def build_assembly(plan: Plan, arrays: Arrays, *, attrs: dict[str, Any]) -> xr.D
         **_times(arrays, step),
         **_poses(arrays),
         **_parameters(plan),
-        "outcome": ("run", outcome, _index("class", "outcome class at the end, -1 for none")),
-        "status": ("run", arrays["status"].astype(np.int32), _status_flags()),
+        "outcome": ("run", outcome),
+        "status": ("run", arrays["status"].astype(np.int32)),
     }
-    return xr.Dataset(
+    return build_dataset(
+        "assembly",
         data,
-        coords={
-            "run": ("run", np.arange(outcome.size), {"long_name": "run"}),
-            "block": ("block", np.arange(study.assembly.blocks), {"long_name": "block"}),
-            "class": _names("class", replayed.classes, "outcome class"),
-            "shape": _names("shape", replayed.shapes, "shape of an assembly"),
+        {
+            "run": ("run", np.arange(outcome.size)),
+            "block": ("block", np.arange(study.assembly.blocks)),
+            "class": ("class", np.array(replayed.classes, dtype=object)),
+            "shape": ("shape", np.array(replayed.shapes, dtype=object)),
         },
-        attrs={
-            "kind": "assembly",
-            "schema_version": SCHEMA_VERSION,
-            **assembly_attrs(plan),
-            **attrs,
-        },
+        {**assembly_attrs(plan), **attrs},
     )
 
 
@@ -89,26 +84,22 @@ def build_path(plan: Plan, samples: Arrays, *, every: int) -> xr.Dataset:
     every : int
         Time steps between samples.
     """
-    import xarray as xr
-
     dims = ("run", "time", "block")
     pose, step = samples["sample_pose"], plan.study.time_step_s
     time = times_of(np.arange(pose.shape[1]) * every, time_step=step)
     data: dict[str, Any] = {
-        name: (dims, np.ascontiguousarray(pose[..., part]), _units(unit, long_name))
-        for part, (name, unit, long_name) in enumerate(_POSE)
+        name: (dims, np.ascontiguousarray(pose[..., part])) for part, name in enumerate(POSE)
     }
-    data["assembly"] = (dims, samples["sample_assembly"].astype(np.int32), _LOWEST)
-    return xr.Dataset(
+    data["assembly"] = (dims, samples["sample_assembly"].astype(np.int32))
+    return build_dataset(
+        "assembly_path",
         data,
-        coords={
-            "run": ("run", plan.index, {"long_name": "run"}),
-            "time": ("time", time, _units("s", "time from the start of the run")),
-            "block": ("block", np.arange(pose.shape[2]), {"long_name": "block"}),
+        {
+            "run": ("run", plan.index),
+            "time": ("time", time),
+            "block": ("block", np.arange(pose.shape[2])),
         },
-        attrs={
-            "kind": "assembly_path",
-            "schema_version": SCHEMA_VERSION,
+        {
             **assembly_attrs(plan),
             "runs": plan.index.size,
             "sample_interval_s": float(np.round(every * step, DECIMALS)),
@@ -170,115 +161,46 @@ def times_of(step: npt.NDArray[Any], *, time_step: float) -> Floats:
     return np.where(step < 0, np.nan, np.round(step * time_step, DECIMALS))
 
 
-_POSE: Final = (
-    ("x", "m", "position x of the block's centre"),
-    ("y", "m", "position y of the block's centre"),
-    ("theta", "rad", "orientation of the block, counter-clockwise from x"),
-)
-_LOWEST: Final = {"long_name": "assembly of the block, as its lowest block"}
-
-
 def _events(arrays: Arrays, replayed: ReplayedEvents, step: float) -> dict[str, Any]:
     sides = ("run", "event", "side")
-    order = "first of the assembly that stayed, then of the one that was moved"
-    shape = _index("shape", "shapes of the assembly that stayed, of the one moved, of both joined")
     return {
-        "event_count": (
-            "run",
-            arrays["event_count"].astype(np.int32),
-            _units("1", "number of joinings"),
-        ),
-        "event_time": (
-            ("run", "event"),
-            times_of(arrays["event_step"], time_step=step),
-            _units("s", "time of the joining"),
-        ),
-        "event_block": (
-            sides,
-            arrays["event_block"].astype(np.int32),
-            {"long_name": f"blocks whose faces joined, {order}"},
-        ),
-        "event_face": (
-            sides,
-            arrays["event_face"].astype(np.int32),
-            {"long_name": "faces that joined, in the blocks' own frames: 0 +x, 1 +y, 2 -x, 3 -y"},
-        ),
-        "event_assembly": (
-            sides,
-            replayed.event_assembly,
-            {"long_name": f"lowest block of the assemblies that joined, {order}"},
-        ),
-        "event_shape": (("run", "event", "part"), replayed.event_shape, shape),
-        "event_class": (
-            ("run", "event"),
-            replayed.event_class,
-            _index("class", "outcome class of the whole world after the joining"),
-        ),
+        "event_count": ("run", arrays["event_count"].astype(np.int32)),
+        "event_time": (("run", "event"), times_of(arrays["event_step"], time_step=step)),
+        "event_block": (sides, arrays["event_block"].astype(np.int32)),
+        "event_face": (sides, arrays["event_face"].astype(np.int32)),
+        "event_assembly": (sides, replayed.event_assembly),
+        "event_shape": (("run", "event", "part"), replayed.event_shape),
+        "event_class": (("run", "event"), replayed.event_class),
     }
 
 
 def _times(arrays: Arrays, step: float) -> dict[str, Any]:
-    completion = completion_step(arrays)
     known = {
-        "first_contact_time": (arrays["first_contact_step"], "time of the first contact of blocks"),
-        "completion_time": (completion, "time at which all blocks had become one assembly"),
-        "end_time": (arrays["end_step"], "time at which the run stopped"),
+        "first_contact_time": arrays["first_contact_step"],
+        "completion_time": completion_step(arrays),
+        "end_time": arrays["end_step"],
     }
-    return {
-        name: ("run", times_of(steps, time_step=step), _units("s", long_name))
-        for name, (steps, long_name) in known.items()
-    }
+    return {name: ("run", times_of(steps, time_step=step)) for name, steps in known.items()}
 
 
 def _poses(arrays: Arrays) -> dict[str, Any]:
     dims = ("run", "block")
-    poses = {
-        name: (dims, np.ascontiguousarray(arrays["pose"][..., part]), _units(unit, long_name))
-        for part, (name, unit, long_name) in enumerate(_POSE)
-    }
     return {
-        **poses,
-        "cell": (
-            (*dims, "axis"),
-            arrays["cell"].astype(np.int32),
-            {"long_name": "cell of the block on its assembly's lattice, x and y"},
-        ),
-        "quarter": (
-            dims,
-            arrays["quarter"].astype(np.int32),
-            {"long_name": "quarter turns of the block against its assembly"},
-        ),
-        "assembly": (dims, arrays["assembly"].astype(np.int32), _LOWEST),
+        **{
+            name: (dims, np.ascontiguousarray(arrays["pose"][..., part]))
+            for part, name in enumerate(POSE)
+        },
+        "cell": ((*dims, "axis"), arrays["cell"].astype(np.int32)),
+        "quarter": (dims, arrays["quarter"].astype(np.int32)),
+        "assembly": (dims, arrays["assembly"].astype(np.int32)),
     }
 
 
 def _parameters(plan: Plan) -> dict[str, Any]:
-    drag, force = _units("1", "drag coefficient"), _units("N", "standard deviation of the force")
     known: dict[str, Any] = {
-        "drag_coefficient": ("run", plan.drag_coefficient, drag),
-        "force_std": ("run", plan.force_std, force),
+        "drag_coefficient": ("run", plan.drag_coefficient),
+        "force_std": ("run", plan.force_std),
     }
     if plan.flow_draw is not None:
-        about = {"long_name": "which drawn flow field the run had"}
-        known["flow_draw"] = ("run", plan.flow_draw.astype(np.int32), about)
+        known["flow_draw"] = ("run", plan.flow_draw.astype(np.int32))
     return known
-
-
-def _status_flags() -> dict[str, Any]:
-    return {
-        "long_name": "problems in a run",
-        "flag_masks": np.array(list(STATUS.values()), dtype=np.int32),
-        "flag_meanings": " ".join(STATUS),
-    }
-
-
-def _names(dim: str, values: tuple[str, ...], long_name: str) -> tuple[str, Any, dict[str, str]]:
-    return dim, np.array(values, dtype=object), {"long_name": long_name}
-
-
-def _index(of: str, long_name: str) -> dict[str, Any]:
-    return {"long_name": f"{long_name}: index into '{of}'"}
-
-
-def _units(units: str, long_name: str) -> dict[str, Any]:
-    return {"units": units, "long_name": long_name}

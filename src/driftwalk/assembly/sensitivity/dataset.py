@@ -17,6 +17,7 @@ from driftwalk.assembly.sensitivity.settings import Outcomes, Settings
 from driftwalk.assembly.sensitivity.times import map_courses, reference_courses
 from driftwalk.core.errors import InputError
 from driftwalk.core.json_text import parse_json
+from driftwalk.schema.check import build_dataset, described
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
-SCHEMA_VERSION: Final = 1
 NOT_COMMON: Final[dict[str, tuple[str, ...]]] = {
     "tank_diameter": ("arena",),
     "flow": (),
@@ -58,23 +58,10 @@ def reference_dataset(plan: Plan, outcomes: Outcomes) -> xr.Dataset:
     found = found.assign_coords(times).assign(courses)
     share = count / runs[:, None]
     forces = plan.study.forces
-    about = {"units": "1"}
-    return found.assign(
-        realisation_count=(
-            ("realisation", "class"),
-            count,
-            {**about, "long_name": "runs of this class"},
-        ),
-        realisation_proportion=(
-            ("realisation", "class"),
-            share,
-            {**about, "long_name": "share of runs"},
-        ),
-        standard_deviation=(
-            "class",
-            share.std(axis=0, ddof=1),
-            {**about, "long_name": "standard deviation of the share over realisations"},
-        ),
+    found = found.assign(
+        realisation_count=(("realisation", "class"), count),
+        realisation_proportion=(("realisation", "class"), share),
+        standard_deviation=("class", share.std(axis=0, ddof=1)),
     ).assign_attrs(
         {
             **{k: v for k, v in assembly_attrs(plan).items() if k not in ("trial", "runs")},
@@ -86,14 +73,13 @@ def reference_dataset(plan: Plan, outcomes: Outcomes) -> xr.Dataset:
             "expected_pairwise_l1": l1_noise_floor(found, assembly.runs, assembly.runs).mean,
         }
     )
+    return described(found)
 
 
 def map_dataset(
     axes: Axes, settings: Settings, outcomes: Outcomes, reference: xr.Dataset
 ) -> xr.Dataset:
     """Return the `sensitivity` dataset of a map."""
-    import xarray as xr
-
     names = _map_classes(settings, outcomes, reference)
     count = count_table(outcomes.count, names)
     runs = count.sum(axis=1)
@@ -106,45 +92,37 @@ def map_dataset(
     dims = tuple(axes.values)
     sizes = dict(zip(dims, axes.shape, strict=True))
     courses, times = map_courses(settings.worlds[0], outcomes.courses, reference, dims=sizes)
-    of_setting: dict[str, tuple[npt.NDArray[Any], str, str]] = {
-        "runs": (runs, "1", "runs with an outcome"),
-        "left_out": (outcomes.left_out, "1", "runs without an outcome"),
-        "complete": (complete, "1", "share of runs with one assembly"),
-        "first_contact_median": (outcomes.first_contact_median, "s", "median of first contact"),
-        "completion_median": (outcomes.completion_median, "s", "median of completion"),
-        "l1_distance": (distance, "1", "l1 distance to the reference"),
-        "l1_in_floors": (in_floors, "1", "l1 distance divided by that of chance alone"),
-        "trial": (settings.trial, "1", "address of the random numbers"),
+    of_setting: dict[str, npt.NDArray[Any]] = {
+        "runs": runs,
+        "left_out": outcomes.left_out,
+        "complete": complete,
+        "first_contact_median": outcomes.first_contact_median,
+        "completion_median": outcomes.completion_median,
+        "l1_distance": distance,
+        "l1_in_floors": in_floors,
+        "trial": settings.trial,
     }
-    of_class = {"count": (count, "runs of this class"), "proportion": (share, "share of runs")}
-    return xr.Dataset(
+    of_class = {"count": count, "proportion": share}
+    return build_dataset(
+        "sensitivity",
         {
             **{
-                name: (
-                    (*dims, "class"),
-                    values.reshape(*axes.shape, len(names)),
-                    {"units": "1", "long_name": words},
-                )
-                for name, (values, words) in of_class.items()
+                name: ((*dims, "class"), values.reshape(*axes.shape, len(names)))
+                for name, values in of_class.items()
             },
-            **{
-                name: (dims, values.reshape(axes.shape), {"units": unit, "long_name": words})
-                for name, (values, unit, words) in of_setting.items()
-            },
-            "reference": ("class", known, {"units": "1", "long_name": "share in the reference"}),
+            **{name: (dims, values.reshape(axes.shape)) for name, values in of_setting.items()},
+            "reference": ("class", known),
             **courses,
         },
-        coords={
+        {
             **axes.coordinates(),
-            "class": ("class", np.array(names, dtype=object), {"long_name": "outcome class"}),
+            "class": ("class", np.array(names, dtype=object)),
             **times,
         },
-        attrs={
+        {
             **_common_attrs(axes, settings.worlds[0]),
             **_reference_attrs(reference),
             **_floor(reference, axes.study.sensitivity.runs),
-            "kind": "sensitivity",
-            "schema_version": SCHEMA_VERSION,
         },
     )
 

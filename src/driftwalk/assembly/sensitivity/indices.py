@@ -21,6 +21,7 @@ from driftwalk.assembly.sensitivity.settings import (
 )
 from driftwalk.assembly.sensitivity.sobol import sobol_design, sobol_indices
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import described
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -210,9 +211,8 @@ def _indices(study: Study, design: xr.Dataset, outcomes: Outcomes) -> xr.Dataset
         "study": study.to_toml(),
         "input_units": " ".join(ABOUT[str(name)]["units"] for name in design["input"].values),
     }
-    return found.assign(
-        proportion=outputs.assign_attrs(units="1", long_name="share of runs"),
-        value=design["value"],
-        low=design["low"],
-        high=design["high"],
-    ).assign_attrs(facts)
+    return described(
+        found.assign(
+            proportion=outputs, value=design["value"], low=design["low"], high=design["high"]
+        ).assign_attrs(facts)
+    )

@@ -15,13 +15,13 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
 
 Floats = npt.NDArray[np.float64]
 
-SCHEMA_VERSION = 1
 RESAMPLES = 200
 MEASURES = (
     "first_order",
@@ -29,16 +29,6 @@ MEASURES = (
     "total_order",
     "total_order_half_width",
 )
-LONG_NAMES = {
-    "first_order": "first order Sobol' index",
-    "first_order_half_width": "half width of its confidence interval",
-    "total_order": "total order Sobol' index",
-    "total_order_half_width": "half width of its confidence interval",
-    "first_order_corrected": "first order Sobol' index without sampling noise",
-    "total_order_corrected": "total order Sobol' index without sampling noise",
-    "variance": "variance over the design",
-    "noise_share": "share of the variance that is sampling noise",
-}
 
 
 def sobol_design(
@@ -77,7 +67,6 @@ def sobol_design(
     >>> dict(design["value"].sizes)
     {'setting': 32, 'input': 2}
     """
-    import xarray as xr
     from scipy.stats import qmc
 
     low, high = _checked_bounds(bounds)
@@ -92,19 +81,15 @@ def sobol_design(
     unit[:, np.arange(1, count + 1), np.arange(count)] = b
     unit[:, -1] = b
     value = qmc.scale(unit.reshape(-1, count), low, high)
-    return xr.Dataset(
+    return build_dataset(
+        "sobol_design",
         {
-            "value": (("setting", "input"), value, {"long_name": "value of the input"}),
-            "low": ("input", low, {"long_name": "lowest value"}),
-            "high": ("input", high, {"long_name": "highest value"}),
+            "value": (("setting", "input"), value),
+            "low": ("input", low),
+            "high": ("input", high),
         },
-        coords={"input": ("input", np.array(list(bounds), dtype=object))},
-        attrs={
-            "kind": "sobol_design",
-            "schema_version": SCHEMA_VERSION,
-            "samples": samples,
-            "seed": seed,
-        },
+        {"input": ("input", np.array(list(bounds), dtype=object))},
+        {"samples": samples, "seed": seed},
     )
 
 
@@ -318,17 +303,10 @@ def _dataset(
     attrs: dict[str, Any],
     one_output: bool,
 ) -> xr.Dataset:
-    import xarray as xr
 
     dims = tuple(name for name in coords if name != "input")
     data: dict[str, Any] = {}
     for table, axes in ((by_input, (*dims, "input")), (by_output, dims)):
         for name, values in table.items():
-            about = {"units": "1"} if name != "variance" else {}
-            about["long_name"] = LONG_NAMES[name]
-            data[name] = (axes, values[0] if one_output else values, about)
-    return xr.Dataset(
-        data,
-        coords=coords,
-        attrs={"kind": "sobol_indices", "schema_version": SCHEMA_VERSION, **attrs},
-    )
+            data[name] = (axes, values[0] if one_output else values)
+    return build_dataset("sobol_indices", data, coords, attrs)

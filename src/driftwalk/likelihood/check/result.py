@@ -12,7 +12,6 @@ from driftwalk.likelihood.check.residuals import Residuals
 from driftwalk.likelihood.check.verdict import Criterion, components_of, distance_limit
 
 Parts = tuple[dict[str, Any], dict[str, Any]]
-ONE = {"units": "1"}
 
 
 def white_variables(found: Residuals) -> Parts:
@@ -20,23 +19,19 @@ def white_variables(found: Residuals) -> Parts:
     white = found.white
     by_lag, by_component = ("component", "lag"), ("component",)
     data = {
-        "autocorrelation": (by_lag, white.autocorrelation, ONE),
-        "autocorrelation_expected": (
-            by_lag,
-            white.expected,
-            {**ONE, "long_name": "value after fitting if the model is right"},
-        ),
-        "autocorrelation_std": (by_lag, white.std, ONE),
-        "chi_squared_per_dof": (by_component, white.chi_squared, ONE),
-        "chi_squared_expected": (by_component, white.expected_chi_squared, ONE),
-        "excess_kurtosis": (by_component, white.excess_kurtosis, ONE),
-        "tail_share": (by_component, white.tail_share, {**ONE, "long_name": "share beyond 3 sd"}),
+        "autocorrelation": (by_lag, white.autocorrelation),
+        "autocorrelation_expected": (by_lag, white.expected),
+        "autocorrelation_std": (by_lag, white.std),
+        "chi_squared_per_dof": (by_component, white.chi_squared),
+        "chi_squared_expected": (by_component, white.expected_chi_squared),
+        "excess_kurtosis": (by_component, white.excess_kurtosis),
+        "tail_share": (by_component, white.tail_share),
     }
     names = np.array(components_of(len(white.chi_squared)), dtype=object)
     lags = np.arange(1, white.autocorrelation.shape[1] + 1)
     return data, {
         "component": ("component", names),
-        "lag": ("lag", lags, {"units": "1", "long_name": "samples"}),
+        "lag": ("lag", lags),
     }
 
 
@@ -52,48 +47,41 @@ def place_variables(found: Residuals) -> Parts:
     sums = (part.mean * part.samples[:, None]).reshape(layout.parts, layout.cells, -1).sum(axis=1)
     mean = np.where(place.samples[:, None] > 0, place.mean, np.nan).T.reshape(-1, *shape)
     data = {
-        "residual": (("component", *plane), mean, {**ONE, "long_name": "mean error in its sd"}),
-        "residual_count": (plane, place.samples.reshape(shape), {**ONE, "long_name": "samples"}),
+        "residual": (("component", *plane), mean),
+        "residual_count": (plane, place.samples.reshape(shape)),
         "residual_distance": (
             plane,
             np.sqrt(place.chi_squared).reshape(shape),
-            {
-                **ONE,
-                "long_name": "distance of the mean error from zero, in its sd after fitting",
-                "limit": _limit(place),
-            },
+            {"limit": _limit(place)},
         ),
-        "noise_ratio": (plane, found.noise_by_place.ratio.reshape(shape), ONE),
-        "noise_ratio_std": (plane, found.noise_by_place.std.reshape(shape), ONE),
+        "noise_ratio": (plane, found.noise_by_place.ratio.reshape(shape)),
+        "noise_ratio_std": (plane, found.noise_by_place.std.reshape(shape)),
         "part_residual": (
             ("part", "component"),
             sums / np.maximum(count.sum(axis=1), 1.0)[:, None],
-            {**ONE, "long_name": "mean error in its sd"},
         ),
-        "part_count": ("part", count.sum(axis=1), ONE),
+        "part_count": ("part", count.sum(axis=1)),
         "part_chi_squared": (
             "part",
             np.nansum(table, axis=1),
-            {**ONE, "long_name": "squared distances of the cells' mean errors, summed up"},
         ),
-        "part_dof": ("part", place.mean.shape[1] * known.sum(axis=1), ONE),
-        "part_noise_ratio": ("part", found.noise_by_part.ratio, ONE),
-        "part_noise_ratio_std": ("part", found.noise_by_part.std, ONE),
-        "flow_change": ("part", found.strength.change, {**ONE, "long_name": "relative"}),
-        "flow_change_std": ("part", found.strength.std, ONE),
-        "drag_change": ("speed_range", found.drag.change, {**ONE, "long_name": "relative"}),
-        "drag_change_std": ("speed_range", found.drag.std, ONE),
+        "part_dof": ("part", place.mean.shape[1] * known.sum(axis=1)),
+        "part_noise_ratio": ("part", found.noise_by_part.ratio),
+        "part_noise_ratio_std": ("part", found.noise_by_part.std),
+        "flow_change": ("part", found.strength.change),
+        "flow_change_std": ("part", found.strength.std),
+        "drag_change": ("speed_range", found.drag.change),
+        "drag_change_std": ("speed_range", found.drag.std),
     }
-    second, speed = {"units": "s"}, {"units": "m s-1"}
     edges = layout.speed if layout.speed.size > 1 else np.array([np.nan, np.nan])
     coords = {
-        "x": ("x", layout.x, {"units": "m"}),
-        "y": ("y", layout.y, {"units": "m"}),
+        "x": ("x", layout.x),
+        "y": ("y", layout.y),
         "part_recording": ("part", [layout.recording(part) for part in range(layout.parts)]),
-        "part_start": ("part", layout.start, second),
-        "part_end": ("part", layout.end, second),
-        "speed_low": ("speed_range", edges[:-1], speed),
-        "speed_high": ("speed_range", edges[1:], speed),
+        "part_start": ("part", layout.start),
+        "part_end": ("part", layout.end),
+        "speed_low": ("speed_range", edges[:-1]),
+        "speed_high": ("speed_range", edges[1:]),
     }
     return data, coords
 
@@ -107,17 +95,17 @@ def _limit(place: Local) -> float:
 def motion_variables(motion: Motion) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
     """Return distances and densities, their coordinates, and attributes."""
     data: dict[str, Any] = {
-        "ks_to_estimate": ("replicate", motion.distance, ONE),
-        "ks_floor": ("pair", motion.floor, ONE),
-        "ks_to_drawn": ("drawn_replicate", motion.drawn_distance, ONE),
-        "ks_between_drawn": ("drawn_replicate", motion.drawn_between, ONE),
+        "ks_to_estimate": ("replicate", motion.distance),
+        "ks_floor": ("pair", motion.floor),
+        "ks_to_drawn": ("drawn_replicate", motion.drawn_distance),
+        "ks_between_drawn": ("drawn_replicate", motion.drawn_between),
     }
     coords: dict[str, Any] = {}
-    for name, density, unit in (
-        ("step_length", motion.step_length, "m"),
-        ("turning_angle", motion.turning_angle, "rad"),
+    for name, density in (
+        ("step_length", motion.step_length),
+        ("turning_angle", motion.turning_angle),
     ):
-        _add_density(data, coords, name, density, unit)
+        _add_density(data, coords, name, density)
     low, high = np.quantile(motion.distance, [0.5 * (1 - BAND), 0.5 * (1 + BAND)])
     attrs = {
         "ks_distance": float(np.median(motion.distance)),
@@ -131,19 +119,16 @@ def motion_variables(motion: Motion) -> tuple[dict[str, Any], dict[str, Any], di
     return data, coords, attrs
 
 
-def _add_density(
-    data: dict[str, Any], coords: dict[str, Any], name: str, density: Density, unit: str
-) -> None:
-    per = {"units": f"{unit}-1"}
+def _add_density(data: dict[str, Any], coords: dict[str, Any], name: str, density: Density) -> None:
     for part in ("recording", "median", "low", "high"):
-        data[f"{name}_density_{part}"] = (f"{name}_bin", getattr(density, part), per)
-    coords[f"{name}_edge"] = (f"{name}_edge", density.edge, {"units": unit})
+        data[f"{name}_density_{part}"] = (f"{name}_bin", getattr(density, part))
+    coords[f"{name}_edge"] = (f"{name}_edge", density.edge)
 
 
 def criterion_variables(criteria: list[Criterion]) -> Parts:
     """Return the p values of the criteria and which of them failed."""
     data = {
-        "p_value": ("criterion", [one.p_value for one in criteria], ONE),
+        "p_value": ("criterion", [one.p_value for one in criteria]),
         "failed": ("criterion", np.array([one.failed for one in criteria], dtype=np.int8)),
     }
     names = np.array([one.name for one in criteria], dtype=object)

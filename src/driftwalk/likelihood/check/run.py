@@ -26,11 +26,11 @@ from driftwalk.likelihood.check.worlds import (
     replicates_drawn,
 )
 from driftwalk.likelihood.ready import as_list
+from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
 
-SCHEMA_VERSION: Final = 1
 FEWEST_REPLICATES: Final = 4
 FEWEST_USED: Final = 300
 """Intervals. With fewer the fitted flow takes so much out of the errors that recordings of the
@@ -90,8 +90,6 @@ def check_model(
     >>> check.attrs["explained"]  # doctest: +SKIP
     'yes'
     """
-    import xarray as xr
-
     if replicates < FEWEST_REPLICATES:
         raise InputError(f"replicates must be at least {FEWEST_REPLICATES}, got {replicates}")
     many = as_list(recordings)
@@ -106,8 +104,6 @@ def check_model(
             "the motion says next to nothing about the flow"
         ) from error
     attrs: dict[str, Any] = {
-        "kind": "model_check",
-        "schema_version": SCHEMA_VERSION,
         "effective_parameters": found.leverage.parameters,
         "samples": sum(one.used.size for one in errors),
         "samples_used": sum(int(one.used.sum()) for one in errors),
@@ -153,7 +149,7 @@ def check_model(
     findings = findings_of(criteria)
     attrs["explained"] = "no" if findings else "yes"
     attrs["findings"] = json.dumps(findings, ensure_ascii=False)
-    return xr.Dataset(data, coords=coords, attrs=attrs)
+    return build_dataset("model_check", data, coords, attrs)
 
 
 def _require_used(errors: Sequence[Errors]) -> None:

@@ -20,6 +20,7 @@ from driftwalk.likelihood.recover.score import SCORED, score_fit
 from driftwalk.model import Study, apply_overrides
 from driftwalk.model.recover import true_time_step_s
 from driftwalk.schema import build_trajectory
+from driftwalk.schema.kinds.recovery import RECORDING_STATUS
 from driftwalk.simulation import simulate
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-STATUS: Final = {"fitted": 0, "not_fitted": 1, "not_simulated": 2}
+STATUS: Final = RECORDING_STATUS
 """Status of a recording. Not fitted means that the fit refused it, with a message."""
 MESSAGE: Final = 400
 """Letters of a message that are kept."""

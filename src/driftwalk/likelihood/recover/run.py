@@ -23,6 +23,8 @@ from driftwalk.likelihood.recover.score import SCORED
 from driftwalk.likelihood.recover.summary import COVERAGE_CONFIDENCE, NEEDED_CONFIDENCE, add_summary
 from driftwalk.likelihood.warnings import MOST_WALL_SHARE
 from driftwalk.model.recover import RANDOM
+from driftwalk.schema.check import described
+from driftwalk.schema.kinds import KINDS
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
 from driftwalk.sweep.processes import single_threaded_processes
 
@@ -31,10 +33,8 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
-SCHEMA_VERSION: Final = 1
 Tell = Callable[[int, int], None]
 
-_UNITS: Final = {"drag_coefficient": "1", "force_std_N": "N", "tracking_noise_m": "m"}
 _NAMES: Final = dict(zip(SCORED, ("drag_coefficient", "force_std", "tracking_noise"), strict=True))
 """From a parameter as a score names it to the variable."""
 
@@ -131,34 +131,29 @@ def _dataset(
     data: dict[str, Any] = {}
     for key, name in _NAMES.items():
         for part in PARTS:
-            units = _UNITS[key] if part in ("", "_low", "_high") else "1"
-            data[f"{name}{part}"] = (dims, tables[f"{key}{part}"], {"units": units})
+            data[f"{name}{part}"] = (dims, tables[f"{key}{part}"])
     for key in (*FLOW_PARTS, *FACTS):
-        data[key] = (dims, tables[key], {"units": "s" if key == "fit_time" else "1"})
-    flags = {
-        "flag_values": np.array(list(STATUS.values()), dtype=np.int32),
-        "flag_meanings": " ".join(STATUS),
-    }
-    data["status"] = (dims, tables["status"], flags)
+        data[key] = (dims, tables[key])
+    data["status"] = (dims, tables["status"])
     data["message"] = (dims, tables["message"].astype(object))
     fitted = tables["status"] == STATUS["fitted"]
     used = fitted & (np.where(fitted, tables["wall_share"], 1.0) <= MOST_WALL_SHARE)
-    data["used"] = (dims, used.astype(np.int8), {"long_name": "enters the summary"})
+    data["used"] = (dims, used.astype(np.int8))
     coords = {
-        "duration": ("duration", np.array(study.recover.durations_s), {"units": "s"}),
+        "duration": ("duration", np.array(study.recover.durations_s)),
         "angle": ("angle", np.array(angles, dtype=object)),
-        "recording": np.arange(study.recover.recordings),
+        "recording": ("recording", np.arange(study.recover.recordings)),
     }
-    dataset = xr.Dataset(data, coords=coords, attrs=_attrs(study, flow))
-    return add_summary(dataset, precision=study.recover.drag_coefficient_precision)
+    facts = {"kind": "recovery", "schema_version": KINDS["recovery"].version, **_attrs(study, flow)}
+    dataset = xr.Dataset(data, coords=coords, attrs=facts)
+    precision = study.recover.drag_coefficient_precision
+    return described(add_summary(dataset, precision=precision))
 
 
 def _attrs(study: Study, flow: xr.Dataset | None) -> dict[str, Any]:
     settings, forces = study.recover, study.forces
     asked = settings.drag_coefficient_precision
     return {
-        "kind": "recovery",
-        "schema_version": SCHEMA_VERSION,
         "drag_coefficient": forces.drag_coefficient,
         "force_std_N": forces.force_std_N,
         "force_interval_s": forces.force_interval_s,

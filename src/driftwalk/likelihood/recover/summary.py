@@ -174,13 +174,13 @@ def add_summary(recovery: xr.Dataset, *, precision: float | None) -> xr.Dataset:
             flow["median_flow_error"][place] = np.median(errors)
             flow["flow_error_90"][place] = np.quantile(errors, 0.9)
     scales, needed = _needed(recovery, tables["rms_error"][0], precision)
-    by_angle = {"drag_coefficient_error_scale": (scales, "s0.5"), "needed_duration": (needed, "s")}
+    by_angle = {"drag_coefficient_error_scale": scales, "needed_duration": needed}
     return recovery.assign(
         {key: (("parameter", "duration", "angle"), table) for key, table in tables.items()}
         | {key: (("duration", "angle"), table) for key, table in flow.items()}
         | {
-            f"{key}{end}": (("angle",), values[:, column], {"units": unit})
-            for key, (values, unit) in by_angle.items()
+            f"{key}{end}": (("angle",), values[:, column])
+            for key, values in by_angle.items()
             for column, end in enumerate(("", "_low", "_high"))
         }
     ).assign_coords(parameter=np.array(PARAMETERS, dtype=object))

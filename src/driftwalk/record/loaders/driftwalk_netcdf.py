@@ -12,7 +12,7 @@ from driftwalk.record.raw import Extra, RawBody, RawRecording, ReadOptions
 from driftwalk.schema import body_names, check_trajectory
 from driftwalk.schema.contents import check_contents
 from driftwalk.schema.netcdf import MAGIC, kind_of, open_netcdf
-from driftwalk.schema.trajectory import VARIABLES
+from driftwalk.schema.trajectory import POSE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -69,7 +69,7 @@ def _extra(dataset: xr.Dataset) -> dict[str, Extra]:
     found = {}
     for name, variable in dataset.data_vars.items():
         dims = tuple(str(dim) for dim in variable.dims)
-        if name in VARIABLES or dims[:2] != ("time", "body") or variable.dtype.kind not in "fiub":
+        if name in POSE or dims[:2] != ("time", "body") or variable.dtype.kind not in "fiub":
             continue
         coords = {dim: dataset[dim] for dim in dims[2:] if dim in dataset.coords}
         found[str(name)] = Extra(dims[2:], dict(variable.attrs), coords)

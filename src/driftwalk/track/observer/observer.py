@@ -22,6 +22,7 @@ from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
 from driftwalk.assembly.lattice.world import LatticeWorld
 from driftwalk.assembly.recordings import HOLD, JOIN_ANGLE, JOIN_DISTANCE, LOOSER, MIN_DURATION
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import described
 from driftwalk.track.observer.pair_state import PairState
 from driftwalk.track.observer.possible import Lattice, possible_classes
 
@@ -341,11 +342,7 @@ def observe(recording: xr.Dataset, *, side: float, **rules: Any) -> xr.Dataset:
     possible = np.array([[name in one for name in classes] for one in sets])
     known = outcome >= 0
     possible[known] = np.arange(len(classes)) == outcome[known, None]
-    about = {"long_name": "whether the class is possible"}
-    number = {"long_name": "number of blocks that are hidden", "units": "1"}
-    return found.assign(
-        possible=(("time", "class"), possible, about), hidden=("time", hidden, number)
-    )
+    return described(found.assign(possible=(("time", "class"), possible), hidden=("time", hidden)))
 
 
 def _with_classes(found: xr.Dataset, classes: Sequence[str]) -> xr.Dataset:

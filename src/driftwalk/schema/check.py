@@ -1,0 +1,187 @@
+"""Whether a dataset is what its kind says, and what its kind says of it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from driftwalk.core.errors import InputError
+from driftwalk.schema.description import Kind, Variable
+from driftwalk.schema.kinds import KINDS, find_kind
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+LETTERS: Final = {"float": "f", "int": "iu", "bool": "b", "text": "OU"}
+"""Letters of the NumPy types that may hold each."""
+WORDS: Final = {"float": "numbers", "int": "whole numbers", "bool": "truth values", "text": "text"}
+
+
+def kind_of_dataset(dataset: xr.Dataset) -> Kind:
+    """Return the kind that a dataset says it is.
+
+    Raises
+    ------
+    InputError
+        When it says none, or one that is not known.
+    """
+    kind = find_kind(dataset)
+    if kind is not None:
+        return kind
+    name = dataset.attrs.get("kind")
+    if not isinstance(name, str):
+        raise InputError("not a dataset of driftwalk: it has no attribute 'kind'")
+    raise InputError(f"no kind of dataset is called '{name}': there are {', '.join(KINDS)}")
+
+
+def check_dataset(dataset: xr.Dataset, kind: str | None = None) -> xr.Dataset:
+    """Return a dataset that holds all that its kind says, with its dimensions and units.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Any dataset of driftwalk's. Variables and attributes of one's own may be in it.
+    kind : str, optional
+        What kind it has to be; default: whatever its attribute ``kind`` says.
+
+    Raises
+    ------
+    InputError
+        When it is of another kind or version, a variable or attribute is missing, a variable lies
+        on other dimensions, has other units, or holds text for numbers.
+
+    Examples
+    --------
+    >>> from driftwalk.schema import build_trajectory
+    >>> still = build_trajectory([0.0, 0.1], [0.0, 0.0], [0.0, 0.0])
+    >>> check_dataset(still) is still
+    True
+    >>> check_dataset(still.drop_vars("theta"))
+    Traceback (most recent call last):
+        ...
+    driftwalk.core.errors.InputError: not of the kind trajectory: the variable 'theta' is missing
+    """
+    found = kind_of_dataset(dataset)
+    if kind is not None and found.name != kind:
+        raise InputError(f"not of the kind {kind}, but {found.name}")
+    require_version(dataset, found)
+    for variable in found.variables:
+        if variable.name in dataset.variables:
+            _check_variable(dataset, variable, found)
+        elif not variable.when:
+            raise InputError(
+                f"not of the kind {found.name}: the variable '{variable.name}' is missing"
+            )
+    for attribute in found.attributes:
+        if not attribute.when and attribute.name not in dataset.attrs:
+            raise InputError(
+                f"not of the kind {found.name}: the attribute '{attribute.name}' is missing"
+            )
+    return dataset
+
+
+def require_version(dataset: xr.Dataset, kind: Kind) -> None:
+    """Refuse a dataset of a version that is not the current one."""
+    version = dataset.attrs.get("schema_version")
+    if not isinstance(version, int | np.integer) or version != kind.version:
+        raise InputError(
+            f"no {kind.name} of this version of driftwalk: its schema_version is {version}, "
+            f"expected {kind.version}"
+        )
+
+
+def described(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset whose variables carry the units and names of its kind's schema, checked.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        With the attribute ``kind``. Its variables' own attributes stay, unless the schema has them.
+
+    Raises
+    ------
+    InputError
+        As `check_dataset`.
+    """
+    kind = kind_of_dataset(dataset)
+    dataset = dataset.copy(deep=False)
+    for variable in kind.variables:
+        if variable.name in dataset.variables:
+            held = dataset.variables[variable.name]
+            dataset[variable.name].attrs.update(variable.described(held.dtype))
+    return check_dataset(dataset)
+
+
+def build_dataset(
+    kind: str, data: dict[str, Any], coords: dict[str, Any], attrs: dict[str, Any]
+) -> xr.Dataset:
+    """Return a new dataset of a kind, described and checked.
+
+    Parameters
+    ----------
+    kind : str
+        What it is.
+    data, coords : dict
+        By name ``(dims, values)``, as `xarray.Dataset` takes them. Units and long names are the
+        schema's.
+    attrs : dict
+        Attributes, without ``kind`` and ``schema_version``.
+
+    Raises
+    ------
+    InputError
+        As `check_dataset`.
+
+    Examples
+    --------
+    >>> data = {"step_length": ("step", [0.01]), "turning_angle": ("step", [0.2])}
+    >>> build_dataset("steps", data, {}, {})
+    Traceback (most recent call last):
+        ...
+    driftwalk.core.errors.InputError: not of the kind steps: the variable 'time' is missing
+    """
+    import xarray as xr
+
+    known = {"kind": kind, "schema_version": KINDS[kind].version}
+    return described(xr.Dataset(data, coords, {**known, **attrs, **known}))
+
+
+def unknown_names(dataset: xr.Dataset) -> list[str]:
+    """Return the variables, dimensions and attributes that its kind does not name."""
+    kind = kind_of_dataset(dataset)
+    variables = {one.name: one for one in kind.variables}
+    free = {
+        str(dim)
+        for name, one in dataset.variables.items()
+        if name in variables and variables[str(name)].dims.startswith("...")
+        for dim in one.dims
+    }
+    known = {one.name for one in kind.attributes} | {"kind", "schema_version"}
+    return [
+        *(f"variable {name}" for name in dataset.variables if name not in {*variables, *free}),
+        *(f"dimension {name}" for name in dataset.dims if name not in {*kind.dimensions, *free}),
+        *(f"attribute {name}" for name in dataset.attrs if name not in known),
+    ]
+
+
+def _check_variable(dataset: xr.Dataset, variable: Variable, kind: Kind) -> None:
+    held = dataset.variables[variable.name]
+    dims = tuple(str(dim) for dim in held.dims)
+    if not variable.lies_on(dims):
+        raise InputError(
+            f"not of the kind {kind.name}: '{variable.name}' lies on ({', '.join(dims)}), expected "
+            f"({', '.join(variable.dims.split())})"
+        )
+    letter = held.dtype.kind
+    if letter not in LETTERS[variable.holds]:
+        raise InputError(
+            f"not of the kind {kind.name}: '{variable.name}' holds {held.dtype}, expected "
+            f"{WORDS[variable.holds]}"
+        )
+    units = held.attrs.get("units")
+    if units != variable.units:
+        raise InputError(
+            f"not of the kind {kind.name}: '{variable.name}' has the units {units!r}, expected "
+            f"{variable.units!r}"
+        )

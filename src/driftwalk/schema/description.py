@@ -1,0 +1,154 @@
+"""Descriptions of kinds of datasets, as data: `driftwalk.schema.kinds` has one of each kind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+Holds = Literal["float", "int", "bool", "text"]
+Said = Literal["number", "numbers", "text", "yes or no", "object", "list"]
+FREE: Final = "..."
+"""Any dimensions, in front of the others: the axes of a map have the names of what varies."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable or coordinate.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    dims : str
+        Its dimensions, separated by spaces; one in brackets may be absent, ``...`` in front means
+        any. A scalar has none: "".
+    units : str or None
+        As the attribute ``units`` has them; None for names, indices and flags.
+    long_name : str
+        What it is, for the axis of a plot and for the reference page.
+    holds : str
+        What its values are. Single precision is a "float" too.
+    when : str
+        When it is there; always, where this is empty.
+    note : str
+        What else the reference page says.
+    flags : mapping of str to int
+        Meaning to value, of a variable that holds flags.
+    bits : bool
+        Whether several flags may be set at once.
+    """
+
+    name: str
+    dims: str
+    units: str | None
+    long_name: str
+    holds: Holds = "float"
+    when: str = ""
+    note: str = ""
+    flags: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
+    bits: bool = False
+
+    @property
+    def fixed_dims(self) -> tuple[str, ...]:
+        """Dimensions that it has at most, apart from free ones."""
+        return tuple(one.strip("[]") for one in self.dims.split() if one != FREE)
+
+    @property
+    def optional_dims(self) -> frozenset[str]:
+        """Those of them that may be absent."""
+        return frozenset(one[1:-1] for one in self.dims.split() if one.startswith("["))
+
+    def lies_on(self, dims: tuple[str, ...]) -> bool:
+        """Return whether these are its dimensions.
+
+        Examples
+        --------
+        >>> u = Variable("u", "[time] y x", "m s-1", "flow velocity x")
+        >>> u.lies_on(("y", "x")), u.lies_on(("x", "y"))
+        (True, False)
+        """
+        absent = self.optional_dims - set(dims)
+        expected = tuple(one for one in self.fixed_dims if one not in absent)
+        if self.dims.startswith(FREE):
+            return dims[len(dims) - len(expected) :] == expected
+        return dims == expected
+
+    def described(self, dtype: npt.DTypeLike) -> dict[str, Any]:
+        """Return the attributes that it carries; flags have the type of the values."""
+        found: dict[str, Any] = {} if self.units is None else {"units": self.units}
+        found["long_name"] = self.long_name
+        if self.flags:
+            values = np.array(list(self.flags.values()), dtype=dtype)
+            found["flag_masks" if self.bits else "flag_values"] = values
+            found["flag_meanings"] = " ".join(self.flags)
+        return found
+
+
+@dataclass(frozen=True)
+class Attribute:
+    """An attribute of the whole dataset.
+
+    Attributes
+    ----------
+    name : str
+        Its name; the unit stands in it where it has one.
+    says : str
+        What it holds. An "object" and a "list" are JSON text.
+    meaning : str
+        What it is.
+    when : str
+        When it is there; always, where this is empty.
+    """
+
+    name: str
+    says: Said
+    meaning: str
+    when: str = ""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of dataset.
+
+    Attributes
+    ----------
+    name : str
+        What its attribute ``kind`` says.
+    version : int
+        What its attribute ``schema_version`` says.
+    dimensions : mapping of str to str
+        Dimension to what lies along it.
+    variables : tuple of Variable
+        What it may hold.
+    attributes : tuple of Attribute
+        What it may say of itself, next to ``kind`` and ``schema_version``.
+    read, read_attributes : str
+        Names of the variables and of the attributes without which a stored one cannot be read,
+        separated by spaces. Files of other programs and of earlier versions have less than driftwalk writes.
+    """
+
+    name: str
+    version: int
+    dimensions: Mapping[str, str]
+    variables: tuple[Variable, ...]
+    attributes: tuple[Attribute, ...]
+    read: str = ""
+    read_attributes: str = ""
+
+    def variable(self, name: str) -> Variable:
+        """Return the variable of a name; `KeyError` where it has none."""
+        return {one.name: one for one in self.variables}[name]
+
+
+KIND: Final = Attribute("kind", "text", "what kind of dataset it is")
+VERSION: Final = Attribute("schema_version", "number", "version of its kind's schema")
+SOURCE: Final = Attribute("source", "text", "name of the file that it was made from")
+STUDY: Final = Attribute("study", "text", "the whole study, as TOML")
+ARENA: Final = Attribute("arena", "object", "the tank: a circle, rectangle or polygon in m")
+WARNINGS: Final = Attribute("warnings", "list", "sentences")
+SIMULATED: Final = Attribute("simulated_recording", "yes or no", "whether a model made the motion")

@@ -1,0 +1,118 @@
+"""The dataset of a recovery study: simulated recordings of known truth, fitted."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from driftwalk.schema.description import STUDY, Attribute, Kind, Variable
+
+RECORDING_STATUS: Final = {"fitted": 0, "not_fitted": 1, "not_simulated": 2}
+"""Status of a recording. Not fitted means that the fit refused it, with a message."""
+
+_EACH: Final = "duration angle recording"
+_ALL: Final = "parameter duration angle"
+_OF: Final = {
+    "drag_coefficient": ("1", "drag coefficient"),
+    "force_std": ("N", "standard deviation of the force"),
+    "tracking_noise": ("m", "tracking noise"),
+}
+
+
+def _estimate(name: str, unit: str, words: str) -> tuple[Variable, ...]:
+    return (
+        Variable(name, _EACH, unit, words, note="NaN without a fit"),
+        Variable(f"{name}_low", _EACH, unit, f"{words}, lower end of the interval"),
+        Variable(f"{name}_high", _EACH, unit, f"{words}, upper end of the interval"),
+        Variable(f"{name}_sd", _EACH, "1", f"stated standard deviation of ln {words}"),
+        Variable(f"{name}_error", _EACH, "1", f"{words}, estimate / truth - 1"),
+        Variable(f"{name}_z", _EACH, "1", f"{words}, ln(estimate / truth) / sd"),
+        Variable(f"{name}_covered", _EACH, "1", f"{words}, 1 if the interval holds the truth"),
+    )
+
+
+def _by_angle(name: str, unit: str, words: str, note: str) -> tuple[Variable, ...]:
+    return (
+        Variable(name, "angle", unit, words, note=note),
+        Variable(f"{name}_low", "angle", unit, f"{words}, lower end (90 %)"),
+        Variable(f"{name}_high", "angle", unit, f"{words}, upper end (90 %)"),
+    )
+
+
+RECOVERY: Final = Kind(
+    name="recovery",
+    version=1,
+    dimensions={
+        "duration": "lengths of the recordings",
+        "angle": "uses of the orientation",
+        "recording": "simulated recordings",
+        "parameter": "drag_coefficient, force_std, tracking_noise",
+    },
+    variables=(
+        *(one for name, about in _OF.items() for one in _estimate(name, *about)),
+        Variable(
+            "flow_error", _EACH, "1", "rms error of the flow over its rms speed",
+            note="averaged over the block, where it has been",
+        ),
+        Variable("flow_point_error", _EACH, "1", "rms error of the flow at points"),
+        Variable("flow_z_rms", _EACH, "1", "rms error of the flow in standard errors"),
+        Variable("flow_cells", _EACH, "1", "cells in which the flow is compared"),
+        Variable("wall_share", _EACH, "1", "share of the intervals at the wall"),
+        Variable("samples_used", _EACH, "1", "samples that the fit used"),
+        Variable("iterations", _EACH, "1", "iterations of the fit"),
+        Variable("converged", _EACH, "1", "1 if the fit converged"),
+        Variable("fit_time", _EACH, "s", "time that the fit took"),
+        Variable(
+            "status", _EACH, None, "status of the recording", "int", flags=RECORDING_STATUS
+        ),
+        Variable("message", _EACH, None, "reason why there is no fit", "text"),
+        Variable(
+            "used", _EACH, None, "enters the summary", "int",
+            note="1 where fitted, with at most 30 % of the intervals at the wall",
+        ),
+        Variable("median_absolute_error", _ALL, "1", "median of the relative error's size"),
+        Variable("absolute_error_90", _ALL, "1", "90 % quantile of the relative error's size"),
+        Variable("bias", _ALL, "1", "mean of the relative error"),
+        Variable("rms_error", _ALL, "1", "rms of ln(estimate / truth)"),
+        Variable("spread", _ALL, "1", "standard deviation of ln(estimate) over the recordings"),
+        Variable("rms_z", _ALL, "1", "rms of z", note="1 if the stated deviations are right"),
+        Variable("coverage", _ALL, "1", "share of intervals that hold the truth"),
+        Variable("coverage_low", _ALL, "1", "lower end of the coverage's interval"),
+        Variable(
+            "coverage_high", _ALL, "1", "upper end of the coverage's interval",
+            note="Clopper-Pearson, 95 %",
+        ),
+        Variable("median_flow_error", "duration angle", "1", "median of the flow's error"),
+        Variable("flow_error_90", "duration angle", "1", "90 % quantile of the flow's error"),
+        *_by_angle(
+            "drag_coefficient_error_scale", "s0.5", "scale of C_d's error",
+            "a of rms error = a / √T",
+        ),
+        *_by_angle(
+            "needed_duration", "s", "length that the asked precision needs",
+            "(a / precision)²; NaN where none is asked",
+        ),
+        Variable("duration", "duration", "s", "length of the recording"),
+        Variable("angle", "angle", None, "use of the orientation", "text"),
+        Variable("recording", "recording", None, "recording", "int"),
+        Variable("parameter", "parameter", None, "parameter", "text"),
+    ),
+    attributes=(
+        Attribute("drag_coefficient", "number", "the truth"),
+        Attribute("force_std_N", "number", "the truth"),
+        Attribute("force_interval_s", "number", "the truth"),
+        Attribute("tracking_noise_m", "number", "the truth"),
+        Attribute("flow", "text", "the true flow"),
+        Attribute("sample_interval_s", "number", "time between samples"),
+        Attribute("recordings_per_fit", "number", "recordings that are fitted together"),
+        Attribute("missing_share", "number", "share of the samples that is missing"),
+        Attribute("seed", "number", "seed of the random numbers"),
+        Attribute("confidence", "number", "of the fits' intervals"),
+        Attribute("coverage_confidence", "number", "of the coverage's interval"),
+        Attribute("needed_confidence", "number", "of the needed length's interval"),
+        Attribute("most_wall_share", "number", "share at the wall with which a fit is used"),
+        Attribute("drag_coefficient_precision", "number", "that is asked, NaN for none"),
+        STUDY,
+    ),
+)  # fmt: skip
+
+KINDS: Final = (RECOVERY,)

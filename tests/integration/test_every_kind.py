@@ -1,0 +1,44 @@
+"""What the stages make passes the check of its kind, in memory and after it was stored."""
+
+from __future__ import annotations
+
+import pytest
+import xarray as xr
+from every_kind import FORMS, every_kind
+
+from driftwalk.core.errors import InputError
+from driftwalk.schema.check import check_dataset, unknown_names
+from driftwalk.schema.kinds import KINDS
+from driftwalk.schema.netcdf import open_netcdf
+
+
+def test_every_kind_is_made() -> None:
+    assert {form.split()[0] for form in FORMS} == set(KINDS)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_it_is_what_its_schema_says(form: str, tmp_path) -> None:
+    made = every_kind(form)
+    assert made.attrs["kind"] == form.split()[0]
+    assert check_dataset(made) is made
+    assert [name for name in unknown_names(made) if name.startswith(("var", "dim"))] == []
+    path = tmp_path / "a.nc"
+    path.write_bytes(made.to_netcdf(engine="h5netcdf"))
+    stored = open_netcdf(path)
+    check_dataset(stored)
+    xr.testing.assert_equal(stored, made)
+
+
+@pytest.mark.parametrize("form", ["assembly", "recovery", "sensitivity", "model_check"])
+def test_every_variable_of_it_is_needed(form: str) -> None:
+    """Each variable that is always there is missed, and its units are looked at."""
+    made = every_kind(form)
+    for variable in KINDS[made.attrs["kind"]].variables:
+        if variable.when:
+            continue
+        with pytest.raises(InputError, match=f"'{variable.name}' is missing"):
+            check_dataset(made.drop_vars(variable.name))
+        other = made.copy()
+        other[variable.name].attrs["units"] = "furlong"
+        with pytest.raises(InputError, match=f"'{variable.name}' has the units 'furlong'"):
+            check_dataset(other)

@@ -1,0 +1,131 @@
+"""One real dataset of every kind, each made by the stage that makes it, as small as it allows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import xarray as xr
+from fit_worlds import coarse_study, recording
+from recovery_worlds import small_study
+from small_sensitivity import FLOW, small
+from switching_worlds import START_S, SWITCH_S, coarse_study as switched_study, two_flows
+from walkers import diffuse, tumble
+
+import driftwalk as dw
+from driftwalk.assembly import assemble, sobol_design, sobol_indices
+from driftwalk.calibration import calibrate
+from driftwalk.comparison import compare
+from driftwalk.model import apply_overrides
+from driftwalk.motion import MotionModel, Parameter, motion_model
+from driftwalk.simulation import simulate
+
+SECONDS = 120.0
+FEW_SETTINGS = {
+    "calibration.drag_coefficient_min": 0.2,
+    "calibration.drag_coefficient_max": 0.8,
+    "calibration.drag_coefficient_step": 0.2,
+    "calibration.force_std_min_N": 0.2e-3,
+    "calibration.force_std_max_N": 1.0e-3,
+    "calibration.force_std_step_N": 0.2e-3,
+    "calibration.replicates": 2,
+    "calibration.refined_drag_coefficient_step": 0.05,
+    "calibration.refined_force_std_step_N": 0.1e-3,
+    "calibration.refined_replicates": 2,
+    "calibration.bootstrap": 10,
+}
+MAP = {"drag_coefficient": [0.3, 0.6], "force_std_N": [5e-4, 1e-3]}
+TUMBLE = motion_model(
+    tumble,
+    Parameter("speed", "m/s", 0.01, 0.05, step=0.02, refined_step=0.005),
+    Parameter("tumble_rate", "1/s", 0.0, 4.0, step=2.0, refined_step=0.5, label="rate of tumbles"),
+)
+DIFFUSE = motion_model(
+    diffuse,
+    Parameter("diffusivity", "m2/s", 1e-6, 1e-4, step=0.5, refined_step=0.1, scale="log"),
+)
+BLOCK = {"mass": 0.0116, "side": 0.03, "depth": 0.03}
+
+
+def track() -> xr.Dataset:
+    return recording(SECONDS)
+
+
+def simulated() -> xr.Dataset:
+    times = track()["time"]
+    return simulate(coarse_study(), FLOW, sample_time=times, replicates=2, seed=1)
+
+
+def path_seen() -> xr.Dataset:
+    return dw.path_recording(every_kind("assembly_path"))
+
+
+def design() -> xr.Dataset:
+    return sobol_design({"a": (0.0, 1.0), "b": (0.0, 1.0)}, samples=8, seed=1)
+
+
+def switched_fit() -> xr.Dataset:
+    times = {"switching_times_s": [START_S + SWITCH_S]}
+    return dw.fit_motion(two_flows(), switched_study(**times))
+
+
+def recovery() -> xr.Dataset:
+    precise = {"durations_s": [60.0], "drag_coefficient_precision": 0.1}
+    return dw.recovery_study(small_study(**precise), dw.tank30_flow())
+
+
+def calibration() -> xr.Dataset:
+    study = apply_overrides(coarse_study(), FEW_SETTINGS)
+    return calibrate(track(), study, flow=dw.tank30_flow(), threads=2)
+
+
+def calibration_of_a_function(model: MotionModel) -> xr.Dataset:
+    study = apply_overrides(dw.Study(), {**FEW_SETTINGS, "observation.position_noise_m": 3e-4})
+    return calibrate(track(), model, study=study, threads=2)
+
+
+def check() -> xr.Dataset:
+    return dw.check_model(every_kind("fit with the angle in the state"), track(), replicates=4)
+
+
+FORMS: dict[str, Callable[[], xr.Dataset]] = {
+    "trajectory": track,
+    "simulation": simulated,
+    "flow_field of a formula": lambda: FLOW,
+    "flow_field of a recording": lambda: dw.extract_flow(track(), **BLOCK),
+    "flow_field of a fit": lambda: dw.fitted_flow(every_kind("fit")),
+    "steps": lambda: dw.steps(track()),
+    "comparison": lambda: compare(track(), recording(SECONDS, "second"), permutations=19),
+    "replicate_comparison": lambda: dw.compare_replicates(track(), every_kind("simulation")),
+    "calibration": calibration,
+    "calibration of one parameter": lambda: calibration_of_a_function(DIFFUSE),
+    "calibration of two parameters": lambda: calibration_of_a_function(TUMBLE),
+    "fit": lambda: dw.fit_motion(track(), coarse_study(), angle="none"),
+    "fit with the angle in the state": lambda: dw.fit_motion(
+        track(), coarse_study(), angle="state"
+    ),
+    "fit of several flows": switched_fit,
+    "model_check": check,
+    "recovery": recovery,
+    "assembly": lambda: assemble(small(), FLOW, runs=12, seed=5),
+    "assembly_path": lambda: dw.assembly_path(small(), FLOW, runs=[0], seed=5),
+    "outcome_distribution": lambda: dw.outcome_distribution(every_kind("assembly")),
+    "outcome_distribution of realisations": lambda: dw.sensitivity_reference(small(), FLOW),
+    "class_times": lambda: dw.class_times(every_kind("assembly")),
+    "classification": lambda: dw.classify(path_seen(), side=0.03),
+    "classification with blocks hidden": lambda: dw.observe(path_seen(), side=0.03),
+    "sensitivity": lambda: dw.sensitivity_map(
+        small(sensitivity=MAP), FLOW, reference=every_kind("outcome_distribution of realisations")
+    ),
+    "components": lambda: dw.principal_components(every_kind("sensitivity")),
+    "sobol_design": design,
+    "sobol_indices": lambda: sobol_indices(design(), design()["value"].sum("input")),
+    "sobol_indices of a tank": lambda: dw.sensitivity_indices(small(), FLOW, samples=8),
+}
+"""By what they are, the kind first; several of one kind where it has several forms."""
+
+
+@cache
+def every_kind(form: str) -> xr.Dataset:
+    """Return the dataset of a form, made once."""
+    return FORMS[form]()
