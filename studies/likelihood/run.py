@@ -27,6 +27,7 @@ import driftwalk as dw
 from driftwalk.core.errors import DriftwalkError
 from driftwalk.core.provenance import plain
 from driftwalk.likelihood.ready import AngleUse
+from driftwalk.schema.facts import fit_facts
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 INFER: Final = "cpp/include/driftwalk/infer"
@@ -35,7 +36,7 @@ KEPT: Final = (
     "wall_share", "samples_used", "maximum_likelihood_drag_coefficient", "iterations", "converged",
     "restricted", "chi_squared_per_dof", "autocorrelation",
 )  # fmt: skip
-"""Attributes of the fit that are kept beside the score."""
+"""Facts of the fit that are kept beside the score."""
 
 
 def main() -> None:
@@ -113,7 +114,7 @@ def fit_one(case: Case, folder: Path, angle: str) -> dict[str, Any]:
         flow=world.flow(),
         recordings=recording,
     )
-    kept = {name: fit.attrs[name] for name in KEPT}
+    kept = {name: fit_facts(fit)[name] for name in KEPT}
     return dict(plain({**facts, **score, **kept, "seconds": round(seconds, 2)}))
 
 

@@ -25,6 +25,7 @@ from table import markdown
 import driftwalk as dw
 from driftwalk.core.atomic import write_atomic
 from driftwalk.core.provenance import manifest, plain, write_manifest
+from driftwalk.schema.facts import fit_facts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -60,7 +61,8 @@ VERSION: Final = version_of_source()
 class Answer(NamedTuple):
     """What a method found."""
 
-    attrs: dict[str, Any]
+    facts: dict[str, Any]
+    """With units in the keys."""
     flow: xr.Dataset
     distance: float
     floor: float
@@ -124,7 +126,7 @@ def by_likelihood(known: Known, fit: xr.Dataset, seconds: float) -> Answer:
     begin = time.process_time()
     check = dw.check_model(fit, known.recording).attrs
     return Answer(
-        fit.attrs,
+        fit_facts(fit),
         dw.fitted_flow(fit),
         check["ks_distance"],
         check["ks_noise_floor"],
@@ -141,8 +143,17 @@ def by_distance(known: Known, flow_of: Callable[[], xr.Dataset]) -> Answer:
     study = dw.apply_overrides(known.study, SEARCH)
     found = dw.calibrate(known.recording, study, flow=flow, threads=1).attrs
     distance, floor = found["ks_distance"], found["noise_floor"]
-    findings = [one for one in json.loads(found["warnings"]) if "does not explain" in one]
-    return Answer(found, flow, distance, floor, findings, time.process_time() - begin, 0.0)
+    warnings = json.loads(found["warnings"])
+    findings = [one for one in warnings if "does not explain" in one]
+    return Answer(
+        found | {"warnings": warnings},
+        flow,
+        distance,
+        floor,
+        findings,
+        time.process_time() - begin,
+        0.0,
+    )
 
 
 def line_of(
@@ -159,18 +170,18 @@ def line_of(
         "findings": answer.findings,
         "seconds": round(answer.seconds, 1),
         "check_seconds": round(answer.check_seconds, 1),
-        "wall_share": fit.attrs["wall_share"],
-        "warnings": json.loads(answer.attrs["warnings"]),
+        "wall_share": fit["wall_share"].item(),
+        "warnings": answer.facts["warnings"],
     }
     for name in PARAMETERS:
         truth = getattr(known, name)
-        low, high = answer.attrs[f"{name}_interval"]
+        low, high = answer.facts[f"{name}_interval"]
         found |= {
-            name: answer.attrs[name],
+            name: answer.facts[name],
             f"{name}_true": truth,
             f"{name}_low": low,
             f"{name}_high": high,
-            f"{name}_error": answer.attrs[name] / truth - 1.0,
+            f"{name}_error": answer.facts[name] / truth - 1.0,
             f"{name}_covered": bool(low <= truth <= high),
         }
     flow = answer.flow

@@ -13,6 +13,8 @@ from driftwalk.schema.description import FREE, Kind
 from driftwalk.schema.kinds import KINDS
 
 SOURCE = Path(__file__).resolve().parents[2] / "src" / "driftwalk"
+OF_WHAT_IS_GIVEN = {"value", "low", "high", "variance", "estimate", "interval"}
+"""Numbers whose unit depends on the input, the output or the parameter."""
 
 
 @cache
@@ -66,12 +68,7 @@ def test_a_schema_agrees_with_itself(kind: Kind) -> None:
         assert FREE not in variable.dims.split()[1:]
         # Flags, names and indices count nothing; every other number has a unit, "1" at least.
         if variable.holds == "float":
-            assert variable.units is not None or variable.name in {
-                "value",
-                "low",
-                "high",
-                "variance",
-            }
+            assert variable.units is not None or variable.name in OF_WHAT_IS_GIVEN
         if variable.flags:
             assert variable.holds == "int"
             assert variable.units is None

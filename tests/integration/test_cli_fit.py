@@ -15,6 +15,7 @@ import xarray as xr
 from command_line import DATA, RECORDING, Done, here, refusal
 
 import driftwalk as dw
+from driftwalk.schema.facts import fit_facts
 
 SECOND = DATA / "recording_second_seed.csv"
 SHORT = ("--to", "300", "--spline-spacing", "3cm", "--force-interval", "16ms")
@@ -61,7 +62,7 @@ def test_the_run_directory_is_whole(finished: tuple[Path, Done]) -> None:
         assert (folder / "figures" / f"{name}.svg").stat().st_size > 1000
     with xr.open_dataset(folder / "fit.nc", engine="h5netcdf") as stored:
         assert stored.attrs["kind"] == "fit"
-        assert stored.attrs["drag_coefficient"] == answer(finished[1])["drag_coefficient"]
+        assert fit_facts(stored)["drag_coefficient"] == answer(finished[1])["drag_coefficient"]
         flow = dw.load_flow(folder / "flow.nc")
         assert dw.fitted_flow(stored)["u"].values == pytest.approx(flow["u"].values)
 

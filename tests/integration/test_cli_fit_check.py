@@ -11,6 +11,8 @@ import pytest
 import xarray as xr
 from command_line import RECORDING, Done, here
 
+from driftwalk.schema.facts import fit_facts
+
 SHORT = ("--to", "150", "--spline-spacing", "3cm", "--force-interval", "16ms")
 STUDIES = Path(__file__).resolve().parents[2] / "studies" / "real"
 FIGURES = ("check_innovations", "check_map", "check_time", "check_steps")
@@ -90,7 +92,7 @@ def test_a_check_that_cannot_be_made_says_so_and_the_fit_is_kept(tmp_path: Path)
     assert found["check_left_out"] in line
     with xr.open_dataset(tmp_path / "run" / "fit.nc", engine="h5netcdf") as stored:
         assert stored.attrs["check_left_out"] == found["check_left_out"]
-        assert stored.attrs["drag_coefficient"] == found["drag_coefficient"]
+        assert fit_facts(stored)["drag_coefficient"] == found["drag_coefficient"]
     assert here("report", tmp_path / "run", "-o", tmp_path / "page.html").code == 0
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert found["check_left_out"] in page

@@ -12,6 +12,7 @@ import pytest
 
 import driftwalk as dw
 from driftwalk.schema import build_flow_field, build_trajectory
+from driftwalk.schema.facts import fit_facts
 
 FOLDER = Path(__file__).resolve().parents[1] / "data" / "ode_recordings"
 AXIS = np.linspace(-0.165, 0.165, 133)
@@ -45,7 +46,7 @@ def test_half_an_hour_of_another_engine(
         flow=flow,
         recordings=recording,
     )
-    assert fit.attrs["wall_share"] < 0.3
+    assert fit_facts(fit)["wall_share"] < 0.3
     assert abs(score["drag_coefficient_error"]) <= most_drag
     assert abs(score["force_std_N_error"]) <= 0.03
     assert abs(score["tracking_noise_m_error"]) <= 0.03

@@ -8,6 +8,8 @@ import numpy as np
 import xarray as xr
 from synthetic_calibration import ARENA, bundled_flow
 
+from driftwalk.schema.facts import fit_variables
+
 LAGS, CELLS, PARTS, BINS = 5, 4, 4, 6
 
 
@@ -20,17 +22,17 @@ def made_up_fit(*, flows: tuple[str, ...] = ()) -> xr.Dataset:
         fit = fit.expand_dims(flow=np.array(flows, dtype=object))
     answer = {"drag_coefficient": 0.39, "force_std_N": 6e-4, "tracking_noise_m": 3e-4}
     answer["force_noise_intensity_N2_s"] = 6e-4**2 * 0.016
-    return fit.assign_attrs(
+    numbers, names = fit_variables(
         {
             **answer,
             **{f"{name}_interval": [0.9 * v, 1.1 * v] for name, v in answer.items()},
-            "kind": "fit", "arena": ARENA, "confidence": 0.9, "force_interval_s": 0.016,
-            "source": "recording.csv", "simulated_recording": "no", "samples": 1000,
-            "samples_used": 990, "duration_s": 600.0, "recordings": 2, "wall_share": 0.01,
-            "visited_share": 0.65, "chi_squared_per_dof": 1.02,
-            "warnings": json.dumps(["the block was rarely in the middle"]),
+            "confidence": 0.9, "force_interval_s": 0.016, "samples": 1000, "samples_used": 990,
+            "duration_s": 600.0, "recordings": 2, "wall_share": 0.01, "visited_share": 0.65,
+            "chi_squared_per_dof": 1.02, "warnings": ["the block was rarely in the middle"],
         }
     )  # fmt: skip
+    words = {"source": "recording.csv", "simulated_recording": "no", "arena": ARENA}
+    return fit.assign(numbers).assign_coords(names).assign_attrs(words, kind="fit")
 
 
 def made_up_check(*, explained: str = "no") -> xr.Dataset:

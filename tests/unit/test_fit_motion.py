@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 
 import numpy as np
@@ -17,6 +16,7 @@ from driftwalk.likelihood.filter_pass import Series
 from driftwalk.likelihood.result import footprint_count, whiteness_of
 from driftwalk.model import apply_overrides
 from driftwalk.schema import FLAGS, build_trajectory
+from driftwalk.schema.facts import fit_facts
 
 
 @pytest.fixture(scope="module")
@@ -46,33 +46,37 @@ def standard_deviations(fit: xr.Dataset) -> np.ndarray:
 def deviations(fit: xr.Dataset) -> np.ndarray:
     """Return how far the parameters are from the truth, in their standard deviations."""
     truth = np.array([DRAG * np.exp(STEP_16_MS), FORCE_N, NOISE_M])
-    return np.log(np.array([fit.attrs[name] for name in NAMES]) / truth) / standard_deviations(fit)
+    return np.log(np.array([fit_facts(fit)[name] for name in NAMES]) / truth) / standard_deviations(
+        fit
+    )
 
 
 def test_the_truth_is_within_the_errors(fit: xr.Dataset) -> None:
     """4 sd for each of three: once in 5000 runs, if the errors are right."""
     assert np.abs(deviations(fit)).max() < 4.0
-    assert fit.attrs["converged"] == "yes"
+    assert fit_facts(fit)["converged"] == "yes"
     for name in ("drag_coefficient", "force_std_N", "force_noise_intensity_N2_s"):
-        low, high = fit.attrs[f"{name}_interval"]
-        assert low < fit.attrs[name] < high
-    assert fit.attrs["force_noise_intensity_N2_s"] == pytest.approx(
-        fit.attrs["force_std_N"] ** 2 * fit.attrs["force_interval_s"]
+        low, high = fit_facts(fit)[f"{name}_interval"]
+        assert low < fit_facts(fit)[name] < high
+    assert fit_facts(fit)["force_noise_intensity_N2_s"] == pytest.approx(
+        fit_facts(fit)["force_std_N"] ** 2 * fit_facts(fit)["force_interval_s"]
     )
     # 90 % of a normal: 1.645 sd on either side, in logarithms.
-    low, high = np.log(fit.attrs["drag_coefficient_interval"])
+    low, high = np.log(fit_facts(fit)["drag_coefficient_interval"])
     assert high - low == pytest.approx(2 * 1.644854 * np.sqrt(fit["covariance"].values[0, 0]))
 
 
 def test_restricted_likelihood_lowers_the_drag(fit: xr.Dataset) -> None:
-    assert fit.attrs["drag_coefficient"] < fit.attrs["maximum_likelihood_drag_coefficient"]
+    assert (
+        fit_facts(fit)["drag_coefficient"] < fit_facts(fit)["maximum_likelihood_drag_coefficient"]
+    )
 
 
 def test_innovations_are_white(fit: xr.Dataset) -> None:
     """Some 12,000 numbers: 4 sd of the mean square are 5 %, and the fit takes less than 1 %."""
-    assert fit.attrs["chi_squared_per_dof"] == pytest.approx(1.0, abs=0.06)
-    assert abs(fit.attrs["autocorrelation"]) < 4.0 * fit.attrs["autocorrelation_std"]
-    assert json.loads(fit.attrs["warnings"]) == []
+    assert fit_facts(fit)["chi_squared_per_dof"] == pytest.approx(1.0, abs=0.06)
+    assert abs(fit_facts(fit)["autocorrelation"]) < 4.0 * fit_facts(fit)["autocorrelation_std"]
+    assert fit_facts(fit)["warnings"] == []
 
 
 def test_the_flow_is_within_its_standard_errors(fit: xr.Dataset) -> None:
@@ -118,11 +122,11 @@ def test_a_recording_with_holes_gives_the_same_within_errors(
         holes[name].values[lost] = np.nan
     holes["theta"].values[generator.random(time.size) < 0.1] = np.nan
     found = dw.fit_motion(holes, coarse_study())
-    part, whole = (np.array([one.attrs[name] for name in NAMES]) for one in (found, fit))
+    part, whole = (np.array([fit_facts(one)[name] for name in NAMES]) for one in (found, fit))
     more = standard_deviations(found) ** 2 - standard_deviations(fit) ** 2
     assert (more > 0.0).all()
     assert np.abs(np.log(part / whole) / np.sqrt(more)).max() < 4.0
-    assert found.attrs["samples"] == np.count_nonzero(~lost)
+    assert fit_facts(found)["samples"] == np.count_nonzero(~lost)
 
 
 @pytest.mark.slow
@@ -132,7 +136,7 @@ def test_two_recordings_are_better_than_one(track: xr.Dataset, fit: xr.Dataset) 
     # Twice the data: 1 / sqrt(2), as far as the information does not vary from one to the other.
     lever = 3  # known from its prior alone
     assert np.delete(ratio, lever) == pytest.approx(np.full(4, np.sqrt(0.5)), rel=0.25)
-    assert both.attrs["recordings"] == 2
+    assert fit_facts(both)["recordings"] == 2
     assert np.abs(deviations(both)).max() < 4.0
 
 
@@ -142,7 +146,7 @@ def test_without_angles_the_drag_is_averaged(track: xr.Dataset) -> None:
     blind["theta"].values[:] = np.nan
     found = dw.fit_motion(blind, coarse_study())
     assert found.attrs["angle"] == "none"
-    assert "no orientation" in found.attrs["warnings"]
+    assert "no orientation" in " ".join(fit_facts(found)["warnings"])
     # The mean over all orientations makes C_d up to 16 % too small (docs: what `none` costs); what
     # its sd adds to that is 4 of them, as for the others: once in 5000 if they are right.
     sd, off = standard_deviations(found), deviations(found)
@@ -150,16 +154,18 @@ def test_without_angles_the_drag_is_averaged(track: xr.Dataset) -> None:
     assert np.log(1.0 - 0.16) / sd[0] - 4.0 < off[0] < 4.0
     assert np.abs(off[1:]).max() < 4.0
     same = dw.fit_motion(track, coarse_study(), angle="none")
-    assert same.attrs["drag_coefficient"] == pytest.approx(found.attrs["drag_coefficient"])
+    assert fit_facts(same)["drag_coefficient"] == pytest.approx(
+        fit_facts(found)["drag_coefficient"]
+    )
 
 
 def test_force_std_follows_its_interval(track: xr.Dataset, fit: xr.Dataset) -> None:
     other = apply_overrides(coarse_study(), {"forces.force_interval_s": 0.064})
     found = dw.fit_motion(track, other)
-    assert found.attrs["force_noise_intensity_N2_s"] == pytest.approx(
-        fit.attrs["force_noise_intensity_N2_s"]
+    assert fit_facts(found)["force_noise_intensity_N2_s"] == pytest.approx(
+        fit_facts(fit)["force_noise_intensity_N2_s"]
     )
-    assert found.attrs["force_std_N"] == pytest.approx(fit.attrs["force_std_N"] / 2.0)
+    assert fit_facts(found)["force_std_N"] == pytest.approx(fit_facts(fit)["force_std_N"] / 2.0)
 
 
 def still(count: int, **changed: np.ndarray) -> xr.Dataset:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -13,6 +11,7 @@ import driftwalk as dw
 from driftwalk.likelihood.ready import use_angle
 from driftwalk.model import apply_overrides
 from driftwalk.schema import body_track, build_trajectory
+from driftwalk.schema.facts import fit_facts
 
 SECONDS = 600.0
 ANGLE_NOISE = np.radians(0.5)
@@ -74,51 +73,52 @@ def deviations(fit: xr.Dataset) -> np.ndarray:
     truth = np.array([DRAG, FORCE_N, NOISE_M, ANGLE_NOISE])
     names = ("drag_coefficient", "force_std_N", "tracking_noise_m", "orientation_noise_rad")
     sd = np.sqrt(np.diag(fit["covariance"].values))[[0, 1, 2, 4]] * (1.0, 0.5, 1.0, 1.0)
-    return np.log(np.array([fit.attrs[name] for name in names]) / truth) / sd
+    return np.log(np.array([fit_facts(fit)[name] for name in names]) / truth) / sd
 
 
 def test_the_truth_is_within_the_errors(fit: xr.Dataset) -> None:
     """4 sd for each of four: once in 4000 runs, if the errors are right."""
     assert fit.attrs["angle"] == "state"
-    assert fit.attrs["converged"] == "yes"
+    assert fit_facts(fit)["converged"] == "yes"
     assert np.abs(deviations(fit)).max() < 4.0
     sd = np.sqrt(np.diag(fit["covariance"].values))
     # The turning tells of the drag: from the motion alone it is some 8 % in ten minutes.
     assert sd[0] < 0.02
-    assert fit["parameter"].values.tolist()[3:] == ["ln_force_lever", "ln_orientation_noise"]
+    assert fit["log_parameter"].values.tolist()[3:] == ["ln_force_lever", "ln_orientation_noise"]
     for name in ("force_lever_m", "orientation_noise_rad"):
-        low, high = fit.attrs[f"{name}_interval"]
-        assert low < fit.attrs[name] < high
+        low, high = fit_facts(fit)[f"{name}_interval"]
+        assert low < fit_facts(fit)[name] < high
 
 
 def test_a_force_on_the_centre_has_no_lever(fit: xr.Dataset) -> None:
     """What is found, from its prior, is below a hundredth of the block's side."""
-    assert fit.attrs["force_lever_m"] < 3e-4
+    assert fit_facts(fit)["force_lever_m"] < 3e-4
     assert np.sqrt(fit["covariance"].values[3, 3]) > 0.3
 
 
 def test_turning_and_motion_agree_on_the_drag(fit: xr.Dataset) -> None:
-    assert 0.0 <= fit.attrs["angle_disagreement_std"] < 3.0
-    low, high = fit.attrs["drag_coefficient_angle_given_interval"]
-    assert low < fit.attrs["drag_coefficient_angle_given"] < high
+    assert 0.0 <= fit_facts(fit)["angle_disagreement_std"] < 3.0
+    low, high = fit_facts(fit)["drag_coefficient_angle_given_interval"]
+    assert low < fit_facts(fit)["drag_coefficient_angle_given"] < high
     assert np.log(high / low) > 2.0 * np.log(
-        fit.attrs["drag_coefficient_interval"][1] / fit.attrs["drag_coefficient_interval"][0]
+        fit_facts(fit)["drag_coefficient_interval"][1]
+        / fit_facts(fit)["drag_coefficient_interval"][0]
     )
-    assert json.loads(fit.attrs["warnings"]) == []
+    assert fit_facts(fit)["warnings"] == []
 
 
 def test_the_errors_of_prediction_are_white(fit: xr.Dataset) -> None:
     """18,000 numbers: 4 sd of the mean square are 4 %, and the fit takes less than 1 %."""
-    assert fit.attrs["chi_squared_per_dof"] == pytest.approx(1.0, abs=0.05)
-    assert abs(fit.attrs["autocorrelation"]) < 4.0 * fit.attrs["autocorrelation_std"]
-    assert fit.attrs["autocorrelation_std"] == pytest.approx(1 / np.sqrt(18_000), rel=0.05)
+    assert fit_facts(fit)["chi_squared_per_dof"] == pytest.approx(1.0, abs=0.05)
+    assert abs(fit_facts(fit)["autocorrelation"]) < 4.0 * fit_facts(fit)["autocorrelation_std"]
+    assert fit_facts(fit)["autocorrelation_std"] == pytest.approx(1 / np.sqrt(18_000), rel=0.05)
 
 
 def test_holes_and_missing_angles_leave_the_truth_within_the_errors(
     holed: xr.Dataset, holed_fit: xr.Dataset, fit: xr.Dataset
 ) -> None:
     assert np.abs(deviations(holed_fit)).max() < 4.0
-    assert holed_fit.attrs["samples"] == int(np.isfinite(holed["x"].values).sum())
+    assert fit_facts(holed_fit)["samples"] == int(np.isfinite(holed["x"].values).sum())
     # Less is known, of the angle's noise the most.
     ratio = np.sqrt(np.diag(holed_fit["covariance"].values) / np.diag(fit["covariance"].values))
     assert ratio[[0, 1, 2, 4]] == pytest.approx(np.full(4, 1.5), abs=0.45)
@@ -126,7 +126,7 @@ def test_holes_and_missing_angles_leave_the_truth_within_the_errors(
 
 def test_missing_angles_are_no_errors_of_prediction(holed_fit: xr.Dataset) -> None:
     """Some 10,000 numbers are there; counted as zeros, missing angles would make it 0.87."""
-    assert holed_fit.attrs["chi_squared_per_dof"] == pytest.approx(1.0, abs=0.06)
+    assert fit_facts(holed_fit)["chi_squared_per_dof"] == pytest.approx(1.0, abs=0.06)
 
 
 @pytest.mark.slow
@@ -145,8 +145,8 @@ def test_an_angle_of_the_wrong_side_is_noticed(track: xr.Dataset) -> None:
     short = track.isel(time=slice(0, 4000))
     lie = turned(short, short["theta"].values[:, 0] + np.pi / 4)
     found = dw.fit_motion(lie, coarse_study(), angle="state")
-    assert found.attrs["angle_disagreement_std"] > 3.0
-    assert any("one drag law" in one for one in json.loads(found.attrs["warnings"]))
+    assert fit_facts(found)["angle_disagreement_std"] > 3.0
+    assert any("one drag law" in one for one in fit_facts(found)["warnings"])
 
 
 def test_an_angle_that_comes_late_shows_in_the_lever(track: xr.Dataset, fit: xr.Dataset) -> None:
@@ -154,7 +154,10 @@ def test_an_angle_that_comes_late_shows_in_the_lever(track: xr.Dataset, fit: xr.
     short = track.isel(time=slice(0, 4000))
     late = turned(short, np.roll(short["theta"].values[:, 0], 3))
     found = dw.fit_motion(late, coarse_study(), angle="state")
-    assert found.attrs["force_lever_m_interval"][0] > 2.0 * fit.attrs["force_lever_m_interval"][1]
+    assert (
+        fit_facts(found)["force_lever_m_interval"][0]
+        > 2.0 * fit_facts(fit)["force_lever_m_interval"][1]
+    )
 
 
 def test_half_of_the_angles_make_it_the_default(track: xr.Dataset) -> None:
@@ -185,4 +188,4 @@ def test_an_angle_that_is_off_warns_of_the_lever(track: xr.Dataset) -> None:
 
 def warnings_in(recording: xr.Dataset) -> list[str]:
     fit = dw.fit_motion(recording, coarse_study(), angle="state")
-    return list(json.loads(fit.attrs["warnings"]))
+    return list(fit_facts(fit)["warnings"])

@@ -27,6 +27,7 @@ from driftwalk.cli.options.shared import (
 from driftwalk.cli.terminal.output import print_json, print_note, report_command
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.study_keys import FIT_KEYS, study_overrides
+from driftwalk.schema.facts import fit_facts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -198,10 +199,11 @@ _KEYS = (
 
 def summary(found: xr.Dataset) -> dict[str, Any]:
     """Return the fit with units in its keys."""
+    facts = fit_facts(found)
     return {
-        **{key: found.attrs[key] for key in _KEYS if key in found.attrs},
-        "recording": found.attrs["source"],
-        "warnings": json_module.loads(found.attrs["warnings"]),
+        **{key: facts[key] for key in _KEYS if key in facts},
+        "recording": facts["source"],
+        "warnings": facts["warnings"],
     }
 
 
@@ -212,7 +214,7 @@ def answer(fit: xr.Dataset, check: xr.Dataset | None) -> dict[str, Any]:
 
 def print_answer(found: xr.Dataset, folder: Path) -> None:
     """Print the answer for people, and where the flow is."""
-    facts = found.attrs
+    facts = fit_facts(found)
     if facts["simulated_recording"] == "yes":
         print("This recording was simulated by another engine (ODE).")
     every = f", redrawn every {1e3 * facts['force_interval_s']:g} ms"
@@ -231,7 +233,7 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
         names = found["flow"].values[found["interval_flow"].values]
         times = ", ".join(f"{time:g} s" for time in facts["switching_times_s"])
         print(f"flows                  {', '.join(names)}, switched at {times}")
-    for warning in json_module.loads(facts["warnings"]):
+    for warning in facts["warnings"]:
         print_note(f"warning: {warning}")
     print(f"flow                   {folder / 'flow.nc'}")
 

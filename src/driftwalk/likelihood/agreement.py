@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.likelihood.filter_pass import Passes
 from driftwalk.likelihood.newton import Mode, Prior, find_mode
 from driftwalk.likelihood.reml import Restricted, restricted_drag
-from driftwalk.likelihood.result import parameter_attrs, parameter_covariance
+from driftwalk.likelihood.result import parameter_covariance, parameter_facts
 from driftwalk.likelihood.solution import BREAKDOWN
 
 if TYPE_CHECKING:
@@ -57,9 +57,9 @@ def angle_given_facts(
     covariance = parameter_covariance(other, found)
     own = parameter_covariance(mode, restricted)
     apart = abs(found.point.log_drag - restricted.point.log_drag)
-    attrs = parameter_attrs(found.point, covariance, study)
+    facts = parameter_facts(found.point, covariance, study)
     return {
-        "drag_coefficient_angle_given": attrs["drag_coefficient"],
-        "drag_coefficient_angle_given_interval": attrs["drag_coefficient_interval"],
+        "drag_coefficient_angle_given": facts["drag_coefficient"],
+        "drag_coefficient_angle_given_interval": facts["drag_coefficient_interval"],
         "angle_disagreement_std": apart / math.sqrt(covariance[0, 0] + own[0, 0]),
     }

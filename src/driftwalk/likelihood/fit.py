@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -25,8 +24,8 @@ from driftwalk.likelihood.ready import (
 from driftwalk.likelihood.reml import Restricted, restricted_drag
 from driftwalk.likelihood.result import (
     build_fit,
-    parameter_attrs,
     parameter_covariance,
+    parameter_facts,
     visited_shares,
     whiteness_of,
 )
@@ -35,6 +34,7 @@ from driftwalk.likelihood.start import first_point, first_weights
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema import Track
 from driftwalk.schema.check import described
+from driftwalk.schema.facts import texts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -74,10 +74,11 @@ def fit_motion(
     Returns
     -------
     xarray.Dataset
-        A `fit`; `fitted_flow` makes a flow field of it. The answer stands in its attributes:
-        ``drag_coefficient``, ``force_std_N``, ``force_noise_intensity_N2_s``, ``tracking_noise_m``,
-        each with ``_interval``, ``force_interval_s``, ``wall_share``, ``warnings``, and the check
-        of the innovations (``chi_squared_per_dof``, ``autocorrelation``).
+        A `fit`; `fitted_flow` makes a flow field of it. The answer stands in ``estimate``
+        (parameter: drag_coefficient, force_std, force_noise_intensity, tracking_noise) with
+        ``unit``, ``interval`` (parameter, bound) and ``warning``; besides there are
+        ``force_interval``, ``wall_share``, ``converged`` and the check of the innovations
+        (``chi_squared_per_dof``, ``autocorrelation``).
 
     Raises
     ------
@@ -90,7 +91,7 @@ def fit_motion(
     --------
     >>> import driftwalk as dw
     >>> fit = dw.fit_motion(dw.tank30_recording())  # doctest: +SKIP
-    >>> round(fit.attrs["drag_coefficient"], 2)  # doctest: +SKIP
+    >>> round(float(fit["estimate"].sel(parameter="drag_coefficient")), 2)  # doctest: +SKIP
     0.39
     """
     from driftwalk.model import Study
@@ -115,8 +116,8 @@ def fit_motion(
         )
     duration = sum(float(one.time[-1] - one.time[0]) for one in series)
     covariance = parameter_covariance(mode, restricted)
-    attrs: dict[str, Any] = {
-        **parameter_attrs(restricted.point, covariance, chosen),
+    facts: dict[str, Any] = {
+        **parameter_facts(restricted.point, covariance, chosen),
         "maximum_likelihood_drag_coefficient": math.exp(mode.point.log_drag),
         **precision_facts(math.sqrt(covariance[0, 0]), duration, chosen),
         "wetted_depth_m": chosen.wetted_depth_m,
@@ -136,7 +137,6 @@ def fit_motion(
         "size_weight": mode.weights.size,
         "source": ", ".join(str(one.attrs.get("source", "")) for one in many),
         "simulated_recording": "yes" if any(is_simulated(one) for one in many) else "no",
-        "study": chosen.to_toml(),
     }
     fit = build_fit(
         spline,
@@ -147,13 +147,15 @@ def fit_motion(
         oriented=used_angle != "none",
         intervals=intervals,
         first=float(ready.tracks[0].time[0]),
-        attrs=attrs,
+        facts=facts,
     )
     shares = visited_shares(fit)
-    fit.attrs["visited_share"] = min(shares)
-    warnings = warnings_of(fit.attrs, whiteness, shares, intervals, side_m=chosen.block.side_m)
-    fit.attrs["warnings"] = json.dumps(warnings)
-    return described(fit)
+    warnings = warnings_of(facts, whiteness, shares, intervals, side_m=chosen.block.side_m)
+    return described(
+        fit.assign(visited_share=((), min(shares))).assign_coords(
+            warning=("warning", texts(warnings))
+        )
+    )
 
 
 def check_fit(

@@ -87,7 +87,7 @@ def fitted_intervals(fit: xr.Dataset) -> Intervals:
     """Return the intervals of a fit."""
     if "flow" not in fit.dims:
         return Intervals((), (0,), ("A",))
-    times = np.atleast_1d(fit.attrs["switching_times_s"])
+    times = fit["switching_time"].values
     flows = fit["interval_flow"].values
     labels = fit["flow"].values
     return Intervals(

@@ -1,10 +1,12 @@
-"""The `fit` dataset: the flow with its errors, and in its attributes the parameters.
+"""The `fit` dataset: the parameters with their intervals, and the flow with its errors.
 
-On (y, x), the nodes of a flow field: ``u``, ``v`` and their standard errors [m/s] at every node,
-``flag`` and ``count`` (samples with the block over the node); on (component, knot_y, knot_x) the
-coefficients of the spline; ``covariance`` of (ln C_d, ln q, ln r); the profile of the likelihood
-along C_d. With switching times all that belongs to a flow has the dimension ``flow`` in front, and
-``interval_flow`` on (interval) says which flow each interval has.
+``estimate`` by parameter and ``interval`` by parameter and bound; every other number of the search
+is a variable of its own. On (y, x), the nodes of a flow field: ``u``, ``v`` and their standard
+errors [m/s] at every node, ``flag`` and ``count`` (samples with the block over the node); on
+(component, knot_y, knot_x) the coefficients of the spline; ``covariance`` of (ln C_d, ln q, ln r);
+the profile of the likelihood along C_d. With switching times all that belongs to a flow has the
+dimension ``flow`` in front, and ``interval_flow`` on (flow_interval) says which flow each interval
+has.
 """
 
 from __future__ import annotations
@@ -26,6 +28,8 @@ from driftwalk.likelihood.reml import Restricted
 from driftwalk.likelihood.spline import Floats, Spline
 from driftwalk.likelihood.widening import widened
 from driftwalk.schema import FLAGS, build_flow_field
+from driftwalk.schema.earlier import current_form
+from driftwalk.schema.facts import fit_variables
 from driftwalk.schema.kinds import KINDS
 
 if TYPE_CHECKING:
@@ -95,7 +99,7 @@ def parameter_covariance(mode: Mode, restricted: Restricted) -> Floats:
     return widened(covariance * np.outer(scale, scale), mode.point)
 
 
-def parameter_attrs(point: Any, covariance: Floats, study: Study) -> dict[str, Any]:
+def parameter_facts(point: Any, covariance: Floats, study: Study) -> dict[str, Any]:
     """Return the parameters with their intervals, units in the keys."""
     from scipy.special import ndtri
 
@@ -113,11 +117,11 @@ def parameter_attrs(point: Any, covariance: Floats, study: Study) -> dict[str, A
     if point.log_lever is not None:
         values["force_lever_m"] = (math.exp(point.log_lever), reach[3])
         values["orientation_noise_rad"] = (math.exp(point.log_angle_noise), reach[4])
-    attrs: dict[str, Any] = {"force_interval_s": interval, "confidence": confidence}
+    facts: dict[str, Any] = {"force_interval_s": interval, "confidence": confidence}
     for name, (value, width) in values.items():
-        attrs[name] = value
-        attrs[f"{name}_interval"] = [value * math.exp(-width), _upper(value, width)]
-    return attrs
+        facts[name] = value
+        facts[f"{name}_interval"] = [value * math.exp(-width), _upper(value, width)]
+    return facts
 
 
 def _upper(value: float, log_width: float) -> float:
@@ -135,9 +139,12 @@ def build_fit(
     oriented: bool,
     intervals: Intervals,
     first: float,
-    attrs: dict[str, Any],
+    facts: dict[str, Any],
 ) -> xr.Dataset:
-    """Assemble the dataset of a fit; `first` is the first recording's first time stamp [s]."""
+    """Assemble the dataset of a fit, without warnings and the share of the tank that was visited.
+
+    `first` is the first recording's first time stamp [s]; for `facts` see `fit_variables`.
+    """
     import xarray as xr
 
     outline = outline_of(study.tank.to_arena())
@@ -163,44 +170,46 @@ def build_fit(
     data: dict[str, Any] = {
         **(flows[0] if intervals.steady else _stacked(flows)),
         "covariance": (
-            ("parameter", "other_parameter"),
+            ("log_parameter", "other_log_parameter"),
             uncertainty,
-            {"units": "1"},
         ),
-        "profile_deviance": ("profile", [one.deviance - least for one in profiles], {"units": "1"}),
+        "profile_deviance": ("profile", [one.deviance - least for one in profiles]),
         "profile_half_log_determinant": (
             "profile",
             [one.half_log_determinant - flat for one in profiles],
-            {"units": "1"},
         ),
     }
     coords: dict[str, Any] = {
-        "y": ("y", grid.y, {"units": "m"}),
-        "x": ("x", grid.x, {"units": "m"}),
+        "y": ("y", grid.y),
+        "x": ("x", grid.x),
         "component": ("component", np.array(["u", "v"], dtype=object)),
-        "parameter": ("parameter", names),
-        "other_parameter": ("other_parameter", names),
-        "profile": ("profile", [math.exp(one.log_drag) for one in profiles], {"units": "1"}),
+        "log_parameter": ("log_parameter", names),
+        "other_log_parameter": ("other_log_parameter", names),
+        "profile": ("profile", [math.exp(one.log_drag) for one in profiles]),
     }
     facts = {
-        "kind": "fit",
-        "schema_version": KINDS["fit"].version,
+        **facts,
         "spline_origin_m": [spline.origin_x, spline.origin_y],
         "spline_spacing_m": spline.spacing,
         "cell_size_m": grid.cell_size,
-        "arena": json.dumps(study.tank.to_arena()),
-        **attrs,
     }
     if not intervals.steady:
         coords["flow"] = ("flow", np.array(intervals.labels, dtype=object))
         data["interval_flow"] = (
-            "interval",
+            "flow_interval",
             np.array(intervals.flows, dtype=np.int32),
-            {"long_name": "number of the flow in each interval between the switching times"},
         )
         facts["switching_times_s"] = list(intervals.times)
         facts["recording_start_s"] = first
-    return xr.Dataset(data, coords=coords, attrs=facts)
+    numbers, names_of = fit_variables(facts)
+    attrs = {
+        "kind": "fit",
+        "schema_version": KINDS["fit"].version,
+        "arena": json.dumps(study.tank.to_arena()),
+        **{name: facts[name] for name in ("angle", "source", "simulated_recording")},
+        "study": study.to_toml(),
+    }
+    return xr.Dataset(data | numbers, coords | names_of, attrs)
 
 
 def _block(spline: Spline, flow: int) -> slice:
@@ -220,32 +229,27 @@ def _flow_variables(
     study: Study,
     oriented: bool,
 ) -> dict[str, Any]:
-    """Return the variables of one flow, with their dimensions and attributes."""
+    """Return the variables of one flow, with their dimensions."""
     count = footprint_count(grid, series, side=study.block.side_m, oriented=oriented)
-    speed = {"units": "m s-1"}
     values = spline.values(coefficients, grid.x, grid.y)
     errors = spline.standard_errors(covariance, grid.x, grid.y)
     plane, knots = ("y", "x"), ("component", "knot_y", "knot_x")
     return {
-        "u": (plane, values[0], speed),
-        "v": (plane, values[1], speed),
-        "u_standard_error": (plane, errors[0], speed),
-        "v_standard_error": (plane, errors[1], speed),
-        "count": (
-            plane,
-            count,
-            {"units": "1", "long_name": "samples with the block over the node"},
-        ),
-        "flag": (plane, _flags(grid, outline, count), {"long_name": "origin of the node's value"}),
-        "coefficient": (knots, coefficients, speed),
+        "u": (plane, values[0]),
+        "v": (plane, values[1]),
+        "u_standard_error": (plane, errors[0]),
+        "v_standard_error": (plane, errors[1]),
+        "count": (plane, count),
+        "flag": (plane, _flags(grid, outline, count)),
+        "coefficient": (knots, coefficients),
     }
 
 
 def _stacked(flows: list[dict[str, Any]]) -> dict[str, Any]:
     """Return the variables of several flows along a dimension of their own."""
     return {
-        name: (("flow", *dims), np.stack([one[name][1] for one in flows]), attrs)
-        for name, (dims, _, attrs) in flows[0].items()
+        name: (("flow", *dims), np.stack([one[name][1] for one in flows]))
+        for name, (dims, _) in flows[0].items()
     }
 
 
@@ -256,6 +260,20 @@ def visited_shares(fit: xr.Dataset) -> list[float]:
         float((one == FLAGS["measured"]).sum() / max((one != FLAGS["outside"]).sum(), 1))
         for one in flags
     ]
+
+
+def require_fit(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a fit, one of an earlier schema version in its current form.
+
+    Raises
+    ------
+    InputError
+        When it is no fit.
+    """
+    kind = dataset.attrs.get("kind")
+    if kind != "fit":
+        raise InputError(f"not a fit: its kind is {kind!r}; fit_motion makes one")
+    return current_form(dataset)
 
 
 def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
@@ -288,17 +306,16 @@ def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
     >>> import driftwalk as dw
     >>> flow = dw.fitted_flow(dw.fit_motion(dw.tank30_recording()))  # doctest: +SKIP
     """
-    if fit.attrs.get("kind") != "fit":
-        raise InputError(f"not a fit: its kind is {fit.attrs.get('kind')!r}; fit_motion makes one")
+    fit = require_fit(fit)
     intervals = fitted_intervals(fit)
     if interval is not None and not 0 <= interval < len(intervals.flows):
         raise InputError(
             f"no interval {interval}: the fit has {len(intervals.flows)}, counted from 0"
         )
-    kept = ("cell_size_m", "arena", "source")
     attrs: dict[str, Any] = {
         "method": "bicubic spline, fitted with drag and noise by the innovations' likelihood",
-        **{key: fit.attrs[key] for key in kept},
+        "cell_size_m": float(fit["cell_size"]),
+        **{key: fit.attrs[key] for key in ("arena", "source")},
     }
     if intervals.steady:
         return build_flow_field(
@@ -311,7 +328,7 @@ def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
         attrs["intervals"] = ", ".join(intervals.describe(one) for one in intervals.of_flow(flow))
         return build_flow_field(fit["x"].values, fit["y"].values, attrs=attrs, **fields[flow])
     by_name = {name: [one[name] for one in fields] for name in fields[0]}
-    time, frames = switched_frames(intervals, by_name, first=float(fit.attrs["recording_start_s"]))
+    time, frames = switched_frames(intervals, by_name, first=float(fit["recording_start"]))
     return build_flow_field(fit["x"].values, fit["y"].values, time=time, attrs=attrs, **frames)
 
 

@@ -48,6 +48,7 @@ def model_of(
     """
     from driftwalk.likelihood import fitted_flow
     from driftwalk.model import Study, apply_overrides, parse_study
+    from driftwalk.schema.facts import fit_facts
 
     if isinstance(source, Study):
         return FoundModel(apply_overrides(source, overrides), _flow(flow), None)
@@ -56,7 +57,7 @@ def model_of(
         raise InputError(
             f"a study, a fit or a calibration is needed, got a dataset of kind {kind!r}"
         )
-    facts = source.attrs
+    facts = fit_facts(source) if kind == "fit" else source.attrs
     study = apply_overrides(
         parse_study(facts["study"]),
         {

@@ -134,7 +134,7 @@ def run_fit(
         )
         check = None
         if work.check:
-            progress(found.attrs["iterations"], found.attrs["iterations"], "check")
+            progress(int(found["iterations"]), int(found["iterations"]), "check")
             try:
                 check = check_model(found, work.recordings, body=work.body)
             except InputError as error:

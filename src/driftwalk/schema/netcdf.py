@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.bounded import MIB
 from driftwalk.core.errors import FormatError
+from driftwalk.schema.earlier import current_file
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,8 +40,9 @@ _WIDTH: Final = 8
 def open_netcdf(path: Path) -> xr.Dataset:
     """Read a NetCDF file into memory and close it.
 
-    Numbers stay as they are stored: a time in "s" does not become a date. Each reader checks the
-    required contents, by `driftwalk.schema.contents.check_contents` where work goes on with it.
+    Numbers stay as they are stored: a time in "s" does not become a date. A dataset of an earlier
+    schema version comes in the form of the current one. Each reader checks the required contents,
+    by `driftwalk.schema.contents.check_contents` where work goes on with it.
 
     Raises
     ------
@@ -50,7 +52,7 @@ def open_netcdf(path: Path) -> xr.Dataset:
     if not is_netcdf(path):
         raise FormatError("is not a NetCDF file", path=path)
     with _opened(path) as dataset:
-        return dataset.load()
+        return current_file(dataset.load(), path)
 
 
 def netcdf_bytes(dataset: xr.Dataset) -> bytes:

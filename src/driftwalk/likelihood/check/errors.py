@@ -21,8 +21,10 @@ from driftwalk.core.errors import InputError
 from driftwalk.likelihood.filter_pass import Passes, Place, Point, Series, Sums
 from driftwalk.likelihood.newton import Prior, Weights
 from driftwalk.likelihood.ready import body_of, prepare
+from driftwalk.likelihood.result import require_fit
 from driftwalk.likelihood.spline import DEGREE, Floats, Spline, basis
 from driftwalk.schema import Track
+from driftwalk.schema.facts import fitted_value
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,35 +60,32 @@ def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str 
     """Return what a fit found, with the recordings it was fitted to."""
     from driftwalk.model import parse_study
 
-    if fit.attrs.get("kind") != "fit":
-        raise InputError(f"not a fit: its kind is {fit.attrs.get('kind')!r}; fit_motion makes one")
+    fit = require_fit(fit)
     study = parse_study(fit.attrs["study"])
     ready = prepare(recordings, study, fit.attrs["angle"], body)
     samples = sum(one.time.size for one in ready.series)
-    if samples != int(fit.attrs["samples"]):
+    if samples != int(fit["samples"]):
         raise InputError(
-            f"the recordings have {samples} positions, the fit was made of {fit.attrs['samples']}: "
+            f"the recordings have {samples} positions, the fit was made of {int(fit['samples'])}: "
             "check it with the recordings that it was fitted to"
         )
     coefficients = np.asarray(fit["coefficient"].values, dtype=np.float64)
-    x, y = fit.attrs["spline_origin_m"]
-    spline = Spline(
-        float(x), float(y), float(fit.attrs["spline_spacing_m"]), *coefficients.shape[:-3:-1]
-    )
-    intensity = fit.attrs["force_noise_intensity_N2_s"] / study.block.mass_kg**2
+    x, y = fit["spline_origin"].values
+    spline = Spline(float(x), float(y), float(fit["spline_spacing"]), *coefficients.shape[:-3:-1])
+    intensity = fitted_value(fit, "force_noise_intensity") / study.block.mass_kg**2
     point = Point(
         coefficients,
-        math.log(fit.attrs["drag_coefficient"]),
+        math.log(fitted_value(fit, "drag_coefficient")),
         math.log(intensity),
-        math.log(fit.attrs["tracking_noise_m"]),
+        math.log(fitted_value(fit, "tracking_noise")),
     )
     if ready.angle == "state":
         point = replace(
             point,
-            log_lever=math.log(fit.attrs["force_lever_m"]),
-            log_angle_noise=math.log(fit.attrs["orientation_noise_rad"]),
+            log_lever=math.log(fitted_value(fit, "force_lever")),
+            log_angle_noise=math.log(fitted_value(fit, "orientation_noise")),
         )
-    weights = Weights(float(fit.attrs["roughness_weight"]), float(fit.attrs["size_weight"]))
+    weights = Weights(float(fit["roughness_weight"]), float(fit["size_weight"]))
     passes = Passes(ready.series, body_of(study, ready.angle), spline, len(ready.intervals.labels))
     return Estimate(study, passes, point, weights, ready.parts)
 

@@ -26,6 +26,7 @@ from driftwalk.likelihood.check.worlds import (
     replicates_drawn,
 )
 from driftwalk.likelihood.ready import as_list
+from driftwalk.likelihood.result import require_fit
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
@@ -92,7 +93,7 @@ def check_model(
     """
     if replicates < FEWEST_REPLICATES:
         raise InputError(f"replicates must be at least {FEWEST_REPLICATES}, got {replicates}")
-    many = as_list(recordings)
+    fit, many = require_fit(fit), as_list(recordings)
     estimate = estimate_of(fit, many, body=body)
     errors = errors_of(estimate)
     _require_used(errors)

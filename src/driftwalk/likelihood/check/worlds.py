@@ -22,6 +22,7 @@ from driftwalk.likelihood.intervals import fitted_intervals
 from driftwalk.likelihood.result import fitted_flow
 from driftwalk.likelihood.spline import Floats
 from driftwalk.schema import Track
+from driftwalk.schema.facts import fitted_value
 from driftwalk.simulation import recorded_camera
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ def ready_problems(
             track,
             study,
             flows[one.flow],
-            noise=fit.attrs["tracking_noise_m"],
+            noise=fitted_value(fit, "tracking_noise"),
             recording=recordings[one.recording],
         )
         for track, one in zip(tracks, series, strict=True)
@@ -104,7 +105,7 @@ def replicates_at_estimate(
     fit: xr.Dataset, problems: Sequence[Problem], *, count: int, seed: int
 ) -> Replicates:
     """Simulate the recordings with what the fit found."""
-    drag, force = fit.attrs["drag_coefficient"], fit.attrs["force_std_N"]
+    drag, force = fitted_value(fit, "drag_coefficient"), fitted_value(fit, "force_std")
     parts = []
     for index, problem in enumerate(problems):
         keys = _keys(seed, CheckStream.ESTIMATE, index, count)
@@ -137,8 +138,8 @@ def replicates_drawn(
     flows = min(FLOWS, count)
     flow_of = np.arange(count) % flows
     coefficients, factors = _draws(fit, estimate, spread, flows, seed)
-    drag = fit.attrs["drag_coefficient"] * factors[:, 0]
-    force = fit.attrs["force_std_N"] * factors[:, 1]
+    drag = fitted_value(fit, "drag_coefficient") * factors[:, 0]
+    force = fitted_value(fit, "force_std") * factors[:, 1]
     parts: list[list[_World]] = []
     for index, problem in enumerate(problems):
         keys = _keys(seed, CheckStream.DRAWN, index, count)

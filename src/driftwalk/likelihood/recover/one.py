@@ -125,10 +125,8 @@ def recover_one(truth: Truth, *, recording: int, duration: float, angle: str) ->
         recordings=tracks,
     )
     facts = {
-        "wall_share": fit.attrs["wall_share"],
-        "samples_used": fit.attrs["samples_used"],
-        "iterations": fit.attrs["iterations"],
-        "converged": fit.attrs["converged"] == "yes",
+        **{name: fit[name].item() for name in ("wall_share", "samples_used", "iterations")},
+        "converged": bool(fit["converged"]),
         "fit_time": took,
     }
     kept = {key: float(value) for key, value in {**score, **facts}.items() if key in nothing}

@@ -13,9 +13,10 @@ from driftwalk.core.errors import InputError
 from driftwalk.flow import bilinear
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.intervals import fitted_intervals
-from driftwalk.likelihood.result import fitted_flow
+from driftwalk.likelihood.result import fitted_flow, require_fit
 from driftwalk.likelihood.wall import MARGIN
 from driftwalk.schema import FLAGS, body_track
+from driftwalk.schema.facts import fit_facts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -93,10 +94,11 @@ def score_fit(
     >>> round(score["drag_coefficient_error"], 2)  # doctest: +SKIP
     -0.03
     """
+    fit = require_fit(fit)
     if "flow" in fit.dims and interval is None:
         raise InputError(
             f"the fit has {fit.sizes['flow']} flows: name the interval that the true flow belongs "
-            f"to, 0 to {fit.sizes['interval'] - 1}"
+            f"to, 0 to {fit.sizes['flow_interval'] - 1}"
         )
     estimated = fitted_flow(fit, interval=interval)
     if "time" in flow.dims:
@@ -149,9 +151,10 @@ def _parameter_score(fit: xr.Dataset, name: str, truth: float) -> dict[str, Any]
         raise InputError(
             f"the true {name} is {truth!r}: a positive number is needed, errors are relative to it"
         )
-    value = float(fit.attrs[name])
-    low, high = (float(end) for end in fit.attrs[f"{name}_interval"])
-    reach = 2.0 * float(ndtri(0.5 + 0.5 * float(fit.attrs["confidence"])))
+    facts = fit_facts(fit)
+    value = float(facts[name])
+    low, high = facts[f"{name}_interval"]
+    reach = 2.0 * float(ndtri(0.5 + 0.5 * facts["confidence"]))
     sd = math.log(high / low) / reach
     return {
         name: value,

@@ -9,7 +9,6 @@ from driftwalk.schema.description import (
     SIMULATED,
     SOURCE,
     STUDY,
-    WARNINGS,
     Attribute,
     Kind,
     Variable,
@@ -19,11 +18,12 @@ from driftwalk.schema.kinds.flow import ORIGIN
 _ON: Final = "[flow] y x"
 _SWITCHED: Final = "with switching times"
 _TURNING: Final = "the angle is in the state"
-_INTERVAL: Final = "[low, high] at the confidence"
+_ASKED: Final = "a precision of C_d is asked for"
+_COMPARED: Final = "the angle is in the state, and the second fit has a solution"
 
 FIT: Final = Kind(
     name="fit",
-    version=1,
+    version=2,
     dimensions={
         "flow": "flows, by name, with switching times",
         "y": "nodes of the flow",
@@ -31,12 +31,89 @@ FIT: Final = Kind(
         "component": "u, v",
         "knot_y": "knots of the spline",
         "knot_x": "knots of the spline",
-        "parameter": "logarithms of the fitted parameters",
-        "other_parameter": "the same",
+        "parameter": "fitted parameters, by name",
+        "bound": "lower, upper",
+        "warning": "sentences",
+        "log_parameter": "logarithms of the fitted parameters",
+        "other_log_parameter": "the same",
+        "axis": "x, y",
+        "switch": "switching times",
         "profile": "values of C_d, by their value",
-        "interval": "between the switching times",
+        "flow_interval": "between the switching times",
     },
     variables=(
+        Variable(
+            "estimate", "parameter", None, "estimates of the parameters",
+            note="drag_coefficient C_d, force_std σ_F, force_noise_intensity σ_F² times the force "
+            "interval, tracking_noise; with the angle in the state also force_lever and "
+            "orientation_noise; in the units of the coordinate unit",
+        ),
+        Variable(
+            "interval", "parameter bound", None, "intervals of the parameters",
+            note="at the confidence; infinite where the recording leaves an end open",
+        ),
+        Variable("warning", "warning", None, "evidence against the fit", "text"),
+        Variable("converged", "", None, "whether the search came to its end", "bool"),
+        Variable(
+            "restricted", "", None, "whether the restricted likelihood has a minimum", "bool"
+        ),
+        Variable("confidence", "", "1", "confidence of the intervals"),
+        Variable(
+            "force_interval", "", "s", "time after which a force is redrawn",
+            note="σ_F depends on it",
+        ),
+        Variable(
+            "maximum_likelihood_drag_coefficient", "", "1", "C_d of the plain likelihood"
+        ),
+        Variable("drag_coefficient_relative_std", "", "1", "standard deviation of ln C_d"),
+        Variable(
+            "drag_coefficient_precision", "", "1", "precision of C_d that is asked for",
+            when=_ASKED,
+        ),
+        Variable(
+            "needed_duration", "", "s", "length of a recording like this for that precision",
+            note="for 0.1 if none is asked for",
+        ),
+        Variable("wetted_depth", "", "m", "depth of the block in the water"),
+        Variable("wall_share", "", "1", "share of the intervals at the wall, left out"),
+        Variable(
+            "visited_share", "", "1", "share of the tank's nodes that the block has been over",
+            note="the smallest of all flows",
+        ),
+        Variable("samples", "", "1", "samples of the recordings", "int"),
+        Variable(
+            "samples_used", "", "1", "samples that were near enough to their prediction", "int"
+        ),
+        Variable("intervals_usable", "", "1", "intervals that might have been used", "int"),
+        Variable("duration", "", "s", "length of the recordings together"),
+        Variable("recordings", "", "1", "recordings", "int"),
+        Variable(
+            "chi_squared_per_dof", "", "1", "mean square of the whitened innovations",
+            note="1 if the model is right",
+        ),
+        Variable(
+            "autocorrelation", "", "1", "correlation of whitened innovations one sample apart",
+            note="0 if the model is right",
+        ),
+        Variable("autocorrelation_std", "", "1", "its standard deviation if the model is right"),
+        Variable("iterations", "", "1", "steps of the search", "int"),
+        Variable("roughness_weight", "", "1", "weight of the flow's roughness"),
+        Variable("size_weight", "", "1", "weight of the flow's size"),
+        Variable(
+            "drag_coefficient_angle_given", "", "1", "C_d with the angle as an input",
+            when=_COMPARED,
+        ),
+        Variable(
+            "drag_coefficient_angle_given_interval", "bound", "1", "its interval", when=_COMPARED
+        ),
+        Variable(
+            "angle_disagreement_std", "", "1",
+            "difference of the two ln C_d in combined standard deviations", when=_TURNING,
+            note="NaN where the second fit has no solution",
+        ),
+        Variable("parameter", "parameter", None, "parameter", "text"),
+        Variable("unit", "parameter", None, "unit of the parameter", "text"),
+        Variable("bound", "bound", None, "end of an interval", "text"),
         Variable("u", _ON, "m s-1", "flow velocity x"),
         Variable("v", _ON, "m s-1", "flow velocity y"),
         Variable(
@@ -51,7 +128,7 @@ FIT: Final = Kind(
             "coefficients of the bicubic splines",
         ),
         Variable(
-            "covariance", "parameter other_parameter", "1",
+            "covariance", "log_parameter other_log_parameter", "1",
             "covariance of the logarithms of the parameters",
         ),
         Variable("profile_deviance", "profile", "1", "deviance along C_d"),
@@ -62,33 +139,33 @@ FIT: Final = Kind(
         Variable("x", "x", "m", "x"),
         Variable("y", "y", "m", "y"),
         Variable("component", "component", None, "component", "text"),
-        Variable("parameter", "parameter", None, "parameter", "text"),
-        Variable("other_parameter", "other_parameter", None, "parameter", "text"),
+        Variable("spline_origin", "axis", "m", "first knot of the splines"),
+        Variable("spline_spacing", "", "m", "distance between knots"),
+        Variable("cell_size", "", "m", "distance between nodes"),
+        Variable("log_parameter", "log_parameter", None, "logarithm of a parameter", "text"),
+        Variable(
+            "other_log_parameter", "other_log_parameter", None, "logarithm of a parameter", "text"
+        ),
+        Variable("axis", "axis", None, "axis", "text"),
         Variable("profile", "profile", "1", "C_d"),
         Variable("flow", "flow", None, "flow", "text", when=_SWITCHED),
         Variable(
-            "interval_flow", "interval", "1",
+            "interval_flow", "flow_interval", "1",
             "number of the flow in each interval between the switching times", "int",
             when=_SWITCHED,
         ),
+        Variable(
+            "switching_time", "switch", "s", "when the flow changes", when=_SWITCHED,
+            note="on the clock of the recordings",
+        ),
+        Variable(
+            "recording_start", "", "s", "first sample of the first recording", when=_SWITCHED
+        ),
     ),
     attributes=(
-        Attribute("drag_coefficient", "number", "drag coefficient C_d"),
-        Attribute("drag_coefficient_interval", "numbers", _INTERVAL),
-        Attribute("force_std_N", "number", "standard deviation σ_F of the force"),
-        Attribute("force_std_N_interval", "numbers", _INTERVAL),
-        Attribute("force_noise_intensity_N2_s", "number", "σ_F² times the force interval"),
-        Attribute("force_noise_intensity_N2_s_interval", "numbers", _INTERVAL),
-        Attribute("tracking_noise_m", "number", "standard deviation of the positions' errors"),
-        Attribute("tracking_noise_m_interval", "numbers", _INTERVAL),
-        Attribute("force_lever_m", "number", "lever of the force", _TURNING),
-        Attribute("force_lever_m_interval", "numbers", _INTERVAL, _TURNING),
-        Attribute("orientation_noise_rad", "number", "noise of the orientation", _TURNING),
-        Attribute("orientation_noise_rad_interval", "numbers", _INTERVAL, _TURNING),
-        Attribute("confidence", "number", "of the intervals"),
-        Attribute("force_interval_s", "number", "how long a force lasts; σ_F depends on it"),
+        Attribute("angle", "text", 'how the orientation was used: "state", "given" or "none"'),
+        Attribute("check_left_out", "text", "reason why the model was not checked", "it was not"),
         SIMULATED,
-        WARNINGS,
         ARENA,
         SOURCE,
         STUDY,

@@ -1,0 +1,72 @@
+"""Datasets of earlier schema versions, made into what this version reads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.schema.check import described
+from driftwalk.schema.facts import fit_variables
+from driftwalk.schema.kinds import KINDS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def current_form(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset of an earlier version as this version has it; any other one as it is.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Any dataset, of driftwalk or not.
+
+    Raises
+    ------
+    FormatError
+        When it is of an earlier version and not what that version wrote.
+    """
+    kind, version = (dataset.attrs.get(name) for name in ("kind", "schema_version"))
+    convert = _CONVERTERS.get((str(kind), _number(version)))
+    if convert is None:
+        return dataset
+    try:
+        return convert(dataset)
+    except (InputError, KeyError, ValueError, TypeError) as error:
+        raise FormatError(
+            f"is damaged: its {kind} of schema version {version} is not complete ({error})"
+        ) from error
+
+
+def current_file(dataset: xr.Dataset, path: Path) -> xr.Dataset:
+    """Return the same of a dataset that was read, naming its file where it is damaged."""
+    try:
+        return current_form(dataset)
+    except FormatError as error:
+        raise FormatError(str(error), path=path) from error
+
+
+def _number(version: object) -> int:
+    return int(version) if isinstance(version, int | np.integer) else 0
+
+
+def _fit_of_attributes(fit: xr.Dataset) -> xr.Dataset:
+    """Make variables of the attributes of version 1, in which the answer stood."""
+    names = {"parameter": "log_parameter", "other_parameter": "other_log_parameter"}
+    # The dimension has to make room for the variable of that name.
+    names |= {"interval": "flow_interval"} if "interval" in fit.dims else {}
+    data, coords = fit_variables(fit.attrs)
+    kept = ("kind", *(one.name for one in KINDS["fit"].attributes))
+    found = fit.rename(names).assign(data).assign_coords(coords)
+    found.attrs = {name: fit.attrs[name] for name in kept if name in fit.attrs}
+    return described(found.assign_attrs(schema_version=KINDS["fit"].version))
+
+
+_CONVERTERS: Final[dict[tuple[str, int], Callable[[xr.Dataset], xr.Dataset]]] = {
+    ("fit", 1): _fit_of_attributes,
+}
+"""By kind and the version that is read."""
