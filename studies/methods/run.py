@@ -124,13 +124,13 @@ def lines_of(known: Known, out: Path, done: set[tuple[str, str]]) -> Iterator[di
 def by_likelihood(known: Known, fit: xr.Dataset, seconds: float) -> Answer:
     """Return what a fit found, and its check."""
     begin = time.process_time()
-    check = dw.check_model(fit, known.recording).attrs
+    check = dw.check_model(fit, known.recording)
     return Answer(
         fit_facts(fit),
         dw.fitted_flow(fit),
-        check["ks_distance"],
-        check["ks_noise_floor"],
-        json.loads(check["findings"]),
+        check.attrs["ks_distance"],
+        check.attrs["ks_noise_floor"],
+        check["finding"].values.tolist(),
         seconds,
         time.process_time() - begin,
     )

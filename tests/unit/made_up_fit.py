@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import xarray as xr
 from synthetic_calibration import ARENA, bundled_flow
@@ -72,6 +70,8 @@ def made_up_check(*, explained: str = "no") -> xr.Dataset:
         for part, factor in (("recording", 1.0), ("median", 1.2), ("low", 0.9), ("high", 1.4)):
             data[f"{name}_density_{part}"] = (f"{name}_bin", np.full(BINS, factor))
     facts = {"ks_distance": 0.05, "ks_noise_floor": 0.02, "level": 0.002, "band": 0.9}
-    findings = json.dumps(["the flow changes in time"] if explained == "no" else [])
-    attrs = {"kind": "model_check", "arena": ARENA, "explained": explained, "findings": findings}
+    findings = ["the flow changes in time"] if explained == "no" else []
+    data["explained"] = ((), explained == "yes")
+    coords["finding"] = ("finding", np.array(findings, dtype=np.str_))
+    attrs = {"kind": "model_check", "arena": ARENA}
     return xr.Dataset(data, coords, attrs | facts)

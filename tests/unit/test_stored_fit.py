@@ -132,8 +132,31 @@ def test_a_fit_of_version_1_without_its_answer_is_damaged(lost: str, tmp_path: P
     assert caught.value.path == path
 
 
+def test_a_fit_from_the_beginning_of_version_1_is_read() -> None:
+    """The share of the tank that was visited was not among the first attributes."""
+    old = as_stored(OLD / FITS[0])
+    del old.attrs["visited_share"]
+    found = current_form(old)
+    assert "visited_share" not in found
+    assert fitted_value(found, "drag_coefficient") == old.attrs["drag_coefficient"]
+    xr.testing.assert_identical(dw.fitted_flow(found), dw.fitted_flow(open_netcdf(OLD / FITS[0])))
+
+
 def test_flat_facts_and_variables_are_each_other_s_inverse(fit: xr.Dataset) -> None:
     data, coords = fit_variables(fit_facts(fit))
     made = xr.Dataset(data, coords)
     for name in made.variables:
         np.testing.assert_array_equal(made[name].values, fit[name].values)
+
+
+def test_a_check_of_version_1_is_read_as_a_current_one() -> None:
+    path = OLD / "model_check_version_1.nc"
+    old, found = as_stored(path), open_netcdf(path)
+    assert (old.attrs["schema_version"], found.attrs["schema_version"]) == (1, 2)
+    assert check_dataset(found, "model_check") is found
+    assert unknown_names(found) == []
+    assert bool(found["explained"]) == (old.attrs["explained"] == "yes")
+    assert found["finding"].values.tolist() == json.loads(old.attrs["findings"])
+    told = old.assign_attrs(explained="no", findings='["the flow changes", "the errors are white"]')
+    assert not bool(current_form(told)["explained"])
+    assert current_form(told)["finding"].values.tolist()[0] == "the flow changes"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_module
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -27,7 +26,7 @@ from driftwalk.cli.options.shared import (
 from driftwalk.cli.terminal.output import print_json, print_note, report_command
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.study_keys import FIT_KEYS, study_overrides
-from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.facts import fit_facts, sentences
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -251,8 +250,8 @@ def verdict(check: xr.Dataset | None, fit: xr.Dataset) -> dict[str, Any]:
     facts = check.attrs
     distances = {key: float(facts[key]) for key in ("ks_distance", "ks_noise_floor")}
     return {
-        "explained": facts["explained"] == "yes",
-        "findings": json_module.loads(facts["findings"]),
+        "explained": bool(check["explained"]),
+        "findings": sentences(check, "finding"),
         **{key: value if isfinite(value) else None for key, value in distances.items()},
     }
 

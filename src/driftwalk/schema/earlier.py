@@ -9,12 +9,18 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.schema.check import described
-from driftwalk.schema.facts import fit_variables
+from driftwalk.schema.check import with_descriptions
+from driftwalk.schema.facts import fit_variables, texts
 from driftwalk.schema.kinds import KINDS
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+_ANSWER: Final = (
+    *("drag_coefficient", "force_std_N", "force_noise_intensity_N2_s", "tracking_noise_m"),
+    *("confidence", "force_interval_s", "warnings", "study"),
+)
 
 
 def current_form(dataset: xr.Dataset) -> xr.Dataset:
@@ -55,7 +61,13 @@ def _number(version: object) -> int:
 
 
 def _fit_of_attributes(fit: xr.Dataset) -> xr.Dataset:
-    """Make variables of the attributes of version 1, in which the answer stood."""
+    """Make variables of the attributes of version 1, in which the answer stood.
+
+    Attributes were added while that version lasted: only the answer has to be there.
+    """
+    for name in _ANSWER:
+        if name not in fit.attrs:
+            raise InputError(f"the attribute '{name}' is missing")
     names = {"parameter": "log_parameter", "other_parameter": "other_log_parameter"}
     # The dimension has to make room for the variable of that name.
     names |= {"interval": "flow_interval"} if "interval" in fit.dims else {}
@@ -63,10 +75,20 @@ def _fit_of_attributes(fit: xr.Dataset) -> xr.Dataset:
     kept = ("kind", *(one.name for one in KINDS["fit"].attributes))
     found = fit.rename(names).assign(data).assign_coords(coords)
     found.attrs = {name: fit.attrs[name] for name in kept if name in fit.attrs}
-    return described(found.assign_attrs(schema_version=KINDS["fit"].version))
+    return with_descriptions(found.assign_attrs(schema_version=KINDS["fit"].version))
+
+
+def _check_of_attributes(check: xr.Dataset) -> xr.Dataset:
+    """Make variables of the attributes of version 1, in which the verdict stood."""
+    found = check.assign(explained=((), np.bool_(check.attrs["explained"] == "yes")))
+    found = found.assign_coords(finding=("finding", texts(check.attrs["findings"])))
+    for name in ("explained", "findings"):
+        del found.attrs[name]
+    return with_descriptions(found.assign_attrs(schema_version=KINDS["model_check"].version))
 
 
 _CONVERTERS: Final[dict[tuple[str, int], Callable[[xr.Dataset], xr.Dataset]]] = {
     ("fit", 1): _fit_of_attributes,
+    ("model_check", 1): _check_of_attributes,
 }
 """By kind and the version that is read."""

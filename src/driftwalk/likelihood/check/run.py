@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
@@ -28,6 +27,7 @@ from driftwalk.likelihood.check.worlds import (
 from driftwalk.likelihood.ready import as_list
 from driftwalk.likelihood.result import require_fit
 from driftwalk.schema.check import build_dataset
+from driftwalk.schema.facts import texts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -71,9 +71,9 @@ def check_model(
     Returns
     -------
     xarray.Dataset
-        A `model_check`. In its attributes ``explained`` ("yes", "no") and ``findings`` (JSON list
-        of sentences: statistic, value, expected, place or time), ``ks_distance``,
-        ``ks_noise_floor``, ``effective_parameters``. By criterion ``p_value``; whiteness by
+        A `model_check`: ``explained`` (true, false) and ``finding`` (sentences: statistic, value,
+        expected, place or time); in its attributes ``ks_distance``, ``ks_noise_floor``,
+        ``effective_parameters``. By criterion ``p_value``; whiteness by
         component and lag; residuals by cell, by part of the recording and by speed; densities of
         steps with bands.
 
@@ -88,8 +88,8 @@ def check_model(
     >>> import driftwalk as dw
     >>> recording = dw.tank30_recording()
     >>> check = dw.check_model(dw.fit_motion(recording), recording)  # doctest: +SKIP
-    >>> check.attrs["explained"]  # doctest: +SKIP
-    'yes'
+    >>> bool(check["explained"])  # doctest: +SKIP
+    True
     """
     if replicates < FEWEST_REPLICATES:
         raise InputError(f"replicates must be at least {FEWEST_REPLICATES}, got {replicates}")
@@ -148,8 +148,8 @@ def check_model(
         data |= more
         coords |= at
     findings = findings_of(criteria)
-    attrs["explained"] = "no" if findings else "yes"
-    attrs["findings"] = json.dumps(findings, ensure_ascii=False)
+    data["explained"] = ((), np.bool_(not findings))
+    coords["finding"] = ("finding", texts(findings))
     return build_dataset("model_check", data, coords, attrs)
 
 

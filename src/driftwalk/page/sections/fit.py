@@ -14,9 +14,9 @@ from driftwalk.page.parts import (
     figure,
     head_sections,
     is_simulated,
+    require,
     required,
     section,
-    texts_of,
     value_of,
 )
 from driftwalk.page.sections.check import check_sections
@@ -152,7 +152,8 @@ def _what_was_found(fit: xr.Dataset) -> str:
 
 
 def _verdict(check: xr.Dataset) -> str:
-    explained = str(required(check, "explained")) == "yes"
+    require(check, "explained")
+    explained = bool(check["explained"])
     words = (
         "The check found no evidence against the model. It finds many faults, but not all."
         if explained
@@ -168,7 +169,7 @@ def _verdict(check: xr.Dataset) -> str:
 
 
 def _warnings(fit: xr.Dataset, check: xr.Dataset | None) -> list[str]:
-    findings = [] if check is None else texts_of(check, "findings")
+    findings = [] if check is None else sentences(check, "finding")
     return [*sentences(fit, "warning"), *(f"model check: {text}" for text in findings)]
 
 

@@ -36,8 +36,9 @@ def _density(name: str, unit: str, words: str) -> tuple[Variable, ...]:
 
 MODEL_CHECK: Final = Kind(
     name="model_check",
-    version=1,
+    version=2,
     dimensions={
+        "finding": "sentences",
         "criterion": "criteria, by name",
         "component": "along and across the motion, and of the turn",
         "lag": "samples",
@@ -54,6 +55,8 @@ MODEL_CHECK: Final = Kind(
         "turning_angle_edge": "edges of the bins",
     },
     variables=(
+        Variable("explained", "", None, "whether the model explains the recordings", "bool"),
+        Variable("finding", "finding", None, "evidence against the model", "text"),
         Variable(
             "p_value", "criterion", "1", "p value of the criterion",
             note=f"[the criteria]({_CRITERIA})",
@@ -118,8 +121,6 @@ MODEL_CHECK: Final = Kind(
         Variable("speed_high", "speed_range", "m s-1", "upper end of the range"),
     ),
     attributes=(
-        Attribute("explained", "yes or no", "whether the model explains the recordings"),
-        Attribute("findings", "list", "evidence against it, in sentences"),
         Attribute("level", "number", "below which a p value is a finding"),
         Attribute("effective_parameters", "number", "parameters that the fit took out"),
         Attribute("samples", "number", "samples of the recordings"),
