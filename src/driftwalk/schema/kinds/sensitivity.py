@@ -175,7 +175,7 @@ SOBOL_INDICES: Final = Kind(
     name="sobol_indices",
     version=1,
     dimensions={
-        "output": "outputs, by name; or what the given outputs lie along",
+        "output": "outputs, by name; or whatever the given outputs lie along, as they name it",
         "input": "inputs, by name",
         "setting": "settings of the design",
     },
@@ -185,7 +185,6 @@ SOBOL_INDICES: Final = Kind(
         Variable("variance", "...", None, "variance over the design", note="squared output"),
         Variable("noise_share", "...", "1", "share of the variance that is sampling noise"),
         Variable("input", "input", None, "input", "text"),
-        Variable("output", "output", None, "output", "text", when=_SIMULATED),
         Variable("proportion", "setting output", "1", "share of runs", when=_SIMULATED),
         *(Variable(name, dims, None, words, when=_SIMULATED) for name, dims, words in _DESIGN),
     ),
