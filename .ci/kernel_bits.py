@@ -23,7 +23,8 @@ def tell(name: str, dataset: xr.Dataset) -> None:
     for key, variable in sorted(dataset.data_vars.items()):
         values = np.ascontiguousarray(variable.values)
         digest = sha256(values.tobytes()).hexdigest() if values.dtype != object else "text"
-        print(name, key, values.dtype, values.shape, repr(values.flat[0]), digest)
+        first = repr(values.flat[0]) if values.size else "nothing"
+        print(name, key, values.dtype, values.shape, first, digest)
 
 
 def main() -> None:
