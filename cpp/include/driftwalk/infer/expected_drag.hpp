@@ -50,33 +50,6 @@ inline void spread_of(const double (*P)[2 * D], const AlongState<D>& n, const Al
   }
 }
 
-// Moments of the closing speed and the slip of the strips of a side.
-struct StripMoments {
-  Eight closing;       // E[s+]
-  Eight square;        // E[s+^2]
-  Eight closing_slip;  // E[s+ w_t]
-  Eight windward_slip; // E[w_t; s > 0]
-  Eight windward;      // P(s > 0)
-  Eight edge_slip;     // E[w_t delta(s)]
-  Eight::Mask takes_part;
-};
-
-inline StripMoments strip_moments(Eight mean, Eight slip, Eight variance, Eight cross) {
-  // A block that is known exactly has tau = 0; the floor replaces it, at 10 nm/s.
-  const Eight tau = square_root(at_least(variance, 1e-16));
-  const Eight z = mean / tau;
-  const NormalLaw law = normal_law(z);
-  StripMoments m;
-  m.closing = mean * law.probability + tau * law.density;
-  m.square = (mean * mean + variance) * law.probability + mean * (tau * law.density);
-  m.closing_slip = slip * m.closing + cross * law.probability;
-  m.windward_slip = slip * law.probability + cross * law.density / tau;
-  m.windward = law.probability;
-  m.edge_slip = law.density / tau * (slip - cross * mean / (tau * tau));
-  m.takes_part = z > -normal_reach;
-  return m;
-}
-
 template <int D>
 struct DragSumsOfEight {
   Eight acceleration[D];
