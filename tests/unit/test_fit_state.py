@@ -135,9 +135,9 @@ def test_turns_of_the_recorded_angle_do_not_matter(track: xr.Dataset) -> None:
     short = track.isel(time=slice(0, 1000))
     theta = short["theta"].values[:, 0]
     other = turned(short, np.unwrap(theta) + 0.5 * np.pi + 8.0 * np.pi)
-    fits = [dw.fit_motion(one, coarse_study(), angle="state") for one in (short, other)]
+    fits = [fit_facts(dw.fit_motion(one, coarse_study(), angle="state")) for one in (short, other)]
     for name in ("drag_coefficient", "force_std_N", "orientation_noise_rad"):
-        assert fits[1].attrs[name] == pytest.approx(fits[0].attrs[name], rel=1e-6)
+        assert fits[1][name] == pytest.approx(fits[0][name], rel=1e-6)
 
 
 def test_an_angle_of_the_wrong_side_is_noticed(track: xr.Dataset) -> None:
