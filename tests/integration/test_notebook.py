@@ -147,6 +147,19 @@ def test_a_study_needs_a_flow(recording: xr.Dataset) -> None:
         dw.simulate(recording)
 
 
+def test_only_a_calibration_of_the_block_simulates_blocks() -> None:
+    """A calibration of a user's model has no drag coefficient, and no block."""
+    speed = ("speed", [0.1, 0.2], {"units": "m/s", "long_name": "speed"})
+    other = xr.Dataset(
+        {"ks_distance": ("speed", [0.3, 0.2])},
+        {"speed": speed},
+        {"kind": "calibration", "model": "tumble"},
+    )
+    for call in (dw.simulate, dw.assemble):
+        with pytest.raises(dw.InputError, match="about the model tumble"):
+            call(other, dw.tank30_flow())
+
+
 def test_replicates_of_the_same_model_are_exchangeable() -> None:
     """A replicate in the place of the recording: p is uniform on 1/9 ... 1.
 

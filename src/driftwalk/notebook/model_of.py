@@ -48,6 +48,7 @@ def model_of(
     """
     from driftwalk.likelihood import fitted_flow
     from driftwalk.model import Study, apply_overrides, parse_study
+    from driftwalk.schema.calibration import is_block
     from driftwalk.schema.facts import fit_facts
 
     if isinstance(source, Study):
@@ -56,6 +57,11 @@ def model_of(
     if kind not in ("fit", "calibration"):
         raise InputError(
             f"a study, a fit or a calibration is needed, got a dataset of kind {kind!r}"
+        )
+    if kind == "calibration" and not is_block(source):
+        raise InputError(
+            f"the calibration is about the model {source.attrs.get('model', 'of a user')}: the "
+            "tank simulates blocks, so give a calibration of the block"
         )
     facts = fit_facts(source) if kind == "fit" else source.attrs
     study = apply_overrides(
