@@ -65,14 +65,6 @@ FIT_ROWS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
     }
 )
 
-CHECK_NUMBERS: Final = (
-    *("effective_parameters", "portmanteau", "level", "ks_distance", "ks_noise_floor"),
-    *("ks_noise_floor_upper", "ks_p_value", "ks_rank_p_value", "band"),
-)
-CHECK_COUNTS: Final = (
-    *("samples", "samples_used", "outliers", "portmanteau_dof", "replicates", "seed"),
-)
-
 
 def fit_variables(facts: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the variables and coordinates of a fit that hold facts under flat names.
