@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from typing import Any, Final
 
+from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import ConfigurationError
 
 STUDY_KEYS: Final[dict[str, str]] = {
@@ -107,8 +107,7 @@ def study_overrides(*, keys: Mapping[str, str] = STUDY_KEYS, **options: Any) -> 
     """
     unknown = [name for name in options if name not in keys]
     if unknown:
-        close = difflib.get_close_matches(unknown[0], keys, n=1)
-        advice = f"; did you mean '{close[0]}'?" if close else f"; there are {', '.join(keys)}"
+        advice = did_you_mean(unknown[0], keys) or f"; there are {', '.join(keys)}"
         raise ConfigurationError(f"there is no argument '{unknown[0]}'{advice}")
     overrides = {keys[name]: value for name, value in options.items() if value is not None}
     depth = overrides.get("block.depth")

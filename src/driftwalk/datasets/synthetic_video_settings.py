@@ -6,11 +6,11 @@ The levels stand apart from every tracker: they were fixed before one was writte
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 from dataclasses import dataclass
 from typing import Any, Final
 
+from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import InputError
 
 Colour = tuple[int, int, int]
@@ -203,7 +203,6 @@ def video_settings(level: str = "moderate", **changes: Any) -> VideoSettings:
     known = [field.name for field in dataclasses.fields(VideoSettings)]
     for name in changes:
         if name not in known:
-            close = difflib.get_close_matches(name, known, n=1)
-            hint = f"; did you mean '{close[0]}'?" if close else ""
+            hint = did_you_mean(name, known)
             raise InputError(f"a synthetic video has no setting '{name}'{hint}")
     return VideoSettings(**{**VIDEO_LEVELS[level], **changes})

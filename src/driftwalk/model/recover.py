@@ -7,9 +7,10 @@ from typing import Annotated, ClassVar, Final, Literal, TypeVar
 
 from pydantic import Field, field_validator
 
+from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.model.fit import Fit
-from driftwalk.model.section import Quantity, Section, did_you_mean, quoted, words_of
+from driftwalk.model.section import Quantity, Section, quoted, words_of
 
 LARGEST_STEP_S: Final = 0.0025
 """Largest time step of a simulation that is taken for the truth: its error is then far below what

@@ -6,7 +6,6 @@ declaration checks the value, writes the commented template and makes the refere
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar, get_args
@@ -14,6 +13,7 @@ from typing import Any, ClassVar, get_args
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
 from pydantic_core import CoreSchema, ErrorDetails, core_schema
 
+from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.units import parse_quantity
 
@@ -124,17 +124,6 @@ class _SectionError(ConfigurationError):
 def quoted(words: Iterable[str]) -> str:
     """Return words in quotes, joined for a sentence."""
     return " or ".join(f'"{word}"' for word in words)
-
-
-def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """Return "; did you mean '…'?" for the closest known word, or nothing.
-
-    A name that lacks only its unit ("diameter" for "diameter_m") counts as close.
-    """
-    names = list(known)
-    found = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
-    found = found or [name for name in names if name.startswith(f"{word}_")]
-    return f"; did you mean '{found[0]}'?" if found else ""
 
 
 def quantity_of(section: type[Section], key: str) -> Quantity | None:

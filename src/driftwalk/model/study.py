@@ -9,6 +9,7 @@ from typing import Any, Self
 
 from pydantic import Field, model_validator
 
+from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import ConfigurationError, FormatError
 from driftwalk.core.toml_text import parse_toml, read_toml
 from driftwalk.model.assembly import Assembly
@@ -20,7 +21,7 @@ from driftwalk.model.forces import Forces
 from driftwalk.model.observation import Observation
 from driftwalk.model.recording import Recording
 from driftwalk.model.recover import Recover
-from driftwalk.model.section import Section, did_you_mean
+from driftwalk.model.section import Section
 from driftwalk.model.sensitivity import Sensitivity
 from driftwalk.model.simulation import Pose, Simulation, resolve_time_step
 from driftwalk.model.steps import Steps
