@@ -91,6 +91,7 @@ def simulate(
     """Simulate the motion of the block."""
     from driftwalk.core.atomic import write_atomic
     from driftwalk.flow import load_flow
+    from driftwalk.schema.netcdf import netcdf_bytes
     from driftwalk.simulation import simulate as run, simulate_like
 
     if backend not in ("cpu", "reference"):
@@ -123,8 +124,6 @@ def simulate(
     else:
         recording = RecordingOptions(body=body).load(like)
         result = simulate_like(chosen, field, recording)
-    from driftwalk.schema.netcdf import netcdf_bytes
-
     write_atomic(out, netcdf_bytes(result))
     facts = summary(result)
     if json:
