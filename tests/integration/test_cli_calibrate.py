@@ -83,6 +83,7 @@ def test_json_holds_the_answer_with_its_intervals(finished: tuple[Path, Done]) -
     stored = calibration(finished[0])
     for name in ("drag_coefficient", "force_std_N", "noise_floor", "ks_distance"):
         assert found[name] == stored.attrs[name]
+    assert 0 < found["noise_floor"] < found["ks_distance"] < 0.5
     # The estimate is the lowest point of the stored surface, to half a step of its grid.
     surface = stored["refined_surface"]
     lowest = surface.isel(surface.argmin(surface.dims))

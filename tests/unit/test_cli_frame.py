@@ -33,6 +33,7 @@ from driftwalk.cli.options.shared import (
 from driftwalk.cli.terminal.output import print_json, print_table, to_json
 from driftwalk.cli.terminal.progress import ProgressReporter, duration_text
 from driftwalk.core.errors import ConfigurationError, FormatError, InputError
+from driftwalk.core.json_text import json_value
 from driftwalk.core.study_keys import CALIBRATION_KEYS, STUDY_KEYS, study_overrides
 from driftwalk.model import Study, load_study
 
@@ -308,6 +309,7 @@ def test_json_has_plain_finite_values_in_order(capsys: pytest.CaptureFixture[str
 def test_json_refuses_what_it_cannot_write() -> None:
     with pytest.raises(TypeError, match="object"):
         to_json({"a": object()})
+    assert json_value(float("-inf")) is None
 
 
 def test_table_is_aligned(capsys: pytest.CaptureFixture[str]) -> None:
