@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), str(HERE.parent / "unit")]
+sys.path[:0] = [str(HERE), str(HERE.parent / "helpers")]
 
 from mutate import BYTES, PACKED, TEXT, mutated  # noqa: E402
 from mutate_netcdf import damage  # noqa: E402

@@ -22,7 +22,7 @@ from page_reading import page_in, part_of, values
 from driftwalk.page import decode_array, report_html
 
 TANK = ("--tank-diameter", "30cm")
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[3] / "docs"
 FIGURES = (
     "write_figures", "write_fit_figures", "write_check_figures", "write_assembly_figures",
     "write_sensitivity_figures", "write_recovery_figures",

@@ -18,7 +18,7 @@ from driftwalk.core.streams import (
     trial_in,
 )
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def test_purposes_are_those_of_the_native_core():

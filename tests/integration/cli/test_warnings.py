@@ -297,7 +297,7 @@ LONG: dict[str, Callable[[Path, Path, Path], Words]] = {
     ],
 }
 ELSEWHERE = {"demo", "view", "play"}
-"""`test_cli_demo.py` and `page_server.py` run these with warnings as errors too."""
+"""`test_demo.py` and `page_server.py` run these with warnings as errors too."""
 
 
 def own_words(err: str) -> None:

@@ -14,7 +14,7 @@ from command_line import RECORDING, Done, here
 from driftwalk.schema.facts import fit_facts
 
 SHORT = ("--to", "150", "--spline-spacing", "3cm", "--force-interval", "16ms")
-STUDIES = Path(__file__).resolve().parents[2] / "studies" / "real"
+STUDIES = Path(__file__).resolve().parents[3] / "studies" / "real"
 FIGURES = ("check_innovations", "check_map", "check_time", "check_steps")
 
 

@@ -11,7 +11,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-STUDY = Path(__file__).resolve().parents[2] / "studies" / "likelihood"
+STUDY = Path(__file__).resolve().parents[3] / "studies" / "likelihood"
 
 
 @pytest.fixture(scope="module", autouse=True)

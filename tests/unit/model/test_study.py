@@ -260,7 +260,7 @@ def test_override_of_nothing_is_refused(name: str) -> None:
         apply_overrides(Study(), {name: 1})
 
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "study-file.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "reference" / "study-file.md"
 
 
 @pytest.mark.parametrize("name", list(Study.model_fields))

@@ -18,7 +18,7 @@ from driftwalk.schema.earlier import current_form
 from driftwalk.schema.facts import ESTIMATES, fit_facts, fit_variables, fitted_value
 from driftwalk.schema.netcdf import open_netcdf
 
-OLD = Path(__file__).resolve().parents[1] / "data" / "old_datasets"
+OLD = Path(__file__).resolve().parents[2] / "data" / "old_datasets"
 FITS = ("fit_version_1.nc", "fit_of_several_flows_version_1.nc")
 
 

@@ -27,7 +27,7 @@ from driftwalk.track.live import LiveServer
 cv2 = pytest.importorskip("cv2")
 
 FRAMES = 40
-DOCS = Path(__file__).resolve().parents[2] / "docs" / "reference"
+DOCS = Path(__file__).resolve().parents[3] / "docs" / "reference"
 TANK = ("--tank-diameter", "30cm")
 
 
