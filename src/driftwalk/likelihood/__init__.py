@@ -1,5 +1,6 @@
 """The likelihood fit: flow, drag, stochastic force and tracking noise of one recording."""
 
+from driftwalk.likelihood.check.judged import Judged, judge_fit
 from driftwalk.likelihood.check.run import check_model
 from driftwalk.likelihood.fit import check_fit, fit_motion
 from driftwalk.likelihood.recover.check import check_recovery
@@ -8,11 +9,13 @@ from driftwalk.likelihood.recover.score import score_fit
 from driftwalk.likelihood.result import fitted_flow
 
 __all__ = [
+    "Judged",
     "check_fit",
     "check_model",
     "check_recovery",
     "fit_motion",
     "fitted_flow",
+    "judge_fit",
     "recovery_study",
     "score_fit",
 ]

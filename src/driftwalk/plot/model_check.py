@@ -20,6 +20,7 @@ from driftwalk.plot.parts.style import (
     axes_or_new,
     speed_colormap,
 )
+from driftwalk.schema.verdict import residuals_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -95,14 +96,14 @@ def plot_innovations(check: xr.Dataset, ax: Axes | None = None) -> Axes:
 
 
 def plot_residual_map(
-    check: xr.Dataset, ax: Axes | None = None, *, show: Literal["mean", "noise"] = "mean"
+    found: xr.Dataset, ax: Axes | None = None, *, show: Literal["mean", "noise"] = "mean"
 ) -> Axes:
     """Draw where in the tank the prediction errors disagree with the model.
 
     Parameters
     ----------
-    check : xarray.Dataset
-        A `model_check`.
+    found : xarray.Dataset
+        A `model_check`, or a `fit` that was checked.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure when left out.
     show : {"mean", "noise"}
@@ -117,19 +118,19 @@ def plot_residual_map(
     Raises
     ------
     InputError
-        When the dataset is no model check.
+        When the dataset is neither, or the fit was not checked.
 
     Examples
     --------
     >>> plot_residual_map(check)  # doctest: +SKIP
     """
-    _require(check)
+    residuals = residuals_of(found)
     ax = axes_or_new(ax, layout="compressed")
     if show == "mean":
-        _draw_means(ax, check)
+        _draw_means(ax, residuals)
     else:
-        _draw_noise(ax, check)
-    draw_arena(ax, arena_of(check, None))
+        _draw_noise(ax, residuals)
+    draw_arena(ax, arena_of(residuals, None))
     label_position(ax)
     return ax
 

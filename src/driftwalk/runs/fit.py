@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from driftwalk.core.errors import InputError
 from driftwalk.runs.folder import Progress, open_run, silent
 from driftwalk.runs.stored import dataset_hash
 from driftwalk.schema.netcdf import netcdf_bytes
@@ -102,7 +101,7 @@ def run_fit(
     >>> found = run_fit(work, Path("fit"))  # doctest: +SKIP
     """
     from driftwalk.figures import write_check_figures, write_fit_figures
-    from driftwalk.likelihood import check_fit, check_model, fit_motion, fitted_flow
+    from driftwalk.likelihood import check_fit, fit_motion, fitted_flow, judge_fit
 
     check_fit(work.recordings, work.study, body=work.body)
     with open_run(
@@ -135,13 +134,10 @@ def run_fit(
         check = None
         if work.check:
             progress(int(found["iterations"]), int(found["iterations"]), "check")
-            try:
-                check = check_model(found, work.recordings, body=work.body)
-            except InputError as error:
-                # The fit is kept, and says why nothing stands beside it.
-                found.attrs["check_left_out"] = str(error)
-                run.write("fit.nc", netcdf_bytes(found))
-            else:
+            found, check = judge_fit(found, work.recordings, body=work.body)
+            # The fit was stored before the check; now it says what the check found.
+            run.write("fit.nc", netcdf_bytes(found))
+            if check is not None:
                 run.write("check.nc", netcdf_bytes(check))
                 write_check_figures(run.folder("figures"), check=check)
     return Fitted(found, check)

@@ -75,7 +75,7 @@ def fit_sections(
         made += parts
     if fit is not None:
         made += flow_sections(fit)
-        if check is None:
+        if check is None and "explained" not in fit:
             why = fit.attrs.get("check_left_out")
             reason = f"{why}." if why else "The model was not checked against the recording."
             made.append(empty_section("check", "Does the model explain the recording?", reason))
@@ -90,7 +90,8 @@ def fit_summary(fit: xr.Dataset, check: xr.Dataset | None = None) -> Section:
     every = quantity(required(fit, "force_interval_s"), "s")
     paragraphs = [SIMULATED] if is_simulated(fit) else []
     paragraphs += [_what_was_done(fit), _what_was_found(fit)]
-    paragraphs += [] if check is None else [_verdict(check)]
+    judge = _judge(fit, check)
+    paragraphs += [] if judge is None else [_verdict(judge)]
     shown = [
         estimate(fit, "drag_coefficient", label="drag coefficient", symbol="C_d", unit="1"),
         estimate(
@@ -159,6 +160,8 @@ def _verdict(check: xr.Dataset) -> str:
         if explained
         else "THE MODEL DOES NOT EXPLAIN THIS RECORDING: see the warnings."
     )
+    if check.attrs.get("kind") == "fit":
+        return words
     distance, floor = (value_of(check, name) for name in ("ks_distance", "ks_noise_floor"))
     if distance is None or floor is None:
         return f"{words} There is no KS distance: {check.attrs.get('ks_left_out', 'left out')}."
@@ -168,8 +171,14 @@ def _verdict(check: xr.Dataset) -> str:
     )
 
 
+def _judge(fit: xr.Dataset, check: xr.Dataset | None) -> xr.Dataset | None:
+    """Return the dataset that holds the verdict: the check, or the fit that keeps it."""
+    return fit if check is None and "explained" in fit else check
+
+
 def _warnings(fit: xr.Dataset, check: xr.Dataset | None) -> list[str]:
-    findings = [] if check is None else sentences(check, "finding")
+    judge = _judge(fit, check)
+    findings = [] if judge is None else sentences(judge, "finding")
     return [*sentences(fit, "warning"), *(f"model check: {text}" for text in findings)]
 
 

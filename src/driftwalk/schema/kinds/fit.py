@@ -19,6 +19,7 @@ _ON: Final = "[flow] y x"
 _SWITCHED: Final = "with switching times"
 _TURNING: Final = "the angle is in the state"
 _ASKED: Final = "a precision of C_d is asked for"
+_CHECKED: Final = "the model was checked"
 _COMPARED: Final = "the angle is in the state, and the second fit has a solution"
 
 FIT: Final = Kind(
@@ -34,6 +35,11 @@ FIT: Final = Kind(
         "parameter": "fitted parameters, by name",
         "bound": "lower, upper",
         "warning": "sentences",
+        "finding": "sentences",
+        "criterion": "criteria of the check, by name",
+        "residual_component": "errors in x, in y, and in the angle where it is in the state",
+        "cell_y": "centres of the cells of the check",
+        "cell_x": "centres of the cells of the check",
         "log_parameter": "logarithms of the fitted parameters",
         "other_log_parameter": "the same",
         "axis": "x, y",
@@ -53,6 +59,14 @@ FIT: Final = Kind(
             note="at the confidence; infinite where the recording leaves an end open",
         ),
         Variable("warning", "warning", None, "evidence against the fit", "text"),
+        Variable(
+            "explained", "", None, "whether the model explains the recordings", "bool",
+            when=_CHECKED,
+        ),
+        Variable(
+            "finding", "finding", None, "evidence against the model", "text", when=_CHECKED
+        ),
+        Variable("p_value", "criterion", "1", "p value of the criterion", when=_CHECKED),
         Variable("converged", "", None, "whether the search came to its end", "bool"),
         Variable(
             "restricted", "", None, "whether the restricted likelihood has a minimum", "bool"
@@ -136,6 +150,29 @@ FIT: Final = Kind(
             "profile_half_log_determinant", "profile", "1",
             "half the logarithm of the determinant along C_d",
         ),
+        Variable(
+            "residual", "residual_component cell_y cell_x", "1", "mean error in its sd",
+            when=_CHECKED, note="by cell",
+        ),
+        Variable("residual_count", "cell_y cell_x", "1", "samples", when=_CHECKED),
+        Variable(
+            "residual_distance", "cell_y cell_x", "1",
+            "distance of the mean error from zero, in its sd after fitting", when=_CHECKED,
+            note="the largest exceeds its attribute limit once in twenty",
+        ),
+        Variable(
+            "noise_ratio", "cell_y cell_x", "1", "mean square against that of all", when=_CHECKED
+        ),
+        Variable(
+            "noise_ratio_std", "cell_y cell_x", "1", "its standard deviation", when=_CHECKED
+        ),
+        Variable("residual_cell_size", "", "m", "size of a cell of the check", when=_CHECKED),
+        Variable("criterion", "criterion", None, "criterion", "text", when=_CHECKED),
+        Variable(
+            "residual_component", "residual_component", None, "component", "text", when=_CHECKED
+        ),
+        Variable("cell_x", "cell_x", "m", "x", when=_CHECKED),
+        Variable("cell_y", "cell_y", "m", "y", when=_CHECKED),
         Variable("x", "x", "m", "x"),
         Variable("y", "y", "m", "y"),
         Variable("component", "component", None, "component", "text"),

@@ -40,7 +40,7 @@ MODEL_CHECK: Final = Kind(
     dimensions={
         "finding": "sentences",
         "criterion": "criteria, by name",
-        "component": "along and across the motion, and of the turn",
+        "component": "errors in x, in y, and in the angle where it is in the state",
         "lag": "samples",
         "y": "centres of cells",
         "x": "centres of cells",
