@@ -62,7 +62,7 @@ def calibrate(
     Returns
     -------
     xarray.Dataset
-        A `calibration`, see `driftwalk.calibration.calibrate`.
+        A `calibration`, see `driftwalk.calibration.calibrate`. Printed, it begins with the answer.
 
     Raises
     ------
@@ -80,6 +80,7 @@ def calibrate(
     from driftwalk.likelihood import fitted_flow
     from driftwalk.model import Study
     from driftwalk.motion import BlockModel
+    from driftwalk.notebook.result import as_result
     from driftwalk.runs import CalibrationWork, run_calibration
     from driftwalk.runs.folder import silent
     from driftwalk.schema.netcdf import open_netcdf
@@ -97,7 +98,7 @@ def calibrate(
     field = fitted_flow(flow) if flow is not None and flow.attrs.get("kind") == "fit" else flow
     say = progress or silent
     if folder is None:
-        return calibrate_model(
+        found = calibrate_model(
             recording,
             model,
             study=chosen,
@@ -106,6 +107,7 @@ def calibrate(
             threads=threads,
             tell=lambda stage, done, total: say(done, total, stage),
         )
+        return as_result(found)
     place = Path(folder)
     work = CalibrationWork(recording, chosen, field, body, {}, threads, model)
     run_calibration(
@@ -115,4 +117,4 @@ def calibrate(
         progress=say,
         command=f"driftwalk.calibrate(..., folder={str(folder)!r})",
     )
-    return open_netcdf(place / "calibration.nc")
+    return as_result(open_netcdf(place / "calibration.nc"))

@@ -24,6 +24,7 @@ def fit(
     *,
     body: str | None = None,
     folder: str | PathLike[str] | None = None,
+    check: bool = True,
     overwrite: bool = False,
     progress: Progress | None = None,
     **settings: Unpack[FitSettings],
@@ -41,8 +42,11 @@ def fit(
         The body, where a recording has several.
     folder : path-like, optional
         Run directory to make or continue, the same as that of ``driftwalk fit``: fit, flow,
-        recording, check of the model, figures and manifest. Without it the model is not checked;
-        `check_model` does that.
+        recording, check of the model, figures and manifest.
+    check : bool
+        Whether to check if the model explains the recordings: some seconds. The fit then holds the
+        verdict (``explained``, ``finding``, ``p_value``) and the residuals by cell; `check_model`
+        returns all of the check.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
     progress : callable, optional
@@ -54,7 +58,7 @@ def fit(
     Returns
     -------
     xarray.Dataset
-        A `fit`, see `driftwalk.likelihood.fit_motion`.
+        A `fit`, see `driftwalk.likelihood.fit_motion`. Printed, it begins with the answer.
 
     Raises
     ------
@@ -70,7 +74,8 @@ def fit(
     """
     import xarray as xr
 
-    from driftwalk.likelihood import fit_motion
+    from driftwalk.likelihood import fit_motion, judge_fit
+    from driftwalk.notebook.result import as_result
     from driftwalk.runs import FitWork, run_fit
     from driftwalk.runs.folder import silent
     from driftwalk.schema.netcdf import open_netcdf
@@ -79,9 +84,10 @@ def fit(
     given: dict[str, Any] = dict(settings)
     chosen = study_for(many, study, study_overrides(keys=FIT_KEYS, **given), body=body)
     if folder is None:
-        return fit_motion(many, chosen, body=body, tell=progress)
+        found = fit_motion(many, chosen, body=body, tell=progress)
+        return as_result(judge_fit(found, many, body=body).fit if check else found)
     place = Path(folder)
-    work = FitWork(many, chosen, body, {})
+    work = FitWork(many, chosen, body, {}, check=check)
     run_fit(
         work,
         place,
@@ -89,4 +95,4 @@ def fit(
         progress=progress or silent,
         command=f"driftwalk.fit(..., folder={str(folder)!r})",
     )
-    return open_netcdf(place / "fit.nc")
+    return as_result(open_netcdf(place / "fit.nc"))

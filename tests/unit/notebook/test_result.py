@@ -1,0 +1,104 @@
+"""A result prints its answer first, and is a dataset in every other way."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given, strategies as st
+
+from driftwalk.notebook.result import Result, as_result
+from driftwalk.schema.answer import answer_lines
+from driftwalk.schema.netcdf import netcdf_bytes, open_netcdf
+
+
+def answer(**more: object) -> xr.Dataset:
+    values = {
+        "estimate": ("parameter", [0.393, 0.55e-3, 0.1e-3]),
+        "interval": (
+            ("parameter", "bound"),
+            [[0.388, 0.398], [0.54e-3, 0.56e-3], [0.09e-3, np.inf]],
+        ),
+        "confidence": 0.9,
+        "force_interval": 0.016,
+    }
+    names = {
+        "parameter": ["drag_coefficient", "force_std", "tracking_noise"],
+        "unit": ("parameter", ["1", "N", "m"]),
+    }
+    return xr.Dataset(values | more, names, {"kind": "fit"})
+
+
+def test_the_answer_comes_first() -> None:
+    found = as_result(answer(explained=True))
+    assert repr(found).splitlines()[:5] == [
+        "C_d             0.393  [0.388, 0.398]",
+        "σ_F             0.55 mN  [0.54, 0.56]",
+        "tracking noise  0.1 mm  [0.09, inf]",
+        "intervals of 90 %; force redrawn every 16 ms",
+        "explains the recording: yes",
+    ]
+    assert "0.388, 0.398" in found._repr_html_()
+
+
+def test_what_speaks_against_the_model_is_said() -> None:
+    found = answer(explained=False).assign_coords(
+        finding=("finding", ["the flow <changes>"]), warning=("warning", ["few samples"])
+    )
+    lines = answer_lines(found)
+    assert lines[-3:] == [
+        "explains the recording: NO",
+        "finding: the flow <changes>",
+        "warning: few samples",
+    ]
+    # Text of a dataset is no markup of the page that shows it.
+    assert "the flow &lt;changes&gt;" in as_result(found)._repr_html_()
+    left_out = answer().assign_attrs(check_left_out="too few samples")
+    assert answer_lines(left_out)[-1] == "not checked: too few samples"
+
+
+def test_a_parameter_without_an_interval_has_none() -> None:
+    found = answer()
+    found["interval"][0] = np.nan
+    assert answer_lines(found)[0] == "C_d             0.393"
+
+
+@pytest.mark.parametrize("part", [["estimate"], ["confidence"], []])
+def test_a_part_without_an_answer_prints_as_a_dataset(part: list[str]) -> None:
+    assert answer_lines(answer()[part]) == []
+    assert repr(as_result(answer())[part]).startswith("<xarray")
+    assert repr(as_result(answer()).isel(parameter=0)).startswith("<xarray")
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda d: d.copy(deep=True)])
+def test_a_copy_is_a_result(copied: object) -> None:
+    found = as_result(answer())
+    other = copied(found)  # type: ignore[operator]
+    assert isinstance(other, Result)
+    assert other.identical(found)
+    assert pickle.loads(pickle.dumps(found)).identical(found)
+
+
+def test_it_is_stored_as_a_dataset_and_remembers_its_file(tmp_path: Path) -> None:
+    path = tmp_path / "answer.nc"
+    path.write_bytes(netcdf_bytes(as_result(answer())))
+    read = open_netcdf(path)
+    assert not isinstance(read, Result)
+    assert as_result(read).identical(as_result(answer()))
+    assert as_result(read).encoding["source"] == read.encoding["source"]
+
+
+@given(st.floats(1e-12, 1e12), st.floats(0.1, 0.99), st.floats(1.01, 10.0))
+def test_numbers_survive_to_four_digits(value: float, low: float, high: float) -> None:
+    found = answer()
+    found["estimate"][1] = value
+    found["interval"][1] = [low * value, high * value]
+    line = answer_lines(found)[1]
+    shown = line.removeprefix("σ_F").replace("mN", "").replace("[", "").replace("]", "")
+    numbers = [1e-3 * float(part) for part in shown.replace(",", " ").split()]
+    # Four significant digits: half a unit of the fourth.
+    np.testing.assert_allclose(numbers, [value, low * value, high * value], rtol=5.1e-4)
