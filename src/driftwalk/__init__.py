@@ -1,7 +1,7 @@
 """driftwalk: calibrated stochastic motion models of floating, drifting and stirred robots.
 
 The names that most work needs are here, the others by room: `driftwalk.track.Tracker`,
-`driftwalk.plot.plot_flow`. Every name is resolved on first use, so `import driftwalk` loads nothing
+`driftwalk.plot.flow`. Every name is resolved on first use, so `import driftwalk` loads nothing
 heavy; `__init__.pyi` has the same names for type checkers and editors.
 """
 

@@ -34,16 +34,16 @@ def draw(fit: Path, four: Path, target: Path) -> None:
         layout="constrained",
     )
     with xr.open_dataset(fit / "recording.nc", engine="h5netcdf") as recording:
-        dw.plot.plot_trajectory(recording, axes[0], stop=EXCERPT_S)
+        dw.plot.trajectory(recording, axes[0], stop=EXCERPT_S)
     axes[0].set_title("in: the track of a block (2 of 30 min)")
     with xr.open_dataset(fit / "flow.nc", engine="h5netcdf") as flow:
-        dw.plot.plot_flow(flow, axes[1])
+        dw.plot.flow(flow, axes[1])
     axes[1].set_title("out: the flow, with drag and noise")
     for tank in axes[:2]:
         tank.set_xticks(TICKS_CM)
         tank.set_yticks(TICKS_CM)
     with xr.open_dataset(four / "distribution.nc", engine="h5netcdf") as shares:
-        dw.plot.plot_outcomes(shares, axes[2])
+        dw.plot.outcomes(shares, axes[2])
     # The caption says how many runs and which intervals.
     axes[2].get_legend().remove()
     axes[2].set_title("next: what four such blocks build")

@@ -26,7 +26,7 @@ def main(file: str, latching: str = "connector") -> None:
     labels = ("hidden faces without drag", "with the drag of free faces")
     with print_style():
         figure = new_figure(width_mm=160.0, height_mm=76.0)
-        dw.plot.plot_outcomes(without, figure.add_subplot(), beside=full, labels=labels)
+        dw.plot.outcomes(without, figure.add_subplot(), beside=full, labels=labels)
         figure.savefig(Path(file), dpi=DPI, metadata={"Software": None})
 
 

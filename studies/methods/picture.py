@@ -150,7 +150,7 @@ def flow_errors(known: Known, out: Path) -> Figure:
     }
     figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=62.0, layout="compressed")
     axes = list(figure.subplots(1, 3))
-    dw.plot.plot_flow(known.flow, axes[0])
+    dw.plot.flow(known.flow, axes[0])
     grid = found["fit, angle state"]
     x, y = grid["x"].values, grid["y"].values
     at_x, at_y = (part.ravel() for part in np.meshgrid(x, y))

@@ -26,7 +26,7 @@ from driftwalk.plot.parts.style import (
     new_figure,
     print_style,
 )
-from driftwalk.plot.step_density import DENSITY_LABEL, density_mesh, density_of
+from driftwalk.plot.step_densities import DENSITY_LABEL, density_mesh, density_of
 from driftwalk.schema import body_track
 from driftwalk.simulation import recorded_camera
 

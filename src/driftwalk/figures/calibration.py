@@ -23,7 +23,7 @@ from driftwalk.plot.parts.style import (
     print_style,
 )
 from driftwalk.plot.path import plot_trajectory
-from driftwalk.plot.step_density import plot_steps
+from driftwalk.plot.step_densities import plot_steps
 from driftwalk.plot.uncertainty import plot_distance_profile, plot_validation
 from driftwalk.schema import body_track
 

@@ -1,46 +1,58 @@
 """Figures of stored datasets: functions that take axes and return them."""
 
-from driftwalk.plot.class_courses import plot_class_times, plot_survival
-from driftwalk.plot.components import plot_biplot
-from driftwalk.plot.distances import plot_ks_map, plot_refined_map
-from driftwalk.plot.flow_field import plot_flow
+from driftwalk.plot.class_courses import plot_class_times as class_times, plot_survival as survival
+from driftwalk.plot.components import plot_biplot as biplot
+from driftwalk.plot.distances import plot_ks_map as map, plot_refined_map as refined_map
+from driftwalk.plot.flow_field import plot_flow as flow
 from driftwalk.plot.model_check import (
-    plot_innovations,
-    plot_predicted_steps,
-    plot_residual_map,
-    plot_residual_time,
+    plot_innovations as innovations,
+    plot_predicted_steps as predicted_steps,
+    plot_residual_map as residuals,
+    plot_residual_time as residual_time,
 )
-from driftwalk.plot.outcome_bars import plot_outcomes
-from driftwalk.plot.panels import plot_density_panels
-from driftwalk.plot.path import plot_trajectory
-from driftwalk.plot.sensitivity_maps import plot_class_key, plot_class_panels, plot_l1_map
-from driftwalk.plot.step_density import plot_step_density, plot_steps
-from driftwalk.plot.tank import plot_blocks, plot_film_strip, write_animation
-from driftwalk.plot.uncertainty import plot_bootstrap, plot_distance_profile, plot_validation
+from driftwalk.plot.outcome_bars import plot_outcomes as outcomes
+from driftwalk.plot.panels import plot_density_panels as density_panels
+from driftwalk.plot.path import plot_trajectory as trajectory
+from driftwalk.plot.sensitivity_maps import (
+    plot_class_key as class_key,
+    plot_class_panels as class_panels,
+    plot_l1_map as l1_map,
+)
+from driftwalk.plot.step_densities import plot_step_density as step_density, plot_steps as steps
+from driftwalk.plot.tank import (
+    plot_blocks as blocks,
+    plot_film_strip as film_strip,
+    write_animation,
+)
+from driftwalk.plot.uncertainty import (
+    plot_bootstrap as bootstrap,
+    plot_distance_profile as distance_profile,
+    plot_validation as validation,
+)
 
 __all__ = [
-    "plot_biplot",
-    "plot_blocks",
-    "plot_bootstrap",
-    "plot_class_key",
-    "plot_class_panels",
-    "plot_class_times",
-    "plot_density_panels",
-    "plot_distance_profile",
-    "plot_film_strip",
-    "plot_flow",
-    "plot_innovations",
-    "plot_ks_map",
-    "plot_l1_map",
-    "plot_outcomes",
-    "plot_predicted_steps",
-    "plot_refined_map",
-    "plot_residual_map",
-    "plot_residual_time",
-    "plot_step_density",
-    "plot_steps",
-    "plot_survival",
-    "plot_trajectory",
-    "plot_validation",
+    "biplot",
+    "blocks",
+    "bootstrap",
+    "class_key",
+    "class_panels",
+    "class_times",
+    "density_panels",
+    "distance_profile",
+    "film_strip",
+    "flow",
+    "innovations",
+    "l1_map",
+    "map",
+    "outcomes",
+    "predicted_steps",
+    "refined_map",
+    "residual_time",
+    "residuals",
+    "step_density",
+    "steps",
+    "survival",
+    "trajectory",
+    "validation",
     "write_animation",
 ]

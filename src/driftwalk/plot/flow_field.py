@@ -43,7 +43,7 @@ def plot_flow(
     Parameters
     ----------
     flow : xarray.Dataset
-        A `flow_field`.
+        A `flow_field`, or a `fit` with one flow.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure when left out.
     field : {"water", "block"}
@@ -74,6 +74,11 @@ def plot_flow(
     >>> plot_flow(flow).get_xlabel()
     'x (cm)'
     """
+    if "flow" in flow.dims:
+        raise InputError(
+            f"the fit has {flow.sizes['flow']} flows: draw one, "
+            "such as dw.fitted_flow(fit, interval=0)"
+        )
     u, v, flag = velocity_of(flow, field)
     x, y = (in_unit(flow[axis], "cm", stored="m") for axis in ("x", "y"))
     ax = axes_or_new(ax, layout="compressed")

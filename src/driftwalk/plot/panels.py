@@ -23,7 +23,7 @@ from driftwalk.plot.parts.parameters import (
     plot_parameters,
 )
 from driftwalk.plot.parts.style import MUTED, add_colorbar, axes_row_or_new, letter_panels
-from driftwalk.plot.step_density import DENSITY_LABEL, density_mesh, density_of, filled_range
+from driftwalk.plot.step_densities import DENSITY_LABEL, density_mesh, density_of, filled_range
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -84,7 +84,7 @@ def test_importing_is_light_and_drawing_needs_no_pyplot() -> None:
     code = (
         "import sys, driftwalk.plot as plot\n"
         "assert 'matplotlib' not in sys.modules\n"
-        "plot.plot_steps([0.001, 0.002], [0.0, 0.1])\n"
+        "plot.steps([0.001, 0.002], [0.0, 0.1])\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)

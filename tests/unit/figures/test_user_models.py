@@ -15,7 +15,12 @@ from driftwalk.core.errors import InputError
 from driftwalk.figures import write_figures
 from driftwalk.figures.calibration import panels_figure
 from driftwalk.page.sections.calibration import calibration_sections
-from driftwalk.plot import plot_bootstrap, plot_distance_profile, plot_ks_map, plot_refined_map
+from driftwalk.plot import (
+    bootstrap as plot_bootstrap,
+    distance_profile as plot_distance_profile,
+    map as plot_ks_map,
+    refined_map as plot_refined_map,
+)
 from driftwalk.plot.panels import shared_setting_text
 from driftwalk.plot.parts.style import new_figure
 from driftwalk.schema.calibration import stored_parameters
@@ -78,7 +83,7 @@ def test_panels_name_what_differs_and_what_stays():
     assert shared_setting_text(calibration, parameter="speed") == "rate of tumbles = 0.0005 1/s"
     assert shared_setting_text(one_parameter(), parameter="tumble_rate") == ""
     row = new_figure(width_mm=180, height_mm=60).subplots(1, 4)
-    from driftwalk.plot import plot_density_panels
+    from driftwalk.plot import density_panels as plot_density_panels
 
     plot_density_panels(calibration, row, parameter="speed")
     assert row[1].get_title(loc="left") == "(b) speed\n= 0 m/s"

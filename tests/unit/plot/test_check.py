@@ -13,10 +13,10 @@ from matplotlib.patches import Rectangle
 from driftwalk.core.errors import InputError
 from driftwalk.figures import write_check_figures
 from driftwalk.plot import (
-    plot_innovations,
-    plot_predicted_steps,
-    plot_residual_map,
-    plot_residual_time,
+    innovations as plot_innovations,
+    predicted_steps as plot_predicted_steps,
+    residual_time as plot_residual_time,
+    residuals as plot_residual_map,
 )
 
 LAGS, CELLS, PARTS, BINS = 20, 5, 4, 6

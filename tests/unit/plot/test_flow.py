@@ -13,7 +13,7 @@ from matplotlib.quiver import Quiver
 from synthetic_calibration import ARENA, bundled_flow
 
 from driftwalk.core.errors import InputError
-from driftwalk.plot import plot_flow
+from driftwalk.plot import flow as plot_flow
 from driftwalk.plot.parts.arena import arena_of, arena_patch
 from driftwalk.plot.parts.style import new_figure
 from driftwalk.schema import FLAGS, build_flow_field

@@ -12,7 +12,7 @@ from matplotlib.patches import Polygon, Rectangle
 from synthetic_calibration import synthetic_calibration
 
 from driftwalk.core.errors import InputError
-from driftwalk.plot import plot_ks_map, plot_refined_map
+from driftwalk.plot import map as plot_ks_map, refined_map as plot_refined_map
 from driftwalk.plot.distances import cell_edges
 
 

@@ -9,7 +9,7 @@ from matplotlib.collections import QuadMesh
 from synthetic_calibration import synthetic_calibration
 
 from driftwalk.core.errors import InputError
-from driftwalk.plot import plot_density_panels
+from driftwalk.plot import density_panels as plot_density_panels
 from driftwalk.plot.panels import choose_settings, shared_setting_text
 from driftwalk.plot.parts.style import new_figure
 

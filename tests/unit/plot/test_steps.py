@@ -9,8 +9,8 @@ from matplotlib.patches import StepPatch
 from synthetic_calibration import recording_steps
 
 from driftwalk.core.errors import InputError
-from driftwalk.plot import plot_step_density, plot_steps
-from driftwalk.plot.step_density import density_of, filled_range
+from driftwalk.plot import step_density as plot_step_density, steps as plot_steps
+from driftwalk.plot.step_densities import density_of, filled_range
 
 
 def _mesh(ax) -> QuadMesh:

@@ -8,7 +8,7 @@ from matplotlib.collections import LineCollection
 from synthetic_calibration import ARENA, bundled_recording
 
 from driftwalk.core.errors import InputError
-from driftwalk.plot import plot_trajectory
+from driftwalk.plot import trajectory as plot_trajectory
 from driftwalk.schema import build_trajectory
 
 

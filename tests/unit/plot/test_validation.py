@@ -9,7 +9,11 @@ from matplotlib.patches import Polygon
 from synthetic_calibration import synthetic_calibration
 
 from driftwalk.core.errors import InputError
-from driftwalk.plot import plot_bootstrap, plot_distance_profile, plot_validation
+from driftwalk.plot import (
+    bootstrap as plot_bootstrap,
+    distance_profile as plot_distance_profile,
+    validation as plot_validation,
+)
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ import driftwalk as dw
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood import Judged, fit_motion, judge_fit
 from driftwalk.page.sections.fit import fit_sections
-from driftwalk.plot import plot_residual_map
+from driftwalk.plot import residuals as plot_residual_map
 from driftwalk.schema.check import check_dataset, unknown_names
 from driftwalk.schema.netcdf import netcdf_bytes, open_netcdf
 from driftwalk.schema.verdict import BY_CELL, residuals_of
@@ -70,6 +70,14 @@ def test_the_map_of_the_fit_is_that_of_the_check(judged: Judged, show: str) -> N
         for one in (fit, check)
     ]
     np.testing.assert_array_equal(*drawn)
+
+
+def test_the_flow_of_a_fit_is_drawn_as_its_flow_field(judged: Judged) -> None:
+    drawn = [dw.plot.flow(one) for one in (judged.fit, dw.fitted_flow(judged.fit))]
+    colours = [ax.collections[0].get_array() for ax in drawn]
+    np.testing.assert_array_equal(*colours)
+    with pytest.raises(InputError, match="2 flows: draw one"):
+        dw.plot.flow(judged.fit.expand_dims(flow=["a", "b"]))
 
 
 def test_a_fit_that_could_not_be_checked_says_why() -> None:
