@@ -32,7 +32,7 @@ Floats = npt.NDArray[np.float64]
 TIMES = 201
 # A product of shares like 2/3 * 3/4 may miss one half by rounding.
 HALF = 0.5 + 1e-12
-EVENTS = {"first_contact": "first contact", "completion": "completion"}
+EVENTS = ("first_contact", "completion")
 
 
 class SurvivalCurve(NamedTuple):
@@ -124,20 +124,20 @@ def class_times(
     low, high = proportion_interval(count, runs, confidence=confidence)
     by_class = ("time", "class")
     data: dict[str, Any] = {
-        "proportion": (by_class, count / runs, _share("share of runs")),
-        "proportion_low": (by_class, low, _share("lower limit of the share of runs")),
-        "proportion_high": (by_class, high, _share("upper limit of the share of runs")),
+        "proportion": (by_class, count / runs),
+        "proportion_low": (by_class, low),
+        "proportion_high": (by_class, high),
     }
     attrs: dict[str, Any] = {}
     end_time = assembly["end_time"].values[sound]
-    for event, words in EVENTS.items():
+    for event in EVENTS:
         curve = survival_curve(
             assembly[f"{event}_time"].values[sound], end_time, times=time, confidence=confidence
         )
         data |= {
-            event: ("time", curve.survival, _share(f"share of runs before {words}")),
-            f"{event}_low": ("time", curve.low, _share(f"lower limit, share before {words}")),
-            f"{event}_high": ("time", curve.high, _share(f"upper limit, share before {words}")),
+            event: ("time", curve.survival),
+            f"{event}_low": ("time", curve.low),
+            f"{event}_high": ("time", curve.high),
         }
         attrs |= {
             f"{event}_median_s": curve.median,
@@ -301,10 +301,6 @@ def _checked_times(times: npt.ArrayLike | None, longest: float) -> Floats:
         raise InputError("times: expected a row of increasing numbers")
     check_times(time, longest)
     return time
-
-
-def _share(long_name: str) -> dict[str, str]:
-    return {"units": "1", "long_name": long_name}
 
 
 def _dataset(

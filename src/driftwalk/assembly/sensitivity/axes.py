@@ -32,15 +32,6 @@ KEYS: Final[dict[str, str]] = {
 """From the name of an axis to the parameter of the study that it varies."""
 OF_EACH_RUN: Final = ("drag_coefficient", "force_std")
 """The axes along which runs can be simulated side by side."""
-ABOUT: Final[dict[str, dict[str, str]]] = {
-    "tank_diameter": {"units": "m", "long_name": "diameter of the tank"},
-    "blocks": {"units": "1", "long_name": "number of blocks"},
-    "flow": {"long_name": "flow field"},
-    "latching": {"long_name": "rule by which two blocks latch"},
-    "hidden_face_drag": {"long_name": "drag on joined faces"},
-    "drag_coefficient": {"units": "1", "long_name": "drag coefficient"},
-    "force_std": {"units": "N", "long_name": "standard deviation of the force"},
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,9 +57,9 @@ class Axes:
         """Number of values of each axis."""
         return tuple(len(values) for values in self.values.values())
 
-    def coordinates(self) -> dict[str, tuple[str, npt.NDArray[Any], dict[str, str]]]:
+    def coordinates(self) -> dict[str, tuple[str, npt.NDArray[Any]]]:
         """Return the coordinates of the axes for a dataset."""
-        return {name: (name, _array(values), ABOUT[name]) for name, values in self.values.items()}
+        return {name: (name, _array(values)) for name, values in self.values.items()}
 
     def settings(self, flow: xr.Dataset, *, first_trial: int, threads: int | None) -> Settings:
         """Return every combination of the values, the last axis fastest.

@@ -9,7 +9,7 @@ import numpy as np
 
 from driftwalk.assembly.outcomes.classes import listed_classes
 from driftwalk.assembly.outcomes.distribution import is_complete, sampling_variance
-from driftwalk.assembly.sensitivity.axes import ABOUT, KEYS
+from driftwalk.assembly.sensitivity.axes import KEYS
 from driftwalk.assembly.sensitivity.dataset import count_table
 from driftwalk.assembly.sensitivity.settings import (
     Outcomes,
@@ -22,6 +22,7 @@ from driftwalk.assembly.sensitivity.settings import (
 from driftwalk.assembly.sensitivity.sobol import sobol_design, sobol_indices
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import described
+from driftwalk.schema.kinds import KINDS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -209,10 +210,15 @@ def _indices(study: Study, design: xr.Dataset, outcomes: Outcomes) -> xr.Dataset
         "left_out": int(outcomes.left_out.sum()),
         "blocks": assembly.blocks,
         "study": study.to_toml(),
-        "input_units": " ".join(ABOUT[str(name)]["units"] for name in design["input"].values),
+        "input_units": " ".join(_unit(str(name)) for name in design["input"].values),
     }
     return described(
         found.assign(
             proportion=outputs, value=design["value"], low=design["low"], high=design["high"]
         ).assign_attrs(facts)
     )
+
+
+def _unit(name: str) -> str:
+    """Return the unit of an input, as the axis of a map has it."""
+    return str(KINDS["sensitivity"].variable(name).units)

@@ -100,11 +100,9 @@ def courses_from_text(text: str | bytes) -> Courses:
 
 def time_coordinates(plan: Plan, names: Sequence[str]) -> dict[str, Any]:
     """Return the coordinates of what is kept over time."""
-    about = {"units": "s", "long_name": "time from the start of the run"}
-    classes = {"long_name": "outcome class"}
     return {
-        "time": ("time", kept_times(plan.study), about),
-        "class_over_time": ("class_over_time", np.array(names, dtype=object), classes),
+        "time": ("time", kept_times(plan.study)),
+        "class_over_time": ("class_over_time", np.array(names, dtype=object)),
     }
 
 
@@ -113,8 +111,7 @@ def reference_courses(plan: Plan, texts: Sequence[str]) -> tuple[dict[str, Any],
     courses = added(map(courses_from_text, texts))
     names = sort_classes(courses)
     count = np.stack([courses[name] for name in names], axis=1)
-    about = {"units": "1", "long_name": "runs of this class at this time"}
-    return {"count_over_time": (DIMS, count.astype(np.int32), about)}, time_coordinates(plan, names)
+    return {"count_over_time": (DIMS, count.astype(np.int32))}, time_coordinates(plan, names)
 
 
 def map_courses(
@@ -150,16 +147,11 @@ def map_courses(
     count = np.stack([course_table(courses_from_text(text), listed) for text in texts])
     shape = (*dims.values(), TIMES, len(listed))
     variables: dict[str, Any] = {
-        "count_over_time": (
-            (*dims, *DIMS),
-            count.astype(np.int32).reshape(shape),
-            {"units": "1", "long_name": "runs of this class at this time"},
-        )
+        "count_over_time": ((*dims, *DIMS), count.astype(np.int32).reshape(shape))
     }
     if known:
         table = course_table(known, listed)
-        about = {"units": "1", "long_name": "share in the reference at this time"}
-        variables["reference_over_time"] = (DIMS, table / table.sum(axis=1, keepdims=True), about)
+        variables["reference_over_time"] = (DIMS, table / table.sum(axis=1, keepdims=True))
     return variables, time_coordinates(plan, listed)
 
 
