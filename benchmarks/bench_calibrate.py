@@ -32,6 +32,7 @@ from driftwalk.datasets import tank30_flow, tank30_recording, tank30_truth
 from driftwalk.figures import write_figures
 from driftwalk.motion import BlockModel
 from driftwalk.schema import body_track
+from driftwalk.schema.calibration_facts import calibration_facts
 from driftwalk.simulation import recorded_camera
 from driftwalk.simulation.backend import default_threads, world_table
 from driftwalk.simulation.initial import world_orientations
@@ -100,9 +101,9 @@ def baseline_seconds(recording: Any, flow: Any, study: Any, threads: int) -> flo
 def check_answer(found: Any) -> None:
     truth = tank30_truth()
     for key in ("drag_coefficient", "force_std_N"):
-        ratio = found.attrs[key] / truth[key]
+        ratio = found[key] / truth[key]
         if not abs(ratio - 1) < TOLERANCE:
-            sys.exit(f"wrong answer: {key} = {found.attrs[key]:.3g}, the truth is {truth[key]:.3g}")
+            sys.exit(f"wrong answer: {key} = {found[key]:.3g}, the truth is {truth[key]:.3g}")
 
 
 def main() -> None:
@@ -134,14 +135,14 @@ def main() -> None:
     print(f"{'all':<20} {wall:>9.1f} {processor:>14.1f} {target}")
     print(f"{'map, plain (double)':<20} {'':>9} {'~' + format(plain, '.0f'):>14}")
     print(f"peak memory {memory:.2f} GB (target {TARGET_MEMORY_GB:.0f} GB)")
-    truth = tank30_truth()
+    truth, facts = tank30_truth(), calibration_facts(found)
     for key in ("drag_coefficient", "force_std_N"):
-        low, high = found.attrs[f"{key}_interval"]
+        low, high = facts[f"{key}_interval"]
         print(
-            f"{key} = {found.attrs[key]:.3g}, 90 % interval {low:.3g} to {high:.3g}; "
+            f"{key} = {facts[key]:.3g}, 90 % interval {low:.3g} to {high:.3g}; "
             f"the truth is {truth[key]:.3g}"
         )
-    check_answer(found)
+    check_answer(facts)
 
 
 if __name__ == "__main__":

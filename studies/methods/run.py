@@ -25,6 +25,7 @@ from table import markdown
 import driftwalk as dw
 from driftwalk.core.atomic import write_atomic
 from driftwalk.core.provenance import manifest, plain, write_manifest
+from driftwalk.schema.calibration_facts import calibration_facts
 from driftwalk.schema.facts import fit_facts
 
 if TYPE_CHECKING:
@@ -141,9 +142,9 @@ def by_distance(known: Known, flow_of: Callable[[], xr.Dataset]) -> Answer:
     begin = time.process_time()
     flow = flow_of()
     study = dw.apply_overrides(known.study, SEARCH)
-    found = dw.calibrate(known.recording, study, flow=flow, threads=1).attrs
+    found = calibration_facts(dw.calibrate(known.recording, study, flow=flow, threads=1))
     distance, floor = found["ks_distance"], found["noise_floor"]
-    warnings = json.loads(found["warnings"])
+    warnings = found["warnings"]
     findings = [one for one in warnings if "does not explain" in one]
     return Answer(
         found | {"warnings": warnings},

@@ -28,6 +28,8 @@ from driftwalk.plot.parts.style import (
 )
 from driftwalk.plot.step_densities import DENSITY_LABEL, density_mesh, density_of
 from driftwalk.schema import body_track
+from driftwalk.schema.facts import fitted_value
+from driftwalk.schema.netcdf import open_netcdf
 from driftwalk.simulation import recorded_camera
 
 if TYPE_CHECKING:
@@ -62,7 +64,7 @@ class Fit(NamedTuple):
 
 def simulate_optimum(run: Path, body: str | None) -> tuple[Fit, Problem]:
     """Simulate the optimum of a run; the place is that of the replicate with the median D."""
-    found = xr.open_dataset(run / "calibration.nc")
+    found = open_netcdf(run / "calibration.nc")
     recording = xr.open_dataset(run / "recording.nc")
     study = parse_study(found.attrs["study"])
     track = body_track(recording, body)
@@ -70,7 +72,7 @@ def simulate_optimum(run: Path, body: str | None) -> tuple[Fit, Problem]:
     camera = recorded_camera(track, study, position_quantum=quantum)
     flow = xr.open_dataset(run / "flow.nc")
     problem = prepare_problem(track, study, flow, camera=camera)
-    optimum = found.attrs["drag_coefficient"], found.attrs["force_std_N"]
+    optimum = fitted_value(found, "drag_coefficient"), fitted_value(found, "force_std")
     scored = score_settings(
         problem, optimum, stage="floor", first=1, replicates=REPLICATES, details="steps"
     )

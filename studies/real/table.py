@@ -5,7 +5,6 @@ Each run is a run directory of `driftwalk calibrate`; its name becomes the first
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,8 +28,9 @@ COLUMNS = (
 def row(name: str, found: xr.Dataset) -> list[str]:
     """Return the cells of one calibration; what is interpreted, each with its 90 % interval."""
     from driftwalk.model import parse_study
+    from driftwalk.schema.calibration_facts import calibration_facts
 
-    facts: dict[str, Any] = found.attrs
+    facts = calibration_facts(found)
     study = parse_study(facts["study"])
     per_mass = 1.0 / study.block.mass_kg
     drag = per_mass * study.wetted_depth_m
@@ -54,15 +54,15 @@ def _with_interval(facts: dict[str, Any], key: str, factor: float) -> str:
 
 def main(runs: list[str]) -> None:
     """Print the table, and below it the warnings of each run."""
-    import xarray as xr
+    from driftwalk.schema.netcdf import open_netcdf
 
     print("| " + " | ".join(COLUMNS) + " |")
     print("|" + "---|" * len(COLUMNS))
     warnings = []
     for run in runs:
-        with xr.open_dataset(Path(run) / "calibration.nc") as found:
-            print("| " + " | ".join(row(Path(run).name, found)) + " |")
-            warnings += [(Path(run).name, text) for text in json.loads(found.attrs["warnings"])]
+        found = open_netcdf(Path(run) / "calibration.nc")
+        print("| " + " | ".join(row(Path(run).name, found)) + " |")
+        warnings += [(Path(run).name, text) for text in found["warning"].values]
     print()
     for name, text in warnings:
         print(f"- {name}: {text}")

@@ -13,7 +13,10 @@ from driftwalk.schema.description import FREE, Kind
 from driftwalk.schema.kinds import KINDS
 
 SOURCE = Path(__file__).resolve().parents[2] / "src" / "driftwalk"
-OF_WHAT_IS_GIVEN = {"value", "low", "high", "variance", "estimate", "interval"}
+OF_WHAT_IS_GIVEN = {
+    *("value", "low", "high", "variance"),
+    *("estimate", "interval", "coarse_estimate", "first_half_estimate"),
+}
 """Numbers whose unit depends on the input, the output or the parameter."""
 
 

@@ -38,7 +38,9 @@ def region_calibration(
             "refined_surface": (("refined_drag_coefficient", "refined_force_std"), surface),
             "region_drag_coefficient": ("region_vertex", border[:, 0]),
             "region_force_std": ("region_vertex", border[:, 1]),
+            "region_level": ((), LEVEL),
+            "confidence": ((), confidence),
         },
         coords={"refined_drag_coefficient": drag, "refined_force_std": force},
-        attrs={"kind": "calibration", "region_level": LEVEL, "confidence": confidence},
+        attrs={"kind": "calibration"},
     )

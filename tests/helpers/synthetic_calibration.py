@@ -14,6 +14,8 @@ import numpy as np
 import xarray as xr
 
 from driftwalk.schema import FLAGS, build_flow_field, build_trajectory
+from driftwalk.schema.calibration import stored_parameters
+from driftwalk.schema.calibration_facts import calibration_facts, calibration_parts
 
 BUNDLED = Path(__file__).parents[2] / "src" / "driftwalk" / "datasets" / "tank30_ode_a"
 ARENA = json.dumps({"shape": "circle", "diameter_m": 0.3, "center_m": [0.0, 0.0]})
@@ -110,7 +112,7 @@ def synthetic_calibration(*, simulated: str = "yes", points: int = 17) -> xr.Dat
     plane = ("drag_coefficient", "force_std")
     place = random.uniform(0.0, 0.01, (points, points))[..., None].repeat(4, axis=-1)
     each = (*plane, "replicate")
-    return xr.Dataset(
+    found = xr.Dataset(
         {
             **coarse,
             **refined,
@@ -138,21 +140,33 @@ def synthetic_calibration(*, simulated: str = "yes", points: int = 17) -> xr.Dat
             "step_length_edge": ("step_length_edge", edges[0], {"units": "m"}),
             "turning_angle_edge": ("turning_angle_edge", edges[1], {"units": "rad"}),
         },
-        attrs={
-            "drag_coefficient": BEST_DRAG,
-            "force_std_N": BEST_FORCE,
-            "drag_coefficient_interval": [0.34, 0.44],
-            "force_std_N_interval": [0.53e-3, 0.70e-3],
-            "force_interval_s": 0.016,
-            "force_noise_intensity_N2_s": BEST_FORCE**2 * 0.016,
-            "ks_distance": 0.041,
-            "noise_floor": 0.032,
-            "warnings": "[]",
-            "recording_name": "synthetic",
-            "simulated_recording": simulated,
-            "duration_s": 1800.0,
-        },
     )
+    facts = {
+        "drag_coefficient": BEST_DRAG,
+        "force_std_N": BEST_FORCE,
+        "drag_coefficient_interval": [0.34, 0.44],
+        "force_std_N_interval": [0.53e-3, 0.70e-3],
+        "force_interval_s": 0.016,
+        "force_noise_intensity_N2_s": BEST_FORCE**2 * 0.016,
+        "ks_distance": 0.041,
+        "noise_floor": 0.032,
+        "warnings": [],
+        "recording_name": "synthetic",
+        "simulated_recording": simulated,
+        "duration_s": 1800.0,
+        "kind": "calibration",
+    }
+    return answered(found, facts)
+
+
+def answered(calibration: xr.Dataset, facts: dict[str, Any]) -> xr.Dataset:
+    """Return a calibration that says more under flat names, as attributes or in variables."""
+    parts = calibration_parts(
+        {**calibration_facts(calibration), **facts}, stored_parameters(calibration)
+    )
+    found = calibration.assign(parts.data).assign_coords(parts.coords)
+    found.attrs = parts.attrs
+    return found
 
 
 def _map(

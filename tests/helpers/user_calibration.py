@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import xarray as xr
-from synthetic_calibration import synthetic_calibration
+from synthetic_calibration import answered, synthetic_calibration
+
+from driftwalk.schema.calibration_facts import calibration_facts
 
 NAMES = {"drag_coefficient": "speed", "force_std": "tumble_rate"}
 UNITS = {"speed": "m/s", "tumble_rate": "1/s"}
@@ -22,23 +22,23 @@ def two_parameters(points: int = 9) -> xr.Dataset:
     for prefix in PREFIXES:
         for name, unit in UNITS.items():
             renamed[f"{prefix}{name}"].attrs = {"units": unit, "long_name": LABELS[name]}
-    kept: dict[str, Any] = {
+    facts = calibration_facts(found)
+    kept = {
         name: value
-        for name, value in found.attrs.items()
+        for name, value in facts.items()
         if not name.startswith(("drag_coefficient", "force_"))
     }
-    drag, force = found.attrs["drag_coefficient"], found.attrs["force_std_N"]
-    renamed.attrs = {
-        **kept,
-        "kind": "calibration",
+    bare = renamed.drop_vars(["estimate", "interval", "force_interval", "force_noise_intensity"])
+    bare.attrs = {}
+    answer = {
         "model": "tumble",
-        "speed_m_s": drag,
-        "speed_m_s_interval": found.attrs["drag_coefficient_interval"],
-        "tumble_rate_per_s": force,
-        "tumble_rate_per_s_interval": found.attrs["force_std_N_interval"],
+        "speed_m_s": facts["drag_coefficient"],
+        "speed_m_s_interval": facts["drag_coefficient_interval"],
+        "tumble_rate_per_s": facts["force_std_N"],
+        "tumble_rate_per_s_interval": facts["force_std_N_interval"],
         "confidence": 0.9,
     }
-    return renamed
+    return answered(bare, kept | answer)
 
 
 def one_parameter() -> xr.Dataset:
@@ -51,6 +51,4 @@ def one_parameter() -> xr.Dataset:
         shifted = found[name] + 1e-4  # a logarithmic axis has no zero
         found = found.assign_coords({name: (name, shifted.values, found[name].attrs)})
         found[name].attrs["scale"] = "log"
-    return found.assign_attrs(
-        {name: value for name, value in whole.attrs.items() if not name.startswith("speed")}
-    ).assign_attrs(model="tumble")
+    return found.sel(parameter=["tumble_rate"])

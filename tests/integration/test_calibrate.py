@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 
 import driftwalk as dw
 from driftwalk.model import apply_overrides
 from driftwalk.schema import build_trajectory
+from driftwalk.schema.calibration_facts import calibration_facts
 
 TRUTH = {"drag_coefficient": 0.45, "force_std_N": 0.6e-3}
 SMALL = {
@@ -69,9 +68,12 @@ def test_the_truth_of_a_synthetic_recording_is_found(found):
     In steps of 0.1 s, which are mostly camera noise, three replicates tell sigma_F to a third at
     best (the 12 recordings gave 0.67 to 0.82 mN); what they tell of it is tested below.
     """
-    assert found.attrs["drag_coefficient"] == pytest.approx(TRUTH["drag_coefficient"], abs=0.03)
-    assert found.attrs["distance_to_floor_ratio"] < 1.5
-    assert json.loads(found.attrs["warnings"]) == []
+    assert calibration_facts(found)["drag_coefficient"] == pytest.approx(
+        TRUTH["drag_coefficient"], abs=0.03
+    )
+    assert found["distance_to_floor_ratio"] < 1.5
+    assert bool(found["explained"])
+    assert found["warning"].values.tolist() == []
 
 
 @pytest.mark.false_alarm(2e-3)
@@ -83,13 +85,13 @@ def test_the_truth_explains_a_recording_best(fresh_seed):
     """
     study = apply_overrides(dw.Study(), {**AROUND_THE_TRUTH, "calibration.seed": fresh_seed(1)})
     recording = synthetic_recording(1200.0, seed=fresh_seed(5))
-    found = dw.calibrate(recording, study, flow=dw.tank30_flow(), threads=2).attrs
+    found = calibration_facts(dw.calibrate(recording, study, flow=dw.tank30_flow(), threads=2))
     assert found["drag_coefficient"] == pytest.approx(TRUTH["drag_coefficient"])
     assert found["force_std_N"] == pytest.approx(TRUTH["force_std_N"])
 
 
 def test_sigma_f_comes_with_its_interval_and_the_intensity(found):
-    facts = found.attrs
+    facts = calibration_facts(found)
     assert facts["force_noise_intensity_N2_s"] == pytest.approx(
         facts["force_std_N"] ** 2 * facts["force_interval_s"]
     )
@@ -100,8 +102,8 @@ def test_sigma_f_comes_with_its_interval_and_the_intensity(found):
 
 
 def test_the_camera_noise_was_estimated(found):
-    assert found.attrs["position_noise_m"] == pytest.approx(3e-4, rel=0.15)
-    assert found.attrs["orientation_noise_rad"] == pytest.approx(0.01, rel=0.2)
+    assert found["position_noise"].item() == pytest.approx(3e-4, rel=0.15)
+    assert found["orientation_noise"].item() == pytest.approx(0.01, rel=0.2)
 
 
 def test_the_dataset_holds_what_is_kept_of_every_setting(found):
@@ -166,18 +168,20 @@ def test_an_optimum_at_the_edge_of_the_grid_is_warned_of():
         },
     )
     found = dw.calibrate(synthetic_recording(200.0), study, flow=dw.tank30_flow())
-    warnings = json.loads(found.attrs["warnings"])
+    warnings = found["warning"].values.tolist()
     assert any("edge of the grid" in text for text in warnings)
     assert any("does not explain" in text for text in warnings)
-    assert found.attrs["interval_stretch"] > 2.0
+    assert found["interval_stretch"] > 2.0
+    assert not bool(found["explained"])
 
 
 def test_a_coarse_map_alone_is_possible():
     study = apply_overrides(dw.Study(), {**SMALL, "calibration.refine": "none"})
     found = dw.calibrate(synthetic_recording(100.0), study, flow=dw.tank30_flow())
     assert "refined_ks_distance" not in found
-    assert "drag_coefficient_interval" not in found.attrs
-    assert found.attrs["drag_coefficient"] in found["drag_coefficient"].values
+    assert "interval" not in found
+    assert "explained" not in found
+    assert calibration_facts(found)["drag_coefficient"] in found["drag_coefficient"].values
 
 
 def test_without_a_given_flow_it_is_extracted_from_the_recording():
@@ -203,6 +207,6 @@ def test_an_interval_that_reaches_the_end_of_the_refined_grid_is_warned_of():
     )
     found = dw.calibrate(synthetic_recording(60.0), study, flow=dw.tank30_flow())
     window = found["refined_force_std"].values
-    interval = found.attrs["force_std_N_interval"]
+    interval = found["interval"].sel(parameter="force_std").values
     assert np.isclose(interval[0], window[0]) or np.isclose(interval[1], window[-1])
-    assert "force_std reaches the end of the refined grid" in found.attrs["warnings"]
+    assert "force_std reaches the end of the refined grid" in " ".join(found["warning"].values)

@@ -21,6 +21,7 @@ from driftwalk.core.seeds import world_keys
 from driftwalk.model import apply_overrides
 from driftwalk.motion import Parameter, motion_model
 from driftwalk.schema import build_trajectory
+from driftwalk.schema.calibration_facts import calibration_facts
 from driftwalk.simulation import Start
 from driftwalk.simulation.backend import Camera
 
@@ -74,14 +75,14 @@ def diffusing():
 
 
 def test_both_parameters_of_a_tumbling_particle_are_found(tumbling):
-    facts = tumbling.attrs
+    facts = calibration_facts(tumbling)
     tumbles = DURATION * TUMBLE_RATE
     assert facts["tumble_rate_per_s"] == pytest.approx(TUMBLE_RATE, rel=ALLOWED / np.sqrt(tumbles))
     # The noise of a step's length, sqrt(2) NOISE, is all that hides the speed.
     bound = np.sqrt(2.0) * NOISE * RATE_HZ / np.sqrt(DURATION * RATE_HZ)
     assert facts["speed_m_s"] == pytest.approx(SPEED, abs=ALLOWED * bound + 0.0005 / 4)
     assert facts["distance_to_floor_ratio"] < 2.0
-    assert json.loads(facts["warnings"]) == []
+    assert facts["warnings"] == []
 
 
 def test_the_bootstrap_scatters_by_no_less_than_the_information_allows(tumbling):
@@ -89,8 +90,8 @@ def test_the_bootstrap_scatters_by_no_less_than_the_information_allows(tumbling)
     bound = TUMBLE_RATE / np.sqrt(DURATION * TUMBLE_RATE)
     # 40 estimates know their standard deviation to 11 %: four of these below, the budget above.
     assert (1 - 4 * 0.11) * bound < rates.std(ddof=1) < 2 * 1.44 * bound
-    low, high = tumbling.attrs["tumble_rate_per_s_interval"]
-    assert low < tumbling.attrs["tumble_rate_per_s"] < high
+    low, high = tumbling["interval"].sel(parameter="tumble_rate").values
+    assert low < tumbling["estimate"].sel(parameter="tumble_rate") < high
 
 
 def test_everything_stands_under_the_names_of_the_parameters(tumbling):
@@ -99,19 +100,20 @@ def test_everything_stands_under_the_names_of_the_parameters(tumbling):
     assert tumbling["tumble_rate"].attrs == {"units": "1/s", "long_name": "rate of tumbles"}
     assert tumbling["region_speed"].attrs["units"] == "m/s"
     assert tumbling.attrs["model"] == "tumble"
-    assert "drag_coefficient" not in tumbling.attrs
-    assert "force_interval_s" not in tumbling.attrs
+    assert tumbling["parameter"].values.tolist() == ["speed", "tumble_rate"]
+    assert tumbling["unit"].values.tolist() == ["m/s", "1/s"]
+    assert not {"drag_coefficient", "force_interval_s"} & set(calibration_facts(tumbling))
     assert tumbling["step_density"].shape == (9, 11, 32, 32)
     border = tumbling["region_speed"], tumbling["region_tumble_rate"]
     assert border[0][0] == border[0][-1]
-    assert border[1].min() < tumbling.attrs["tumble_rate_per_s"] < border[1].max()
+    assert border[1].min() < tumbling["estimate"].sel(parameter="tumble_rate") < border[1].max()
 
 
 def test_one_parameter_on_a_logarithmic_scale_is_found(diffusing):
-    found = diffusing.attrs["diffusivity_m2_s"]
+    found = diffusing["estimate"].sel(parameter="diffusivity").item()
     allowed = ALLOWED / np.sqrt(DURATION * RATE_HZ) + np.log(10.0) * 0.1 / 5 / 4
     assert abs(np.log(found / DIFFUSIVITY)) < allowed
-    low, high = diffusing.attrs["diffusivity_m2_s_interval"]
+    low, high = diffusing["interval"].sel(parameter="diffusivity").values
     assert low < found < high
     assert high / low < np.exp(2 * allowed)
     assert diffusing["ks_distance"].dims == ("diffusivity",)
@@ -119,7 +121,8 @@ def test_one_parameter_on_a_logarithmic_scale_is_found(diffusing):
     assert diffusing["diffusivity"].values[[0, 10, 20]] == pytest.approx([1e-6, 1e-5, 1e-4])
     ends = diffusing["region_diffusivity"].values
     assert ends == pytest.approx([low, high])
-    assert diffusing.attrs["first_half_diffusivity_m2_s"] == pytest.approx(DIFFUSIVITY, rel=0.25)
+    first = diffusing["first_half_estimate"].item()
+    assert first == pytest.approx(DIFFUSIVITY, rel=0.25)
 
 
 def test_threads_and_company_of_settings_do_not_change_a_single_bit(diffusing):

@@ -26,12 +26,11 @@ from driftwalk.calibration.region import (
     run_bootstrap,
 )
 from driftwalk.calibration.result import (
-    add_uncertainty,
-    answer_attrs,
-    as_json,
+    Found,
+    answer_facts,
     build_calibration,
-    estimate_attrs,
-    interval_attrs,
+    estimate_facts,
+    interval_facts,
 )
 from driftwalk.calibration.search import (
     Map,
@@ -46,7 +45,6 @@ from driftwalk.comparison import Statistic
 from driftwalk.core.errors import InputError
 from driftwalk.motion import BlockModel, Details, MotionModel
 from driftwalk.schema import Track, body_track
-from driftwalk.schema.check import check_dataset
 from driftwalk.simulation import recorded_camera
 
 if TYPE_CHECKING:
@@ -116,10 +114,11 @@ def calibrate(
     Returns
     -------
     xarray.Dataset
-        See `driftwalk.calibration.result`. The answer stands in its attributes, under the names
-        of the parameters with their units: ``drag_coefficient`` and ``force_std_N`` for the block,
-        each with ``_interval``; ``ks_distance``, ``noise_floor``, ``warnings``; for the block
-        ``force_interval_s`` and ``force_noise_intensity_N2_s`` (what the recording can tell).
+        A `calibration`. ``estimate`` and ``interval`` are the answer, by parameter:
+        ``drag_coefficient`` and ``force_std`` [N] of the block. ``optimum_ks_distance`` is to be
+        compared with ``noise_floor``; ``explained`` and ``warning`` say what comes of that. Of the
+        block also ``force_interval`` [s] and ``force_noise_intensity`` [N2 s], which is what the
+        recording can tell.
 
     Raises
     ------
@@ -136,7 +135,7 @@ def calibrate(
     --------
     >>> import driftwalk as dw
     >>> found = dw.calibrate(dw.tank30_recording(), flow=dw.tank30_flow())  # doctest: +SKIP
-    >>> found.attrs["drag_coefficient"]  # doctest: +SKIP
+    >>> found["estimate"].sel(parameter="drag_coefficient").item()  # doctest: +SKIP
     0.39
     """
     chosen, searched = _study_and_model(model, study, recording)
@@ -377,35 +376,40 @@ def _halves(track: Track, problem: Problem, flow_of: FlowSource, say: Tell) -> H
 def _finish(
     found: _Calibration, halves: Halves | None, recording: xr.Dataset, problem: Problem
 ) -> xr.Dataset:
-    """Put the pieces into one dataset and state the answer in its attributes."""
-    study = problem.study
-    attrs: dict[str, Any] = answer_attrs(problem, found.optimum.point)
-    attrs["ks_distance"] = found.optimum.distance
-    attrs["noise_floor"] = found.floor
-    if found.quality is not None:
-        attrs["ks_distance"] = found.quality.distance
-        attrs["ks_distance_standard_error"] = found.quality.standard_error
-        attrs["noise_floor_upper"] = found.quality.floor_upper
-        attrs["distance_to_floor_ratio"] = found.quality.distance / found.quality.floor
-        attrs["far_above_floor"] = FAR_ABOVE_FLOOR
+    """Put the pieces into one dataset and state the answer."""
     lowest = found.coarse.point(found.coarse.cell_of_minimum())
-    attrs.update(estimate_attrs(problem, lowest, "coarse_"))
+    facts: dict[str, Any] = {
+        **answer_facts(problem, found.optimum.point),
+        **estimate_facts(problem, lowest, "coarse_"),
+        "ks_distance": found.optimum.distance,
+        "noise_floor": found.floor,
+        "warnings": found.warnings,
+        "recording_name": str(recording.attrs.get("source", "")),
+        "simulated_recording": str(recording.attrs.get("simulated", "no")),
+        "study": problem.study.to_toml(),
+    }
+    if found.quality is not None and found.region is not None:
+        facts |= _quality_facts(found.quality, found.region, problem)
     if halves is not None:
-        attrs.update(estimate_attrs(problem, halves.point, "first_half_"))
-        attrs["second_half_ks_distance"] = halves.distance
-        attrs["second_half_noise_floor"] = halves.floor
-    attrs["recording_name"] = str(recording.attrs.get("source", ""))
-    attrs["simulated_recording"] = str(recording.attrs.get("simulated", "no"))
-    attrs["study"] = study.to_toml()
+        facts |= estimate_facts(problem, halves.point, "first_half_")
+        facts["second_half_ks_distance"] = halves.distance
+        facts["second_half_noise_floor"] = halves.floor
     surface = None if found.surface is None else at_settings(found.surface)
-    dataset = build_calibration(problem, found.coarse, found.refined, surface, attrs=attrs)
-    if found.bootstrap is not None:
-        assert found.quality is not None
-        assert found.region is not None
-        dataset = add_uncertainty(dataset, problem, found.bootstrap, found.region)
-        dataset.attrs["region_level"] = found.region.level
-        dataset.attrs["interval_stretch"] = found.quality.stretch
-        dataset.attrs.update(interval_attrs(problem, found.region))
-        dataset.attrs["confidence"] = study.calibration.confidence
-    dataset.attrs["warnings"] = as_json(found.warnings)
-    return check_dataset(dataset)
+    pieces = Found(found.coarse, found.refined, surface, found.bootstrap, found.region)
+    return build_calibration(problem, pieces, facts)
+
+
+def _quality_facts(quality: Quality, region: Region, problem: Problem) -> dict[str, Any]:
+    """Return what only a bootstrap tells: how sure the answer is, and how good."""
+    return {
+        **interval_facts(problem, region),
+        "confidence": problem.study.calibration.confidence,
+        "ks_distance": quality.distance,
+        "ks_distance_standard_error": quality.standard_error,
+        "noise_floor_upper": quality.floor_upper,
+        "distance_to_floor_ratio": quality.distance / quality.floor,
+        "far_above_floor": FAR_ABOVE_FLOOR,
+        "explained": quality.explained,
+        "region_level": region.level,
+        "interval_stretch": quality.stretch,
+    }

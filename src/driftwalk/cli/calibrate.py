@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -33,6 +32,7 @@ from driftwalk.cli.options.shared import (
 from driftwalk.cli.terminal.output import print_json, print_note, report_command
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.study_keys import CALIBRATION_KEYS, study_overrides
+from driftwalk.schema.calibration_facts import calibration_facts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -162,17 +162,17 @@ _KEYS = (
 
 def summary(found: xr.Dataset) -> dict[str, Any]:
     """Return what ``--json`` prints: the answer with units in its keys."""
-    values = {key: found.attrs.get(key) for key in _KEYS}
+    facts = calibration_facts(found)
     return {
-        **values,
-        "recording": found.attrs["recording_name"],
-        "warnings": json_module.loads(found.attrs["warnings"]),
+        **{key: facts.get(key) for key in _KEYS},
+        "recording": facts["recording_name"],
+        "warnings": facts["warnings"],
     }
 
 
 def print_answer(found: xr.Dataset, folder: Path) -> None:
     """Print the answer for people, and where the figures are."""
-    facts = found.attrs
+    facts = calibration_facts(found)
     interval = facts["force_interval_s"]
     if facts["simulated_recording"] == "yes":
         print("This recording was simulated by another engine (ODE).")
@@ -194,7 +194,7 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
             f"second half            {facts['second_half_ks_distance']:.4f} for a calibration on "
             f"the first, noise floor {facts['second_half_noise_floor']:.4f}"
         )
-    for warning in json_module.loads(facts["warnings"]):
+    for warning in facts["warnings"]:
         print_note(f"warning: {warning}")
     print(f"figures                {folder / 'figures'}")
     print(f"all in one page        {report_command(folder)}")

@@ -84,7 +84,7 @@ def assemble(
         )
     place = Path(folder)
     region = found.calibration
-    if region is not None and "region_level" not in region.attrs:
+    if region is not None and "region_level" not in region:
         region = None
     run_assembly(
         AssemblyWork(found.study, found.flow, region, {}, threads),

@@ -49,10 +49,12 @@ def model_of(
     from driftwalk.likelihood import fitted_flow
     from driftwalk.model import Study, apply_overrides, parse_study
     from driftwalk.schema.calibration import is_block
-    from driftwalk.schema.facts import fit_facts
+    from driftwalk.schema.earlier import current_form
+    from driftwalk.schema.facts import fitted_value
 
     if isinstance(source, Study):
         return FoundModel(apply_overrides(source, overrides), _flow(flow), None)
+    source = current_form(source)
     kind = source.attrs.get("kind")
     if kind not in ("fit", "calibration"):
         raise InputError(
@@ -63,12 +65,11 @@ def model_of(
             f"the calibration is about the model {source.attrs.get('model', 'of a user')}: the "
             "tank simulates blocks, so give a calibration of the block"
         )
-    facts = fit_facts(source) if kind == "fit" else source.attrs
     study = apply_overrides(
-        parse_study(facts["study"]),
+        parse_study(source.attrs["study"]),
         {
-            "forces.drag_coefficient": facts["drag_coefficient"],
-            "forces.force_std_N": facts["force_std_N"],
+            "forces.drag_coefficient": fitted_value(source, "drag_coefficient"),
+            "forces.force_std_N": fitted_value(source, "force_std"),
             **overrides,
         },
     )

@@ -8,6 +8,7 @@ from driftwalk.page.chart import label as chart_label
 from driftwalk.page.parts import axis
 from driftwalk.plot.parts.labels import force_interval_text
 from driftwalk.schema.calibration import BLOCK, is_block, stored_parameters
+from driftwalk.schema.calibration_facts import facts_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,7 +20,7 @@ class PageParameter(NamedTuple):
     name: str
     """Dimension of the dataset."""
     key: str
-    """Attribute of its estimate."""
+    """Flat name of its estimate."""
     unit: str
     label: str
     symbol: str
@@ -41,7 +42,7 @@ class PageParameter(NamedTuple):
     def axis(self, dataset: xr.Dataset, prefix: str = "") -> dict[str, Any]:
         """Return the axis of a map or a chart; the force means nothing without its interval."""
         every = ""
-        if self.symbol == FORCE.symbol and "force_interval_s" in dataset.attrs:
+        if self.symbol == FORCE.symbol and "force_interval_s" in facts_of(dataset):
             every = f", {force_interval_text(dataset)}"
         words = f"{self.words}{every}"
         found = axis(self.name, words, self.unit, dataset[f"{prefix}{self.name}"].values)

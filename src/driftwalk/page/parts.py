@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.core.errors import DriftwalkError, FormatError, InputError
-from driftwalk.core.json_text import json_value, parse_json
+from driftwalk.core.errors import DriftwalkError, InputError
+from driftwalk.core.json_text import json_value
 from driftwalk.page.arrays import number
 from driftwalk.plot.parts.arena import arena_of
 from driftwalk.plot.parts.labels import interval_of
+from driftwalk.schema.calibration_facts import facts_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -91,25 +92,17 @@ def require(dataset: xr.Dataset, *names: str) -> None:
 
 
 def required(dataset: xr.Dataset, name: str) -> Any:
-    """Return an attribute, or raise `InputError` naming it."""
-    if name not in dataset.attrs:
-        raise InputError(f"the {dataset.attrs.get('kind', 'dataset')} has no attribute '{name}'")
-    return dataset.attrs[name]
+    """Return a fact of a dataset, see `facts_of`, or raise `InputError` naming it."""
+    facts = facts_of(dataset)
+    if name not in facts:
+        raise InputError(f"the {dataset.attrs.get('kind', 'dataset')} has no '{name}'")
+    return facts[name]
 
 
 def value_of(dataset: xr.Dataset, name: str) -> float | None:
-    """Return a number of the attributes, None when it is absent or not finite."""
-    found = dataset.attrs.get(name)
+    """Return a number of the facts, None when it is absent or not finite."""
+    found = facts_of(dataset).get(name)
     return None if isinstance(found, str) else number(found)
-
-
-def texts_of(dataset: xr.Dataset, name: str) -> list[str]:
-    """Return a list of sentences that an attribute holds as JSON; empty when it is absent."""
-    try:
-        found = parse_json(str(dataset.attrs.get(name, "[]")))
-    except FormatError as error:
-        raise InputError(f"the attribute '{name}' is not JSON: {error}") from error
-    return [str(item) for item in found] if isinstance(found, list) else [str(found)]
 
 
 def is_simulated(dataset: xr.Dataset) -> bool:
@@ -137,7 +130,7 @@ def axis(name: str, label: str, unit: str, values: Any) -> dict[str, Any]:
 def estimate(
     dataset: xr.Dataset, name: str, *, label: str, symbol: str, unit: str, note: str | None = None
 ) -> dict[str, Any]:
-    """Return an estimate of the attributes with its interval, for a summary."""
+    """Return an estimate of the facts with its interval, for a summary."""
     ends = interval_of(dataset, f"{name}_interval")
     return {
         "label": label,

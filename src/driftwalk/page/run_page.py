@@ -26,6 +26,7 @@ from driftwalk.page.sections.sensitivity import sensitivity_sections
 from driftwalk.page.sections.tracking import tracking_sections, tracking_warnings
 from driftwalk.page.stored_run import MAIN_FILES, Run, open_run_folder
 from driftwalk.schema import body_names
+from driftwalk.schema.earlier import current_form
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -117,6 +118,7 @@ def dataset_page(dataset: xr.Dataset) -> dict[str, Any]:
     --------
     ``dataset_page(fit)["title"]``
     """
+    dataset = current_form(dataset)
     kind = str(dataset.attrs.get("kind", ""))
     if kind not in _SECTIONS_OF_ONE:
         raise InputError(

@@ -18,7 +18,7 @@ from driftwalk.plot.parts.assembly_labels import (
     percent,
     runs_text,
 )
-from driftwalk.plot.parts.labels import number_attribute
+from driftwalk.plot.parts.labels import number_fact
 from driftwalk.plot.parts.polyomino_sketch import (
     NAME_SIZE_PT,
     axes_points,
@@ -152,7 +152,7 @@ def plot_survival(times: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.set_xlabel(TIME_LABEL)
     ax.set_ylabel("proportion of runs")
     ax.spines[["top", "right"]].set_visible(False)
-    confidence = number_attribute(times, "confidence")
+    confidence = number_fact(times, "confidence")
     bands = f"bands: {percent(confidence)}" if np.isfinite(confidence) else ""
     ax.set_title(", ".join(part for part in (runs_text(times), bands) if part), loc="left")
     ax.legend(loc="upper right")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.plot.parts.labels import interval_of, number_attribute, require_variables
+from driftwalk.plot.parts.labels import interval_of, number_fact, require_variables
 from driftwalk.plot.parts.parameters import PlotParameter, plane_of
 from driftwalk.plot.parts.style import INK, SCORE_COLORMAP, add_colorbar, axes_or_new
 
@@ -131,7 +131,7 @@ def plot_refined_map(
     mesh = _score_mesh(ax, edges, score, bottom=None, top=None)
     if np.isfinite(score).any():
         low, high = np.nanquantile(score, [0.02, 1.0])
-        floor = 1.0 - number_attribute(calibration, "noise_floor")
+        floor = 1.0 - number_fact(calibration, "noise_floor")
         high = np.nanmax([high, floor])
         mesh.set_clim(low, high + 0.06 * (high - low))
     status = _status(calibration, "refined_status", dims)
@@ -286,7 +286,7 @@ def _finish(ax: Axes, calibration: xr.Dataset, mesh: QuadMesh, colorbar: str) ->
     up.scale(ax, "y")
     if colorbar == "none":
         return None
-    floor = number_attribute(calibration, "noise_floor")
+    floor = number_fact(calibration, "noise_floor")
     bar = add_colorbar(mesh, ax, "score 1 − D")
     if np.isfinite(floor):
         bar.ax.axhline(1.0 - floor, color=INK, lw=1.4)

@@ -13,7 +13,7 @@ from driftwalk.plot.parts.labels import (
     FACTORS,
     LENGTH_LABEL,
     require_variables,
-    required_attribute,
+    required_fact,
 )
 from driftwalk.plot.parts.parameters import (
     FORCE,
@@ -130,8 +130,7 @@ def choose_settings(
     )  # fmt: skip
     along = parameter_named(calibration, parameter)
     best = {
-        one.name: float(required_attribute(calibration, one.key))
-        for one in plot_parameters(calibration)
+        one.name: float(required_fact(calibration, one.key)) for one in plot_parameters(calibration)
     }
     wanted = (
         LOW_FACTOR * best[along.name] if low is None else low,

@@ -19,7 +19,7 @@ from driftwalk.plot.parts.assembly_labels import (
     reference_value,
     sweep_axes,
 )
-from driftwalk.plot.parts.labels import number_attribute
+from driftwalk.plot.parts.labels import number_fact
 from driftwalk.plot.parts.polyomino_sketch import (
     LETTER_PT,
     MAX_CELL_PT,
@@ -118,7 +118,7 @@ def plot_l1_map(
     ax = axes_or_new(ax)
     mesh = _draw_map(ax, sweep, distance, colormap=DISTANCE_COLORMAP)
     mesh.set_clim(0.0, float(np.nanmax(distance)) if np.isfinite(distance).any() else 2.0)
-    floor = number_attribute(sensitivity, "noise_floor_95")
+    floor = number_fact(sensitivity, "noise_floor_95")
     drawn = _draw_floor_contour(ax, sweep, distance, floor)
     _mark_on_map(ax, sensitivity, sweep)
     if colorbar == "beside":
@@ -334,8 +334,8 @@ def _mark_on_map(
 
 
 def _draw_floor_band(ax: Axes, sensitivity: xr.Dataset) -> None:
-    high = number_attribute(sensitivity, "noise_floor_95")
-    mean = number_attribute(sensitivity, "noise_floor_mean")
+    high = number_fact(sensitivity, "noise_floor_95")
+    mean = number_fact(sensitivity, "noise_floor_mean")
     if np.isfinite(high):
         ax.axhspan(0.0, high, color=PALE, lw=0, label=f"below the {FLOOR_LABEL}")
     if np.isfinite(mean):

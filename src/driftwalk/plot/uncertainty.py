@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.plot.distances import REGION_LABEL, draw_optimum, region_of
-from driftwalk.plot.parts.labels import interval_of, number_attribute, require_variables
+from driftwalk.plot.parts.labels import interval_of, number_fact, require_variables
 from driftwalk.plot.parts.parameters import (
     PlotParameter,
     parameter_named,
@@ -116,10 +116,10 @@ def plot_distance_profile(
         fine = along.values(calibration, "refined_")
         fitted = calibration["refined_surface"].values
         ax.plot(fine, fitted, color=ORANGE, lw=1.0, label="fitted curve", zorder=5)
-    floor = number_attribute(calibration, "noise_floor")
+    floor = number_fact(calibration, "noise_floor")
     if np.isfinite(floor):
         ax.axhline(floor, color=INK, lw=0.8, dashes=(4, 2.5), label="noise floor")
-    distance = number_attribute(calibration, "ks_distance")
+    distance = number_fact(calibration, "ks_distance")
     ax.plot(
         [best], [distance], "D", ms=4.5, mfc=ORANGE, mec="white", mew=0.7, zorder=6, label="optimum"
     )

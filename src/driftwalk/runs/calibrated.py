@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.json_text import parse_json
 from driftwalk.core.run_layout import state_of
 from driftwalk.schema.calibration import is_block
 from driftwalk.schema.contents import check_contents
+from driftwalk.schema.facts import fitted_value, sentences
 from driftwalk.schema.netcdf import open_netcdf
 
 if TYPE_CHECKING:
@@ -76,22 +76,22 @@ def read_calibrated(folder: Path) -> Calibrated:
     files = {"calibration": folder / "calibration.nc", "flow": folder / "flow.nc"}
     _require_finished(folder, files)
     found = _read(files["calibration"])
-    facts = found.attrs
     if not is_block(found):
+        model = found.attrs.get("model", "of a user")
         raise InputError(
-            f"{files['calibration']} is about the model {facts.get('model', 'of a user')}, and "
+            f"{files['calibration']} is about the model {model}, and "
             "self-assembly simulates blocks: give a calibration of the block"
         )
     study = apply_overrides(
-        parse_study(facts["study"], source=f"{files['calibration']}: its study"),
+        parse_study(found.attrs["study"], source=f"{files['calibration']}: its study"),
         {
-            "forces.drag_coefficient": facts["drag_coefficient"],
-            "forces.force_std_N": facts["force_std_N"],
+            "forces.drag_coefficient": fitted_value(found, "drag_coefficient"),
+            "forces.force_std_N": fitted_value(found, "force_std"),
         },
     )
     flow = load_flow(files["flow"], arena=study.tank.to_arena(), own_flags="keep")
-    region = found if "region_level" in facts else None
-    return Calibrated(study, flow, found, region, files, parse_json(facts["warnings"]))
+    region = found if "region_level" in found else None
+    return Calibrated(study, flow, found, region, files, sentences(found, "warning"))
 
 
 def _require_finished(folder: Path, files: dict[str, Path]) -> None:

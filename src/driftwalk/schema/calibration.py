@@ -29,7 +29,7 @@ class StoredParameter(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Attribute of its estimate: its name with the unit."""
+        """Flat name of its estimate: its name with the unit."""
         suffix = unit_suffix(self.unit)
         return f"{self.name}_{suffix}" if suffix else self.name
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.schema.calibration import stored_parameters
+from driftwalk.schema.calibration_facts import calibration_parts
 from driftwalk.schema.check import with_descriptions
 from driftwalk.schema.facts import fit_variables, texts
 from driftwalk.schema.kinds import KINDS
@@ -87,8 +89,29 @@ def _check_of_attributes(check: xr.Dataset) -> xr.Dataset:
     return with_descriptions(found.assign_attrs(schema_version=KINDS["model_check"].version))
 
 
+def _calibration_of_attributes(calibration: xr.Dataset) -> xr.Dataset:
+    """Make variables of the attributes of version 1, in which the answer stood.
+
+    Attributes were added while that version lasted: only the estimates and the warnings have to be
+    there. The verdict is the one that version 1 put into the warnings.
+    """
+    for name in ("warnings", "study"):
+        if name not in calibration.attrs:
+            raise InputError(f"the attribute '{name}' is missing")
+    facts = dict(calibration.attrs)
+    judged = ("ks_distance", "noise_floor", "noise_floor_upper", "far_above_floor")
+    if all(name in facts for name in judged):
+        distance, floor, upper, far = (float(facts[name]) for name in judged)
+        facts["explained"] = distance <= max(far * floor, upper)
+    parts = calibration_parts(facts, stored_parameters(calibration))
+    found = calibration.assign(parts.data).assign_coords(parts.coords)
+    found.attrs = parts.attrs
+    return with_descriptions(found.assign_attrs(schema_version=KINDS["calibration"].version))
+
+
 _CONVERTERS: Final[dict[tuple[str, int], Callable[[xr.Dataset], xr.Dataset]]] = {
     ("fit", 1): _fit_of_attributes,
     ("model_check", 1): _check_of_attributes,
+    ("calibration", 1): _calibration_of_attributes,
 }
 """By kind and the version that is read."""

@@ -1,4 +1,4 @@
-"""The numbers of a fit and of its check under flat names, with the unit in the name.
+"""The numbers of a fit under flat names, with the unit in the name.
 
 The command line prints them under these names, and earlier versions stored them so, as attributes:
 ``force_std_N`` is the value at ``force_std`` of the variable ``estimate``.
@@ -139,7 +139,7 @@ def fit_facts(fit: xr.Dataset) -> dict[str, Any]:
                     facts[f"{key}_interval"] = fit["interval"].values[known.index(name)].tolist()
     named = {**FIT_NUMBERS, **{key: key for key in (*FIT_COUNTS, *FIT_VERDICTS)}}
     named |= {key: name for key, (name, _) in FIT_ROWS.items()}
-    facts |= {key: _plain(fit[name]) for key, name in named.items() if name in fit.variables}
+    facts |= {key: plain(fit[name]) for key, name in named.items() if name in fit.variables}
     facts["warnings"] = sentences(fit, "warning")
     return facts
 
@@ -149,13 +149,14 @@ def sentences(dataset: xr.Dataset, name: str) -> list[str]:
     return [str(text) for text in dataset[name].values] if name in dataset.variables else []
 
 
-def _plain(values: xr.DataArray) -> Any:
+def plain(values: xr.DataArray) -> Any:
+    """Return values in Python's own types; a verdict as "yes" or "no"."""
     found = values.values.tolist()
     return {True: "yes", False: "no"}[found] if isinstance(found, bool) else found
 
 
 def fitted_value(fit: xr.Dataset, parameter: str) -> float:
-    """Return the estimate of a parameter of a fit.
+    """Return the estimate of a parameter of a fit or of a calibration.
 
     Raises
     ------
@@ -164,5 +165,6 @@ def fitted_value(fit: xr.Dataset, parameter: str) -> float:
     """
     known = [str(name) for name in fit["parameter"].values]
     if parameter not in known:
-        raise InputError(f"the fit has no {parameter}: it has {', '.join(known)}")
+        kind = fit.attrs.get("kind", "fit")
+        raise InputError(f"the {kind} has no {parameter}: it has {', '.join(known)}")
     return float(fit["estimate"].values[known.index(parameter)])

@@ -28,6 +28,9 @@ from command_line import (
 )
 from signals_at_units import after_units
 
+from driftwalk.schema.calibration_facts import calibration_facts
+from driftwalk.schema.facts import fitted_value
+
 CLASSES = ["I", "O", "T", "S", "L", "I3+1", "L3+1", "2+2", "2+1+1", "1+1+1+1"]
 REQUIRED = {"proportions", "intervals", "complete", "runs"}
 SIZE = ["--blocks", "4", "--runs", "60", "--duration", "30s", "--threads", "1"]
@@ -94,10 +97,10 @@ def test_json_holds_both_distributions(whole: tuple[Path, Done]) -> None:
 def test_the_parameters_are_the_calibrations(whole: tuple[Path, Done], calibrated: Path) -> None:
     found, known = json.loads(whole[1].out), dataset(calibrated / "calibration.nc")
     for name in ("drag_coefficient", "force_std_N", "force_interval_s"):
-        assert found[name] == known.attrs[name]
+        assert found[name] == calibration_facts(known)[name]
     fixed, drawn = (dataset(whole[0] / name) for name in ("assembly.nc", "assembly_drawn.nc"))
-    assert (fixed["drag_coefficient"] == known.attrs["drag_coefficient"]).all()
-    assert (fixed["force_std"] == known.attrs["force_std_N"]).all()
+    assert (fixed["drag_coefficient"] == fitted_value(known, "drag_coefficient")).all()
+    assert (fixed["force_std"] == fitted_value(known, "force_std")).all()
     for name in ("drag_coefficient", "force_std"):
         border = known[f"region_{name}"].values
         assert np.unique(drawn[name]).size == 60
@@ -194,11 +197,9 @@ def test_a_calibration_without_bootstrap_gives_one_distribution(
 ) -> None:
     bare = tmp_path / "bare"
     shutil.copytree(calibrated, bare)
-    known = dataset(calibrated / "calibration.nc")
-    del known.attrs["region_level"]
-    known.drop_vars(["region_drag_coefficient", "region_force_std"]).to_netcdf(
-        bare / "calibration.nc", engine="h5netcdf"
-    )
+    gone = ["region_level", "region_drag_coefficient", "region_force_std"]
+    known = dataset(calibrated / "calibration.nc").drop_vars(gone)
+    known.to_netcdf(bare / "calibration.nc", engine="h5netcdf")
     done = here("assemble", bare, *SIZE, "--json", "-o", tmp_path / "run")
     found = json.loads(done.out)
     assert found["drawn"] is None

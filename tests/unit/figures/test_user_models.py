@@ -51,9 +51,7 @@ def test_a_plane_has_the_labels_and_the_estimate_of_the_model(draw):
     ax = draw(calibration)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("speed (m/s)", "rate of tumbles (1/s)")
     places = [container[0].get_xydata()[0] for container in ax.containers]
-    assert places[0] == pytest.approx(
-        [calibration.attrs["speed_m_s"], calibration.attrs["tumble_rate_per_s"]]
-    )
+    assert places[0] == pytest.approx(calibration["estimate"].values)
 
 
 @pytest.mark.parametrize("draw", [plot_ks_map, plot_refined_map])

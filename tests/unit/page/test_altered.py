@@ -32,6 +32,10 @@ def text(name: str) -> Alter:
     return lambda data: data.assign({name: (data[name].dims, np.full(data[name].shape, "<x>"))})
 
 
+def three(name: str) -> Alter:
+    return lambda data: data.assign({name: ("three", np.ones(3))})
+
+
 def attribute(name: str, value: object) -> Alter:
     return lambda data: data.assign_attrs({name: value})
 
@@ -40,10 +44,10 @@ def attribute(name: str, value: object) -> Alter:
     ("file", "alter", "lost", "kept"),
     [
         ("calibration.nc", scalar("ks_distance"), {"map"}, {"recording-1", "flow"}),
-        ("calibration.nc", attribute("drag_coefficient", "<b>"), {"summary"}, {"flow"}),
+        ("calibration.nc", text("estimate"), {"summary"}, {"flow"}),
         ("calibration.nc", lambda d: d.isel(force_std=slice(0, 0)), {"map"}, {"flow"}),
         # Read outside of any section: nothing but the manifest is left, and the reason.
-        ("calibration.nc", attribute("position_noise_m", np.ones(3)), {"summary"}, {"manifest"}),
+        ("calibration.nc", three("position_noise"), {"summary"}, {"manifest"}),
         ("flow.nc", text("u"), {"flow"}, {"map", "recording-1"}),
         ("recording.nc", lambda d: d.assign(x=np.nan * d["x"]), {"map"}, {"summary", "flow"}),
         ("recording.nc", attribute("arena", np.ones(3)), {"recording-1"}, {"summary", "flow"}),

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 from page_reading import numbers_of, part_of, values
-from synthetic_calibration import bundled_recording, synthetic_calibration
+from synthetic_calibration import answered, bundled_recording, synthetic_calibration
 
 from driftwalk.core.errors import InputError
 from driftwalk.page import calibration_sections, map_section
@@ -170,7 +169,7 @@ def test_the_summary_has_the_answer_with_its_uncertainty(
 def test_a_distance_is_judged_by_the_floor(
     calibration: xr.Dataset, distance: float, words: str
 ) -> None:
-    made = calibration_sections(calibration.assign_attrs(ks_distance=distance))
+    made = calibration_sections(answered(calibration, {"ks_distance": distance}))
     assert words in " ".join(part_of(made, "summary")["paragraphs"])
 
 
@@ -181,7 +180,7 @@ def test_a_real_recording_is_not_called_simulated(calibration: xr.Dataset) -> No
 
 def test_warnings_of_the_calibration_are_shown(calibration: xr.Dataset) -> None:
     texts = ["the flow is thin", "<img src=x onerror=alert(1)>"]
-    made = calibration_sections(calibration.assign_attrs(warnings=json.dumps(texts)))
+    made = calibration_sections(answered(calibration, {"warnings": texts}))
     assert part_of(made, "warnings")["items"] == texts
 
 
@@ -230,7 +229,7 @@ def test_halves_are_shown_where_they_are(calibration: xr.Dataset) -> None:
         "second_half_ks_distance": 0.05,
         "second_half_noise_floor": 0.03,
     }
-    made = calibration_sections(calibration.assign_attrs(halves))
+    made = calibration_sections(answered(calibration, halves))
     rows = dict(part_of(made, "validation")["rows"])
     assert rows["σ_F [mN], first half"] == pytest.approx(0.6)
     assert rows["KS distance to the second half"] == 0.05
@@ -241,9 +240,7 @@ def test_without_a_bootstrap_there_is_no_interval_and_that_is_said(
     calibration: xr.Dataset,
 ) -> None:
     names = [name for name in calibration.variables if str(name).startswith(("boot", "region"))]
-    bare = calibration.drop_vars(names)
-    for name in ("drag_coefficient_interval", "force_std_N_interval"):
-        del bare.attrs[name]
+    bare = calibration.drop_vars([*names, "interval"])
     made = calibration_sections(bare)
     assert part_of(made, "bootstrap")["kind"] == "empty"
     assert part_of(made, "map")["region"] is None

@@ -15,7 +15,7 @@ import xarray as xr
 from made_up_fit import made_up_fit
 from page_reading import part_of
 from synthetic_assembly import assembly_path, class_times, distribution
-from synthetic_calibration import bundled_flow, bundled_recording, synthetic_calibration
+from synthetic_calibration import answered, bundled_flow, bundled_recording, synthetic_calibration
 
 from driftwalk import __version__
 from driftwalk.core.errors import InputError, RunDirectoryError
@@ -287,8 +287,8 @@ def test_a_hostile_name_is_only_text(
     tmp_path: Path, datasets: dict[str, xr.Dataset], name: str
 ) -> None:
     hostile = {
-        "calibration.nc": datasets["calibration.nc"].assign_attrs(
-            recording_name=HOSTILE, warnings=json.dumps([HOSTILE])
+        "calibration.nc": answered(
+            datasets["calibration.nc"], {"recording_name": HOSTILE, "warnings": [HOSTILE]}
         )
     }
     folder = make_run(tmp_path / name, hostile, command=HOSTILE, study={HOSTILE: HOSTILE})

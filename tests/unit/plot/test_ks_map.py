@@ -9,7 +9,7 @@ from hypothesis import given, settings, strategies as st
 from matplotlib.collections import QuadMesh
 from matplotlib.contour import ContourSet
 from matplotlib.patches import Polygon, Rectangle
-from synthetic_calibration import synthetic_calibration
+from synthetic_calibration import answered, synthetic_calibration
 
 from driftwalk.core.errors import InputError
 from driftwalk.plot import map as plot_ks_map, refined_map as plot_refined_map
@@ -91,10 +91,8 @@ def test_axis_of_the_force_always_states_its_interval(calibration) -> None:
         label = plot(calibration).get_ylabel()
         assert "mN" in label
         assert "every 16 ms" in label
-    bare = calibration.copy()
-    bare.attrs = {k: v for k, v in calibration.attrs.items() if k != "force_interval_s"}
     with pytest.raises(InputError, match="force_interval_s"):
-        plot_ks_map(bare)
+        plot_ks_map(calibration.drop_vars("force_interval"))
 
 
 def test_optimum_and_interval_bars(calibration) -> None:
@@ -106,12 +104,15 @@ def test_optimum_and_interval_bars(calibration) -> None:
     assert upright[:, 1] == pytest.approx([0.53, 0.70])
 
 
-@pytest.mark.parametrize("interval", [None, [np.nan, np.nan], "[0.34, 0.44]"])
-def test_intervals_may_be_absent_unknown_or_json(calibration, interval) -> None:
-    changed = calibration.copy()
-    changed.attrs = {**calibration.attrs, "drag_coefficient_interval": interval}
-    (bars,) = plot_ks_map(changed).containers
-    assert bars.has_xerr == (interval == "[0.34, 0.44]")
+def test_intervals_may_be_absent_or_unknown(calibration) -> None:
+    unknown = answered(calibration, {"drag_coefficient_interval": [np.nan, np.nan]})
+    for one, across, upright in (
+        (calibration, True, True),
+        (unknown, False, True),
+        (calibration.drop_vars("interval"), False, False),
+    ):
+        (bars,) = plot_ks_map(one).containers
+        assert (bars.has_xerr, bars.has_yerr) == (across, upright)
 
 
 def test_region_is_outlined_in_mn(calibration) -> None:

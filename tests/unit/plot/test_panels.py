@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.collections import QuadMesh
-from synthetic_calibration import synthetic_calibration
+from synthetic_calibration import answered, synthetic_calibration
 
 from driftwalk.core.errors import InputError
 from driftwalk.plot import density_panels as plot_density_panels
@@ -75,8 +75,7 @@ def test_limits_show_all_but_the_tails_of_every_panel(calibration) -> None:
 
 
 def test_a_setting_without_motion_is_a_hatched_panel(calibration) -> None:
-    still = calibration.copy()
-    still.attrs = {**calibration.attrs, "force_std_N": 0.0}
+    still = answered(calibration, {"force_std_N": 0.0})
     row = plot_density_panels(still, low=0.0)
     assert [len([p for p in ax.patches if p.get_hatch()]) for ax in row] == [0, 1, 0, 0]
     assert [text.get_text() for text in row[1].texts] == ["no motion (D = 1)"]

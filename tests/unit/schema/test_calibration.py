@@ -22,7 +22,7 @@ PLACE = Path("run/calibration.nc")
 
 
 def stored(calibration: xr.Dataset) -> xr.Dataset:
-    return calibration.assign_attrs(study=Study().to_toml(), warnings="[]")
+    return calibration.assign_attrs(study=Study().to_toml())
 
 
 @pytest.mark.parametrize("make", [one_parameter, two_parameters])
@@ -42,9 +42,10 @@ def test_the_block_is_known_however_its_dimensions_are_turned():
     ("damage", "message"),
     [
         (lambda found: found.drop_vars("speed"), "lacks the variable 'speed'"),
-        (lambda found: found.drop_attrs(deep=False).assign_attrs(
-            kind="calibration", model="tumble", study="", warnings="[]"
-        ), "lacks the attribute 'speed_m_s'"),
+        (lambda found: found.drop_vars("estimate"), "lacks the variable 'estimate'"),
+        (lambda found: found.drop_attrs(deep=False).assign_attrs(kind="calibration"),
+         "lacks the attribute 'study'"),
+        (lambda found: found.assign(duration=((), "long")), "'duration' holds no numbers"),
         (
             lambda found: found.assign(refined_surface=("refined_speed", np.zeros(13))),
             "'refined_surface' lies on",

@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from driftwalk.assembly.runs.address import stream_keys
 from driftwalk.core.errors import InputError
+from driftwalk.schema.earlier import current_form
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -99,14 +100,15 @@ def has_region(calibration: xr.Dataset) -> bool:
 
 
 def _region_of(calibration: xr.Dataset) -> _Region:
+    calibration = current_form(calibration)
     if not has_region(calibration):
         raise InputError(
             "the calibration has no joint region to draw parameters from: it was made without a "
             "bootstrap or without its refined map; calibrate with `calibration.bootstrap=200`"
         )
     surface = calibration["refined_surface"].values
-    low, level = float(surface.min()), float(calibration.attrs["region_level"])
-    confidence = float(calibration.attrs["confidence"])
+    low, level = float(surface.min()), float(calibration["region_level"])
+    confidence = float(calibration["confidence"])
     # A surface that stays below the level on all its settings still has a border: its own end.
     rise = np.clip((surface - low) / max(level - low, np.finfo(np.float64).tiny), 0.0, 1.0)
     border = np.column_stack(

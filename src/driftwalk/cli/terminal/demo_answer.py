@@ -113,10 +113,9 @@ def print_next(page: Path) -> None:
 def print_calibration(calibration: xr.Dataset) -> None:
     """Print the minimum of the map next to the truth, and its warnings."""
     search = calibration_summary(calibration)
-    near = search["distance_to_floor_ratio"] < calibration.attrs["far_above_floor"]
     _print_estimates("KS map in the fitted flow", search)
     print_row("KS distance, floor", "", _distance(search))
-    print_row("model explains it", "", _word(near))
+    print_row("model explains it", "", _word(bool(calibration["explained"])))
     for warning in search["warnings"]:
         print_note(f"warning: KS map: {warning}")
 

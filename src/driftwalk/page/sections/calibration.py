@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from driftwalk.page.arrays import number
 from driftwalk.page.chart import chart, label, mark, series
 from driftwalk.page.parameters import FORCE, PageParameter, page_parameters
 from driftwalk.page.parts import (
@@ -21,7 +22,6 @@ from driftwalk.page.parts import (
     require,
     required,
     section,
-    texts_of,
     value_of,
 )
 from driftwalk.page.sections.flow import flow_sections
@@ -29,12 +29,14 @@ from driftwalk.page.sections.map import map_section, region_part
 from driftwalk.page.sections.recording import Noise, recording_sections
 from driftwalk.page.words import count, quantity, with_interval
 from driftwalk.plot.parts.labels import interval_of
+from driftwalk.schema.facts import sentences
 
 if TYPE_CHECKING:
     import xarray as xr
 
 FAR: Final = 2.0
-"""From this ratio of distance to floor on a fit is far off, where the dataset does not say."""
+"""From this ratio of distance to floor on a fit is far off; without a bootstrap nothing else says
+so."""
 
 
 def calibration_sections(
@@ -72,7 +74,7 @@ def calibration_sections(
         made = empty_head("There is no calibration yet.")
     else:
         made = head_sections(
-            lambda: calibration_summary(calibration), lambda: texts_of(calibration, "warnings")
+            lambda: calibration_summary(calibration), lambda: sentences(calibration, "warning")
         )
         noise = _noise(calibration)
     if recording is not None:
@@ -92,14 +94,13 @@ def calibration_sections(
 def calibration_summary(calibration: xr.Dataset) -> Section:
     """Return the answer of a calibration in words and numbers."""
     require(calibration, "ks_distance")
-    facts = calibration.attrs
     paragraphs = [SIMULATED] if is_simulated(calibration) else []
     paragraphs += [_what_was_done(calibration), _what_was_found(calibration)]
     shown = [
         *_estimates(calibration),
-        figure("KS distance at the optimum", facts.get("ks_distance"), symbol="D"),
+        figure("KS distance at the optimum", value_of(calibration, "ks_distance"), symbol="D"),
         figure(
-            "noise floor", facts.get("noise_floor"),
+            "noise floor", value_of(calibration, "noise_floor"),
             note="distance between two runs of the same model",
         ),
     ]  # fmt: skip
@@ -114,7 +115,7 @@ def _estimates(calibration: xr.Dataset) -> list[dict[str, Any]]:
         note = None
         if one == FORCE:
             note = f"redrawn every {quantity(required(calibration, 'force_interval_s'), 's')}"
-            found = calibration.attrs.get("force_noise_intensity_N2_s")
+            found = value_of(calibration, "force_noise_intensity_N2_s")
             intensity = [figure("noise intensity", found, "N²·s", symbol="σ_F²·τ")]
         shown.append(
             estimate(
@@ -211,7 +212,7 @@ def _shares(calibration: xr.Dataset, one: PageParameter, title: str, note: str) 
 def validation_section(calibration: xr.Dataset) -> Section:
     """Return the calibration on the first half, judged on the second."""
     title = "Fitted on the first half, tested on the second"
-    if "second_half_ks_distance" not in calibration.attrs:
+    if "second_half_ks_distance" not in calibration:
         return empty_section("validation", title, "The recording was not split into halves.")
     keys = [
         (f"{_with_unit(one)}, {part}", f"{prefix}{one.key}", 1e3 if one == FORCE else 1.0)
@@ -235,8 +236,8 @@ def _with_unit(one: PageParameter) -> str:
 
 
 def _what_was_done(calibration: xr.Dataset) -> str:
-    facts = calibration.attrs
-    words = f"driftwalk compared the recording {facts.get('recording_name', '')}".rstrip()
+    name = calibration.attrs.get("recording_name", "")
+    words = f"driftwalk compared the recording {name}".rstrip()
     duration, pairs = (value_of(calibration, name) for name in ("duration_s", "recording_pairs"))
     if duration is not None and pairs is not None:
         step = value_of(calibration, "step_interval_s")
@@ -284,7 +285,7 @@ def _how_good(calibration: xr.Dataset) -> list[str]:
     if distance is None or floor is None:
         return []
     ratio = distance / floor
-    far = ratio >= (value_of(calibration, "far_above_floor") or FAR)
+    far = not bool(calibration["explained"]) if "explained" in calibration else ratio >= FAR
     verdict = (
         "far above the chance level: the model does not explain this motion"
         if far
@@ -354,10 +355,10 @@ def _profile_series(line: xr.Dataset, along: str) -> list[dict[str, Any]]:
 
 
 def _noise(calibration: xr.Dataset) -> Noise | None:
-    value = value_of(calibration, "position_noise_m")
-    if value is None:
+    if "position_noise" not in calibration:
         return None
-    return Noise(value, None, None, "used in the simulated camera")
+    value = number(float(calibration["position_noise"]))
+    return None if value is None else Noise(value, None, None, "used in the simulated camera")
 
 
 def _one_body(recording: xr.Dataset | None, body: str | None) -> xr.Dataset | None:

@@ -24,7 +24,7 @@ from driftwalk.page.sections.flow import flow_sections
 from driftwalk.page.sections.recording import Noise, recording_sections
 from driftwalk.page.words import count, percent, quantity, with_interval
 from driftwalk.plot.parts.labels import interval_of
-from driftwalk.schema.facts import fit_facts, sentences
+from driftwalk.schema.facts import sentences
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -86,7 +86,6 @@ def fit_sections(
 
 def fit_summary(fit: xr.Dataset, check: xr.Dataset | None = None) -> Section:
     """Return the answer of a fit in words and numbers."""
-    fit = _told(fit)
     every = quantity(required(fit, "force_interval_s"), "s")
     paragraphs = [SIMULATED] if is_simulated(fit) else []
     paragraphs += [_what_was_done(fit), _what_was_found(fit)]
@@ -103,7 +102,7 @@ def fit_summary(fit: xr.Dataset, check: xr.Dataset | None = None) -> Section:
             unit="N²·s",
         ),
         estimate(fit, "tracking_noise_m", label="tracking noise", symbol="", unit="m"),
-        figure("mean squared error of prediction", fit.attrs.get("chi_squared_per_dof"),
+        figure("mean squared error of prediction", value_of(fit, "chi_squared_per_dof"),
                note="1 if the model is right"),
     ]  # fmt: skip
     return section("summary", "summary", "Method and results", paragraphs=paragraphs, numbers=shown)
@@ -183,14 +182,8 @@ def _warnings(fit: xr.Dataset, check: xr.Dataset | None) -> list[str]:
 
 
 def _noise(fit: xr.Dataset) -> Noise | None:
-    fit = _told(fit)
     value = value_of(fit, "tracking_noise_m")
     if value is None:
         return None
     low, high = interval_of(fit, "tracking_noise_m_interval") or (None, None)
     return Noise(value, low, high, "estimated by the fit")
-
-
-def _told(fit: xr.Dataset) -> xr.Dataset:
-    """Return a fit that says its numbers in its attributes, where a summary looks for them."""
-    return fit.assign_attrs(fit_facts(fit))

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.json_text import parse_json
+from driftwalk.schema.calibration_facts import facts_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,7 +62,7 @@ def force_label(calibration: xr.Dataset) -> str:
 
 def force_interval_text(calibration: xr.Dataset) -> str:
     """Return "redrawn every 16 ms" for the force interval of the calibration."""
-    interval_s = required_attribute(calibration, "force_interval_s")
+    interval_s = required_fact(calibration, "force_interval_s")
     return f"redrawn every {1e3 * float(interval_s):.4g} ms"
 
 
@@ -72,11 +72,12 @@ LENGTH_LABEL = "step length (mm)"
 ANGLE_LABEL = "turning (step) angle (°)"
 
 
-def required_attribute(dataset: xr.Dataset, name: str) -> Any:
-    """Return an attribute of the dataset, or raise `InputError` naming it."""
-    if name not in dataset.attrs:
-        raise InputError(f"the calibration has no attribute '{name}': it is not complete")
-    return dataset.attrs[name]
+def required_fact(dataset: xr.Dataset, name: str) -> Any:
+    """Return a fact of the dataset, see `facts_of`, or raise `InputError` naming it."""
+    facts = facts_of(dataset)
+    if name not in facts:
+        raise InputError(f"the calibration has no '{name}': it is not complete")
+    return facts[name]
 
 
 def require_variables(dataset: xr.Dataset, *names: str) -> None:
@@ -87,16 +88,16 @@ def require_variables(dataset: xr.Dataset, *names: str) -> None:
 
 
 def interval_of(calibration: xr.Dataset, name: str) -> tuple[float, float] | None:
-    """Return an interval [low, high] stored as an attribute, None when absent or not finite."""
-    stored = calibration.attrs.get(name)
+    """Return an interval [low, high] of the facts, None when absent or not finite."""
+    stored = facts_of(calibration).get(name)
     if stored is None:
         return None
-    ends = np.asarray(parse_json(stored) if isinstance(stored, str) else stored, dtype=np.float64)
+    ends = np.asarray(stored, dtype=np.float64)
     if ends.shape != (2,) or not np.isfinite(ends).all():
         return None
     return float(ends[0]), float(ends[1])
 
 
-def number_attribute(dataset: xr.Dataset, name: str) -> float:
-    """Return a numeric attribute, NaN when it is absent."""
-    return float(dataset.attrs.get(name, math.nan))
+def number_fact(dataset: xr.Dataset, name: str) -> float:
+    """Return a number of the facts, NaN when it is absent."""
+    return float(facts_of(dataset).get(name, math.nan))

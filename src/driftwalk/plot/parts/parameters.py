@@ -15,8 +15,8 @@ from driftwalk.plot.parts.labels import (
     force_interval_text,
     force_label,
     in_unit,
-    number_attribute,
-    required_attribute,
+    number_fact,
+    required_fact,
 )
 from driftwalk.schema.calibration import StoredParameter, is_block, stored_parameters
 
@@ -55,7 +55,7 @@ class PlotParameter:
 
     @property
     def key(self) -> str:
-        """Attribute of its estimate."""
+        """Flat name of its estimate."""
         return self.stored.key
 
     def label(self, calibration: xr.Dataset) -> str:
@@ -75,7 +75,7 @@ class PlotParameter:
 
     def best(self, calibration: xr.Dataset) -> float:
         """Return the estimate in the figure's unit, or raise `InputError`."""
-        return self.factor * float(required_attribute(calibration, self.key))
+        return self.factor * float(required_fact(calibration, self.key))
 
     def words(self, value: float) -> str:
         """Return a value of the dataset with its unit, for a sentence."""
@@ -147,6 +147,6 @@ def plane_of(calibration: xr.Dataset) -> tuple[PlotParameter, PlotParameter]:
 
 def drawn_anew(calibration: xr.Dataset) -> str:
     """Return "redrawn every 16 ms" for the block's force, "" for other models."""
-    if not np.isfinite(number_attribute(calibration, "force_interval_s")):
+    if not np.isfinite(number_fact(calibration, "force_interval_s")):
         return ""
     return force_interval_text(calibration)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from driftwalk.schema.calibration import StoredParameter
-from driftwalk.schema.description import SIMULATED, STUDY, WARNINGS, Attribute, Kind, Variable
+from driftwalk.schema.description import SIMULATED, STUDY, Attribute, Kind, Variable
 
 CELL_STATUS: Final = {"no_motion": 1, "non_finite": 2, "too_few_steps": 4}
 """Why a setting has no ordinary distance, in bits."""
@@ -23,15 +23,20 @@ _BLOCK: Final = (
     StoredParameter("force_std", "N", "sigma_F", "linear"),
 )
 _OF_THE_BLOCK: Final = (
-    Attribute("force_interval_s", "number", "how long a force lasts; σ_F depends on it"),
-    Attribute("force_noise_intensity_N2_s", "number", "σ_F² times the force interval"),
-    Attribute("wetted_depth_m", "number", "depth of the block in the water"),
-    Attribute("time_step_s", "number", "step of the integrator"),
-)
+    Variable(
+        "force_interval", "", "s", "time after which a force is redrawn",
+        note="σ_F depends on it",
+    ),
+    Variable("force_noise_intensity", "", "N2 s", "σ_F² times the force interval"),
+    Variable("wetted_depth", "", "m", "depth of the block in the water"),
+    Variable("time_step", "", "s", "step of the integrator"),
+)  # fmt: skip
 _OF_ANOTHER_MODEL: Final = (
     Attribute("model", "text", "name of the model", "the model names itself"),
     Attribute("model_source_sha256", "text", "hash of the model's source", "the source is known"),
 )
+OPTIMUM: Final = "optimum_"
+"""In front of the distance at the optimum: the map's own has the plain name."""
 _BINS: Final = "density_step_length density_turning_angle"
 _REFINED: Final = "refined"
 _BOOTSTRAPPED: Final = "with a bootstrap"
@@ -116,57 +121,78 @@ _RECORDING: Final = (
 )  # fmt: skip
 
 
-def _estimates(
-    keys: Sequence[str], prefix: str, meaning: str, when: str = ""
-) -> tuple[Attribute, ...]:
-    return tuple(Attribute(f"{prefix}{key}", "number", meaning, when) for key in keys)
-
-
-def _attributes(
-    parameters: Sequence[StoredParameter], facts: tuple[Attribute, ...]
-) -> tuple[Attribute, ...]:
-    keys = [one.key for one in parameters]
-    level = "[low, high] at the confidence"
-    return (
-        *_estimates(keys, "", "the optimum"),
-        *(Attribute(f"{key}_interval", "numbers", level, _BOOTSTRAPPED) for key in keys),
-        Attribute("confidence", "number", "of the intervals", _BOOTSTRAPPED),
-        *facts,
-        Attribute("ks_distance", "number", "distance at the optimum"),
-        Attribute("ks_distance_standard_error", "number", "its standard error", _BOOTSTRAPPED),
-        Attribute("noise_floor", "number", "distance of two realisations of the optimum"),
-        Attribute("noise_floor_upper", "number", "95 % quantile of that", _BOOTSTRAPPED),
-        Attribute("distance_to_floor_ratio", "number", "how good the fit is", _BOOTSTRAPPED),
-        Attribute("far_above_floor", "number", "ratio that is warned of", _BOOTSTRAPPED),
-        *_estimates(keys, "coarse_", "best setting of the coarse map"),
-        *_estimates(keys, "first_half_", "fitted on the first half", _REFINED),
-        Attribute("second_half_ks_distance", "number", "tested on the second half", _REFINED),
-        Attribute("second_half_noise_floor", "number", "tested on the second half", _REFINED),
-        Attribute("region_level", "number", "distance at the border of the region", _BOOTSTRAPPED),
-        Attribute("interval_stretch", "number", "factor of the intervals", _BOOTSTRAPPED),
-        Attribute("position_noise_m", "number", "noise of the simulated camera"),
-        Attribute("orientation_noise_rad", "number", "noise of the simulated camera"),
-        Attribute("position_quantum_m", "number", "rounding of the simulated camera"),
-        Attribute("step_interval_s", "number", "time of a step"),
-        Attribute("duration_s", "number", "of the recording"),
-        Attribute("recording_pairs", "number", "steps of the recording"),
-        Attribute("recording_name", "text", "name of the recording"),
-        WARNINGS,
-        SIMULATED,
-        STUDY,
-    )
+_ANSWER: Final = (
+    Variable(
+        "estimate", "parameter", None, "estimates of the parameters",
+        note="the optimum, in the units of the coordinate unit",
+    ),
+    Variable(
+        "interval", "parameter bound", None, "intervals of the parameters",
+        when=_BOOTSTRAPPED, note="at the confidence",
+    ),
+    Variable("coarse_estimate", "parameter", None, "best setting of the coarse map"),
+    Variable(
+        "first_half_estimate", "parameter", None, "estimates from the first half of the recording",
+        when=_REFINED,
+    ),
+    Variable("parameter", "parameter", None, "parameter", "text"),
+    Variable("unit", "parameter", None, "unit of the parameter", "text"),
+    Variable("bound", "bound", None, "end of an interval", "text", when=_BOOTSTRAPPED),
+    Variable("warning", "warning", None, "evidence against the calibration", "text"),
+    Variable(
+        "explained", "", None, "whether the model explains the recording", "bool",
+        when=_BOOTSTRAPPED, note="a distance near the floor is no proof",
+    ),
+    Variable("confidence", "", "1", "confidence of the intervals", when=_BOOTSTRAPPED),
+    Variable(f"{OPTIMUM}ks_distance", "", "1", "KS distance at the optimum"),
+    Variable(
+        f"{OPTIMUM}ks_distance_standard_error", "", "1", "its standard error", when=_BOOTSTRAPPED
+    ),
+    Variable("noise_floor", "", "1", "KS distance of two realisations of the optimum"),
+    Variable("noise_floor_upper", "", "1", "its 95 % quantile", when=_BOOTSTRAPPED),
+    Variable(
+        "distance_to_floor_ratio", "", "1", "KS distance at the optimum over the noise floor",
+        when=_BOOTSTRAPPED,
+    ),
+    Variable("far_above_floor", "", "1", "ratio that is warned of", when=_BOOTSTRAPPED),
+    Variable(
+        "second_half_ks_distance", "", "1",
+        "KS distance of the estimates from the first half to the second", when=_REFINED,
+    ),
+    Variable("second_half_noise_floor", "", "1", "noise floor of the second half", when=_REFINED),
+    Variable(
+        "region_level", "", "1", "KS distance at the border of the joint region",
+        when=_BOOTSTRAPPED,
+    ),
+    Variable(
+        "interval_stretch", "", "1", "factor by which the intervals are widened",
+        when=_BOOTSTRAPPED,
+    ),
+    Variable("position_noise", "", "m", "position noise of the simulated camera"),
+    Variable("orientation_noise", "", "rad", "orientation noise of the simulated camera"),
+    Variable("position_quantum", "", "m", "rounding of the simulated camera"),
+    Variable("step_interval", "", "s", "time of a step"),
+    Variable("duration", "", "s", "length of the recording"),
+    Variable("recording_pairs", "", "1", "steps of the recording", "int"),
+)  # fmt: skip
 
 
 def _calibration(
-    parameters: Sequence[StoredParameter], facts: tuple[Attribute, ...], read: str
+    parameters: Sequence[StoredParameter],
+    facts: tuple[Variable, ...],
+    attributes: tuple[Attribute, ...],
+    read: str = "",
 ) -> Kind:
     names = [one.name for one in parameters]
     grid = " ".join(names)
     fine = " ".join(f"refined_{name}" for name in names)
     return Kind(
         name="calibration",
-        version=1,
+        version=2,
         dimensions={
+            "parameter": "parameters of the model, by name",
+            "bound": "lower, upper",
+            "warning": "sentences",
             **dict.fromkeys(names, "coarse map, by the parameter's name"),
             **dict.fromkeys(fine.split(), "refined map"),
             "replicate": "simulations of a setting",
@@ -181,6 +207,8 @@ def _calibration(
             "region_vertex": "border of the joint region",
         },
         variables=(
+            *_ANSWER,
+            *facts,
             *_map("", grid, "replicate", ""),
             *_axes(parameters, "", ""),
             *_details(grid),
@@ -202,13 +230,18 @@ def _calibration(
             ),
             *_each(parameters, "region_", "region_vertex", "at the border of the joint region"),
         ),
-        attributes=_attributes(parameters, facts),
-        read=f"ks_distance {grid}",
-        read_attributes=f"{' '.join(one.key for one in parameters)} {read}",
+        attributes=(
+            *attributes,
+            Attribute("recording_name", "text", "name of the recording"),
+            SIMULATED,
+            STUDY,
+        ),
+        read=f"ks_distance {grid} estimate parameter {read}",
+        read_attributes="study",
     )  # fmt: skip
 
 
-CALIBRATION: Final = _calibration(_BLOCK, _OF_THE_BLOCK, "force_interval_s study warnings")
+CALIBRATION: Final = _calibration(_BLOCK, _OF_THE_BLOCK, (), "force_interval")
 
 
 def calibration_of(parameters: Sequence[StoredParameter]) -> Kind:
@@ -222,10 +255,10 @@ def calibration_of(parameters: Sequence[StoredParameter]) -> Kind:
     Examples
     --------
     >>> kind = calibration_of([StoredParameter("speed", "m/s", "speed", "linear")])
-    >>> kind.variable("bootstrap_speed").units, kind.read_attributes
-    ('m/s', 'speed_m_s study warnings')
+    >>> kind.variable("bootstrap_speed").units, kind.read.split()
+    ('m/s', ['ks_distance', 'speed', 'estimate', 'parameter'])
     """
-    return _calibration(parameters, _OF_ANOTHER_MODEL, "study warnings")
+    return _calibration(parameters, (), _OF_ANOTHER_MODEL)
 
 
 KINDS: Final = (CALIBRATION,)

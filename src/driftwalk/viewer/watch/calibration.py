@@ -242,10 +242,9 @@ class RunningCalibration:
             variables["excerpt_time"] = ("excerpt_sample", self._recorded.excerpt_time)
             coordinates["step_length_edge"] = self._recorded.length_edge
             coordinates["turning_angle_edge"] = self._recorded.angle_edge
-        facts: dict[str, Any] = {"kind": "calibration"}
         if names == BLOCK:
-            facts["force_interval_s"] = self._study.forces.force_interval_s
-        return xr.Dataset(variables, coordinates, facts)
+            variables["force_interval"] = ((), self._study.forces.force_interval_s)
+        return xr.Dataset(variables, coordinates, {"kind": "calibration"})
 
     def _axes(self, found: SettingsMap, prefix: str) -> dict[str, Any]:
         """Return the coordinates of a map in the units of the parameters."""
