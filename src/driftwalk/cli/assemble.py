@@ -41,7 +41,8 @@ from driftwalk.cli.options.shared import (
     WallFriction,
     WallRestitution,
 )
-from driftwalk.cli.terminal.output import print_json, print_note, print_table, report_command
+from driftwalk.cli.terminal.answer import print_figures, print_warnings
+from driftwalk.cli.terminal.output import print_json, print_table
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS, study_overrides
@@ -151,8 +152,7 @@ def assemble(
         print_json({**summary(work.study, result), "warnings": warnings})
         return
     print_answer(work.study, result, out)
-    for warning in warnings:
-        print_note(f"warning: {warning}")
+    print_warnings(warnings)
 
 
 def _check_film(film: str) -> None:
@@ -266,7 +266,7 @@ def print_answer(study: Study, result: AssemblyResult, folder: Path) -> None:
             f"l1 distance of the two: {apart['l1_distance']:.4f}; by chance "
             f"{apart['l1_noise_floor']:.4f} (95 %: {apart['l1_noise_floor_95']:.4f})"
         )
-    print(f"figures: {folder / 'figures'}; all in one page: {report_command(folder)}")
+    print_figures(folder)
 
 
 def _seen(distributions: list[xr.Dataset]) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -29,13 +29,10 @@ from driftwalk.cli.options.shared import (
     WallRestitution,
     resolve_study,
 )
-from driftwalk.cli.terminal.output import print_json, print_note, report_command
+from driftwalk.cli.terminal.calibration_answer import print_answer, summary
+from driftwalk.cli.terminal.output import print_json
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.study_keys import CALIBRATION_KEYS, study_overrides
-from driftwalk.schema.calibration_facts import calibration_facts
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 Threads = Annotated[
     int | None,
@@ -128,80 +125,3 @@ def calibrate(
         print_json(summary(found))
     else:
         print_answer(found, out)
-
-
-_KEYS = (
-    "drag_coefficient",
-    "drag_coefficient_interval",
-    "force_std_N",
-    "force_std_N_interval",
-    "confidence",
-    "force_interval_s",
-    "force_noise_intensity_N2_s",
-    "ks_distance",
-    "ks_distance_standard_error",
-    "noise_floor",
-    "noise_floor_upper",
-    "distance_to_floor_ratio",
-    "interval_stretch",
-    "second_half_ks_distance",
-    "second_half_noise_floor",
-    "first_half_drag_coefficient",
-    "first_half_force_std_N",
-    "coarse_drag_coefficient",
-    "coarse_force_std_N",
-    "wetted_depth_m",
-    "position_noise_m",
-    "orientation_noise_rad",
-    "step_interval_s",
-    "time_step_s",
-    "duration_s",
-    "recording_pairs",
-)
-
-
-def summary(found: xr.Dataset) -> dict[str, Any]:
-    """Return what ``--json`` prints: the answer with units in its keys."""
-    facts = calibration_facts(found)
-    return {
-        **{key: facts.get(key) for key in _KEYS},
-        "recording": facts["recording_name"],
-        "warnings": facts["warnings"],
-    }
-
-
-def print_answer(found: xr.Dataset, folder: Path) -> None:
-    """Print the answer for people, and where the figures are."""
-    facts = calibration_facts(found)
-    interval = facts["force_interval_s"]
-    if facts["simulated_recording"] == "yes":
-        print("This recording was simulated by another engine (ODE).")
-    percent = f"{facts.get('confidence', 0.9):.0%} interval"
-    drag = facts["drag_coefficient"]
-    force = 1e3 * facts["force_std_N"]
-    print(f"drag coefficient C_d   {drag:.4f}{_interval(facts, 'drag_coefficient', 1, percent)}")
-    print(
-        f"stochastic force σ_F   {force:.4f} mN, redrawn every {1e3 * interval:g} ms"
-        f"{_interval(facts, 'force_std_N', 1e3, percent)}"
-    )
-    print(f"noise intensity σ_F²·τ {facts['force_noise_intensity_N2_s']:.4g} N² s")
-    print(
-        f"KS distance            {facts['ks_distance']:.4f} at the optimum, "
-        f"noise floor {facts['noise_floor']:.4f}"
-    )
-    if "second_half_ks_distance" in facts:
-        print(
-            f"second half            {facts['second_half_ks_distance']:.4f} for a calibration on "
-            f"the first, noise floor {facts['second_half_noise_floor']:.4f}"
-        )
-    for warning in facts["warnings"]:
-        print_note(f"warning: {warning}")
-    print(f"figures                {folder / 'figures'}")
-    print(f"all in one page        {report_command(folder)}")
-
-
-def _interval(facts: dict[str, Any], key: str, scale: float, percent: str) -> str:
-    ends = facts.get(f"{key}_interval")
-    if ends is None:
-        return "   no interval without a bootstrap"
-    return f"   {percent} {scale * ends[0]:.4f} to {scale * ends[1]:.4f}"

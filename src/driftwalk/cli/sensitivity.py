@@ -47,7 +47,8 @@ from driftwalk.cli.options.shared import (
     WallRestitution,
 )
 from driftwalk.cli.options.vary import VARY_KEYS, vary_overrides
-from driftwalk.cli.terminal.output import print_json, print_note
+from driftwalk.cli.terminal.answer import print_warnings
+from driftwalk.cli.terminal.output import print_json
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.cli.terminal.sensitivity_answer import print_answer, summary
 from driftwalk.core.study_keys import SENSITIVITY_KEYS, study_overrides
@@ -166,8 +167,7 @@ def sensitivity(
         print_json({**summary(work.study, result), "warnings": warnings})
         return
     print_answer(work.study, result, out)
-    for warning in warnings:
-        print_note(f"warning: {warning}")
+    print_warnings(warnings)
 
 
 def _flow_paths(study: Study, folder: Path) -> dict[str, Path]:

@@ -1,10 +1,10 @@
-"""The answer of a dataset in a few lines of text: its parameters, their intervals, the verdict."""
+"""The answer of a dataset as a person reads it: its parameters, their intervals, the verdict."""
 
 from __future__ import annotations
 
 import math
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,13 +21,63 @@ SMALL_UNITS: Final = MappingProxyType({"N": (1e3, "mN"), "m": (1e3, "mm")})
 """Units in which a person reads the numbers of a 3-cm block, and their number in the SI unit."""
 
 
+class Estimate(NamedTuple):
+    """An estimate in the unit of a reader."""
+
+    value: float
+    unit: str
+    """Such as "mN"; empty for a number without a unit."""
+    ends: tuple[float, float] | None
+    """Its interval, where it has one."""
+
+
+def symbol_of(parameter: str) -> str:
+    """Return the symbol of a parameter, its name in words where it has none."""
+    return SYMBOLS.get(parameter, parameter.replace("_", " "))
+
+
+def reader_unit(unit: str) -> tuple[float, str]:
+    """Return the unit in which a person reads numbers, and their factor.
+
+    Examples
+    --------
+    >>> reader_unit("N"), reader_unit("1"), reader_unit("m/s")
+    ((1000.0, 'mN'), (1.0, ''), (1.0, 'm/s'))
+    """
+    return SMALL_UNITS.get(unit, (1.0, "" if unit == "1" else unit))
+
+
+def estimate_of(found: xr.Dataset, parameter: str) -> Estimate:
+    """Return the estimate of a parameter with its interval.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        With ``estimate`` by ``parameter`` and their ``unit``; ``interval`` may be absent.
+    parameter : str
+        One of them.
+
+    Raises
+    ------
+    KeyError
+        When it has no such parameter.
+    """
+    one = found.sel(parameter=parameter)
+    scale, unit = reader_unit(str(one["unit"].values))
+    ends = None
+    if "interval" in found.variables:
+        low, high = (scale * float(end) for end in one["interval"].values)
+        ends = None if math.isnan(low) else (low, high)
+    return Estimate(scale * float(one["estimate"]), unit, ends)
+
+
 def answer_lines(found: xr.Dataset) -> list[str]:
     """Return what a fit or a calibration says, a line each; nothing for any other dataset.
 
     Parameters
     ----------
     found : xarray.Dataset
-        With ``estimate`` and ``interval`` by parameter, as a `fit` has them.
+        With ``estimate`` by parameter, as a `fit` and a `calibration` have it.
 
     Returns
     -------
@@ -45,14 +95,14 @@ def answer_lines(found: xr.Dataset) -> list[str]:
     >>> answer_lines(found.assign(confidence=0.9))
     ['C_d  0.4  [0.38, 0.42]', 'intervals of 90 %']
     """
-    needed = ("estimate", "interval", "parameter", "unit")
+    needed = ("estimate", "parameter", "unit")
     if any(name not in found.variables for name in needed) or found["estimate"].ndim != 1:
         return []
     names = [str(name) for name in found["parameter"].values]
-    heads = [SYMBOLS.get(name, name.replace("_", " ")) for name in names]
+    heads = [symbol_of(name) for name in names]
     width = max(map(len, heads), default=0)
     lines = [
-        f"{head:{width}}  {_estimate(found.sel(parameter=name))}"
+        f"{head:{width}}  {_text(estimate_of(found, name))}"
         for head, name in zip(heads, names, strict=True)
     ]
     lines += _conditions(found)
@@ -66,13 +116,9 @@ def answer_lines(found: xr.Dataset) -> list[str]:
     return lines
 
 
-def _estimate(found: xr.Dataset) -> str:
-    unit = str(found["unit"].values)
-    scale, shown = SMALL_UNITS.get(unit, (1.0, "" if unit == "1" else unit))
-    value = scale * float(found["estimate"])
-    low, high = (scale * float(end) for end in found["interval"].values)
-    text = f"{value:.4g} {shown}".rstrip()
-    return text if math.isnan(low) else f"{text}  [{low:.4g}, {high:.4g}]"
+def _text(found: Estimate) -> str:
+    text = f"{found.value:.4g} {found.unit}".rstrip()
+    return text if found.ends is None else f"{text}  [{found.ends[0]:.4g}, {found.ends[1]:.4g}]"
 
 
 def _conditions(found: xr.Dataset) -> list[str]:

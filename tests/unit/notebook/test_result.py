@@ -65,9 +65,10 @@ def test_a_parameter_without_an_interval_has_none() -> None:
     found = answer()
     found["interval"][0] = np.nan
     assert answer_lines(found)[0] == "C_d             0.393"
+    assert answer_lines(found.drop_vars("interval"))[1] == "σ_F             0.55 mN"
 
 
-@pytest.mark.parametrize("part", [["estimate"], ["confidence"], []])
+@pytest.mark.parametrize("part", [["interval"], ["confidence"], []])
 def test_a_part_without_an_answer_prints_as_a_dataset(part: list[str]) -> None:
     assert answer_lines(answer()[part]) == []
     assert repr(as_result(answer())[part]).startswith("<xarray")

@@ -6,18 +6,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from driftwalk.cli.calibrate import summary as calibration_summary
-from driftwalk.cli.fit import answer, summary as fit_summary
+from driftwalk.cli.terminal.answer import ends_text, label_of, number_text
+from driftwalk.cli.terminal.calibration_answer import summary as calibration_summary
+from driftwalk.cli.terminal.fit_answer import answer
 from driftwalk.cli.terminal.output import print_note
+from driftwalk.schema.answer import estimate_of, reader_unit
+from driftwalk.schema.facts import ESTIMATES
 
 if TYPE_CHECKING:
     import xarray as xr
 
-ROWS: Final = (
-    ("drag coefficient C_d", "drag_coefficient", 1.0),
-    ("stochastic force σ_F [mN]", "force_std_N", 1e3),
-    ("tracking noise [mm]", "tracking_noise_m", 1e3),
-)
+ROWS: Final = ("drag_coefficient", "force_std_N", "tracking_noise_m")
+"""The estimates by their flat names."""
 KNOWN: Final = ("drag_coefficient", "force_std_N", "force_interval_s", "tracking_noise_m")
 STEP_REMARK: Final = (
     "The engine's steps of 16 ms\nmake its drag act some 2 % stronger than its C_d says."
@@ -81,7 +81,7 @@ def print_fit(fit: xr.Dataset) -> None:
     """Print the estimates of the fit next to the truth, as soon as they are ready."""
     every = 1e3 * demo_truth()["force_interval_s"]
     print("This recording was simulated by another engine (ODE): the truth is known.")
-    _print_estimates("likelihood fit", fit_summary(fit))
+    _print_estimates("likelihood fit", fit)
     # Through a pipe the answer would wait in the buffer for the check and the map.
     print(
         f"Intervals of 90 %; σ_F redrawn every {every:g} ms. {STEP_REMARK}",
@@ -113,7 +113,7 @@ def print_next(page: Path) -> None:
 def print_calibration(calibration: xr.Dataset) -> None:
     """Print the minimum of the map next to the truth, and its warnings."""
     search = calibration_summary(calibration)
-    _print_estimates("KS map in the fitted flow", search)
+    _print_estimates("KS map in the fitted flow", calibration)
     print_row("KS distance, floor", "", _distance(search))
     print_row("model explains it", "", _word(bool(calibration["explained"])))
     for warning in search["warnings"]:
@@ -126,11 +126,14 @@ def print_places(folder: Path, page: Path) -> None:
     print(f"open in a browser: {page}")
 
 
-def _print_estimates(method: str, facts: dict[str, Any]) -> None:
+def _print_estimates(method: str, found: xr.Dataset) -> None:
     truth = demo_truth()
     print_row("", "truth", method)
-    for name, key, scale in ROWS:
-        print_row(name, f"{scale * truth[key]:.4g}", _estimate(facts, key, scale))
+    for key in ROWS:
+        name, stored = ESTIMATES[key]
+        scale, unit = reader_unit(stored)
+        label = f"{label_of(name)} [{unit}]" if unit else label_of(name)
+        print_row(label, f"{scale * truth[key]:.4g}", _estimate(found, name))
 
 
 def print_row(name: str, *cells: str) -> None:
@@ -140,11 +143,12 @@ def print_row(name: str, *cells: str) -> None:
     print(f"{name:27}{line}".rstrip())
 
 
-def _estimate(facts: dict[str, Any], key: str, scale: float) -> str:
-    if f"{key}_interval" not in facts:
+def _estimate(found: xr.Dataset, name: str) -> str:
+    if name not in found["parameter"].values:
         return "taken from the recording"
-    low, high = (scale * end for end in facts[f"{key}_interval"])
-    return f"{scale * facts[key]:.4f} ({low:.4f} to {high:.4f})"
+    one = estimate_of(found, name)
+    ends = ends_text(one)
+    return number_text(one.value) + ("" if ends is None else f" ({ends})")
 
 
 def _distance(facts: dict[str, Any], floor: str = "noise_floor") -> str:

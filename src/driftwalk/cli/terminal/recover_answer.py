@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.cli.terminal.output import print_note, print_table, report_command
+from driftwalk.cli.terminal.answer import print_page, print_row, print_warnings
+from driftwalk.cli.terminal.output import print_table
 from driftwalk.cli.terminal.progress import duration_text
+from driftwalk.schema.answer import symbol_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
-LABELS: Final = {
-    "drag_coefficient": "C_d",
-    "force_std": "σ_F",
-    "tracking_noise": "tracking noise",
-}
+PARAMETERS: Final = ("drag_coefficient", "force_std", "tracking_noise")
 SUMMARY: Final = (
     *("median_absolute_error", "absolute_error_90", "bias", "rms_error", "spread", "rms_z"),
     *("coverage", "coverage_low", "coverage_high"),
@@ -39,7 +37,8 @@ def summary(found: xr.Dataset) -> dict[str, Any]:
     results = []
     for part in _parts(found):
         table = {
-            name: {key: float(part[key].sel(parameter=name)) for key in SUMMARY} for name in LABELS
+            name: {key: float(part[key].sel(parameter=name)) for key in SUMMARY}
+            for name in PARAMETERS
         }
         flow = {key: float(part[key]) for key in ("median_flow_error", "flow_error_90")}
         results.append(
@@ -162,10 +161,9 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
     )
     for angle in found["angle"].values:
         print(_needed_sentence(found.sel(angle=angle)))
-    for text in warnings(found):
-        print_note(f"warning: {text}")
-    print(f"every recording        {folder / 'recovery.nc'}")
-    print(f"all in one page        {report_command(folder)}")
+    print_warnings(warnings(found))
+    print_row("every recording", folder / "recovery.nc")
+    print_page(folder)
 
 
 def _parts(found: xr.Dataset) -> list[xr.Dataset]:
@@ -179,7 +177,7 @@ def _parts(found: xr.Dataset) -> list[xr.Dataset]:
 def _rows(part: xr.Dataset) -> list[list[str]]:
     used = counts(part)["used"]
     rows = []
-    for name, label in LABELS.items():
+    for name in PARAMETERS:
         value = {key: float(part[key].sel(parameter=name)) for key in SUMMARY}
         covered = (
             f"{round(value['coverage'] * used)} of {used} ({value['coverage_low']:.0%} to "
@@ -189,7 +187,13 @@ def _rows(part: xr.Dataset) -> list[list[str]]:
         )
         errors = [_percent(value[key]) for key in ("median_absolute_error", "absolute_error_90")]
         rows.append(
-            [label, *errors, _percent(value["bias"], sign="+"), f"{value['rms_z']:.2f}", covered]
+            [
+                symbol_of(name),
+                *errors,
+                _percent(value["bias"], sign="+"),
+                f"{value['rms_z']:.2f}",
+                covered,
+            ]
         )
     flow = [_percent(float(part[key])) for key in ("median_flow_error", "flow_error_90")]
     rows.append(["flow", *flow])

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.cli.terminal.output import print_table, report_command
+from driftwalk.cli.terminal.answer import print_figures
+from driftwalk.cli.terminal.output import print_table
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -159,7 +160,7 @@ def print_answer(study: Study, result: SensitivityResult, folder: Path) -> None:
     _print_components(result.components)
     if result.indices is not None:
         _print_indices(result.indices)
-    print(f"figures: {folder / 'figures'}; all in one page: {report_command(folder)}")
+    print_figures(folder)
 
 
 def _print_reference(reference: xr.Dataset) -> None:

@@ -1,0 +1,128 @@
+"""Output of `driftwalk fit`: one JSON object, or rows for people."""
+
+from __future__ import annotations
+
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from driftwalk.cli.terminal.answer import (
+    print_estimates,
+    print_intensity,
+    print_origin,
+    print_page,
+    print_row,
+    print_warnings,
+)
+from driftwalk.schema.facts import fit_facts, sentences
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+MOST_FINDINGS: Final = 2
+"""Findings that are printed; all are in the file."""
+FAR_ABOVE_FLOOR: Final = 2.0
+_KEYS: Final = (
+    "drag_coefficient",
+    "drag_coefficient_interval",
+    "force_std_N",
+    "force_std_N_interval",
+    "force_interval_s",
+    "force_noise_intensity_N2_s",
+    "force_noise_intensity_N2_s_interval",
+    "tracking_noise_m",
+    "tracking_noise_m_interval",
+    "confidence",
+    "maximum_likelihood_drag_coefficient",
+    "wetted_depth_m",
+    "wall_share",
+    "angle",
+    "chi_squared_per_dof",
+    "autocorrelation",
+    "autocorrelation_std",
+    "samples",
+    "samples_used",
+    "duration_s",
+    "recordings",
+    "iterations",
+    "converged",
+    "visited_share",
+    "drag_coefficient_relative_std",
+    "drag_coefficient_precision",
+    "needed_duration_s",
+    "switching_times_s",
+)
+"""The last ones where they are in the fit."""
+
+
+def summary(found: xr.Dataset) -> dict[str, Any]:
+    """Return the fit with units in its keys."""
+    facts = fit_facts(found)
+    return {
+        **{key: facts[key] for key in _KEYS if key in facts},
+        "recording": facts["source"],
+        "warnings": facts["warnings"],
+    }
+
+
+def answer(fit: xr.Dataset, check: xr.Dataset | None) -> dict[str, Any]:
+    """Return all that ``--json`` prints: the fit, and the check where one was asked for."""
+    return summary(fit) | verdict(check, fit)
+
+
+def verdict(check: xr.Dataset | None, fit: xr.Dataset) -> dict[str, Any]:
+    """Return the check of the model with units in its keys; nothing where none was asked for."""
+    if check is None:
+        reason = fit.attrs.get("check_left_out")
+        return {} if reason is None else {"explained": None, "check_left_out": reason}
+    facts = check.attrs
+    distances = {key: float(facts[key]) for key in ("ks_distance", "ks_noise_floor")}
+    return {
+        "explained": bool(check["explained"]),
+        "findings": sentences(check, "finding"),
+        **{key: value if isfinite(value) else None for key, value in distances.items()},
+    }
+
+
+def print_answer(fit: xr.Dataset, check: xr.Dataset | None, folder: Path) -> None:
+    """Print the answer for people: the fit, where the flow is, and the check."""
+    facts = fit_facts(fit)
+    print_origin(fit)
+    print_estimates(fit, "drag_coefficient", "force_std", "tracking_noise")
+    print_intensity(facts["force_noise_intensity_N2_s"])
+    print_row("intervals at the wall", f"{facts['wall_share']:.1%}, left out")
+    if "flow" in fit.dims:
+        names = fit["flow"].values[fit["interval_flow"].values]
+        times = ", ".join(f"{time:g} s" for time in facts["switching_times_s"])
+        print_row("flows", f"{', '.join(names)}, switched at {times}")
+    print_warnings(facts["warnings"])
+    print_row("flow", folder / "flow.nc")
+    _print_verdict(check, fit)
+    print_page(folder)
+
+
+def _print_verdict(check: xr.Dataset | None, fit: xr.Dataset) -> None:
+    """Print whether the model explains the recording, and the worst of what speaks against it."""
+    found = verdict(check, fit)
+    if check is None:
+        if found:
+            print_row("model check", found["check_left_out"])
+        return
+    if found["explained"]:
+        print_row("model check", "the model explains this recording")
+    else:
+        print_row("model check", "THE MODEL DOES NOT EXPLAIN THIS RECORDING:")
+        for finding in found["findings"][:MOST_FINDINGS]:
+            print(f"  {finding}")
+        more = len(found["findings"]) - MOST_FINDINGS
+        if more > 0:
+            print(f"  and {more} more: see findings in check.nc, or --json")
+    if found["ks_distance"] is None:
+        print_row("KS distance", f"not available: {check.attrs['ks_left_out']}")
+        return
+    far = found["ks_distance"] > FAR_ABOVE_FLOOR * found["ks_noise_floor"]
+    print_row(
+        "KS distance",
+        f"{found['ks_distance']:.3f}, noise floor {found['ks_noise_floor']:.3f}"
+        + (": far, but within the uncertainty of the fit" if found["explained"] and far else ""),
+    )

@@ -1,0 +1,61 @@
+"""Rows of an answer on the terminal: labels, units for people, intervals."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from driftwalk.cli.terminal.answer import print_estimates, print_figures, print_origin
+
+
+def answer() -> xr.Dataset:
+    values = {
+        "estimate": ("parameter", [0.4, 6e-4, 2e-8, 0.05]),
+        "interval": (
+            ("parameter", "bound"),
+            [[0.35, 0.45], [0.0, np.inf], [1e-8, 4e-8], [np.nan, np.nan]],
+        ),
+        "confidence": 0.95,
+        "force_interval": 0.016,
+    }
+    names = {
+        "parameter": ["drag_coefficient", "force_std", "tracking_noise", "swim_speed"],
+        "unit": ("parameter", ["1", "N", "m", "m/s"]),
+    }
+    return xr.Dataset(values, names)
+
+
+def test_an_estimate_is_a_row_in_the_units_of_a_reader(capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer()
+    print_estimates(found, *(str(name) for name in found["parameter"].values))
+    assert capsys.readouterr().out.splitlines() == [
+        "drag coefficient C_d   0.4000   95% interval 0.3500 to 0.4500",
+        "stochastic force σ_F   0.6000 mN, redrawn every 16 ms   95% interval 0 to inf",
+        "tracking noise         2e-05 mm   95% interval 1e-05 to 4e-05",
+        "swim speed             0.0500 m/s   no interval without a bootstrap",
+    ]
+
+
+def test_without_intervals_that_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    print_estimates(answer().drop_vars(["interval", "confidence"]), "drag_coefficient")
+    (line,) = capsys.readouterr().out.splitlines()
+    assert line == "drag coefficient C_d   0.4000   no interval without a bootstrap"
+
+
+def test_values_of_all_rows_begin_in_one_column(capsys: pytest.CaptureFixture[str]) -> None:
+    print_estimates(answer(), "drag_coefficient", "force_std")
+    print_figures(Path("run"))
+    lines = capsys.readouterr().out.splitlines()
+    assert [line[:22].rstrip() == line[:23].rstrip() for line in lines] == [True] * 4
+    assert [line[23] for line in lines] == ["0", "0", "r", "d"]
+
+
+@pytest.mark.parametrize(("simulated", "lines"), [("yes", 1), ("no", 0)])
+def test_a_simulated_recording_is_called_so(
+    simulated: str, lines: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    print_origin(answer().assign_attrs(simulated_recording=simulated))
+    assert len(capsys.readouterr().out.splitlines()) == lines
