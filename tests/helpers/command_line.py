@@ -35,6 +35,18 @@ refined_replicates = 2
 bootstrap = 10
 """
 
+# What draws the figures and the film of a run, below the package.
+FIGURE_WRITERS = (
+    *("figures.write_figures", "figures.write_fit_figures", "figures.write_check_figures"),
+    *("figures.write_recovery_figures", "figures.write_assembly_figures"),
+    *("figures.write_sensitivity_figures", "plot.write_animation"),
+)
+
+# Lines for `start` and `apart`: no figures and no film, which take most of the time of a short run.
+NO_FIGURES = "import driftwalk.figures, driftwalk.plot\n" + "".join(
+    f"driftwalk.{name} = lambda *folders, **datasets: []\n" for name in FIGURE_WRITERS
+)
+
 # SIGINT is set because a program started in the background inherits that it is ignored.
 PROGRAM = """
 import signal

@@ -37,35 +37,32 @@ SIZE = ["--blocks", "4", "--runs", "60", "--duration", "30s", "--threads", "1"]
 RESULTS = ("assembly.nc", "distribution.nc", "class_times.nc", "path.nc")
 DRAWN = ("assembly_drawn.nc", "distribution_drawn.nc")
 
+# A film of 20 frames in place of 250.
+SHORT_FILM = "from driftwalk.plot import tank\ntank.FRAMES_PER_S = 1.0\n"
+
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 @pytest.fixture(scope="module")
-def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def calibrated(undrawn: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the run directory of a short calibration, with a flow field of its own."""
     place = tmp_path_factory.mktemp("calibrated")
     study = place / "study.toml"
     study.write_text(GRID, encoding="utf-8")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("driftwalk.figures.write_figures", lambda *datasets, **options: [])
-        done = here(
-            *("calibrate", RECORDING, "--to", "60s", "--study", study, "--out", place / "run"),
-            *("--tank-diameter", "30cm", "--threads", "1"),
-        )
+    done = here(
+        *("calibrate", RECORDING, "--to", "60s", "--study", study, "--out", place / "run"),
+        *("--tank-diameter", "30cm", "--threads", "1"),
+    )
     assert done.code == 0, done.err
     return place / "run"
-
-
-@pytest.fixture(autouse=True)
-def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out the figures, which take most of the time of a short run in this process."""
-    monkeypatch.setattr("driftwalk.figures.write_assembly_figures", lambda *folders, **datasets: [])
-    monkeypatch.setattr("driftwalk.plot.write_animation", lambda *words: None)
 
 
 @pytest.fixture(scope="module")
 def whole(calibrated: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Done]:
     """Return a run from the calibration, figures and all."""
     folder = tmp_path_factory.mktemp("whole") / "assembly"
-    return folder, apart("assemble", calibrated, *SIZE, "--json", "-o", folder)
+    done = apart("assemble", calibrated, *SIZE, "--json", "-o", folder, before=SHORT_FILM)
+    return folder, done
 
 
 def dataset(path: Path) -> xr.Dataset:

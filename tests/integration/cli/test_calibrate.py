@@ -18,6 +18,7 @@ import pytest
 from command_line import (
     FLOW,
     GRID,
+    NO_FIGURES,
     RECORDING,
     Done,
     apart,
@@ -31,6 +32,8 @@ from command_line import (
 )
 
 import driftwalk
+from driftwalk.figures.calibration import ks_map_figure
+from driftwalk.plot.parts.style import print_style
 from driftwalk.schema.calibration_facts import calibration_facts
 
 FIGURES = (
@@ -41,12 +44,6 @@ REQUIRED = (
     *("drag_coefficient", "drag_coefficient_interval", "force_std_N", "force_std_N_interval"),
     *("force_interval_s", "force_noise_intensity_N2_s", "ks_distance", "noise_floor"),
 )
-
-
-@pytest.fixture
-def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out the figures, which take most of the time of a short run."""
-    monkeypatch.setattr("driftwalk.figures.write_figures", lambda *datasets, **options: [])
 
 
 @pytest.fixture(scope="module")
@@ -250,6 +247,7 @@ def test_an_optimum_at_the_edge_and_a_bad_fit_are_warned_of(study: Path, tmp_pat
     assert any("edge of the grid" in text for text in warnings)
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_a_setting_in_which_nothing_moves_has_distance_1_and_is_hatched(tmp_path: Path) -> None:
     """A block at rest in still water, without a force: nothing can move it."""
     resting = tmp_path / "resting.csv"
@@ -281,13 +279,14 @@ def test_a_setting_in_which_nothing_moves_has_distance_1_and_is_hatched(tmp_path
     )
     assert ((rest["status"] & masks["no_motion"]) != 0).all()
     assert ((found.sel(force_std=slice(1e-5, None))["status"] & masks["no_motion"]) == 0).all()
-    svg = (run / "figures" / "ks_map.svg").read_text(encoding="utf-8")
+    with print_style():
+        ks_map_figure(found).savefig(tmp_path / "ks_map.svg")
+    svg = (tmp_path / "ks_map.svg").read_text(encoding="utf-8")
     assert svg.count('<g id="no motion (D = 1)">') >= found.sizes["drag_coefficient"]
 
 
 # In processes of their own: what depends on the terminal, the threads and the instruction set.
 
-PLAIN = "import driftwalk.figures\ndriftwalk.figures.write_figures = lambda *a, **k: []\n"
 CHATTY = (
     "from driftwalk.cli.terminal.progress import ProgressReporter\n"
     "ProgressReporter.__init__.__kwdefaults__['seconds_between_lines'] = 0.0\n"
@@ -300,9 +299,9 @@ def test_threads_and_instruction_sets_do_not_change_a_bit(
 ) -> None:
     first, second = tmp_path / "first", tmp_path / "second"
     options = ["--flow", FLOW, "--threads"]
-    assert apart(*words(study, first)[:-2], *options, 1, before=PLAIN).code == 0
+    assert apart(*words(study, first)[:-2], *options, 1, before=NO_FIGURES).code == 0
     monkeypatch.setenv("DRIFTWALK_INSTRUCTION_SET", "baseline")
-    assert apart(*words(study, second)[:-2], *options, 2, before=PLAIN).code == 0
+    assert apart(*words(study, second)[:-2], *options, 2, before=NO_FIGURES).code == 0
     assert_same_bits(calibration(first), calibration(second))
     sets = [
         json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
@@ -314,7 +313,7 @@ def test_threads_and_instruction_sets_do_not_change_a_bit(
 
 
 def test_progress_through_a_pipe_is_plain_lines(study: Path, tmp_path: Path) -> None:
-    done = apart(*words(study, tmp_path / "run"), "--flow", FLOW, before=PLAIN + CHATTY)
+    done = apart(*words(study, tmp_path / "run"), "--flow", FLOW, before=NO_FIGURES + CHATTY)
     assert done.code == 0
     lines = [line for line in done.err.splitlines() if line.startswith("calibrate: ")]
     assert len(lines) > 5
@@ -338,7 +337,7 @@ def test_progress_on_a_terminal_is_a_bar_with_the_time_left(study: Path, tmp_pat
     process = start(
         *words(study, tmp_path / "run", "300s"),
         *("--flow", FLOW),
-        before=PLAIN,
+        before=NO_FIGURES,
         stderr=slave,
         stdin=subprocess.DEVNULL,
         env={**os.environ, "TERM": "xterm", "COLUMNS": "100"},

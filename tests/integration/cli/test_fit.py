@@ -67,6 +67,7 @@ def test_the_run_directory_is_whole(finished: tuple[Path, Done]) -> None:
         assert dw.fitted_flow(stored)["u"].values == pytest.approx(flow["u"].values)
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_simulate_and_assemble_take_its_flow(finished: tuple[Path, Done], tmp_path: Path) -> None:
     flow = finished[0] / "flow.nc"
     done = here("simulate", "--flow", flow, "--duration", "5s", "-o", tmp_path / "run.nc")
@@ -83,6 +84,7 @@ def test_a_finished_run_is_not_done_again(finished: tuple[Path, Done]) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("no_figures")
 def test_several_recordings(finished: tuple[Path, Done], tmp_path: Path) -> None:
     done = here("fit", RECORDING, SECOND, *SHORT, "-o", tmp_path / "two", "--json")
     both, one = answer(done), answer(finished[1])
@@ -93,6 +95,7 @@ def test_several_recordings(finished: tuple[Path, Done], tmp_path: Path) -> None
     assert widths[0] < 0.9 * widths[1]
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_people_read_the_answer(tmp_path: Path) -> None:
     done = here("fit", RECORDING, *SHORT, "-o", tmp_path / "run", "--angle", "none")
     assert done.code == 0, done.err

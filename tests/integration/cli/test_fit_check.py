@@ -45,7 +45,11 @@ def test_the_check_is_written_with_its_figures(finished: tuple[Path, Done]) -> N
         assert stored["x"].attrs["units"] == "m"
 
 
-def test_people_are_told_and_the_check_can_be_left_out(tmp_path: Path) -> None:
+def test_people_are_told_and_the_check_can_be_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Those of the check would be drawn.
+    monkeypatch.setattr("driftwalk.figures.write_fit_figures", lambda *folders, **datasets: [])
     done = here("fit", RECORDING, *SHORT, "-o", tmp_path / "run", "--no-check")
     assert done.code == 0, done.err
     assert "model check" not in done.out
@@ -53,6 +57,7 @@ def test_people_are_told_and_the_check_can_be_left_out(tmp_path: Path) -> None:
     assert not (tmp_path / "run" / "figures" / "check_map.png").exists()
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_a_recording_that_is_not_explained_gets_the_reasons(tmp_path: Path) -> None:
     """The bundled recording with bursts of noise on it: every tenth second five times as much."""
     generator = np.random.default_rng(2)
@@ -73,6 +78,7 @@ def test_a_recording_that_is_not_explained_gets_the_reasons(tmp_path: Path) -> N
     assert "noise floor" in done.out
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_a_check_that_cannot_be_made_says_so_and_the_fit_is_kept(tmp_path: Path) -> None:
     """Synthetic: a body that rests, but for a jump in every eighth of 110 intervals."""
     generator = np.random.default_rng(1)
@@ -99,6 +105,7 @@ def test_a_check_that_cannot_be_made_says_so_and_the_fit_is_kept(tmp_path: Path)
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("no_figures")
 def test_a_robot_that_drives_itself_is_not_explained(
     shared_data: Callable[[str], Path], tmp_path: Path
 ) -> None:

@@ -49,6 +49,7 @@ def test_the_model_with_the_switch_explains_the_recording(finished: tuple[Path, 
     assert abs(np.log(found["drag_coefficient"] / DRAG)) < 4.0 * sd
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_without_the_switch_it_does_not(
     recording: Path, finished: tuple[Path, Done], tmp_path: Path
 ) -> None:
@@ -82,6 +83,7 @@ def test_others_take_the_flow(finished: tuple[Path, Done], tmp_path: Path) -> No
     assert done.code == 0, done.err
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_people_read_which_flow_was_when(recording: Path, tmp_path: Path) -> None:
     middle = START_S + SWITCH_S
     times = f"{middle - 100:g},{middle:g}"

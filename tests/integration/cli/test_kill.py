@@ -19,6 +19,7 @@ import xarray as xr
 from command_line import (
     FLOW,
     GRID,
+    NO_FIGURES,
     RECORDING,
     apart,
     assert_same_bits,
@@ -33,8 +34,8 @@ from signals_at_units import after_units, go_on, halted
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
-# Figures take most of the time of a short run, and come after everything that resumes.
-PLAIN = "import driftwalk.figures\ndriftwalk.figures.write_figures = lambda *a, **k: []\n"
+# The figures come after everything that resumes.
+PLAIN = NO_FIGURES
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import FLOW, Done, apart, end, here, refusal, start
+from command_line import FLOW, NO_FIGURES, Done, apart, end, here, refusal, start
 from signals_at_units import after_units, go_on, halted
 
 import driftwalk as dw
@@ -112,7 +112,7 @@ def test_killed_and_continued_with_another_number_of_processes(
     sent: signal.Signals, truth: Path, finished: tuple[Path, Done], tmp_path: Path
 ) -> None:
     folder = tmp_path / "run"
-    done = apart(*words(truth, folder, "--threads", "2"), before=after_units(sent, 2))
+    done = apart(*words(truth, folder, "--threads", "2"), before=NO_FIGURES + after_units(sent, 2))
     if sent is signal.SIGINT:
         assert (done.code, done.out) == (130, "")
         assert done.err.endswith("driftwalk: interrupted\n")
@@ -121,7 +121,7 @@ def test_killed_and_continued_with_another_number_of_processes(
     kept = shards(folder)
     # Ctrl-C keeps what the other process had just finished too.
     assert len(kept) == 2 or (sent is signal.SIGINT and 2 < len(kept) < 6)
-    halting = after_units(signal.SIGSTOP, 1)
+    halting = NO_FIGURES + after_units(signal.SIGSTOP, 1)
     with halted(start(*words(truth, folder, "--threads", "1"), before=halting)) as process:
         # What had been finished is not computed again.
         assert {path: shards(folder)[path] for path in kept} == kept
@@ -135,6 +135,7 @@ def shards(folder: Path) -> dict[Path, int]:
     return {path: path.stat().st_mtime_ns for path in folder.glob(".shards/*/[0-9]*.npz")}
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_people_read_a_table_of_random_flows_without_orientation(tmp_path: Path) -> None:
     text = TRUTH.replace('"flow/true.csv"', '"random"').replace("recordings = 3", "recordings = 2")
     text = text.replace('orientation_noise_rad = "0.5deg"\n', "")

@@ -9,7 +9,6 @@ import json
 import re
 import shutil
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +22,6 @@ from driftwalk.page import decode_array, report_html
 
 TANK = ("--tank-diameter", "30cm")
 DOCS = Path(__file__).parents[3] / "docs"
-FIGURES = (
-    "write_figures", "write_fit_figures", "write_check_figures", "write_assembly_figures",
-    "write_sensitivity_figures", "write_recovery_figures",
-)  # fmt: skip
 TRUTH = """\
 [forces]
 drag_coefficient = 0.4
@@ -47,18 +42,11 @@ durations_s = [60.0]
 flow = "random"
 """
 
-
-@pytest.fixture(scope="module", autouse=True)
-def no_figures() -> Iterator[None]:
-    """Leave out the figures, which take most of the time of short runs."""
-    with pytest.MonkeyPatch.context() as patch:
-        for name in FIGURES:
-            patch.setattr(f"driftwalk.figures.{name}", lambda *folders, **datasets: [])
-        yield
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def run(undrawn: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a calibration of a minute of the recording."""
     place = tmp_path_factory.mktemp("run")
     (place / "study.toml").write_text(GRID, encoding="utf-8")

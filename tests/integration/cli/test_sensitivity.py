@@ -19,6 +19,7 @@ import xarray as xr
 from command_line import (
     FLOW,
     GRID,
+    NO_FIGURES,
     RECORDING,
     Done,
     apart,
@@ -36,28 +37,21 @@ MAP = ["--vary", "drag-coefficient=0.2:1:0.4", "--vary", "force-std=0.2mN,1mN"]
 NAMES = {"reference.nc", "sensitivity.nc", "components.nc", "manifest.json", ".lock", "figures"}
 KEYS = {"settings", "runs", "classes", "reference", "l1", "components", "smallest_distance"}
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 @pytest.fixture(scope="module")
-def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def calibrated(undrawn: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the run directory of a short calibration without bootstrap."""
     place = tmp_path_factory.mktemp("calibrated")
     study = place / "study.toml"
     study.write_text(GRID.replace("bootstrap = 10", "bootstrap = 0"), encoding="utf-8")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("driftwalk.figures.write_figures", lambda *datasets, **options: [])
-        done = here(
-            *("calibrate", RECORDING, "--to", "60s", "--study", study, "--out", place / "run"),
-            *("--tank-diameter", "30cm", "--threads", "1"),
-        )
+    done = here(
+        *("calibrate", RECORDING, "--to", "60s", "--study", study, "--out", place / "run"),
+        *("--tank-diameter", "30cm", "--threads", "1"),
+    )
     assert done.code == 0, done.err
     return place / "run"
-
-
-@pytest.fixture(autouse=True)
-def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out the figures, which take most of the time of a short run in this process."""
-    for name in ("write_assembly_figures", "write_sensitivity_figures"):
-        monkeypatch.setattr(f"driftwalk.figures.{name}", lambda *folders, **datasets: [])
 
 
 @pytest.fixture(scope="module")
@@ -271,11 +265,8 @@ def test_an_unfinished_run_whose_units_keep_less_is_refused(
 
 
 # One setting per unit, without figures.
-SMALL = """
-import driftwalk.figures
+SMALL = f"""{NO_FIGURES}
 from driftwalk.assembly.sensitivity import settings
-driftwalk.figures.write_assembly_figures = lambda *folders, **datasets: []
-driftwalk.figures.write_sensitivity_figures = lambda *folders, **datasets: []
 settings.BLOCK_STEPS_PER_UNIT = 1
 """
 
