@@ -15,23 +15,31 @@ TEST_TOOLS := $(VENV)/.test-tools
 DEV_TOOLS := $(VENV)/.dev-tools
 CPP := $(shell find cpp -name '*.cpp' -o -name '*.hpp')
 
+# Hundreds of tests start a process of their own and every worker imports every test: without bytecode
+# that was kept, each of them would compile what the last one has compiled.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo test test-slow test-fresh test-browser fuzz doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs web wheel clean
 
 demo: $(PACKAGE)
 	$(BIN)/driftwalk demo
 
+# Two workers, each with one half of the tests in their order, which ends with what the slower one has
+# left: tests that share a finished run stay together, so that it is made once.
+SIDE_BY_SIDE := -n 2 --dist worksteal
+
 test: $(TEST_TOOLS)
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest $(SIDE_BY_SIDE)
 
 test-slow: $(TEST_TOOLS)
-	$(BIN)/python -m pytest -n 2 -m slow
+	$(BIN)/python -m pytest $(SIDE_BY_SIDE) -m slow
 
 # The property and statistical tests, slow ones too, with new examples and new seeds: some minutes.
 # The seed is printed first; the same run again: make test-fresh SEED=123
 SEED := $(shell date +%s)
 
 test-fresh: $(TEST_TOOLS)
-	DRIFTWALK_TEST_SEED=$(SEED) $(BIN)/python -m pytest -n 2 -m "false_alarm or hypothesis" \
+	DRIFTWALK_TEST_SEED=$(SEED) $(BIN)/python -m pytest $(SIDE_BY_SIDE) -m "false_alarm or hypothesis" \
 	  --hypothesis-seed=$(SEED)
 
 # In Chromium, which has to be installed; without it the tests are skipped.
@@ -47,8 +55,12 @@ FUZZ_CASES := 2000
 fuzz: $(TEST_TOOLS)
 	$(BIN)/python tests/fuzz/fuzz_run.py $(FUZZ) --seed $(FUZZ_SEED) --cases $(FUZZ_CASES)
 
-doctest: $(TEST_TOOLS)
-	$(BIN)/python -m pytest -n 2 --doctest-modules src/driftwalk tests/reference/twin
+doc# Two workers, each with one half of the tests in their order, which ends with what the slower one has
+# left: tests that share a finished run stay together, so that it is made once.
+SIDE_BY_SIDE := -n 2 --dist worksteal
+
+test: $(TEST_TOOLS)
+	$(BIN)/python -m pytest $(SIDE_BY_SIDE) --doctest-modules src/driftwalk tests/reference/twin
 
 docs: doctest
 	$(BIN)/python -m pytest tests/architecture/test_docs_links.py

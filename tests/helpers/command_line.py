@@ -35,6 +35,9 @@ refined_replicates = 2
 bootstrap = 10
 """
 
+# A fit of five minutes of the bundled recording, with coarse knots for speed.
+FIT = ("fit", RECORDING, "--to", "300", "--spline-spacing", "3cm", "--force-interval", "16ms")
+
 # What draws the figures and the film of a run, below the package.
 FIGURE_WRITERS = (
     *("figures.write_figures", "figures.write_fit_figures", "figures.write_check_figures"),

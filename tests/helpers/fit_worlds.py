@@ -35,3 +35,13 @@ def _whole(realisation: Literal["first", "second"]) -> xr.Dataset:
 def recording(seconds: float, realisation: Literal["first", "second"] = "first") -> xr.Dataset:
     """Return the first part of a bundled recording."""
     return _whole(realisation).sel(time=slice(0.0, seconds)).copy(deep=True)
+
+
+@cache
+def _fitted(seconds: float) -> xr.Dataset:
+    return dw.fit_motion(recording(seconds), coarse_study())
+
+
+def fitted(seconds: float) -> xr.Dataset:
+    """Return the fit of the first part of the bundled recording, made once in a process."""
+    return _fitted(seconds).copy(deep=True)

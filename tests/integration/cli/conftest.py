@@ -1,11 +1,19 @@
-"""Runs without their figures, which take most of the time of a short one."""
+"""A run that several test files look at, and runs without the figures, which take most of a run."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
-from command_line import FIGURE_WRITERS
+from command_line import FIGURE_WRITERS, FIT, Done, here
+
+
+@pytest.fixture(scope="session")
+def fitted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Done]:
+    """Return the run directory of a fit with its check and all figures, and what it printed."""
+    folder = tmp_path_factory.mktemp("fit") / "run"
+    return folder, here(*FIT, "-o", folder, "--json")
 
 
 @pytest.fixture(scope="module")

@@ -12,24 +12,17 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import DATA, RECORDING, Done, here, refusal
+from command_line import DATA, FIT, RECORDING, Done, here, refusal
 
 import driftwalk as dw
 from driftwalk.schema.facts import fit_facts
 
 SECOND = DATA / "recording_second_seed.csv"
-SHORT = ("--to", "300", "--spline-spacing", "3cm", "--force-interval", "16ms")
 REQUIRED = (
     *("drag_coefficient", "drag_coefficient_interval", "force_std_N", "force_std_N_interval"),
     *("force_interval_s", "force_noise_intensity_N2_s", "tracking_noise_m", "wall_share"),
     *("tracking_noise_m_interval", "warnings"),
 )
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Done]:
-    folder = tmp_path_factory.mktemp("fit") / "run"
-    return folder, here("fit", RECORDING, *SHORT, "-o", folder, "--json")
 
 
 def answer(done: Done) -> dict[str, Any]:
@@ -38,8 +31,8 @@ def answer(done: Done) -> dict[str, Any]:
     return found
 
 
-def test_json_holds_what_is_promised(finished: tuple[Path, Done]) -> None:
-    found = answer(finished[1])
+def test_json_holds_what_is_promised(fitted: tuple[Path, Done]) -> None:
+    found = answer(fitted[1])
     assert set(REQUIRED) <= found.keys()
     assert found["force_interval_s"] == 0.016
     assert found["duration_s"] == pytest.approx(300.0)
@@ -53,8 +46,8 @@ def test_json_holds_what_is_promised(finished: tuple[Path, Done]) -> None:
     assert found["tracking_noise_m"] == pytest.approx(truth["tracking_noise_m"], rel=0.05)
 
 
-def test_the_run_directory_is_whole(finished: tuple[Path, Done]) -> None:
-    folder = finished[0]
+def test_the_run_directory_is_whole(fitted: tuple[Path, Done]) -> None:
+    folder = fitted[0]
     for name in ("fit.nc", "flow.nc", "recording.nc", "manifest.json"):
         assert (folder / name).stat().st_size > 0
     for name in ("flow", "trajectory"):
@@ -62,14 +55,14 @@ def test_the_run_directory_is_whole(finished: tuple[Path, Done]) -> None:
         assert (folder / "figures" / f"{name}.svg").stat().st_size > 1000
     with xr.open_dataset(folder / "fit.nc", engine="h5netcdf") as stored:
         assert stored.attrs["kind"] == "fit"
-        assert fit_facts(stored)["drag_coefficient"] == answer(finished[1])["drag_coefficient"]
+        assert fit_facts(stored)["drag_coefficient"] == answer(fitted[1])["drag_coefficient"]
         flow = dw.load_flow(folder / "flow.nc")
         assert dw.fitted_flow(stored)["u"].values == pytest.approx(flow["u"].values)
 
 
 @pytest.mark.usefixtures("no_figures")
-def test_simulate_and_assemble_take_its_flow(finished: tuple[Path, Done], tmp_path: Path) -> None:
-    flow = finished[0] / "flow.nc"
+def test_simulate_and_assemble_take_its_flow(fitted: tuple[Path, Done], tmp_path: Path) -> None:
+    flow = fitted[0] / "flow.nc"
     done = here("simulate", "--flow", flow, "--duration", "5s", "-o", tmp_path / "run.nc")
     assert done.code == 0, done.err
     options = ("--blocks", "2", "--runs", "4", "--duration", "5s", "--film", "none")
@@ -77,17 +70,17 @@ def test_simulate_and_assemble_take_its_flow(finished: tuple[Path, Done], tmp_pa
     assert done.code == 0, done.err
 
 
-def test_a_finished_run_is_not_done_again(finished: tuple[Path, Done]) -> None:
-    done = here("fit", RECORDING, *SHORT, "-o", finished[0])
+def test_a_finished_run_is_not_done_again(fitted: tuple[Path, Done]) -> None:
+    done = here(*FIT, "-o", fitted[0])
     assert done.code == 2
     assert "--overwrite" in done.err
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
-def test_several_recordings(finished: tuple[Path, Done], tmp_path: Path) -> None:
-    done = here("fit", RECORDING, SECOND, *SHORT, "-o", tmp_path / "two", "--json")
-    both, one = answer(done), answer(finished[1])
+def test_several_recordings(fitted: tuple[Path, Done], tmp_path: Path) -> None:
+    done = here("fit", SECOND, *FIT[1:], "-o", tmp_path / "two", "--json")
+    both, one = answer(done), answer(fitted[1])
     assert both["recordings"] == 2
     assert both["duration_s"] == pytest.approx(600.0)
     assert (tmp_path / "two" / "recording-2.nc").stat().st_size > 0
@@ -97,7 +90,7 @@ def test_several_recordings(finished: tuple[Path, Done], tmp_path: Path) -> None
 
 @pytest.mark.usefixtures("no_figures")
 def test_people_read_the_answer(tmp_path: Path) -> None:
-    done = here("fit", RECORDING, *SHORT, "-o", tmp_path / "run", "--angle", "none")
+    done = here(*FIT, "-o", tmp_path / "run", "--angle", "none")
     assert done.code == 0, done.err
     assert "drag coefficient C_d" in done.out
     assert "redrawn every 16 ms" in done.out

@@ -18,30 +18,24 @@ STUDIES = Path(__file__).resolve().parents[3] / "studies" / "real"
 FIGURES = ("check_innovations", "check_map", "check_time", "check_steps")
 
 
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Done]:
-    folder = tmp_path_factory.mktemp("fit") / "run"
-    return folder, here("fit", RECORDING, *SHORT, "-o", folder, "--json")
-
-
-def test_json_says_whether_the_model_explains_it(finished: tuple[Path, Done]) -> None:
-    assert finished[1].code == 0, finished[1].err
-    found = json.loads(finished[1].out)
+def test_json_says_whether_the_model_explains_it(fitted: tuple[Path, Done]) -> None:
+    assert fitted[1].code == 0, fitted[1].err
+    found = json.loads(fitted[1].out)
     assert found["explained"] is True
     assert found["findings"] == []
     # Two halves of a short recording: a distance is of the size of its floor, within a factor.
     assert 0.0 < found["ks_distance"] < 4.0 * found["ks_noise_floor"] < 1.0
 
 
-def test_the_check_is_written_with_its_figures(finished: tuple[Path, Done]) -> None:
-    folder = finished[0]
+def test_the_check_is_written_with_its_figures(fitted: tuple[Path, Done]) -> None:
+    folder = fitted[0]
     for name in FIGURES:
         assert (folder / "figures" / f"{name}.png").stat().st_size > 1000
         assert (folder / "figures" / f"{name}.svg").stat().st_size > 1000
     with xr.open_dataset(folder / "check.nc", engine="h5netcdf") as stored:
         assert stored.attrs["kind"] == "model_check"
         assert bool(stored["explained"])
-        assert stored.attrs["ks_distance"] == json.loads(finished[1].out)["ks_distance"]
+        assert stored.attrs["ks_distance"] == json.loads(fitted[1].out)["ks_distance"]
         assert stored["x"].attrs["units"] == "m"
 
 

@@ -12,7 +12,7 @@ from synthetic_calibration import bundled_recording
 from user_calibration import one_parameter, two_parameters
 
 from driftwalk.core.errors import InputError
-from driftwalk.figures import write_figures
+from driftwalk.figures import calibration as figures, write_figures
 from driftwalk.figures.calibration import panels_figure
 from driftwalk.page.sections.calibration import calibration_sections
 from driftwalk.plot import (
@@ -26,6 +26,12 @@ from driftwalk.plot.parts.style import new_figure
 from driftwalk.schema.calibration import stored_parameters
 
 BLOCK_WORDS = re.compile("drag|force|C_d|σ_F|mN", re.IGNORECASE)
+
+
+def laid_out(figure, stem, formats):
+    """Lay a figure out, which draws all of it, and write no pixel."""
+    figure.draw_without_rendering()
+    return [stem.with_suffix(f".{name}") for name in formats]
 
 
 def texts_of(value):
@@ -95,7 +101,10 @@ def test_panels_name_what_differs_and_what_stays():
         (one_parameter, ["tumble_rate_panels"]),
     ],
 )
-def test_every_figure_is_written_under_the_names_of_the_parameters(make, panels, tmp_path):
+def test_every_figure_is_written_under_the_names_of_the_parameters(
+    make, panels, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(figures, "_save", laid_out)
     files = write_figures(
         make(), flow=None, trajectory=bundled_recording(rows=200), folder=tmp_path, formats=("png",)
     )

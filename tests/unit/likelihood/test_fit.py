@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import xarray as xr
-from fit_worlds import DRAG, FORCE_N, NOISE_M, coarse_study, recording
+from fit_worlds import DRAG, FORCE_N, NOISE_M, coarse_study, fitted, recording
 
 import driftwalk as dw
 from driftwalk.core.errors import InputError
@@ -25,8 +25,8 @@ def track() -> xr.Dataset:
 
 
 @pytest.fixture(scope="module")
-def fit(track: xr.Dataset) -> xr.Dataset:
-    return dw.fit_motion(track, coarse_study())
+def fit() -> xr.Dataset:
+    return fitted(600.0)
 
 
 STEP_16_MS = 0.014
@@ -159,13 +159,12 @@ def test_without_angles_the_drag_is_averaged(track: xr.Dataset) -> None:
     )
 
 
-def test_force_std_follows_its_interval(track: xr.Dataset, fit: xr.Dataset) -> None:
+def test_force_std_follows_its_interval() -> None:
     other = apply_overrides(coarse_study(), {"forces.force_interval_s": 0.064})
-    found = dw.fit_motion(track, other)
-    assert fit_facts(found)["force_noise_intensity_N2_s"] == pytest.approx(
-        fit_facts(fit)["force_noise_intensity_N2_s"]
-    )
-    assert fit_facts(found)["force_std_N"] == pytest.approx(fit_facts(fit)["force_std_N"] / 2.0)
+    found, known = fit_facts(dw.fit_motion(recording(200.0), other)), fit_facts(fitted(200.0))
+    name = "force_noise_intensity_N2_s"
+    assert found[name] == pytest.approx(known[name])
+    assert found["force_std_N"] == pytest.approx(known["force_std_N"] / 2.0)
 
 
 def still(count: int, **changed: np.ndarray) -> xr.Dataset:

@@ -171,7 +171,7 @@ def test_half_of_the_angles_make_it_the_default(track: xr.Dataset) -> None:
 
 @pytest.mark.parametrize("angle", [0.0, 0.3])
 def test_a_column_that_is_only_filled_is_no_orientation(track: xr.Dataset, angle: float) -> None:
-    short = track.isel(time=slice(0, 1500)).copy(deep=True)
+    short = track.isel(time=slice(0, 600)).copy(deep=True)
     short["theta"].values[:] = angle
     assert dw.fit_motion(short, coarse_study()).attrs["angle"] == "none"
     with pytest.raises(dw.core.errors.InputError, match="the same in every row"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -104,16 +105,21 @@ def test_no_rim_is_said() -> None:
         dw.track.camera_from_rim(np.full((240, 320, 3), 90, np.uint8), diameter=0.0)
 
 
-def drawn_board(turn: tuple[float, float, float], away: tuple[float, float, float]) -> np.ndarray:
-    """Return a chessboard of 9 x 7 squares of 20 mm through the lens, four rays a pixel."""
-    rotation, _ = cv2.Rodrigues(np.array(turn))
+@cache
+def board_rays() -> np.ndarray:
+    """Return the directions of four rays a pixel through the lens."""
     column, row = np.meshgrid((np.arange(1280) - 0.5) / 2, (np.arange(960) - 0.5) / 2)
     pixels = np.stack([column.ravel(), row.ravel()], axis=-1)
     rays = (LENS.straighten(pixels) - [322, 236]) / [620, 622]
-    rays = np.column_stack([rays, np.ones(len(rays))])
+    return np.column_stack([rays, np.ones(len(rays))])
+
+
+def drawn_board(turn: tuple[float, float, float], away: tuple[float, float, float]) -> np.ndarray:
+    """Return a chessboard of 9 x 7 squares of 20 mm through the lens, four rays a pixel."""
+    rotation, _ = cv2.Rodrigues(np.array(turn))
     # Where each ray meets the board: R p + t = s d, the third coordinate of p is zero.
     back = rotation.T @ np.array(away)
-    direction = rays @ rotation
+    direction = board_rays() @ rotation
     place = (direction * (back[2] / direction[:, 2])[:, None] - back)[:, :2] + [0.09, 0.07]
     square = np.floor(place / 0.02)
     on = ((square >= 0) & (square < [9, 7])).all(axis=1)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from fit_worlds import DRAG, FORCE_N, coarse_study, recording
+from fit_worlds import DRAG, FORCE_N, coarse_study, fitted, recording
 
 import driftwalk as dw
 from driftwalk.core.errors import InputError
@@ -27,8 +27,8 @@ def track() -> xr.Dataset:
 
 
 @pytest.fixture(scope="module")
-def fit(track: xr.Dataset) -> xr.Dataset:
-    return dw.fit_motion(track, coarse_study())
+def fit() -> xr.Dataset:
+    return fitted(600.0)
 
 
 @pytest.fixture(scope="module")
