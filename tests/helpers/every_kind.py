@@ -9,7 +9,7 @@ import xarray as xr
 from fit_worlds import coarse_study, recording
 from recovery_worlds import small_study
 from small_sensitivity import FLOW, small
-from switching_worlds import START_S, SWITCH_S, coarse_study as switched_study, two_flows
+from switching_worlds import START_S, coarse_study as switched_study, two_flows
 from walkers import diffuse, tumble
 
 import driftwalk as dw
@@ -65,8 +65,8 @@ def design() -> xr.Dataset:
 
 
 def switched_fit() -> xr.Dataset:
-    times = {"switching_times_s": [START_S + SWITCH_S]}
-    return dw.fit_motion(two_flows(), switched_study(**times))
+    times = {"switching_times_s": [START_S + SECONDS]}
+    return dw.fit_motion(two_flows(SECONDS), switched_study(**times))
 
 
 def recovery() -> xr.Dataset:

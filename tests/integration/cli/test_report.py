@@ -124,7 +124,7 @@ def test_the_example_of_the_docs_reads_it(
 
 def test_a_fit(tmp_path: Path) -> None:
     made = here(
-        *("fit", RECORDING, "--to", "120s", *TANK, "--spline-spacing", "4cm", "--no-check"),
+        *("fit", RECORDING, "--to", "60s", *TANK, "--spline-spacing", "4cm", "--no-check"),
         *("--angle", "none", "--out", tmp_path / "fit"),
     )
     assert made.code == 0, made.err
