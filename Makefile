@@ -55,11 +55,7 @@ FUZZ_CASES := 2000
 fuzz: $(TEST_TOOLS)
 	$(BIN)/python tests/fuzz/fuzz_run.py $(FUZZ) --seed $(FUZZ_SEED) --cases $(FUZZ_CASES)
 
-doc# Two workers, each with one half of the tests in their order, which ends with what the slower one has
-# left: tests that share a finished run stay together, so that it is made once.
-SIDE_BY_SIDE := -n 2 --dist worksteal
-
-test: $(TEST_TOOLS)
+doctest: $(TEST_TOOLS)
 	$(BIN)/python -m pytest $(SIDE_BY_SIDE) --doctest-modules src/driftwalk tests/reference/twin
 
 docs: doctest
