@@ -47,3 +47,11 @@ def test_command_is_on_the_page(name: str) -> None:
 
 def test_page_has_no_other_commands() -> None:
     assert sections().keys() - {READING} == {name for name, _ in commands()}
+
+
+@pytest.mark.parametrize("name", [name for name, _ in commands()])
+def test_no_help_is_taken_for_a_style(name: str) -> None:
+    """Rich drops an unescaped ``[recover]`` from the text that it prints."""
+    command = dict(commands())[name]
+    for text in (command.help, *(getattr(one, "help", "") for one in command.params)):
+        assert not re.search(r"(?<!\\)\[[a-z/]", text or ""), text

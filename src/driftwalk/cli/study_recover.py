@@ -32,7 +32,7 @@ def recover(
     truth: Annotated[
         Path,
         typer.Option(
-            "--truth", metavar="FILE", help="Study file with the true values and [recover]."
+            "--truth", metavar="FILE", help="Study file with the true values and \\[recover]."
         ),
     ],
     out: Annotated[
