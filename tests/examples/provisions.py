@@ -1,0 +1,403 @@
+"""For every page: the files that its examples name, and where less is computed than it says.
+
+A page says "your recording"; here a reader has the bundled recording, or its first minutes. All
+files are simulated. An example that would take minutes runs with the options or sizes of `instead`.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from command_line import FLOW, GRID, RECORDING, here
+from finished_run import write_finished_run
+
+import driftwalk as dw
+from driftwalk.record.raw import ReadOptions
+from examples.printed import Numbers
+
+Names = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Page:
+    """How the examples of a page run."""
+
+    provide: Callable[[Path], Names] = lambda _: {}
+    """Writes the files of the page into a folder, and returns Python names that it presumes."""
+    instead: Mapping[str, str] = field(default_factory=dict)
+    """From a text of the examples to the one that runs; every text has to be on the page."""
+    not_run: Mapping[str, str] = field(default_factory=dict)
+    """From a command, or a pattern of some, to the reason why no test runs it."""
+    holds: tuple[str, ...] = ()
+    """Expressions that are true after the last example."""
+    makes: tuple[str, ...] = ()
+    """Files that are there after the last example."""
+    streams: bool = False
+    """Whether a simulated tank is published as a tracker's stream, for two seconds."""
+    numbers: Numbers = Numbers.ANY
+    """How the numbers that the page shows compare, where a command runs as it is written.
+
+    `Numbers.ANY` where the files differ from those of which the page shows the results.
+    """
+    numbers_of: Mapping[str, Numbers] = field(default_factory=dict)
+    """The same for single commands, by a pattern."""
+    slow: bool = False
+    """Whether the page takes more than a few seconds."""
+
+
+def _files(*provisions: Callable[[Path], Names]) -> Callable[[Path], Names]:
+    """Return a function that makes all of these provisions."""
+
+    def provide(folder: Path) -> Names:
+        names: Names = {}
+        for one in provisions:
+            names |= one(folder)
+        return names
+
+    return provide
+
+
+def _recording(seconds: float | None = None, name: str = "recording.csv") -> Callable:
+    """Provide the bundled recording, or its first seconds."""
+
+    def provide(folder: Path) -> Names:
+        first, *lines = RECORDING.read_text(encoding="utf-8").splitlines()
+        kept = lines if seconds is None else lines[: round(10 * seconds) + 1]
+        (folder / name).write_text("\n".join([first, *kept, ""]), encoding="utf-8")
+        return {}
+
+    return provide
+
+
+def _flow(*names: str) -> Callable[[Path], Names]:
+    """Provide the true flow of the bundled recording under some names."""
+
+    def provide(folder: Path) -> Names:
+        for name in names:
+            if name.endswith(".csv"):
+                shutil.copy(FLOW, folder / name)
+            else:
+                dw.save_flow(dw.tank30_flow(), folder / name)
+        return {}
+
+    return provide
+
+
+def _search(name: str) -> Callable[[Path], Names]:
+    """Provide a study file with the search of a small calibration."""
+
+    def provide(folder: Path) -> Names:
+        (folder / name).write_text(GRID, encoding="utf-8")
+        return {}
+
+    return provide
+
+
+def _calibrated(folder: Path) -> Names:
+    """Provide ``run/``: a calibration of few settings on the bundled recording."""
+    write_finished_run(folder / "run")
+    return {}
+
+
+def _with_intervals(folder: Path) -> Names:
+    """Provide ``run/calibration.nc`` with the intervals of a small bootstrap."""
+    study = dw.load_study(folder / "search.toml")
+    recording = dw.tank30_recording().isel(time=slice(1200))
+    (folder / "run").mkdir()
+    found = dw.calibrate(recording, study, flow=dw.tank30_flow())
+    found.to_netcdf(folder / "run" / "calibration.nc", engine="h5netcdf")
+    return {}
+
+
+def _report(folder: Path) -> Names:
+    """Provide ``report.html``, of a calibration."""
+    dw.write_report(dw.report_page(write_finished_run(folder / "run")), folder / "report.html")
+    return {}
+
+
+def _simulated(folder: Path) -> Names:
+    """Provide ``sim.nc``: a minute of the bundled example, simulated."""
+    words = ("--flow", FLOW, "--duration", "1min", "-o", folder / "sim.nc")
+    done = here("simulate", *words)
+    assert done.code == 0, done.err
+    return {}
+
+
+def _minutes(**names: float) -> Callable[[Path], Names]:
+    """Provide Python names of recordings: the bundled one, from 0 on, for some minutes each."""
+
+    def provide(_: Path) -> Names:
+        whole = dw.tank30_recording()
+        return {name: whole.isel(time=slice(round(600 * long))) for name, long in names.items()}
+
+    return provide
+
+
+def _study(_: Path) -> Names:
+    return {"study": dw.Study(), "flow": dw.tank30_flow()}
+
+
+def _wide_tank(_: Path) -> Names:
+    """Provide a tank that holds 64 blocks, and its flow."""
+    study = dw.apply_overrides(dw.Study(), {"tank.diameter_m": 1.2})
+    return {"dw": dw, "study": study, "flow": dw.jets_flow(diameter=1.2, swirl_speed=0.03)}
+
+
+def _tumble_search(_: Path) -> Names:
+    """Provide a study of few simulations, for a calibration that a page leaves to its defaults."""
+    small = {"replicates": 1, "refined_replicates": 1, "bootstrap": 4}
+    return {"SMALL": dw.apply_overrides(dw.Study(), {f"calibration.{k}": small[k] for k in small})}
+
+
+def _truth(_: Path) -> Names:
+    """Provide a fit and the flow that is true for it."""
+    recording = dw.tank30_recording().isel(time=slice(1200))
+    return {"fit": dw.fit(recording, force_interval="16ms"), "true_flow": dw.tank30_flow()}
+
+
+def _film(bodies: int, seconds: float) -> Callable[[Path], Names]:
+    """Provide ``video.mp4``: simulated blocks, drawn as a camera would see them."""
+
+    def provide(folder: Path) -> Names:
+        path = dw.assembly_path(
+            dw.Study(), dw.tank30_flow(), runs=[3], blocks=bodies, duration=seconds
+        )
+        small = dw.video_settings("moderate", width_px=480, height_px=360, px_per_m=1100.0)
+        dw.write_video(folder / "video.mp4", dw.path_recording(path, run=3), small)
+        return {}
+
+    return provide
+
+
+def _one_block(folder: Path) -> Names:
+    """Provide ``one.nc``: two minutes of one block, with its tank."""
+    dw.save_trajectory(dw.tank30_recording().isel(time=slice(1200)), folder / "one.nc")
+    return {}
+
+
+def _assembled(folder: Path) -> Names:
+    """Provide ``blocks.csv``: two minutes of four simulated blocks, the run 3 of the default study.
+
+    The bodies have letters for names.
+    """
+    path = dw.assembly_path(dw.Study(), dw.tank30_flow(), runs=[3], duration=120.0)
+    blocks = dw.path_recording(path, run=3).assign_coords(body=list("ABCD"))
+    dw.save_trajectory(blocks, folder / "blocks.csv")
+    return {}
+
+
+def _pixels(folder: Path) -> Names:
+    """Provide tables that need an option: pixels, a clock without a unit, an unnamed body."""
+    rows = [f"{10 + k}\t{20 + k}\t1\t{30 + k}\t40\t1\t" for k in range(20)]
+    text = "\n".join(["X1\tY1\tProbId1\tX2\tY2\tProbId2\t", *rows, ""])
+    (folder / "trajectories.txt").write_text(text, encoding="utf-8")
+    clock = 1_400_000_000_000_000_000 + 5_000_000 * np.arange(301)
+    stamps = [f"{t},{0.001 * k:.3f},0" for k, t in enumerate(clock)]
+    (folder / "imu.csv").write_text("\n".join(["timestamp,x,y", *stamps, ""]), encoding="utf-8")
+    places = [f"{40 * n + k},{30 * n + k},{k},{n}" for k in range(5) for n in range(17)]
+    lines = ["x,y,frame,Teilchen", *places, ""]
+    (folder / "tracks.csv").write_text("\n".join(lines), encoding="utf-8")
+    return {}
+
+
+def _pendulum(folder: Path) -> Names:
+    """Provide a log of the format that the page adds."""
+    (folder / "log.txt").write_text("#pendulum\n0|1.5|2\n1|3|4\n", encoding="utf-8")
+    return {"ReadOptions": ReadOptions, "LOG": folder / "log.txt"}
+
+
+def _markers(folder: Path) -> Names:
+    """Provide ``video.mp4`` with its ``markers.toml``."""
+    _film(4, 4.0)(folder)
+    words = ("--tank-diameter", "30cm", "--side", "3cm", "-o", folder / "markers.toml")
+    done = here("markers", "teach", folder / "video.mp4", *words)
+    assert done.code == 0, done.err
+    return {}
+
+
+STUDY = "a study of hours, which the page names to repeat it"
+OTHERS = "needs recordings of others, which are not part of the project"
+LONG = "a calibration of minutes, whose results the page gives; the how-to pages run it smaller"
+INSTALLS = "installs, builds or tests the project; CI runs it"
+TIMES = "measures times, for minutes on a quiet machine"
+FEW_RUNS = "--runs 20 --film none"
+CAMERA = {"camera:0": "video.mp4"}  # no camera here: a file in its place
+# A minute of 2 x 2 settings instead of half a day.
+FEW_SETTINGS = "--runs 10 --realisations 2 --duration 1min"
+
+PAGES: dict[str, Page] = {
+    "README.md": Page(
+        provide=_files(_recording(), _film(1, 4.0)),
+        not_run={"make *": INSTALLS},
+        numbers=Numbers.SAME,
+        # Thousand runs in a fitted flow; the size of a compressed file.
+        numbers_of={
+            "driftwalk assemble *": Numbers.CLOSE,
+            "driftwalk report *": Numbers.CLOSE,
+        },
+        slow=True,
+    ),
+    "CONTRIBUTING.md": Page(
+        not_run={"make *": INSTALLS, ".ci/*": INSTALLS},
+    ),
+    "docs/explanation/assembly.md": Page(
+        provide=_wide_tank,
+        not_run={"python studies/*": STUDY},
+        holds=("tank.x.shape == tank.assembly.shape == (64,)",),
+    ),
+    "docs/explanation/performance.md": Page(
+        not_run={"make bench": TIMES, "python benchmarks/*": TIMES},
+    ),
+    "docs/explanation/sweeps.md": Page(
+        holds=("speed.shape == (2, 2, 3)", "pool.submit(abs, -1).result() == 1")
+    ),
+    "docs/how-to/add-a-format.md": Page(
+        provide=_pendulum,
+        holds=(
+            "LOADER.sniff(LOG.read_bytes(), LOG) == 0.9",
+            "LOADER.read(LOG, ReadOptions()).bodies[0].x.tolist() == [1.5, 3.0]",
+        ),
+    ),
+    "docs/how-to/assemble.md": Page(
+        provide=_files(
+            _recording(600.0), _flow("flow_true.csv"), _search("small.toml"), _assembled
+        ),
+        instead={
+            "calibrate recording.csv": "calibrate recording.csv --study small.toml",
+            "assemble run/": f"assemble run/ {FEW_RUNS}",
+            "runs=100)": "runs=4)",
+        },
+        holds=("sizes.shape == (4,)", "times['proportion'].dims == ('time', 'class')"),
+        numbers=Numbers.SAME,
+        slow=True,
+    ),
+    "docs/how-to/calibrate-your-own-model.md": Page(
+        provide=_files(_minutes(recording=0.5), _tumble_search),
+        instead={"dw.calibrate(recording, model)": "dw.calibrate(recording, model, study=SMALL)"},
+        holds=(
+            "0 <= found['estimate'].sel(parameter='speed') <= 0.1",
+            "TestTumble().model().name == 'tumble'",
+        ),
+        slow=True,
+    ),
+    "docs/how-to/design-an-experiment.md": Page(
+        provide=_files(_flow("flow_true.csv"), _truth),
+        instead={
+            "recordings = 30": "recordings = 2",
+            '["5min", "10min", "20min", "40min"]': '["1min", "2min"]',
+        },
+        holds=("'duration' in found['coverage'].dims",),
+        slow=True,
+    ),
+    "docs/how-to/fit.md": Page(
+        provide=_files(
+            _recording(120.0),
+            _recording(60.0, "first.csv"),
+            _recording(90.0, "second.csv"),
+            _search("small.toml"),
+            _study,
+            _minutes(first=1, second=1.5),
+        ),
+        instead={
+            "calibrate recording.csv": "calibrate recording.csv --study small.toml",
+            "assemble ": f"assemble {FEW_RUNS} ",
+            "fit first.csv": "fit --no-check first.csv",
+            "fit recording.csv --switching-times 10min,20min": "fit --no-check recording.csv "
+            "--switching-times 40s,80s",
+        },
+        holds=("bool(fit['converged'])", "flow.attrs['kind'] == 'flow_field'"),
+        slow=True,
+    ),
+    "docs/how-to/flow-field.md": Page(
+        provide=_recording(), numbers=Numbers.SAME, holds=("u.shape == (2,)",)
+    ),
+    "docs/how-to/load-a-recording.md": Page(
+        provide=_files(_recording(60.0), _pixels), numbers=Numbers.SAME
+    ),
+    "docs/how-to/report.md": Page(provide=_files(_recording(60.0), _calibrated, _simulated)),
+    "docs/how-to/sensitivity.md": Page(
+        provide=_files(_calibrated, _flow("flow_true.csv", "flow.nc", "piv.csv")),
+        instead={
+            "sensitivity run/ -o": f"sensitivity run/ {FEW_SETTINGS} "
+            "--vary drag-coefficient=0.3:0.6:0.3 --vary force-std=0.3mN:0.6mN:0.3mN -o",
+            "--force-std 0.55mN -o": f"--force-std 0.55mN {FEW_SETTINGS} "
+            "--vary drag-coefficient=0.3:0.6:0.3 -o",
+            "sensitivity run/ --vary": f"sensitivity run/ {FEW_SETTINGS} --vary",
+            "--sobol 64": f"--sobol 8 {FEW_SETTINGS}",
+        },
+        holds=(
+            "dw.outcome_distribution(again).attrs['complete'] == float(setting['complete'])",
+            "rules['l1_distance'].shape == (2,)",
+        ),
+        slow=True,
+    ),
+    "docs/how-to/track.md": Page(
+        provide=_files(_film(4, 6.0), _one_block, _calibrated),
+        instead={
+            **CAMERA,
+            "fit recording.nc": "fit one.nc --no-check",  # the page: a recording of one block
+            "report recording.nc": "report one.nc",
+            "assemble run/": f"assemble run/ {FEW_RUNS}",
+            '"assembly.duration_s": 60.0': '"assembly.duration_s": 2.0',
+        },
+        makes=("markers.png", "recording.html", "video.mkv"),
+        slow=True,
+    ),
+    "docs/how-to/use-as-a-library.md": Page(
+        provide=_files(_recording(120.0), _search("study.toml")),
+        holds=("result.attrs['kind'] == 'calibration'",),
+        makes=("figures/ks_map.png",),
+        slow=True,
+    ),
+    "docs/how-to/view.md": Page(
+        provide=_files(_recording(60.0), _calibrated, _markers, _search("study.toml")),
+        instead=CAMERA,
+        not_run={
+            "ssh -L 8765:127.0.0.1:8765 cluster driftwalk view run/": "needs another machine",
+        },
+        slow=True,
+    ),
+    "docs/reference/datasets.md": Page(
+        provide=_files(_search("search.toml"), _with_intervals, _minutes(recording=0.5))
+    ),
+    "docs/reference/live-stream.md": Page(
+        streams=True, holds=("message['type'] == 'frame'", "printed.count('\\n') > 3")
+    ),
+    "docs/reference/page-data.md": Page(provide=_report, holds=("values.size > 1",)),
+    "docs/reference/study-file.md": Page(),
+    "docs/tutorials/first-calibration.md": Page(
+        provide=_search("small.toml"),
+        instead={
+            "calibrate recording.csv --study study.toml": "calibrate recording.csv "
+            "--study small.toml"
+        },
+        not_run={"make test": INSTALLS, ". .venv/bin/activate": INSTALLS},
+        numbers=Numbers.SAME,
+        # Both simulate in a fitted flow; of half an hour in one world chance makes what it likes.
+        numbers_of={"driftwalk fit *": Numbers.CLOSE, "driftwalk compare *": Numbers.ANY},
+        slow=True,
+    ),
+    "docs/validation.md": Page(
+        not_run={
+            "D=*": LONG,
+            "driftwalk calibrate $D/*": LONG,
+            "python studies/*": STUDY,
+            "make studies-tracking *": STUDY,
+            "driftwalk *video.mkv *": "docs/how-to/track.md runs the same on another video",
+            "driftwalk *mouse*": OTHERS,
+            "cd studies/real": OTHERS,
+            "driftwalk calibrate $DATA/*": OTHERS,
+            "S=*": OTHERS,
+            "for b in *": OTHERS,
+            "python table.py *": OTHERS,
+            "python picture.py *": OTHERS,
+        },
+    ),
+}
+"""The pages with examples. Each of `ELSEWHERE` has a test of its own."""
+ELSEWHERE = {"docs/tutorials/notebook.md": "tests/integration/test_notebook.py"}

@@ -1,0 +1,150 @@
+"""Running the examples of a page in a folder, one after the other, as a reader would."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import shutil
+import signal
+import threading
+import tomllib
+from collections.abc import Iterable, Iterator
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Any
+
+from command_line import here
+from page_server import served
+
+import driftwalk as dw
+from examples.printed import Numbers, not_printed
+from examples.provisions import Page
+from examples.reading import LANGUAGES, ROOT, Block, Command, commands_of
+
+SERVERS = ("view", "play")
+PORT = "5000"
+"""Port of the live stream on the pages; a test takes a free one."""
+
+
+class Reader:
+    """Somebody who follows a page in the current folder."""
+
+    def __init__(self, page: Page, port: int) -> None:
+        self.page = page
+        self.names: dict[str, Any] = {"__name__": "example", **page.provide(Path())}
+        self.port = port
+        self._printed = io.StringIO()
+        self._last = "", Numbers.SAME
+
+    def follow(self, block: Block) -> None:
+        """Do what a block says, and fail with its place where that does not work."""
+        text = block.text
+        for old, new in self.page.instead.items():
+            text = text.replace(old, new)
+        text = re.sub(rf"\b{PORT}\b", str(self.port), text)
+        assert block.language in LANGUAGES, f"{block}: write console, python, toml or text"
+        match block.language:
+            case "console":
+                self._console(block, text)
+            case "python":
+                self._python(block, text)
+            case "toml":
+                self._toml(block, text)
+            case _:
+                self._compare(str(block), text.splitlines())
+
+    def _console(self, block: Block, text: str) -> None:
+        pairs = zip(commands_of(block.text), commands_of(text), strict=True)
+        with contextlib.ExitStack() as servers:
+            for written, command in pairs:
+                if _matches(written, self.page.not_run):
+                    continue
+                where = f"{block}: {command.text}"
+                match command.words:
+                    case ["cp", *sources, target]:
+                        _copy(sources, target)
+                    case ["driftwalk", name, *_] if name in SERVERS:
+                        server = servers.enter_context(served(*command.words[1:]))
+                        answer = server.get("/")
+                        assert answer.status == 200, where
+                        assert b"driftwalk" in answer.body, where
+                    case ["driftwalk", *_]:
+                        self._driftwalk(where, command, self._numbers(written, command))
+                    case _:
+                        raise AssertionError(f"{where}: only driftwalk is run; see provisions.py")
+
+    def _driftwalk(self, where: str, command: Command, numbers: Numbers) -> None:
+        done = here(*command.words[1:])
+        refused = any(line.startswith("driftwalk: error: ") for line in command.shown)
+        assert done.code == (2 if refused else 0), f"{where}\n{done.err}"
+        if command.into:
+            Path(command.into).write_text(done.out, encoding="utf-8")
+        self._last = done.out + done.err, numbers
+        self._compare(where, command.shown)
+
+    def _numbers(self, written: Command, run: Command) -> Numbers:
+        if run.text != written.text:
+            return Numbers.ANY
+        for pattern, numbers in self.page.numbers_of.items():
+            if _matches(written, [pattern]):
+                return numbers
+        return self.page.numbers
+
+    def _compare(self, where: str, shown: list[str]) -> None:
+        """Compare the lines that a page shows with what the last command printed."""
+        printed, numbers = self._last
+        missing = not_printed(shown, printed, numbers)
+        assert not missing, f"{where}\nnot printed: {missing}\n{printed}"
+
+    def _python(self, block: Block, text: str) -> None:
+        assert ">>>" not in text, f"{block}: an example has no prompts"
+        # Empty lines in front: a traceback names the line of the page.
+        with contextlib.redirect_stdout(self._printed):
+            exec(compile("\n" * block.line + text, block.page, "exec"), self.names)
+        self.names["printed"] = self._printed.getvalue()
+
+    def _toml(self, block: Block, text: str) -> None:
+        """Write the file that the first line names, or edit the study that is there."""
+        named = re.match(r"# ([\w.]+\.toml)", text)
+        path = Path(named[1] if named else "study.toml")
+        if path.exists():
+            text = edited(path.read_text(encoding="utf-8"), text)
+        path.write_text(text, encoding="utf-8")
+        dw.load_study(path)
+
+
+def _matches(command: Command, patterns: Iterable[str]) -> bool:
+    return any(fnmatch(command.text, pattern) for pattern in patterns)
+
+
+@contextlib.contextmanager
+def streaming(port: int, seconds: float = 2.0) -> Iterator[None]:
+    """Publish a simulated tank on a port for a while, as a tracker does."""
+    with served("play", "--blocks", 3, "--live", port) as server:
+        end = threading.Timer(seconds, server.process.send_signal, [signal.SIGINT])
+        end.start()
+        try:
+            yield
+        finally:
+            end.join()
+
+
+def _copy(sources: list[str], target: str) -> None:
+    """Copy files of the project, named from its root as a reader in a clone would."""
+    for source in sources:
+        found = sorted(ROOT.glob(source))
+        assert found, source
+        for path in found:
+            shutil.copy(path, target)
+
+
+def edited(study: str, changes: str) -> str:
+    """Return the text of a study file with the values of some keys changed, as a reader would."""
+    for section, keys in tomllib.loads(changes).items():
+        for key in keys:
+            (line,) = re.findall(rf"^{key} = .*$", changes, re.MULTILINE)
+            place = rf"(^\[{section}\]$(?:(?!^\[).)*?)^(?:# )?{key} = [^\n]*$"
+            study, count = re.subn(place, rf"\g<1>{line}", study, flags=re.MULTILINE | re.DOTALL)
+            assert count == 1, f"{section}.{key} is not in the study file"
+    return study

@@ -1,0 +1,72 @@
+"""Every example of the pages runs: as a reader would, in one folder per page, block after block."""
+
+from __future__ import annotations
+
+import fnmatch
+import re
+from contextlib import nullcontext
+from pathlib import Path
+
+import pytest
+from ports import held_port
+
+from examples.provisions import ELSEWHERE, PAGES
+from examples.reading import ROOT, blocks_of, commands_of, pages
+from examples.running import Reader, streaming
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] * page.slow) for name, page in PAGES.items()],
+)
+def test_examples_of_a_page_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    with held_port() as port, streaming(port) if PAGES[name].streams else nullcontext():
+        reader = Reader(PAGES[name], port)
+        for block in blocks_of(name):
+            reader.follow(block)
+    for expression in PAGES[name].holds:
+        assert eval(expression, reader.names), expression
+    for made in PAGES[name].makes:
+        assert Path(made).stat().st_size > 0
+
+
+def test_every_page_with_examples_is_run() -> None:
+    assert sorted([*PAGES, *ELSEWHERE]) == pages()
+    for name, test in ELSEWHERE.items():
+        assert f'"{Path(name).name}"' in (ROOT / test).read_text(encoding="utf-8")
+
+
+def test_commands_that_no_test_runs_exist() -> None:
+    """The targets of make, and the files of the project."""
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    commands = [
+        command.words
+        for name in PAGES
+        for block in blocks_of(name)
+        if block.language == "console"
+        for command in commands_of(block.text)
+    ]
+    for words in commands:
+        if words[0] == "make":
+            assert re.search(rf"^{words[1]}:", makefile, re.MULTILINE), words
+        for word in words:
+            if word.startswith((".ci/", "benchmarks/", "studies/")):
+                assert (ROOT / word).exists(), word
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_what_is_said_about_a_page_is_on_it(name: str) -> None:
+    """A replacement or a reason that no example needs any more has to go."""
+    blocks = blocks_of(name)
+    commands = [
+        command.text
+        for block in blocks
+        if block.language == "console"
+        for command in commands_of(block.text)
+    ]
+    for pattern in (*PAGES[name].not_run, *PAGES[name].numbers_of):
+        assert fnmatch.filter(commands, pattern), pattern
+    for old in PAGES[name].instead:
+        assert any(old in block.text for block in blocks), old
