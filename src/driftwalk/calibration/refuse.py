@@ -6,9 +6,9 @@ import math
 from typing import Final
 
 from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.grid import MOST_SETTINGS
 from driftwalk.motion import MotionModel
 from driftwalk.schema.calibration_facts import taken_keys, taken_names
-from driftwalk.schema.parameters import MOST_SETTINGS
 
 MOST_PARAMETERS: Final = 2
 

@@ -7,9 +7,9 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.grid import MOST_SETTINGS
 from driftwalk.model.force_grid import DragCoefficientStep, ForceGrid, ForceStdStep
 from driftwalk.model.section import Quantity
-from driftwalk.schema.parameters import MOST_SETTINGS
 
 
 class Calibration(ForceGrid):

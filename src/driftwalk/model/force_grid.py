@@ -6,9 +6,9 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
+from driftwalk.core.grid import check_axis, grid_values
 from driftwalk.model.forces import DragCoefficient, ForceStd
 from driftwalk.model.section import Quantity, Section
-from driftwalk.schema.parameters import check_axis, grid_values
 
 DragCoefficientStep = Annotated[float, Quantity("1", gt=0, le=100)]
 ForceStdStep = Annotated[float, Quantity("N", gt=0, le=10)]

@@ -100,7 +100,8 @@ class Quantity:
 class Section(BaseModel):
     """Base of every section: frozen, no unknown keys, errors that name section and key."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=False)
+    # The validator of a section is made for its first object: help needs the declarations alone.
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=False, defer_build=True)
 
     section_name: ClassVar[str] = ""
     """Name of the section in a study file, empty for the study itself."""

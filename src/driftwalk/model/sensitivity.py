@@ -8,11 +8,11 @@ from typing import Annotated, Any, ClassVar, Final, Self
 from pydantic import Field, field_validator, model_validator
 
 from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.grid import MOST_SETTINGS
 from driftwalk.model.assembly import MOST_BLOCKS, HiddenFaceDrag, Latching
 from driftwalk.model.force_grid import ForceGrid
 from driftwalk.model.forces import DragCoefficient, ForceStd
 from driftwalk.model.section import Quantity
-from driftwalk.schema.parameters import MOST_SETTINGS
 
 AXES: Final[dict[str, str]] = {
     "tank_diameter": "tank_diameter_m",
