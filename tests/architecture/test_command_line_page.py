@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 
 from driftwalk.cli.main import COMMANDS, load_command
+from driftwalk.cli.options.shared import PANEL
+from driftwalk.cli.options.study import PANELS
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "command-line.md"
 READING = "Reading a recording"
@@ -55,3 +57,16 @@ def test_no_help_is_taken_for_a_style(name: str) -> None:
     command = dict(commands())[name]
     for text in (command.help, *(getattr(one, "help", "") for one in command.params)):
         assert not re.search(r"(?<!\\)\[[a-z/]", text or ""), text
+
+
+def test_page_says_of_a_key_of_the_study_what_the_study_declares() -> None:
+    rows = {name: "" for name, _ in commands()}
+    for name, text in re.findall(r"^## (.+)$\n((?:(?!^## ).*\n)*)", PAGE.read_text(), flags=re.M):
+        rows[name] = text
+    panels = {PANEL, *PANELS.values()}
+    for name, command in commands():
+        for option in command.params:
+            if getattr(option, "rich_help_panel", None) in panels and option.opts != ["--vary"]:
+                row = re.search(rf"^\| `{option.opts[0]}` \|.*$", rows[name], flags=re.M)
+                assert row is not None
+                assert row[0].endswith(f"| {option.help} |"), (name, row[0])

@@ -10,42 +10,18 @@ import typer
 
 from driftwalk.cli.calibrate import Overwrite, Threads
 from driftwalk.cli.inputs.assembly_source import (
+    RUN_NAMES,
     refuse_found,
     source_from_calibration,
     source_from_flow,
 )
-from driftwalk.cli.options.shared import (
-    BlockFriction,
-    BlockLatching,
-    BlockRestitution,
-    Blocks,
-    Confidence,
-    ConnectorAxis,
-    ConnectorDistance,
-    Depth,
-    DragCoefficient,
-    FlowFile,
-    ForceInterval,
-    ForceStd,
-    HiddenFaces,
-    Json,
-    Mass,
-    MirrorImages,
-    RunDuration,
-    Runs,
-    Seed,
-    Side,
-    StudyFile,
-    TankDiameter,
-    TimeStep,
-    WallFriction,
-    WallRestitution,
-)
+from driftwalk.cli.options.shared import FlowFile, Json
+from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.answer import print_figures, print_warnings
 from driftwalk.cli.terminal.output import print_json, print_table
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.errors import InputError
-from driftwalk.core.study_keys import ASSEMBLY_KEYS, study_overrides
+from driftwalk.core.study_keys import ASSEMBLY_KEYS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,40 +33,19 @@ MOST_ROWS = 16
 """Classes in the printed table: all 12 of four blocks, and the frequent ones of more."""
 
 
+@with_study_options(ASSEMBLY_KEYS, "runs", *RUN_NAMES)
 def assemble(
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="DIR", help="Run directory to make or continue.")
     ],
+    given: StudyOptions,
     run: Annotated[
         Path | None,
         typer.Argument(
             metavar="RUN", help="Run directory of a finished calibration.", show_default=False
         ),
     ] = None,
-    study: StudyFile = None,
     flow: FlowFile = None,
-    blocks: Blocks = None,
-    runs: Runs = None,
-    duration: RunDuration = None,
-    tank_diameter: TankDiameter = None,
-    side: Side = None,
-    mass: Mass = None,
-    depth: Depth = None,
-    drag_coefficient: DragCoefficient = None,
-    force_std: ForceStd = None,
-    force_interval: ForceInterval = None,
-    wall_friction: WallFriction = None,
-    wall_restitution: WallRestitution = None,
-    time_step: TimeStep = None,
-    latching: BlockLatching = None,
-    connector_distance: ConnectorDistance = None,
-    connector_axis: ConnectorAxis = None,
-    hidden_face_drag: HiddenFaces = None,
-    chirality: MirrorImages = None,
-    block_restitution: BlockRestitution = None,
-    block_friction: BlockFriction = None,
-    confidence: Confidence = None,
-    seed: Seed = None,
     film: Annotated[
         str, typer.Option("--film", metavar="gif|mp4|none", help="Film of the first run.")
     ] = "gif",
@@ -108,36 +63,11 @@ def assemble(
     from driftwalk.runs import AssemblyWork, run_assembly
 
     _check_film(film)
-    overrides = study_overrides(
-        keys=ASSEMBLY_KEYS,
-        blocks=blocks,
-        runs=runs,
-        duration=duration,
-        tank_diameter=tank_diameter,
-        side=side,
-        mass=mass,
-        depth=depth,
-        drag_coefficient=drag_coefficient,
-        force_std=force_std,
-        force_interval=force_interval,
-        wall_friction=wall_friction,
-        wall_restitution=wall_restitution,
-        time_step=time_step,
-        latching=latching,
-        connector_distance=connector_distance,
-        connector_axis=connector_axis,
-        hidden_face_drag=hidden_face_drag,
-        chirality=chirality,
-        block_restitution=block_restitution,
-        block_friction=block_friction,
-        confidence=confidence,
-        seed=seed,
-    )
     if run is None:
-        source = source_from_flow(study, flow, overrides, keys=ASSEMBLY_KEYS)
+        source = source_from_flow(given, flow)
     else:
-        refuse_found(run, overrides, also=[] if study is None else ["--study"])
-        source = source_from_calibration(run, flow, overrides, keys=ASSEMBLY_KEYS)
+        refuse_found(run, given.overrides, also=[] if given.file is None else ["--study"])
+        source = source_from_calibration(run, flow, given)
     warnings = list(source.warnings)
     if run is not None and source.region is None:
         warnings.append(

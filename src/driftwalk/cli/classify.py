@@ -9,9 +9,11 @@ import typer
 
 from driftwalk.cli.inputs.study_recording import load_with_study
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, Side, StudyFile, quantity_option, resolve_study
+from driftwalk.cli.options.shared import Json, quantity_option
+from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_json, print_note, print_table, save_dataset
 from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.study_keys import STUDY_KEYS
 from driftwalk.schema.contents import check_contents
 from driftwalk.schema.netcdf import kind_of, open_netcdf
 
@@ -24,20 +26,18 @@ _TOO_CLOSE = 0.8
 
 
 def _tolerance(name: str, unit: str, help: str) -> Any:
-    option = quantity_option(name, unit, help)
-    option.rich_help_panel = _PANEL
-    return option
+    return quantity_option(name, unit, help, panel=_PANEL)
 
 
 @with_recording_options
+@with_study_options(STUDY_KEYS, "side")
 def classify(
     poses: Annotated[
         Path,
         typer.Argument(metavar="POSES", help="Recording of all blocks with their orientations."),
     ],
+    given: StudyOptions,
     how: RecordingOptions,
-    study: StudyFile = None,
-    side: Side = None,
     chirality: Annotated[
         Literal["merged", "distinct"],
         typer.Option("--chirality", help="Mirror images as one shape or two."),
@@ -103,7 +103,7 @@ def classify(
 
     if out is not None:
         require_target(out, existing="replace" if overwrite else "error", endings=(".nc",))
-    recording, block_side = _load(poses, how, study, side, run)
+    recording, block_side = _load(poses, how, given, run)
     tolerances = {
         "join_distance": join_distance,
         "join_angle": join_angle,
@@ -112,9 +112,9 @@ def classify(
         "min_duration": min_duration,
         "hold": hold,
     }
-    given: dict[str, Any] = {key: value for key, value in tolerances.items() if value is not None}
+    stated: dict[str, Any] = {key: value for key, value in tolerances.items() if value is not None}
     try:
-        found = classify_recording(recording, side=block_side, chirality=chirality, **given)
+        found = classify_recording(recording, side=block_side, chirality=chirality, **stated)
     except ConfigurationError:
         raise
     except InputError as error:
@@ -157,11 +157,11 @@ def summarise(found: xr.Dataset) -> dict[str, Any]:
 
 
 def _load(
-    path: Path, how: RecordingOptions, study: Path | None, side: float | None, run: int | None
+    path: Path, how: RecordingOptions, given: StudyOptions, run: int | None
 ) -> tuple[xr.Dataset, float]:
     """Return the recording, or the simulated run, and the side of its blocks [m]."""
     from driftwalk.assembly import path_recording
-    from driftwalk.model import Study
+    from driftwalk.model import Block
 
     simulated = _simulated_path(path)
     if simulated is not None:
@@ -169,11 +169,11 @@ def _load(
         return path_recording(simulated, run=chosen), float(simulated.attrs["block_side_m"])
     if run is not None:
         raise InputError(f"{path}: --run is for a simulated path.nc of driftwalk assemble")
-    if study is None:
+    if given.file is None:
         # Without a study nobody has said how large the tank is: the blocks need not fit into it.
-        own = Study().block.side_m if side is None else side
+        own = given.overrides.get(STUDY_KEYS["side"], Block().side_m)
         return how.load(path, side=own), own
-    resolved = resolve_study(study, {} if side is None else {"block.side_m": side})
+    resolved = given.study()
     return load_with_study(path, resolved, how), resolved.block.side_m
 
 

@@ -12,7 +12,8 @@ import typer
 
 from driftwalk.cli.inputs.motion import load_motion
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, StepInterval
+from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.study import study_option
 from driftwalk.cli.terminal.output import (
     print_json,
     print_note,
@@ -64,7 +65,7 @@ def compare(
     replicate: Annotated[
         int, typer.Option("--replicate", min=0, help="Replicate of a simulation.")
     ] = 0,
-    step_interval: StepInterval = None,
+    step_interval: Annotated[Any, study_option("step_interval")] = None,
     ties: Annotated[
         Literal["strict", "limits"],
         typer.Option(

@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, Side, TankDiameter
+from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.study import Side, TankDiameter
 from driftwalk.cli.terminal.output import print_json, print_note
 
 

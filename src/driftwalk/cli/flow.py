@@ -3,98 +3,38 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from driftwalk.cli.inputs.require_motion import require_motion
 from driftwalk.cli.inputs.study_recording import load_with_study
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import (
-    Depth,
-    Json,
-    Mass,
-    Side,
-    StudyFile,
-    TankDiameter,
-    quantity_option,
-    resolve_study,
-)
+from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_json, print_note
-from driftwalk.core.study_keys import STUDY_KEYS, study_overrides
+from driftwalk.core.study_keys import FLOW_KEYS
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
 
-FLOW_KEYS = {
-    **STUDY_KEYS,
-    "cells": "flow.cells",
-    "cell_size": "flow.cell_size_m",
-    "window": "flow.smoothing_window_s",
-    "flow_drag_coefficient": "flow.flow_drag_coefficient",
-    "min_count": "flow.min_count",
-    "inertia": "flow.inertia",
-}
-_PANEL = "Flow field (over the study file)"
-
-
-def _flow_option(name: str, unit: str, help: str) -> Any:
-    option = quantity_option(name, unit, help)
-    option.rich_help_panel = _PANEL
-    return option
-
 
 @with_recording_options
+@with_study_options(
+    FLOW_KEYS,
+    *("tank_diameter", "side", "mass", "depth"),
+    *("cells", "cell_size", "window", "inertia", "flow_drag_coefficient", "min_count"),
+)
 def flow(
     recording: RecordingFile,
-    how: RecordingOptions,
     out: Annotated[
         Path,
         typer.Option("--out", "-o", metavar="FILE", help="File to write; ends in .nc or .csv."),
     ],
-    study: StudyFile = None,
-    tank_diameter: TankDiameter = None,
-    side: Side = None,
-    mass: Mass = None,
-    depth: Depth = None,
-    cells: Annotated[
-        int | None,
-        typer.Option(
-            "--cells",
-            help="Cells across the longer side of the tank.",
-            rich_help_panel=_PANEL,
-            show_default=False,
-        ),
-    ] = None,
-    cell_size: Annotated[
-        float | None, _flow_option("--cell-size", "m", "Side of a cell, instead of --cells.")
-    ] = None,
-    window: Annotated[float | None, _flow_option("--window", "s", "Smoothing window.")] = None,
-    inertia: Annotated[
-        str | None,
-        typer.Option(
-            "--inertia",
-            metavar="corrected|none",
-            help="Correction for the body's inertia (default: corrected).",
-            rich_help_panel=_PANEL,
-            show_default=False,
-        ),
-    ] = None,
-    flow_drag_coefficient: Annotated[
-        float | None,
-        _flow_option("--flow-drag-coefficient", "1", "Drag coefficient C_x of the correction."),
-    ] = None,
-    min_count: Annotated[
-        int | None,
-        typer.Option(
-            "--min-count",
-            help="Smallest number of samples in a measured cell.",
-            rich_help_panel=_PANEL,
-            show_default=False,
-        ),
-    ] = None,
+    given: StudyOptions,
+    how: RecordingOptions,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a file that exists.")
     ] = False,
@@ -108,23 +48,11 @@ def flow(
     """
     from driftwalk.flow import save_flow
 
-    overrides = study_overrides(
-        keys=FLOW_KEYS,
-        tank_diameter=tank_diameter,
-        side=side,
-        mass=mass,
-        depth=depth,
-        cells=cells,
-        cell_size=cell_size,
-        window=window,
-        inertia=inertia,
-        flow_drag_coefficient=flow_drag_coefficient,
-        min_count=min_count,
-    )
-    resolved = resolve_study(study, overrides, keys=FLOW_KEYS)
-    if study is None:
+    resolved = given.study()
+    if given.file is None:
         # Without a study nobody has said how large the tank is: the default one is no answer.
-        trajectory = how.load(recording, tank_diameter=tank_diameter, side=resolved.block.side_m)
+        diameter = given.overrides.get(FLOW_KEYS["tank_diameter"])
+        trajectory = how.load(recording, tank_diameter=diameter, side=resolved.block.side_m)
     else:
         trajectory = load_with_study(recording, resolved, how)
     require_motion(trajectory, recording, body=how.body)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, Side, TankDiameter
+from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.study import Side, TankDiameter
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_json, print_note, print_table
 

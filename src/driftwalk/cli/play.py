@@ -10,18 +10,11 @@ import typer
 
 from driftwalk.cli.inputs.study_recording import load_for_run
 from driftwalk.cli.options.recording import RecordingOptions
-from driftwalk.cli.options.shared import (
-    Blocks,
-    FlowFile,
-    Seed,
-    StudyFile,
-    TankDiameter,
-    override_study,
-    resolve_study,
-)
+from driftwalk.cli.options.shared import FlowFile
+from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_note
 from driftwalk.cli.view import Host, Open, Port, show
-from driftwalk.core.study_keys import ASSEMBLY_KEYS, study_overrides
+from driftwalk.core.study_keys import ASSEMBLY_KEYS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,8 +25,9 @@ FLOW_SEED = 1
 BLOCKS = 4
 
 
+@with_study_options(ASSEMBLY_KEYS, "tank_diameter", "blocks", "seed")
 def play(
-    study: StudyFile = None,
+    given: StudyOptions,
     flow: FlowFile = None,
     recording: Annotated[
         Path | None,
@@ -48,9 +42,6 @@ def play(
         str | None,
         typer.Option("--body", help="Body of the recording.", show_default=False),
     ] = None,
-    tank_diameter: TankDiameter = None,
-    blocks: Blocks = None,
-    seed: Seed = None,
     live: Annotated[
         int | None,
         typer.Option(
@@ -72,15 +63,8 @@ def play(
     from driftwalk.viewer import PlaySource, hello_line, require_server
 
     require_server()
-    bundled = study is None and flow is None and tank_diameter is None
-    overrides = study_overrides(
-        keys=ASSEMBLY_KEYS, tank_diameter=tank_diameter, blocks=blocks, seed=seed
-    )
-    if bundled:
-        base, name = _bundled(), "the bundled example"
-    else:
-        base, name = resolve_study(study, {}), str(study or "the default study")
-    chosen = override_study(base, overrides, base=name, keys=ASSEMBLY_KEYS)
+    bundled = not given.states_tank and flow is None
+    chosen = given.over(_bundled(), base="the bundled example") if bundled else given.study()
     source = PlaySource(
         chosen,
         _flow(flow, chosen, bundled=bundled),

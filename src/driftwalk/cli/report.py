@@ -10,7 +10,7 @@ import typer
 
 from driftwalk.cli.inputs.motion import load_simulation
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import TankDiameter
+from driftwalk.cli.options.study import TankDiameter
 from driftwalk.cli.terminal.output import print_note, require_place
 from driftwalk.core.errors import InputError
 

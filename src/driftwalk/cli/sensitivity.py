@@ -4,77 +4,48 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
 
 from driftwalk.cli.calibrate import Overwrite, Threads
 from driftwalk.cli.inputs.assembly_source import (
+    RUN_NAMES,
     Source,
     load_flow_for,
     refuse_found,
     source_from_calibration,
     source_from_flow,
 )
-from driftwalk.cli.options.shared import (
-    BlockFriction,
-    BlockLatching,
-    BlockRestitution,
-    Blocks,
-    Confidence,
-    ConnectorAxis,
-    ConnectorDistance,
-    Depth,
-    DragCoefficient,
-    FlowFile,
-    ForceInterval,
-    ForceStd,
-    HiddenFaces,
-    Json,
-    Mass,
-    MirrorImages,
-    Realisations,
-    RunDuration,
-    Runs,
-    Seed,
-    Side,
-    StudyFile,
-    TankDiameter,
-    TimeStep,
-    Vary,
-    WallFriction,
-    WallRestitution,
-)
-from driftwalk.cli.options.vary import VARY_KEYS, vary_overrides
+from driftwalk.cli.options.shared import FlowFile, Json
+from driftwalk.cli.options.study import StudyOptions, with_study_options
+from driftwalk.cli.options.vary import VARY_KEYS, Vary, vary_overrides
 from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.output import print_json
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.cli.terminal.sensitivity_answer import print_answer, summary
-from driftwalk.core.study_keys import SENSITIVITY_KEYS, study_overrides
+from driftwalk.core.study_keys import SENSITIVITY_KEYS
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
     from driftwalk.runs import SensitivityResult
 
-KEYS: Final = {**SENSITIVITY_KEYS, **VARY_KEYS}
 
-
+@with_study_options(SENSITIVITY_KEYS, "runs", "realisations", *RUN_NAMES)
 def sensitivity(
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="DIR", help="Run directory to make or continue.")
     ],
+    given: StudyOptions,
     run: Annotated[
         Path | None,
         typer.Argument(
             metavar="RUN", help="Run directory of a finished calibration.", show_default=False
         ),
     ] = None,
-    study: StudyFile = None,
     flow: FlowFile = None,
     vary: Vary = None,
-    runs: Runs = None,
-    realisations: Realisations = None,
     sobol: Annotated[
         int | None,
         typer.Option(
@@ -85,27 +56,6 @@ def sensitivity(
             show_default=False,
         ),
     ] = None,
-    blocks: Blocks = None,
-    duration: RunDuration = None,
-    tank_diameter: TankDiameter = None,
-    side: Side = None,
-    mass: Mass = None,
-    depth: Depth = None,
-    drag_coefficient: DragCoefficient = None,
-    force_std: ForceStd = None,
-    force_interval: ForceInterval = None,
-    wall_friction: WallFriction = None,
-    wall_restitution: WallRestitution = None,
-    time_step: TimeStep = None,
-    latching: BlockLatching = None,
-    connector_distance: ConnectorDistance = None,
-    connector_axis: ConnectorAxis = None,
-    hidden_face_drag: HiddenFaces = None,
-    chirality: MirrorImages = None,
-    block_restitution: BlockRestitution = None,
-    block_friction: BlockFriction = None,
-    confidence: Confidence = None,
-    seed: Seed = None,
     threads: Threads = None,
     overwrite: Overwrite = False,
     json: Json = False,
@@ -119,39 +69,14 @@ def sensitivity(
     """
     from driftwalk.runs import SensitivityWork, run_sensitivity
 
-    overrides = study_overrides(
-        keys=SENSITIVITY_KEYS,
-        runs=runs,
-        realisations=realisations,
-        blocks=blocks,
-        duration=duration,
-        tank_diameter=tank_diameter,
-        side=side,
-        mass=mass,
-        depth=depth,
-        drag_coefficient=drag_coefficient,
-        force_std=force_std,
-        force_interval=force_interval,
-        wall_friction=wall_friction,
-        wall_restitution=wall_restitution,
-        time_step=time_step,
-        latching=latching,
-        connector_distance=connector_distance,
-        connector_axis=connector_axis,
-        hidden_face_drag=hidden_face_drag,
-        chirality=chirality,
-        block_restitution=block_restitution,
-        block_friction=block_friction,
-        confidence=confidence,
-        seed=seed,
-    ) | vary_overrides(vary or [])
+    given = given.and_also(vary_overrides(vary or []), keys=VARY_KEYS)
     if run is None:
-        source = source_from_flow(study, flow, overrides, keys=KEYS)
+        source = source_from_flow(given, flow)
     else:
-        refuse_found(run, overrides)
-        source = source_from_calibration(run, flow, overrides, keys=KEYS, study_file=study)
-    named = VARY_KEYS["vary flow"] in overrides
-    paths = _flow_paths(source.study, Path() if named or study is None else study.parent)
+        refuse_found(run, given.overrides)
+        source = source_from_calibration(run, flow, given)
+    named = VARY_KEYS["vary flow"] in given.overrides
+    paths = _flow_paths(source.study, Path() if named or given.file is None else given.file.parent)
     work = SensitivityWork(
         study=source.study,
         flow=source.flow,

@@ -9,58 +9,29 @@ import numpy as np
 import typer
 
 from driftwalk.cli.options.recording import RecordingOptions
-from driftwalk.cli.options.shared import (
-    Depth,
-    DragCoefficient,
-    Duration,
-    ForceInterval,
-    ForceStd,
-    Json,
-    Mass,
-    OrientationNoise,
-    PositionNoise,
-    Replicates,
-    SampleRate,
-    Seed,
-    Side,
-    StudyFile,
-    TankDiameter,
-    TimeStep,
-    WallFriction,
-    WallRestitution,
-    resolve_study,
-)
+from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_json, print_note, require_place
 from driftwalk.core.errors import InputError
-from driftwalk.core.study_keys import study_overrides
+from driftwalk.core.study_keys import STUDY_KEYS
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
+@with_study_options(
+    STUDY_KEYS,
+    *("tank_diameter", "side", "mass", "depth", "drag_coefficient", "force_std", "force_interval"),
+    *("wall_friction", "wall_restitution", "time_step", "duration", "sample_rate"),
+    *("position_noise", "orientation_noise", "replicates", "seed"),
+)
 def simulate(
     flow: Annotated[
         Path,
         typer.Option("--flow", metavar="FILE", help="Flow field: NetCDF, or CSV with x, y, u, v."),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.nc", help="File to write.")],
-    study: StudyFile = None,
-    tank_diameter: TankDiameter = None,
-    side: Side = None,
-    mass: Mass = None,
-    depth: Depth = None,
-    drag_coefficient: DragCoefficient = None,
-    force_std: ForceStd = None,
-    force_interval: ForceInterval = None,
-    wall_friction: WallFriction = None,
-    wall_restitution: WallRestitution = None,
-    time_step: TimeStep = None,
-    duration: Duration = None,
-    sample_rate: SampleRate = None,
-    position_noise: PositionNoise = None,
-    orientation_noise: OrientationNoise = None,
-    replicates: Replicates = None,
-    seed: Seed = None,
+    given: StudyOptions,
     like: Annotated[
         Path | None,
         typer.Option(
@@ -99,25 +70,7 @@ def simulate(
     if like is not None and backend == "reference":
         raise InputError("--like runs on the cpu backend only: leave out --backend")
     require_place(out, existing="replace" if overwrite else "error")
-    overrides = study_overrides(
-        tank_diameter=tank_diameter,
-        side=side,
-        mass=mass,
-        depth=depth,
-        drag_coefficient=drag_coefficient,
-        force_std=force_std,
-        force_interval=force_interval,
-        wall_friction=wall_friction,
-        wall_restitution=wall_restitution,
-        time_step=time_step,
-        duration=duration,
-        sample_rate=sample_rate,
-        position_noise=position_noise,
-        orientation_noise=orientation_noise,
-        replicates=replicates,
-        seed=seed,
-    )
-    chosen = resolve_study(study, overrides)
+    chosen = given.study()
     field = load_flow(flow)
     if like is None:
         result = run(chosen, field, backend="reference" if backend == "reference" else "cpu")

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from driftwalk.cli.options.shared import (
-    Json,
-    Seed,
-    quantity_option,
-    quantity_parser,
-    resolve_study,
-)
+from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_json
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.core.study_keys import RECOVER_KEYS, study_overrides
+from driftwalk.core.study_keys import RECOVER_KEYS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,6 +24,9 @@ STATED: Final = ("forces.drag_coefficient", "forces.force_std_N")
 """Parameters with a default that count as the truth only if the file states them."""
 
 
+@with_study_options(
+    RECOVER_KEYS, "flow", "recordings", "duration", "precision", "seed", file="none"
+)
 def recover(
     truth: Annotated[
         Path,
@@ -38,33 +37,7 @@ def recover(
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="DIR", help="Run directory to make or continue.")
     ],
-    flow: Annotated[
-        Path | None,
-        typer.Option(
-            "--flow",
-            metavar="FILE",
-            help="True flow field (default: that of --truth).",
-            show_default=False,
-        ),
-    ] = None,
-    recordings: Annotated[
-        int | None,
-        typer.Option("--recordings", min=2, help="Recordings of each length.", show_default=False),
-    ] = None,
-    duration: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--duration",
-            metavar="<s>",
-            help="Length of the recordings; repeat it to compare lengths.",
-            show_default=False,
-        ),
-    ] = None,
-    precision: Annotated[
-        float | None,
-        quantity_option("--precision", "1", "Wanted relative error of C_d (rms)."),
-    ] = None,
-    seed: Seed = None,
+    given: StudyOptions,
     threads: Annotated[
         int | None,
         typer.Option(
@@ -88,18 +61,11 @@ def recover(
     from driftwalk.cli.terminal.recover_answer import print_answer, summary
     from driftwalk.runs import RecoveryWork, run_recovery
 
-    read = quantity_parser("s")
-    overrides = study_overrides(
-        keys=RECOVER_KEYS,
-        recordings=recordings,
-        duration=[read(text) for text in duration] if duration else None,
-        precision=precision,
-        flow=None if flow is None else str(flow),
-        seed=seed,
-    )
-    chosen = resolve_study(truth, overrides, keys=RECOVER_KEYS)
+    given = replace(given, file=truth)
+    chosen = given.study()
     _require_stated(truth)
-    field, flow_file = _flow(chosen, truth, flow)
+    named = given.overrides.get(RECOVER_KEYS["flow"])
+    field, flow_file = _flow(chosen, truth, None if named is None else Path(named))
     inputs = {"truth": truth, **({} if flow_file is None else {"flow": flow_file})}
     work = RecoveryWork(chosen, field, inputs, threads)
     with reported("recover") as told:

@@ -63,6 +63,16 @@ SENSITIVITY_KEYS: Final[dict[str, str]] = {
 }
 """The same for a sensitivity analysis, where runs are those of a setting."""
 
+FLOW_KEYS: Final[dict[str, str]] = {
+    **STUDY_KEYS,
+    "cells": "flow.cells",
+    "cell_size": "flow.cell_size_m",
+    "window": "flow.smoothing_window_s",
+    "flow_drag_coefficient": "flow.flow_drag_coefficient",
+    "min_count": "flow.min_count",
+    "inertia": "flow.inertia",
+}
+"""The same for the extraction of a flow field."""
 
 FIT_KEYS: Final[dict[str, str]] = {
     **STUDY_KEYS,
@@ -83,6 +93,12 @@ RECOVER_KEYS: Final[dict[str, str]] = {
     "seed": "recover.seed",
 }
 """The same for a recovery study."""
+
+TABLES: Final = (
+    *(STUDY_KEYS, CALIBRATION_KEYS, ASSEMBLY_KEYS, SENSITIVITY_KEYS),
+    *(FLOW_KEYS, FIT_KEYS, RECOVER_KEYS),
+)
+"""All of them."""
 
 
 def study_overrides(*, keys: Mapping[str, str] = STUDY_KEYS, **options: Any) -> dict[str, Any]:

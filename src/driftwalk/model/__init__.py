@@ -3,6 +3,7 @@
 from driftwalk.model.assembly import Assembly
 from driftwalk.model.block import Block
 from driftwalk.model.calibration import Calibration
+from driftwalk.model.declaration import Declaration, declared
 from driftwalk.model.fit import Fit
 from driftwalk.model.flow import Flow
 from driftwalk.model.forces import Forces
@@ -22,6 +23,7 @@ __all__ = [
     "Block",
     "Calibration",
     "Columns",
+    "Declaration",
     "FieldOfView",
     "Fit",
     "Flow",
@@ -37,6 +39,7 @@ __all__ = [
     "Tank",
     "Water",
     "apply_overrides",
+    "declared",
     "load_study",
     "parameter_table",
     "parse_study",

@@ -42,6 +42,7 @@ class Assembly(Section):
     )
     latching: Latching = Field(
         default="collision",
+        title="Rule by which two blocks latch.",
         description=(
             'Latching rule: "collision", whenever two blocks touch (the paper); '
             '"connector", when two faces are within the tolerances of a connector; '
@@ -66,18 +67,22 @@ class Assembly(Section):
     )
     hidden_face_drag: HiddenFaceDrag = Field(
         default="none",
+        title="Drag on faces that are joined.",
         description=(
             'Drag on faces that are joined to another block: "none", or "full" as on a free face.'
         ),
     )
     chirality: Chirality = Field(
         default="merged",
+        title="Mirror images as one class or two.",
         description=(
             'Treatment of mirror images: "merged" into one class (the paper), or "distinct".'
         ),
     )
     block_restitution: Annotated[float, Quantity("1", ge=0, le=1)] = Field(
-        default=0.5, description="Restitution of an impact between two blocks that do not latch."
+        default=0.5,
+        title="Restitution between blocks, 0 to 1.",
+        description="Restitution of an impact between two blocks that do not latch.",
     )
     block_friction: Annotated[float, Quantity("1", ge=0, le=100)] = Field(
         default=0.0, description="Coulomb friction between two blocks; 0 for wet faces."

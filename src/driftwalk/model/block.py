@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.model.section import Quantity, Section
+from driftwalk.model.section import OrNumber, Quantity, Section
 
 
 class Block(Section):
@@ -22,13 +22,18 @@ class Block(Section):
     section_name: ClassVar[str] = "block"
 
     side_m: Annotated[float, Quantity("m", gt=0, le=10)] = Field(
-        default=0.03, description="Side a of the square, seen from above."
+        default=0.03,
+        title="Side of the block.",
+        description="Side a of the square, seen from above.",
     )
     mass_kg: Annotated[float, Quantity("kg", gt=0, le=1e4)] = Field(
-        default=0.0116, description="Mass m, with everything that the block carries."
+        default=0.0116,
+        title="Mass of the block.",
+        description="Mass m, with everything that the block carries.",
     )
-    depth: Literal["immersed", "archimedes"] | None = Field(
+    depth: Annotated[Literal["immersed", "archimedes"] | None, OrNumber("depth_m")] = Field(
         default=None,
+        title="Wetted depth of a side face.",
         description=(
             'Wetted depth d of a side face: "immersed" is d = a (the default), "archimedes" is the '
             "depth at which the block floats, d = m / (density a^2). The drag "

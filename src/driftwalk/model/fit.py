@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Final, Literal
 from pydantic import Field, field_validator, model_validator
 
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.model.section import Quantity, Section
+from driftwalk.model.section import Placeholder, Quantity, Section
 
 Time = Annotated[float, Quantity("s", ge=-1e12, le=1e12)]
 
@@ -39,6 +39,7 @@ class Fit(Section):
     )
     angle: Literal["auto", "state", "given", "none"] = Field(
         default="auto",
+        title="Use of the recorded orientation.",
         description=(
             'Use of the recorded orientation: "state" predicts it like the position '
             'and learns from its errors too; "given" uses it, smoothed, as an input; '
@@ -56,6 +57,10 @@ class Fit(Section):
     )
     switching_times_s: tuple[Time, ...] | None = Field(
         default=None,
+        title=(
+            "Times at which the pumps were switched, on each recording's clock; each interval has "
+            "its own flow."
+        ),
         description=(
             "Times, on the clock of each recording, at which the pumps were "
             "switched. Each interval between them has its own flow, and all share "
@@ -63,8 +68,11 @@ class Fit(Section):
         ),
         examples=["[600.0, 1200.0]"],
     )
-    flow_labels: tuple[str, ...] | None = Field(
+    flow_labels: Annotated[tuple[str, ...] | None, Placeholder("A,B,...")] = Field(
         default=None,
+        title=(
+            "Names of the flows between switching times; repeat a name for a flow that comes back."
+        ),
         description=(
             "Names of the flows in the intervals between the switching times: "
             "intervals with the same name have the same flow. Without names all "
@@ -74,6 +82,7 @@ class Fit(Section):
     )
     drag_coefficient_precision: Annotated[float | None, Quantity("1", gt=0, lt=1)] = Field(
         default=None,
+        title="Wanted relative standard error of C_d.",
         description=(
             "Wanted relative standard error of C_d: the fit says whether it is "
             "reached, and if not, how long a recording must be. Without it, a "

@@ -32,5 +32,6 @@ class Flow(Section):
     )
     inertia: Literal["corrected", "none"] = Field(
         default="corrected",
+        title="Correction for the body's inertia.",
         description='"corrected" adds the inertia term of Eq. 4; "none" leaves it out.',
     )

@@ -28,6 +28,7 @@ class Forces(Section):
     )
     force_std_N: ForceStd = Field(
         default=0.55e-3,
+        title="Standard deviation of the stochastic force.",
         description=(
             "Standard deviation sigma_F of each horizontal component of the stochastic force on "
             "the centre of mass."

@@ -19,6 +19,7 @@ class Observation(Section):
         float | Literal["estimate"], Quantity("m", ge=0, le=1, words=("estimate",))
     ] = Field(
         default="estimate",
+        title="Position noise of the tracker.",
         description=(
             "Standard deviation of the position noise of the tracker, per axis; "
             '"estimate" takes it from the recording; without a recording there is no '
@@ -28,7 +29,9 @@ class Observation(Section):
     orientation_noise_rad: Annotated[
         float | Literal["estimate"], Quantity("rad", ge=0, le=3.2, words=("estimate",))
     ] = Field(
-        default="estimate", description="Standard deviation of the orientation noise, likewise."
+        default="estimate",
+        title="Orientation noise of the tracker.",
+        description="Standard deviation of the orientation noise, likewise.",
     )
     position_quantum_m: Annotated[
         float | Literal["recording"], Quantity("m", ge=0, le=1, words=("recording",))

@@ -10,7 +10,7 @@ from pydantic import Field, field_validator
 from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.model.fit import Fit
-from driftwalk.model.section import Quantity, Section, quoted, words_of
+from driftwalk.model.section import Placeholder, Quantity, Section, quoted, words_of
 
 LARGEST_STEP_S: Final = 0.0025
 """Largest time step of a simulation that is taken for the truth: its error is then far below what
@@ -33,8 +33,9 @@ class Recover(Section):
 
     section_name: ClassVar[str] = "recover"
 
-    flow: str | None = Field(
+    flow: Annotated[str | None, Placeholder("FILE")] = Field(
         default=None,
+        title="File of the true flow field (default: that of the study file).",
         description=(
             'File of the true flow field, relative to the study file; "random" draws '
             "a different flow for every recording."
@@ -81,6 +82,7 @@ class Recover(Section):
     )
     drag_coefficient_precision: Annotated[float | None, Quantity("1", gt=0, lt=1)] = Field(
         default=None,
+        title="Wanted relative error of C_d (rms).",
         description=(
             "Wanted relative error of C_d, root mean square: the study says how long "
             "to record for it."

@@ -97,6 +97,20 @@ class Quantity:
         return value
 
 
+@dataclass(frozen=True)
+class OrNumber:
+    """Declares that a word may be given as a number instead, which has its own key."""
+
+    key: str
+
+
+@dataclass(frozen=True)
+class Placeholder:
+    """Declares the placeholder of a text in the help of an option, such as ``FILE``."""
+
+    text: str
+
+
 class Section(BaseModel):
     """Base of every section: frozen, no unknown keys, errors that name section and key."""
 

@@ -34,6 +34,7 @@ class Simulation(Section):
         float | Literal["auto"], Quantity("s", gt=0, le=0.1, words=("auto",))
     ] = Field(
         default="auto",
+        title="Time step; divides the force interval.",
         description=(
             'Time step of the integrator; "auto" is the largest whole divisor of '
             "force_interval_s up to 10 ms. A step that does not divide the interval "

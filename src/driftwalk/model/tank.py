@@ -35,7 +35,9 @@ class Outline(Section):
         default="circle", description="Shape; each shape has its own keys."
     )
     diameter_m: Annotated[float | None, Quantity("m", gt=0, le=1e3)] = Field(
-        default=None, description="Diameter of a circle (0.3 m when it is not given)."
+        default=None,
+        title="Diameter of a circular tank.",
+        description="Diameter of a circle (0.3 m when it is not given).",
     )
     width_m: Annotated[float | None, Quantity("m", gt=0, le=1e3)] = Field(
         default=None, description="Width of a rectangle, along x.", examples=[0.4]
@@ -189,7 +191,9 @@ class Tank(Outline):
     section_name: ClassVar[str] = "tank"
 
     wall_restitution: Annotated[float, Quantity("1", ge=0, le=1)] = Field(
-        default=0.5, description="Restitution e of an impact on the wall."
+        default=0.5,
+        title="Restitution of the wall, 0 to 1.",
+        description="Restitution e of an impact on the wall.",
     )
     wall_friction: Annotated[float, Quantity("1", ge=0, le=100)] = Field(
         default=0.0, description="Coulomb friction of the wall; 0 for a wet wall."

@@ -20,16 +20,8 @@ import typer
 from driftwalk import __version__
 from driftwalk.cli import main as cli_main
 from driftwalk.cli.main import COMMANDS, Command, main
-from driftwalk.cli.options import shared as options
-from driftwalk.cli.options.shared import (
-    DragCoefficient,
-    ForceStd,
-    Json,
-    StudyFile,
-    TankDiameter,
-    option_name,
-    resolve_study,
-)
+from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
 from driftwalk.cli.terminal.output import print_json, print_table, to_json
 from driftwalk.cli.terminal.progress import ProgressReporter, duration_text
 from driftwalk.core.errors import ConfigurationError, FormatError, InputError
@@ -191,21 +183,12 @@ def test_options_reach_the_study(
     path.write_text("[tank]\ndiameter_m = 0.4\n[simulation]\nseed = 5\n", encoding="utf-8")
     seen: list[Study] = []
 
-    def probe(
-        study: StudyFile = None,
-        tank_diameter: TankDiameter = None,
-        drag_coefficient: DragCoefficient = None,
-        force_std: ForceStd = None,
-        depth: options.Depth = None,
-        time_step: options.TimeStep = None,
-        seed: options.Seed = None,
-        replicates: options.Replicates = None,
-        json: Json = False,
-    ) -> None:
-        given = {"tank_diameter": tank_diameter, "drag_coefficient": drag_coefficient}
-        given |= {"force_std": force_std, "depth": depth, "time_step": time_step}
-        overrides = study_overrides(**given, seed=seed, replicates=replicates)
-        seen.append(resolve_study(study, overrides))
+    @with_study_options(
+        STUDY_KEYS,
+        *("tank_diameter", "drag_coefficient", "force_std", "depth", "time_step", "seed"),
+    )
+    def probe(given: StudyOptions, json: Json = False) -> None:
+        seen.append(given.study())
 
     add_command(probe)
     assert main(["probe", "--study", str(path), "--force-std", "0.55mN", "--depth", "2cm"]) == 0
@@ -237,12 +220,9 @@ def test_options_reach_the_study(
 def test_wrong_option_is_named(
     arguments: list[str], words: str, add_command: AddCommand, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def probe(
-        tank_diameter: TankDiameter = None, force_std: ForceStd = None, seed: options.Seed = None
-    ) -> None:
-        resolve_study(
-            None, study_overrides(tank_diameter=tank_diameter, force_std=force_std, seed=seed)
-        )
+    @with_study_options(STUDY_KEYS, "tank_diameter", "force_std", "seed")
+    def probe(given: StudyOptions) -> None:
+        given.study()
 
     add_command(probe)
     assert main(["probe", *arguments]) == 2

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from driftwalk.cli.options.shared import option_name, override_study, resolve_study
+from driftwalk.cli.options.study import StudyOptions, option_name
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -22,6 +22,14 @@ FOUND_BY_CALIBRATION: Final = (
 )
 SEARCHED: Final = FOUND_BY_CALIBRATION[:2]
 """Parameters that a calibration finds: a study file may hold any value for them."""
+RUN_NAMES: Final = (
+    *("blocks", "duration", "tank_diameter", "side", "mass", "depth"),
+    *("drag_coefficient", "force_std", "force_interval"),
+    *("wall_friction", "wall_restitution", "time_step"),
+    *("latching", "connector_distance", "connector_axis", "hidden_face_drag", "chirality"),
+    *("block_restitution", "block_friction", "confidence", "seed"),
+)
+"""Options for keys of a study that every command on self-assembly takes."""
 MODEL_KEYS: Final = ("block", "tank", "water", "forces", "simulation.time_step_s")
 """Sections that a study file must not contradict when a calibration gives the model."""
 
@@ -51,21 +59,15 @@ class Source:
     warnings: list[str]
 
 
-def source_from_flow(
-    study_file: Path | None,
-    flow_file: Path | None,
-    overrides: Mapping[str, Any],
-    *,
-    keys: Mapping[str, str],
-) -> Source:
+def source_from_flow(given: StudyOptions, flow_file: Path | None) -> Source:
     """Return the model of a study, in a flow field from a file.
 
     Parameters
     ----------
-    study_file, flow_file : Path or None
-        The files; without a study file the default study.
-    overrides, keys : mapping
-        As in `resolve_study`.
+    given : StudyOptions
+        The study.
+    flow_file : Path or None
+        The flow field.
 
     Raises
     ------
@@ -77,8 +79,8 @@ def source_from_flow(
             "the flow of the water is missing: give the run directory of a "
             "calibration, or a flow field (--flow)"
         )
-    chosen = resolve_study(study_file, overrides, keys=keys)
-    inputs = {"flow": flow_file, **({} if study_file is None else {"study": study_file})}
+    chosen = given.study()
+    inputs = {"flow": flow_file, **({} if given.file is None else {"study": given.file})}
     return Source(chosen, load_flow_for(flow_file, chosen), None, inputs, [])
 
 
@@ -98,14 +100,7 @@ def refuse_found(folder: Path, overrides: Mapping[str, Any], *, also: Sequence[s
         )
 
 
-def source_from_calibration(
-    folder: Path,
-    flow_file: Path | None,
-    overrides: Mapping[str, Any],
-    *,
-    keys: Mapping[str, str],
-    study_file: Path | None = None,
-) -> Source:
+def source_from_calibration(folder: Path, flow_file: Path | None, given: StudyOptions) -> Source:
     """Return the model that a calibration has found, in its flow field.
 
     Parameters
@@ -114,11 +109,9 @@ def source_from_calibration(
         The run directory of the calibration.
     flow_file : Path or None
         Another flow field.
-    overrides, keys : mapping
-        As in `resolve_study`.
-    study_file : Path, optional
-        Its sections [assembly] and [sensitivity] take the place of the run's; the model is the
-        run's.
+    given : StudyOptions
+        The options, and a study file whose sections [assembly] and [sensitivity] take the place of
+        the run's; the model is the run's.
 
     Raises
     ------
@@ -130,10 +123,10 @@ def source_from_calibration(
 
     found = read_calibrated(folder)
     base, study, inputs = f"the study of {folder}", found.study, dict(found.files)
-    if study_file is not None:
-        base, study = str(study_file), _with_sections(found.study, study_file, folder)
-        inputs["study"] = study_file
-    chosen = override_study(study, overrides, base=base, keys=keys)
+    if given.file is not None:
+        base, study = str(given.file), _with_sections(found.study, given.file, folder)
+        inputs["study"] = given.file
+    chosen = given.over(study, base=base)
     warnings = [f"of the calibration: {warning}" for warning in found.warnings]
     field = found.flow
     if flow_file is not None:

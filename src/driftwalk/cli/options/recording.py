@@ -9,9 +9,6 @@ A command has one parameter of type `RecordingOptions` and the decorator spreads
 
 from __future__ import annotations
 
-import functools
-import inspect
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
@@ -19,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from driftwalk.cli.options.shared import quantity_parser
+from driftwalk.cli.options.spread import Command, Part, spread
 from driftwalk.core.errors import FormatError, InputError
 
 if TYPE_CHECKING:
@@ -175,33 +173,10 @@ def parse_columns(texts: list[str]) -> dict[str, str]:
     return columns
 
 
-def with_recording_options(function: Callable[..., Any]) -> Callable[..., Any]:
+def with_recording_options(function: Command) -> Command:
     """Spread a command's parameter of type `RecordingOptions` into one option per field."""
-    hints = get_type_hints(function, include_extras=True)
-    field_hints = get_type_hints(RecordingOptions, include_extras=True)
-    signature = inspect.signature(function)
-    name = next(key for key, hint in hints.items() if hint is RecordingOptions)
-    own = [
-        parameter.replace(annotation=hints.get(key, Any))
-        for key, parameter in signature.parameters.items()
-        if key != name
-    ]
-    spread = [
-        inspect.Parameter(
-            field.name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=field.default,
-            annotation=field_hints[field.name],
-        )
-        for field in fields(RecordingOptions)
-    ]
-
-    @functools.wraps(function)
-    def command(**values: Any) -> Any:
-        options = {field.name: values.pop(field.name) for field in fields(RecordingOptions)}
-        return function(**values, **{name: RecordingOptions(**options)})
-
-    keywords = [item.replace(kind=inspect.Parameter.KEYWORD_ONLY) for item in own]
-    command.__signature__ = signature.replace(parameters=[*keywords, *spread])  # type: ignore[attr-defined]
-    command.__annotations__ = {item.name: item.annotation for item in (*keywords, *spread)}
-    return command
+    hints = get_type_hints(RecordingOptions, include_extras=True)
+    parts = {
+        field.name: Part(hints[field.name], field.default) for field in fields(RecordingOptions)
+    }
+    return spread(function, RecordingOptions, parts, lambda given: RecordingOptions(**given))

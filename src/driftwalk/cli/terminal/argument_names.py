@@ -12,6 +12,9 @@ import shlex
 from collections.abc import Mapping
 from typing import Any, Final
 
+from driftwalk.core.study_keys import TABLES
+
+# The tables have most keys in common, each by the same name in all of them.
 OPTIONS: Final[dict[str, str | None]] = {
     "angle": "--angle",
     "area": None,
@@ -49,19 +52,7 @@ OPTIONS: Final[dict[str, str | None]] = {
     "x": "--x",
     "y": "--y",
     "y_axis": "--y-axis",
-    "assembly.blocks": "--blocks",
-    "assembly.duration_s": "--duration",
-    "calibration.bootstrap": "--bootstrap",
-    "fit.flow_labels": "--flow-labels",
-    "fit.spline_spacing_m": "--spline-spacing",
-    "fit.switching_times_s": "--switching-times",
-    "forces.drag_coefficient": "--drag-coefficient",
-    "forces.force_interval_s": "--force-interval",
-    "forces.force_std_N": "--force-std",
-    "sensitivity.runs": "--runs",
-    "simulation.time_step_s": "--time-step",
-    "steps.step_interval_s": "--step-interval",
-    "tank.diameter_m": "--tank-diameter",
+    **{key: f"--{name.replace('_', '-')}" for table in TABLES for name, key in table.items()},
 }
 """From an argument, or a key of the study, to its option; None where there is no option."""
 

@@ -1,0 +1,68 @@
+"""Options in the place of one parameter: a command takes an object, the user types its parts."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, get_type_hints
+
+Command = Callable[..., Any]
+
+
+class Part(NamedTuple):
+    """One option: its annotated type, and its value where it is not given."""
+
+    annotation: Any
+    default: Any
+
+
+def spread(
+    function: Command,
+    kind: type,
+    parts: Mapping[str, Part],
+    make: Callable[[dict[str, Any]], Any],
+) -> Command:
+    """Return a command with options in the place of its parameter of a type.
+
+    Parameters
+    ----------
+    function : callable
+        A command, or what this function returned for one.
+    kind : type
+        The type of the parameter.
+    parts : mapping
+        The options by the names of their values.
+    make : callable
+        Makes the object from the values.
+
+    Examples
+    --------
+    >>> class Size(dict): ...
+    >>> def area(size: Size) -> float:
+    ...     return size["width"] * size["height"]
+    >>> parts = {"width": Part(float, 1.0), "height": Part(float, 1.0)}
+    >>> spread(area, Size, parts, Size)(width=2.0, height=3.0)
+    6.0
+    """
+    hints = get_type_hints(function, include_extras=True)
+    signature = inspect.signature(function)
+    name = next(key for key, hint in hints.items() if hint is kind)
+    parameters = []
+    for key, parameter in signature.parameters.items():
+        own = {key: Part(hints.get(key, Any), parameter.default)}
+        parameters += [
+            inspect.Parameter(
+                part, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation
+            )
+            for part, (annotation, default) in (parts if key == name else own).items()
+        ]
+
+    @functools.wraps(function)
+    def command(**values: Any) -> Any:
+        made = make({part: values.pop(part) for part in parts})
+        return function(**values, **{name: made})
+
+    command.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {item.name: item.annotation for item in parameters}
+    return command
