@@ -23,7 +23,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "sweep": GROUND,
     # `record` for the tracking noise of a recording, which is what "estimate" stands for.
     "simulation": GROUND | {"model", "record"},
-    "conditions": GROUND | {"model", "flow", "simulation"},
+    "conditions": GROUND | {"record", "model", "flow", "simulation"},
     "motion": GROUND | {"conditions", "simulation", "comparison", "model"},
     "calibration": GROUND
     | {"conditions", "motion", "simulation", "comparison", "flow", "model", "sweep"},

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from driftwalk.cli.inputs.require_motion import require_motion
-from driftwalk.cli.inputs.study_recording import default_tank_note, load_for_run
+from driftwalk.cli.inputs.study_recording import read_for_run, tank_note
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowFile, Json
 from driftwalk.cli.options.study import StudyOptions, with_study_options
@@ -53,27 +52,19 @@ def calibrate(
     turning angles, and refines the grid around the minimum. Reports how well the parameters are
     known and whether the model explains the motion. After a kill, the same command continues.
     """
-    from driftwalk.conditions import require_inside, study_in_arena
     from driftwalk.flow import load_flow
     from driftwalk.runs import CalibrationWork, run_calibration
 
-    chosen = given.study()
-    unsaid = not given.states_tank and how.arena is None
-    loaded = load_for_run(recording, chosen, how, tank="unsaid" if unsaid else "stated")
-    trajectory = loaded.trajectory
-    require_motion(trajectory, recording, body=how.body)
-    chosen = study_in_arena(chosen, trajectory)
-    require_inside(chosen, trajectory, how.body)
+    read = read_for_run([recording], given, how)
     inputs = {"recording": recording}
     inputs.update({"flow": flow} if flow is not None else {})
     inputs.update({"study": given.file} if given.file is not None else {})
     field = None
     if flow is not None:
-        field = load_flow(flow, arena=chosen.tank.to_arena(), own_flags="keep")
-    remark = None if loaded.has_tank else default_tank_note(chosen)
-    work = CalibrationWork(trajectory, chosen, field, how.body, inputs, threads)
+        field = load_flow(flow, arena=read.study.tank.to_arena(), own_flags="keep")
+    work = CalibrationWork(read.trajectories[0], read.study, field, how.body, inputs, threads)
     with reported("calibrate") as told:
-        found = run_calibration(work, out, overwrite=overwrite, begun=remark, **told)
+        found = run_calibration(work, out, overwrite=overwrite, begun=tank_note(read), **told)
     if json:
         print_json(summary(found))
     else:

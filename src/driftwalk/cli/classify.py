@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from driftwalk.cli.inputs.study_recording import load_with_study
+from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json, quantity_option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
@@ -161,6 +161,7 @@ def _load(
 ) -> tuple[xr.Dataset, float]:
     """Return the recording, or the simulated run, and the side of its blocks [m]."""
     from driftwalk.assembly import path_recording
+    from driftwalk.conditions import load_with_study
     from driftwalk.model import Block
 
     simulated = _simulated_path(path)
@@ -174,7 +175,8 @@ def _load(
         own = given.overrides.get(STUDY_KEYS["side"], Block().side_m)
         return how.load(path, side=own), own
     resolved = given.study()
-    return load_with_study(path, resolved, how), resolved.block.side_m
+    with explained():
+        return load_with_study(path, resolved, how.arguments()), resolved.block.side_m
 
 
 def _simulated_path(path: Path) -> xr.Dataset | None:

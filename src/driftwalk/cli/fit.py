@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from driftwalk.cli.inputs.require_motion import require_motion
-from driftwalk.cli.inputs.study_recording import default_tank_note, load_for_run
+from driftwalk.cli.inputs.study_recording import read_for_run, tank_note
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json
 from driftwalk.cli.options.study import StudyOptions, with_study_options
@@ -53,25 +52,14 @@ def fit(
     (fit.nc), the flow (flow.nc) for every command that takes one, the recording, the check of the
     model (check.nc), figures and manifest.json.
     """
-    from driftwalk.conditions import require_inside, study_in_arena
     from driftwalk.runs import FitWork, run_fit
 
-    chosen = given.study()
-    unsaid = not given.states_tank and how.arena is None
-    loaded = []
-    for path in recordings:
-        loaded.append(load_for_run(path, chosen, how, tank="unsaid" if unsaid else "stated"))
-        require_motion(loaded[-1].trajectory, path, body=how.body)
-    trajectories = [one.trajectory for one in loaded]
-    chosen = study_in_arena(chosen, trajectories[0])
-    for one in trajectories:
-        require_inside(chosen, one, how.body)
-    remark = None if loaded[0].has_tank else default_tank_note(chosen)
+    read = read_for_run(recordings, given, how)
     inputs = {"recording" if n == 0 else f"recording-{n + 1}": p for n, p in enumerate(recordings)}
     inputs.update({"study": given.file} if given.file is not None else {})
-    work = FitWork(trajectories, chosen, how.body, inputs, check=not no_check)
+    work = FitWork(read.trajectories, read.study, how.body, inputs, check=not no_check)
     with reported("fit") as told:
-        found = run_fit(work, out, overwrite=overwrite, begun=remark, **told)
+        found = run_fit(work, out, overwrite=overwrite, begun=tank_note(read), **told)
     if json:
         print_json(answer(found.fit, found.check))
     else:

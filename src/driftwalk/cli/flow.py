@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from driftwalk.cli.inputs.require_motion import require_motion
-from driftwalk.cli.inputs.study_recording import load_with_study
+from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json
 from driftwalk.cli.options.study import StudyOptions, with_study_options
@@ -46,6 +45,7 @@ def flow(
     that the body never visited are filled in and flagged. Mass and side come from the study; the
     default is the 11.6-g, 3-cm block of the paper.
     """
+    from driftwalk.conditions import load_with_study, require_motion
     from driftwalk.flow import save_flow
 
     resolved = given.study()
@@ -54,8 +54,9 @@ def flow(
         diameter = given.overrides.get(FLOW_KEYS["tank_diameter"])
         trajectory = how.load(recording, tank_diameter=diameter, side=resolved.block.side_m)
     else:
-        trajectory = load_with_study(recording, resolved, how)
-    require_motion(trajectory, recording, body=how.body)
+        with explained():
+            trajectory = load_with_study(recording, resolved, how.arguments())
+    require_motion(trajectory, body=how.body, where=recording)
     field = _extract(trajectory, resolved, body=how.body)
     save_flow(field, out, existing="replace" if overwrite else "error")
     _report(field, out, json=json)

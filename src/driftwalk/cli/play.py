@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from driftwalk.cli.inputs.study_recording import load_for_run
-from driftwalk.cli.options.recording import RecordingOptions
+from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.shared import FlowFile
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_note
@@ -117,9 +116,11 @@ def _recording(
     path: Path | None, study: Study, body: str | None, *, bundled: bool
 ) -> xr.Dataset | None:
     """Return the recording to compare with; none where none was given."""
+    from driftwalk.conditions import load_for_run
     from driftwalk.datasets import tank30_recording
 
     if path is not None:
-        how = RecordingOptions(body=body)
-        return load_for_run(path, study, how, tank="unsaid" if bundled else "stated").trajectory
+        given = {} if body is None else {"body": body}
+        with explained():
+            return load_for_run(path, study, given, tank="unsaid" if bundled else "stated")[0]
     return tank30_recording() if bundled else None

@@ -1,18 +1,32 @@
 """Facts that a simulation or a fit takes from a recording, made once and passed down.
 
-The tank and the block, reconciled with the study; times and gaps, start and camera; the flow.
+How a recording is read when a study says so, and what is refused; the tank and the block,
+reconciled with the study; times and gaps, start and camera; the flow.
 """
 
 from driftwalk.conditions.own_flow import recording_flow
+from driftwalk.conditions.reading import (
+    ReadRecordings,
+    load_for_run,
+    load_with_study,
+    read_recordings,
+)
 from driftwalk.conditions.recorded import Conditions, recorded_conditions
+from driftwalk.conditions.refuse import require_motion, require_positions
 from driftwalk.conditions.study import study_for
 from driftwalk.conditions.tank import require_inside, study_in_arena
 
 __all__ = [
     "Conditions",
+    "ReadRecordings",
+    "load_for_run",
+    "load_with_study",
+    "read_recordings",
     "recorded_conditions",
     "recording_flow",
     "require_inside",
+    "require_motion",
+    "require_positions",
     "study_for",
     "study_in_arena",
 ]

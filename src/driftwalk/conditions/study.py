@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from driftwalk.conditions.tank import require_inside, study_in_arena
+from driftwalk.conditions.tank import OUTLINE, require_inside, study_in_arena
 from driftwalk.core.errors import InputError
+from driftwalk.flow.arena import read_arena
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
 
-_OUTLINE: Final = ("shape", "diameter_m", "width_m", "height_m", "vertices_m")
 _SAME: Final = 1e-9
 """Relative difference of two lengths up to which they are the same statement."""
 
@@ -64,10 +64,14 @@ def study_for(
 
     chosen = apply_overrides(study if study is not None else Study(), overrides or {})
     # A fact that is stated already, by the study or by an earlier recording, has to be the same.
-    tank = not chosen.tank.model_fields_set.isdisjoint(_OUTLINE)
+    tank = not chosen.tank.model_fields_set.isdisjoint(OUTLINE)
     block = "side_m" in chosen.block.model_fields_set
+    fitted = False
     for recording in recordings:
-        chosen = _with_tank(chosen, recording, is_stated=tank)
+        # A circle that is fitted to the positions states no tank: another recording has another.
+        if not (fitted and _is_fitted(recording)):
+            chosen = _with_tank(chosen, recording, is_stated=tank)
+        fitted = fitted or _is_fitted(recording)
         chosen = _with_block(chosen, recording, is_stated=block)
         tank = tank or "arena" in recording.attrs
         block = block or "block_side_m" in recording.attrs
@@ -103,8 +107,13 @@ def _with_block(study: Study, recording: xr.Dataset, *, is_stated: bool) -> Stud
     return apply_overrides(study, {"block.side_m": float(side)})
 
 
+def _is_fitted(recording: xr.Dataset) -> bool:
+    """Return whether the arena is the circle that was fitted to the positions."""
+    return "radius_is" in read_arena(str(recording.attrs.get("arena_found", "{}")))
+
+
 def _outline(study: Study) -> tuple[Any, ...]:
-    return tuple(getattr(study.tank, key) for key in _OUTLINE)
+    return tuple(getattr(study.tank, key) for key in OUTLINE)
 
 
 def _name_of(recording: xr.Dataset) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
+OUTLINE: Final = ("shape", "diameter_m", "width_m", "height_m", "vertices_m")
+"""Keys of a tank that state its outline; the others are about its wall."""
 MOST_OUTSIDE = 0.01
 """Share of positions outside the tank from which on the tank cannot be right."""
 
@@ -52,8 +54,7 @@ def study_in_arena(study: Study, recording: xr.Dataset) -> Study:
         wall_friction=wall.wall_friction,
         bounce_speed_m_s=wall.bounce_speed_m_s,
     )
-    keys = ("shape", "diameter_m", "width_m", "height_m", "vertices_m")
-    given = {f"tank.{key}": getattr(tank, key) for key in keys if getattr(tank, key) is not None}
+    given = {f"tank.{key}": getattr(tank, key) for key in OUTLINE if getattr(tank, key) is not None}
     return apply_overrides(study, given)
 
 

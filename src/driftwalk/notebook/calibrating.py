@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
-from driftwalk.conditions import study_for
+from driftwalk.conditions import require_motion, study_for
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import CALIBRATION_KEYS, study_overrides
 
@@ -93,6 +93,7 @@ def calibrate(
     if isinstance(model, BlockModel) and study is None:
         study = model.study
     is_block = model is None or isinstance(model, BlockModel)
+    require_motion(recording, body=body)
     overrides = study_overrides(keys=CALIBRATION_KEYS, **given)
     chosen = study_for([recording], study, overrides, body=body, needs_tank=is_block)
     field = fitted_flow(flow) if flow is not None and flow.attrs.get("kind") == "fit" else flow

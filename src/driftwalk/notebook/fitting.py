@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
-from driftwalk.conditions import study_for
+from driftwalk.conditions import require_motion, study_for
 from driftwalk.core.study_keys import FIT_KEYS, study_overrides
 
 if TYPE_CHECKING:
@@ -82,6 +82,8 @@ def fit(
 
     many = [recordings] if isinstance(recordings, xr.Dataset) else list(recordings)
     given: dict[str, Any] = dict(settings)
+    for one in many:
+        require_motion(one, body=body)
     chosen = study_for(many, study, study_overrides(keys=FIT_KEYS, **given), body=body)
     if folder is None:
         found = fit_motion(many, chosen, body=body, tell=progress)

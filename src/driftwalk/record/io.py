@@ -21,7 +21,7 @@ from driftwalk.record.clean import Counts, clean_body
 from driftwalk.record.clock import check_clock
 from driftwalk.record.convert_units import convert_units
 from driftwalk.record.extent import refuse_many_bodies, refuse_sparse
-from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
+from driftwalk.record.raw import DELIMITERS, Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.registry import find_loader
 from driftwalk.record.text import DAMAGED_GZIP
 from driftwalk.record.warn import angle_warnings, plausibility_warnings
@@ -90,7 +90,7 @@ def load(
         For a plain table: t, frame, x, y, theta, body to the name or number (from 1) of the
         column; ``":unit"`` may follow, such as ``{"x": "2:mm"}``.
     delimiter : str, optional
-        Character between fields of a plain table.
+        Character between fields of a plain table, or ``"tab"``, ``"space"``.
     x, y, theta : path-like, optional
         One matrix per coordinate: a row per frame, a column per body.
     keypoint : str, optional
@@ -119,7 +119,7 @@ def load(
     block_side = None if block is None else _side(block)
     options = ReadOptions(
         columns=dict(columns or {}),
-        delimiter=delimiter,
+        delimiter=DELIMITERS.get(delimiter or "", delimiter),
         frame_rate_hz=frame_rate,
         metres_per_pixel=metres_per_pixel,
         length_unit=length_unit,

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +24,10 @@ CLOCK_UNITS: dict[str, float] = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "min
 
 ANGLE_UNITS: dict[str, float] = {"rad": 1.0, "deg": float(np.pi / 180.0)}
 """Radians per unit of angle."""
+
+
+DELIMITERS: Final = {"tab": "\t", "\\t": "\t", "space": " "}
+"""Words for characters that are hard to type between quotes."""
 
 
 @dataclass

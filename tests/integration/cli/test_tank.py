@@ -1,43 +1,94 @@
-"""Which tank a calibration takes: what is said, else what the file holds, else the default."""
+"""Which tank a fit or a calibration takes: what is said, else the file's, else the default."""
 
 from __future__ import annotations
 
 import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
 
 import driftwalk as dw
-from driftwalk.cli.inputs.study_recording import load_for_run
-from driftwalk.cli.options.recording import RecordingOptions
-from driftwalk.conditions.tank import study_in_arena
+from driftwalk.conditions import read_recordings
+from driftwalk.model import Study
 from driftwalk.record import save_trajectory
 
 
-def stored(tmp_path, arena=None):
+def circle(diameter: float) -> dict[str, Any]:
+    return {"shape": "circle", "diameter_m": diameter, "center_m": [0.0, 0.0]}
+
+
+def stored(folder: Path, arena: dict[str, Any] | None = None, *, name: str = "recording") -> Path:
     recording = dw.tank30_recording().isel(time=slice(0, 50))
     recording.attrs.pop("arena")
     if arena is not None:
         recording.attrs["arena"] = json.dumps(arena)
-    return save_trajectory(recording, tmp_path / "recording.nc")
+    return save_trajectory(recording, folder / f"{name}.nc")
 
 
-def tank_of(path, tank):
-    loaded = load_for_run(path, dw.Study(), RecordingOptions(), tank=tank)
-    return study_in_arena(dw.Study(), loaded.trajectory).tank.diameter_m, loaded.has_tank
+def tank_of(path: Path, tank: Any, study: Study | None = None) -> tuple[float | None, bool]:
+    read = read_recordings([path], study or dw.Study(), tank=tank)
+    return read.study.tank.diameter_m, read.has_tank
 
 
-def test_the_arena_of_the_file_is_taken_where_nobody_says_another(tmp_path):
-    path = stored(tmp_path, {"shape": "circle", "diameter_m": 0.4, "center_m": [0.0, 0.0]})
-    assert tank_of(path, "unsaid") == (0.4, True)
+def test_the_arena_of_the_file_is_taken_where_nobody_says_another(tmp_path: Path) -> None:
+    assert tank_of(stored(tmp_path, circle(0.4)), "unsaid") == (0.4, True)
 
 
-def test_what_is_said_goes_over_the_arena_of_the_file(tmp_path):
-    path = stored(tmp_path, {"shape": "circle", "diameter_m": 0.4, "center_m": [0.0, 0.0]})
+def test_what_is_said_goes_over_the_arena_of_the_file(tmp_path: Path) -> None:
+    path = stored(tmp_path, circle(0.4))
     assert tank_of(path, "stated") == (0.3, True)
+    wide = dw.apply_overrides(dw.Study(), {"tank.diameter_m": 0.5})
+    assert tank_of(path, "stated", wide) == (0.5, True)
 
 
-def test_a_file_without_an_arena_has_the_default_tank(tmp_path):
+def test_a_file_without_an_arena_has_the_default_tank(tmp_path: Path) -> None:
     assert tank_of(stored(tmp_path), "unsaid") == (0.3, False)
 
 
-def test_the_arena_of_the_file_is_known_even_where_it_equals_the_default(tmp_path):
-    path = stored(tmp_path, {"shape": "circle", "diameter_m": 0.3, "center_m": [0.0, 0.0]})
-    assert tank_of(path, "unsaid") == (0.3, True)
+def test_the_arena_of_the_file_is_known_even_where_it_equals_the_default(tmp_path: Path) -> None:
+    assert tank_of(stored(tmp_path, circle(0.3)), "unsaid") == (0.3, True)
+
+
+def test_an_arena_that_is_given_goes_over_the_tank_of_the_study(tmp_path: Path) -> None:
+    wide = dw.apply_overrides(
+        dw.Study(), {"tank.diameter_m": 0.5, "tank.wall_friction": 0.2, "block.side_m": 0.31}
+    )
+    read = read_recordings([stored(tmp_path)], wide, {"tank": "circle:45cm"})
+    assert (read.study.tank.diameter_m, read.study.tank.wall_friction) == (0.45, 0.2)
+
+
+def test_two_files_that_hold_two_tanks_are_refused(tmp_path: Path) -> None:
+    paths = [stored(tmp_path, circle(size), name=f"{size}") for size in (0.4, 0.5)]
+    with pytest.raises(dw.InputError, match=r"circle of diameter 0.5 m, and the study says .* 0.4"):
+        read_recordings(paths, dw.Study(), tank="unsaid")
+    assert read_recordings(paths, dw.Study()).study.tank.diameter_m == 0.3
+
+
+def test_circles_that_are_fitted_to_two_recordings_are_no_contradiction(tmp_path: Path) -> None:
+    recording = dw.tank30_recording()
+    paths = [
+        save_trajectory(recording.isel(time=part), tmp_path / f"{part.start}.nc")
+        for part in (slice(0, 9000), slice(9000, 18000))
+    ]
+    read = read_recordings(paths, dw.Study(), {"tank": "fit"})
+    diameters = [json.loads(one.attrs["arena"])["diameter_m"] for one in read.trajectories]
+    assert diameters[0] != diameters[1]
+    assert read.study.tank.diameter_m == diameters[0]
+
+
+@pytest.mark.parametrize("call", [dw.fit, dw.calibrate])
+def test_a_body_that_never_moves_is_refused_from_python(call: Any) -> None:
+    still = dw.tank30_recording().isel(time=slice(0, 200)).copy(deep=True)
+    still["x"][:], still["y"][:] = 0.01, 0.02
+    name = str(still["body"].values[0])
+    words = rf"never moves \('{name}'\): all 200 positions are \(0.01, 0.02\) m"
+    with pytest.raises(dw.InputError, match=words):
+        call(still)
+    with pytest.raises(dw.InputError, match="holds 2 positions in the time that is kept"):
+        call(dw.tank30_recording().isel(time=slice(0, 2)))
+    empty = still.copy(deep=True)
+    empty["x"][:] = np.nan
+    with pytest.raises(dw.InputError, match="holds 0 positions"):
+        call(empty)

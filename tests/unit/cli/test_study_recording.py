@@ -4,13 +4,30 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
-from driftwalk.cli.inputs.study_recording import completed, load_with_study
+import pytest
+
 from driftwalk.cli.options.recording import RecordingOptions
+from driftwalk.conditions import load_with_study, reading
 from driftwalk.model import Study, Tank
+from driftwalk.schema import build_trajectory
 
 
-def test_study_stands_in_for_options_that_are_not_given() -> None:
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """Return the arguments that the loader is called with."""
+    seen: dict[str, Any] = {}
+
+    def load(path: Path, **arguments: Any) -> Any:
+        seen.update(arguments, path=path)
+        return build_trajectory([0.0, 1.0], [0.0, 1.0], [0.0, 1.0])
+
+    monkeypatch.setattr(reading, "load", load)
+    return seen
+
+
+def test_study_stands_in_for_options_that_are_not_given(asked: dict[str, Any]) -> None:
     study = Study(
         recording={
             "format": "table",
@@ -22,32 +39,40 @@ def test_study_stands_in_for_options_that_are_not_given() -> None:
             "frame_rate_Hz": 25,
         }
     )
-    how = completed(RecordingOptions(body="b", frame_rate=50.0), study)
-    assert how.body == "b"
-    assert how.frame_rate == 50.0
-    assert (how.format, how.start, how.sort) == ("table", 1.0, True)
-    assert how.columns == ["x=2", "y=py:mm"]
-    assert how.x == Path("x.csv")
-    assert how.arena == "circle:0.3"
-    assert completed(RecordingOptions(arena="fit"), study).arena == "fit"
+    load_with_study(Path("a.csv"), study, RecordingOptions(body="b", frame_rate=50.0).arguments())
+    assert (asked["path"], asked["body"], asked["frame_rate"]) == (Path("a.csv"), "b", 50.0)
+    assert (asked["format"], asked["start"], asked["sort"]) == ("table", 1.0, "sort")
+    assert asked["columns"] == {"x": "2", "y": "py:mm"}
+    assert (asked["x"], asked["tank"], asked["block"]) == ("x.csv", "circle:0.3", None)
+    load_with_study(Path("a.csv"), study, RecordingOptions(arena="fit").arguments())
+    assert (asked["tank"], asked["block"]) == ("fit", 0.03)
+
+
+def test_a_start_of_zero_goes_over_that_of_the_study(asked: dict[str, Any]) -> None:
+    study = Study(recording={"start_s": 5.0, "delimiter": ";"})
+    how = RecordingOptions(start=0.0, delimiter="tab", columns=["t=1,x=2", "y=3"], sort=True)
+    load_with_study(Path("a.csv"), study, how.arguments())
+    assert (asked["start"], asked["delimiter"], asked["sort"]) == (0.0, "tab", "sort")
+    assert asked["columns"] == {"t": "1", "x": "2", "y": "3"}
 
 
 def test_recording_is_read_as_the_study_says(tmp_path: Path) -> None:
     path = tmp_path / "synthetic.csv"
-    rows = [f"{k},{10 * k},{20 * k}" for k in range(10)]
-    path.write_text("\n".join(["n,a,b", *rows]) + "\n", encoding="utf-8")
+    rows = [f"{k}\t{10 * k}\t{20 * k}" for k in range(10)]
+    path.write_text("\n".join(["n\ta\tb", *rows]) + "\n", encoding="utf-8")
     triangle = ((-1.0, -1.0), (2.0, -1.0), (0.0, 2.0))
     study = Study(
         tank={"shape": "polygon", "vertices_m": triangle},
         recording={
             "columns": {"frame": "n", "x": "a", "y": "b"},
+            "delimiter": "tab",
             "frame_rate_Hz": 10,
             "metres_per_pixel": "1mm",
             "length_unit": "px",
             "y_axis": "up",
         },
     )
-    trajectory = load_with_study(path, study, RecordingOptions())
+    trajectory = load_with_study(path, study)
     assert trajectory["time"].values.tolist() == [k / 10 for k in range(10)]
     assert trajectory["x"].values[:, 0].tolist() == [0.01 * k for k in range(10)]
     assert trajectory["y"].values[-1, 0] == 0.18

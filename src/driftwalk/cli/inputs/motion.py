@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from driftwalk.cli.inputs.require_motion import require_motion
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.core.errors import InputError
 from driftwalk.core.file_names import text_of_name
@@ -33,11 +32,13 @@ def load_motion(path: Path, how: RecordingOptions, *, replicate: int = 0) -> xr.
     InputError
         When the file cannot be read, has no such replicate, or the body never moves.
     """
+    from driftwalk.conditions import require_motion
+
     simulated = load_simulation(path, replicate=replicate)
     if simulated is not None:
         return simulated
     recording = how.load(path)
-    require_motion(recording, path, body=how.body)
+    require_motion(recording, body=how.body, where=path)
     return recording
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
+from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.run_layout import state_of
 from driftwalk.schema.netcdf import kind_of
 
@@ -18,6 +21,24 @@ KINDS: Final = {
 _OTHER: Final = (
     "not a recording but a result of kind '{}': driftwalk report takes its run directory"
 )
+
+
+@contextlib.contextmanager
+def explained() -> Iterator[None]:
+    """Say of a file that no reader of recordings could read what it is instead.
+
+    Raises
+    ------
+    InputError
+        In the place of a `FormatError`, where it is known.
+    """
+    try:
+        yield
+    except FormatError as error:
+        other = None if error.path is None else what_else(Path(error.path))
+        if other is None:
+            raise
+        raise InputError(f"{error.path} {other}") from error
 
 
 def what_else(path: Path) -> str | None:

@@ -17,7 +17,7 @@ import typer
 
 from driftwalk.cli.options.shared import quantity_parser
 from driftwalk.cli.options.spread import Command, Part, spread
-from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -109,6 +109,19 @@ class RecordingOptions:
         str | None, _option("--keypoint", "Keypoint of a pose file that is the body.")
     ] = None
 
+    def arguments(self) -> dict[str, Any]:
+        """Return the arguments of `driftwalk.load` that are given."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        # The start may be 0 s; an option that is not given is None, or False for a flag.
+        given = {name: one for name, one in values.items() if one is not None and one is not False}
+        if self.sort:
+            given["sort"] = "sort"
+        if self.columns:
+            given["columns"] = parse_columns(self.columns)
+        if self.arena:
+            given["tank"] = given.pop("arena")
+        return given
+
     def load(
         self, path: Path, *, tank_diameter: float | None = None, side: float | None = None
     ) -> xr.Dataset:
@@ -129,30 +142,18 @@ class RecordingOptions:
             As `driftwalk.load`, and it says what a file is that is no recording; when no row holds
             a position; when ``--arena`` and ``--tank-diameter`` are both given.
         """
-        from driftwalk.cli.inputs.other_files import what_else
-        from driftwalk.cli.inputs.require_motion import require_positions
+        from driftwalk.cli.inputs.other_files import explained
+        from driftwalk.conditions import require_positions
         from driftwalk.record import load
 
-        values: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
+        values = self.arguments()
         if tank_diameter is not None:
             if self.arena is not None:
                 raise InputError("give --arena or --tank-diameter, not both")
-            values["arena"] = f"circle:{tank_diameter!r}"
-        values["sort"] = "sort" if self.sort else "error"
-        values["columns"] = parse_columns(self.columns or [])
-        values["tank"] = values.pop("arena")
-        if values["tank"] == "fit":
-            values["block"] = side
-        words = {"tab": "\t", "\\t": "\t", "space": " "}
-        values["delimiter"] = words.get(self.delimiter or "", self.delimiter)
-        try:
-            recording = load(path, **values)
-        except FormatError as error:
-            other = what_else(path)
-            if other is None:
-                raise
-            raise InputError(f"{path} {other}") from error
-        require_positions(recording, path)
+            values["tank"] = f"circle:{tank_diameter!r}"
+        with explained():
+            recording = load(path, block=side if values.get("tank") == "fit" else None, **values)
+        require_positions(recording, where=path)
         return recording
 
 

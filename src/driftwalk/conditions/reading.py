@@ -1,0 +1,159 @@
+"""How recordings are read when a study says so and arguments go over it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from driftwalk.conditions.refuse import require_motion, require_positions
+from driftwalk.conditions.study import study_for
+from driftwalk.conditions.tank import study_in_arena
+from driftwalk.record import load
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+Tank = Literal["stated", "unsaid"]
+
+
+class ReadRecordings(NamedTuple):
+    """The recordings of a piece of work, and the study that they are worked on with."""
+
+    trajectories: list[xr.Dataset]
+    study: Study
+    has_tank: bool
+    """Whether anything but the default study says the tank."""
+
+
+def read_recordings(
+    paths: Sequence[Path],
+    study: Study,
+    given: Mapping[str, Any] | None = None,
+    *,
+    tank: Tank = "stated",
+    body: str | None = None,
+) -> ReadRecordings:
+    """Read the recordings of a fit or a calibration, and settle tank and block of the study.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Recordings of one block in one tank.
+    study : Study
+        Its [recording] and [tank] say how to read them.
+    given : mapping, optional
+        Arguments of `driftwalk.load` over it; a tank among them takes the place of the study's.
+    tank : {"stated", "unsaid"}
+        Whether anybody says the tank; otherwise an arena that a file itself holds is used, and the
+        default study's where it holds none.
+    body : str, optional
+        The body, where there are several.
+
+    Returns
+    -------
+    ReadRecordings
+        One `trajectory` per path, and the study with their tank and block.
+
+    Raises
+    ------
+    InputError
+        When a file cannot be read, holds no motion, lies outside the tank, or two recordings say
+        two tanks.
+
+    Examples
+    --------
+    >>> from importlib.resources import files
+    >>> import driftwalk as dw
+    >>> path = Path(str(files("driftwalk.datasets") / "tank30_ode_a" / "recording.csv"))
+    >>> read = dw.conditions.read_recordings([path], dw.Study(), {"tank": "circle:32cm"})
+    >>> read.study.tank.diameter_m
+    0.32
+    """
+    values = dict(given or {})
+    trajectories, known = [], []
+    for path in paths:
+        trajectory, has_tank = load_for_run(path, study, values, tank=tank)
+        require_motion(trajectory, body=body, where=path)
+        trajectories.append(trajectory)
+        known.append(has_tank)
+    if "tank" in values or study.recording.arena != "tank":
+        study = study_in_arena(study, trajectories[0])
+    return ReadRecordings(trajectories, study_for(trajectories, study, body=body), known[0])
+
+
+def load_for_run(
+    path: Path, study: Study, given: Mapping[str, Any], *, tank: Tank
+) -> tuple[xr.Dataset, bool]:
+    """Load a recording; where nobody said the tank, an arena that the file itself holds is used.
+
+    Parameters
+    ----------
+    path, study, given
+        As in `load_with_study`.
+    tank : {"stated", "unsaid"}
+        Whether anybody says the tank.
+
+    Returns
+    -------
+    xarray.Dataset
+        A `trajectory`.
+    bool
+        Whether anything but the default study says its tank.
+
+    Examples
+    --------
+    >>> from importlib.resources import files
+    >>> import driftwalk as dw
+    >>> path = Path(str(files("driftwalk.datasets") / "tank30_ode_a" / "recording.csv"))
+    >>> dw.conditions.load_for_run(path, dw.Study(), {}, tank="unsaid")[1]
+    False
+    """
+    from driftwalk.model import apply_overrides
+
+    if tank == "unsaid" and path.suffix.lower() == ".nc":
+        own = load_with_study(path, apply_overrides(study, {"recording.arena": "file"}), given)
+        if "arena" in own.attrs:
+            return own, True
+    return load_with_study(path, study, given), tank == "stated"
+
+
+def load_with_study(path: Path, study: Study, given: Mapping[str, Any] | None = None) -> xr.Dataset:
+    """Load a recording as the study's [recording] and [tank] say, arguments first.
+
+    Parameters
+    ----------
+    path : Path
+        The recording.
+    study : Study
+        Its [recording] stands in for each argument that is not given, its [tank] for the tank.
+    given : mapping, optional
+        Arguments of `driftwalk.load`.
+
+    Returns
+    -------
+    xarray.Dataset
+        A `trajectory`, with the tank as its arena when the study's tank is a polygon.
+
+    Raises
+    ------
+    InputError
+        As `driftwalk.load`; when no row holds a position.
+
+    Examples
+    --------
+    >>> from importlib.resources import files
+    >>> import driftwalk as dw
+    >>> path = Path(str(files("driftwalk.datasets") / "tank30_ode_a" / "recording.csv"))
+    >>> dw.conditions.load_with_study(path, dw.Study()).sizes["time"]
+    18001
+    """
+    values = {**study.load_options(), **(given or {})}
+    values["block"] = study.block.side_m if values.get("tank") == "fit" else None
+    trajectory = load(path, **values)
+    require_positions(trajectory, where=path)
+    if study.tank.shape == "polygon" and "tank" not in values and study.recording.arena == "tank":
+        return trajectory.assign_attrs(arena=study.tank.to_arena_json())
+    return trajectory
