@@ -11,6 +11,7 @@ import pytest
 
 HEAVY = {"xarray", "scipy", "pandas", "cv2", "matplotlib", "dask", "h5netcdf", "optuna", "fastapi"}
 HELP = "from driftwalk.cli.main import main; assert main(['--help']) == 0"
+HELP_OF_FIT = HELP.replace("['--help']", "['fit', '--help']")
 IMPORT = "import driftwalk; driftwalk.__version__"
 
 
@@ -24,8 +25,12 @@ def loaded_by(code: str) -> set[str]:
 
 @pytest.mark.parametrize(
     ("code", "absent"),
-    [(IMPORT, HEAVY | {"pydantic", "numpy", "typer"}), (HELP, HEAVY)],
-    ids=["import", "help"],
+    [
+        (IMPORT, HEAVY | {"pydantic", "numpy", "typer"}),
+        (HELP, HEAVY),
+        (HELP_OF_FIT, HEAVY | {"numpy"}),
+    ],
+    ids=["import", "help", "help of fit"],
 )
 def test_nothing_heavy_is_loaded(code: str, absent: set[str]) -> None:
     loaded = loaded_by(code)

@@ -11,7 +11,6 @@ from driftwalk.cli.inputs.study_recording import read_for_run, tank_note
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.fit_answer import answer, print_answer
 from driftwalk.cli.terminal.output import print_json
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.study_keys import FIT_KEYS
@@ -52,6 +51,7 @@ def fit(
     (fit.nc), the flow (flow.nc) for every command that takes one, the recording, the check of the
     model (check.nc), figures and manifest.json.
     """
+    from driftwalk.cli.terminal.fit_answer import answer, print_answer
     from driftwalk.runs import FitWork, run_fit
 
     read = read_for_run(recordings, given, how)

@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import Final
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.run_layout import state_of
-from driftwalk.schema.netcdf import kind_of
 
 VIDEOS: Final = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpeg", ".mpg", ".webm", ".wmv")
 KINDS: Final = {
@@ -54,6 +52,9 @@ def what_else(path: Path) -> str | None:
     >>> from importlib.resources import files
     >>> what_else(Path(str(files("driftwalk.datasets") / "tank30_ode_a" / "recording.csv")))
     """
+    # NumPy comes with it, which the help of the commands does without.
+    from driftwalk.core.run_layout import state_of
+
     if path.is_dir() and state_of(path) in ("unfinished", "finished"):
         recording = path / "recording.nc"
         inside = f", and its recording is {recording}" if recording.is_file() else ""
@@ -68,6 +69,8 @@ def what_else(path: Path) -> str | None:
 
 def _netcdf_kind(path: Path) -> str | None:
     """Return which kind of driftwalk's own datasets a file holds, None for any other file."""
+    from driftwalk.schema.netcdf import kind_of
+
     if path.suffix.lower() != ".nc":
         return None
     kind = kind_of(path)
