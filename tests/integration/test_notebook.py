@@ -139,6 +139,21 @@ def test_recordings_in_two_tanks_are_refused(recording: xr.Dataset) -> None:
         dw.fit([recording, other])
 
 
+def test_a_simulation_is_in_the_tank_of_its_recording(recording: xr.Dataset) -> None:
+    """The block bounces off the wall that the recording has, not off the default study's."""
+    narrow = recording.isel(time=slice(0, 600)).assign_attrs(
+        arena='{"shape": "circle", "diameter_m": 0.25, "center_m": [0.0, 0.0]}'
+    )
+    water = dw.uniform_flow(0.08, 0.0)
+    run = dw.simulate(dw.Study(), water, like=narrow, replicates=2)
+    assert '"diameter_m": 0.25' in run.attrs["arena"]
+    # The centre stays half a side from the wall; five sd of the camera's noise come on top.
+    assert float(np.hypot(run["x"], run["y"]).max()) < 0.125 - 0.015 + 5 * 3e-4
+    stated = dw.apply_overrides(dw.Study(), {"tank.diameter_m": 0.3})
+    with pytest.raises(dw.InputError, match="state the tank once"):
+        dw.simulate(stated, water, like=narrow)
+
+
 def test_a_study_needs_a_flow(recording: xr.Dataset) -> None:
     for call in (dw.simulate, dw.assemble):
         with pytest.raises(dw.InputError, match="give `flow`, a flow field or a fit"):

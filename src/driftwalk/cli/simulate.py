@@ -60,6 +60,7 @@ def simulate(
     json: Json = False,
 ) -> None:
     """Simulate the motion of the block."""
+    from driftwalk.conditions import study_for
     from driftwalk.core.atomic import write_atomic
     from driftwalk.flow import load_flow
     from driftwalk.schema.netcdf import netcdf_bytes
@@ -76,7 +77,7 @@ def simulate(
         result = run(chosen, field, backend="reference" if backend == "reference" else "cpu")
     else:
         recording = RecordingOptions(body=body).load(like)
-        result = simulate_like(chosen, field, recording)
+        result = simulate_like(study_for([recording], chosen, body=body), field, recording)
     write_atomic(out, netcdf_bytes(result))
     facts = summary(result)
     if json:

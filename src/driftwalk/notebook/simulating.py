@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from driftwalk.conditions import study_for
 from driftwalk.core.errors import InputError
 from driftwalk.notebook.model_of import model_of
 
@@ -38,8 +39,8 @@ def simulate(
     flow : xarray.Dataset, optional
         The water's velocity, a `flow_field`; a fit brings its own.
     like : xarray.Dataset, optional
-        A `trajectory`: simulate what its camera would have recorded, with its start, time stamps,
-        gaps and noise.
+        A `trajectory`: simulate what its camera would have recorded, in its tank, with its start,
+        time stamps, gaps and noise.
     body : str, optional
         The body of that recording, where there are several.
     sample_time : array_like, shape (n,), optional
@@ -61,7 +62,8 @@ def simulate(
     Raises
     ------
     InputError
-        When there is no flow, or an argument contradicts `like`.
+        When there is no flow, or an argument contradicts `like`: it and the study state two tanks
+        or two blocks, say.
 
     Examples
     --------
@@ -82,4 +84,5 @@ def simulate(
         )
     if sample_time is not None or start is not None or backend != "cpu":
         raise InputError("with `like`, the recording gives times and start, in single precision")
-    return simulate_like(study, field, like, body=body, **common)
+    chosen = study_for([like], study, body=body)
+    return simulate_like(chosen, field, like, body=body, **common)
