@@ -168,7 +168,12 @@ def test_pure_noise_shows_what_is_stated(fresh_seed: Callable[[int], int]) -> No
 
 @pytest.mark.false_alarm(1e-3)
 def test_proportions_of_finitely_many_runs(fresh_seed: Callable[[int], int]) -> None:
-    """A proportion that depends on one of two inputs, each setting estimated from 50 runs."""
+    """A proportion that depends on one of two inputs, each setting estimated from 50 runs.
+
+    Standard deviations over 300 seeds: 0.021 of the share of noise (relative), 0.012 of the total
+    index, 0.015 and 0.040 of the corrected ones. The limits are 4 of them: four two-sided tests
+    fail once in 4,000.
+    """
     design = sobol_design({"a": (0.2, 0.6), "b": (0.0, 1.0)}, samples=1024, seed=fresh_seed(7))
     true = design["value"].values[:, 0]
     runs = 50
@@ -186,10 +191,10 @@ def test_proportions_of_finitely_many_runs(fresh_seed: Callable[[int], int]) -> 
     mean_noise = (0.4 - 0.16 - 0.16 / 12) / runs
     share = mean_noise / (mean_noise + 0.16 / 12)
     one = found.sel({"class": "O"})
-    assert float(one["noise_share"]) == pytest.approx(share, rel=0.05)
-    assert float(one["total_order"].sel(input="b")) == pytest.approx(share, abs=0.05)
-    assert float(one["total_order_corrected"].sel(input="b")) == pytest.approx(0.0, abs=0.05)
-    assert float(one["first_order_corrected"].sel(input="a")) == pytest.approx(1.0, abs=0.1)
+    assert float(one["noise_share"]) == pytest.approx(share, rel=0.083)
+    assert float(one["total_order"].sel(input="b")) == pytest.approx(share, abs=0.047)
+    assert float(one["total_order_corrected"].sel(input="b")) == pytest.approx(0.0, abs=0.061)
+    assert float(one["first_order_corrected"].sel(input="a")) == pytest.approx(1.0, abs=0.16)
     xr.testing.assert_allclose(
         one.drop_vars("class"), found.sel({"class": "2+2"}).drop_vars("class")
     )
