@@ -6,6 +6,7 @@ declaration checks the value, writes the commented template and makes the refere
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar, get_args
@@ -111,7 +112,21 @@ class Placeholder:
     text: str
 
 
-class Section(BaseModel):
+class _Signature:
+    """The signature of a section whose validator is not made yet: makes it, for help and hover."""
+
+    def __get__(self, section: Section | None, kind: type[Section]) -> inspect.Signature:
+        kind.model_rebuild()
+        # pydantic has put its own into the class now.
+        signature: inspect.Signature = vars(kind)["__signature__"].__get__(None, kind)
+        return signature
+
+
+class _WithSignature:
+    __signature__ = _Signature()
+
+
+class Section(_WithSignature, BaseModel):
     """Base of every section: frozen, no unknown keys, errors that name section and key."""
 
     # The validator of a section is made for its first object: help needs the declarations alone.
