@@ -97,7 +97,8 @@ def test_a_calibration(run: Path, tmp_path: Path) -> None:
         values(part_of(page, "recording-1")["x"]), recording["x"].values[:, 0], atol=1e-5
     )
     text = " ".join(part_of(page, "summary")["paragraphs"])
-    assert f"C_d = {found.attrs['drag_coefficient']:.4g} (90 % interval" in text
+    drag = float(found["estimate"].sel(parameter="drag_coefficient"))
+    assert f"C_d = {drag:.4g} (90 % interval" in text
     assert part_of(page, "manifest")["inputs"][0]["name"] == "recording.csv"
 
 

@@ -208,7 +208,7 @@ def test_of_many_classes_the_largest_are_kept_and_the_rest_summed() -> None:
         plan, texts, xr.Dataset(), dims={"first": 2, "second": 3}
     )
     assert list(variables) == ["count_over_time"]
-    dims, count, _ = variables["count_over_time"]
+    dims, count = variables["count_over_time"]
     assert (dims, count.shape) == (
         ("first", "second", "time", "class_over_time"),
         (2, 3, times.TIMES, 25),
