@@ -94,6 +94,7 @@ def test_a_header_that_declares_terabytes_is_refused_unread(tmp_path: Path, comm
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 200_000
 
 
+@pytest.mark.slow
 def test_a_recording_that_packs_as_well_as_any_is_read(tmp_path: Path) -> None:
     # A body that stands still, at a clock that counts: 4 columns of doubles in a small file.
     count = 2 * ALLOWANCE_BYTES // (4 * 8)

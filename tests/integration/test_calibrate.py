@@ -151,12 +151,14 @@ def test_place_and_quadrant_are_where_the_world_and_the_recording_differ(found):
     assert np.max(np.abs(off)) < 0.2
 
 
+@pytest.mark.slow
 def test_threads_do_not_change_a_single_bit(found):
     study = apply_overrides(dw.Study(), SMALL)
     again = dw.calibrate(synthetic_recording(400.0), study, flow=dw.tank30_flow(), threads=1)
     assert again.identical(found)
 
 
+@pytest.mark.slow
 def test_an_optimum_at_the_edge_of_the_grid_is_warned_of():
     study = apply_overrides(
         dw.Study(),

@@ -74,6 +74,7 @@ def diffusing():
     return dw.calibrate(recording, DIFFUSE, study=STUDY, threads=2)
 
 
+@pytest.mark.slow
 def test_both_parameters_of_a_tumbling_particle_are_found(tumbling):
     facts = calibration_facts(tumbling)
     tumbles = DURATION * TUMBLE_RATE

@@ -296,6 +296,7 @@ print(kills)
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["resume", "overwrite"])
 @pytest.mark.skipif(sys.platform == "win32", reason="needs fork and SIGKILL")
 def test_killed_at_every_change_of_the_file_system(tmp_path: Path, mode: str) -> None:

@@ -76,6 +76,7 @@ def test_a_live_block_makes_the_steps_of_simulate(
     assert p_value(sampling, fresh_seed) > LEVEL
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(0.01)
 def test_the_comparison_sees_another_force_and_a_camera_without_noise(
     fresh_seed: Callable[[int], int],

@@ -140,6 +140,7 @@ def test_the_path_is_that_of_the_first_runs(whole: tuple[Path, Done]) -> None:
     assert len(set(path["assembly"].values[2, -1].tolist())) == apart
 
 
+@pytest.mark.slow
 def test_from_a_flow_field(tmp_path: Path) -> None:
     """The form of the issue's second example, and that the result does not depend on threads."""
     given = ["--flow", FLOW, "--drag-coefficient", "0.45", "--force-std", "0.55mN"]
@@ -163,6 +164,7 @@ def test_from_a_flow_field(tmp_path: Path) -> None:
     assert printed["drawn"] is None
 
 
+@pytest.mark.slow
 def test_the_answer_for_people_stands_side_by_side(calibrated: Path, tmp_path: Path) -> None:
     done = here("assemble", calibrated, *SIZE, "-o", tmp_path / "run")
     assert done.code == 0, done.err
@@ -175,6 +177,7 @@ def test_the_answer_for_people_stands_side_by_side(calibrated: Path, tmp_path: P
     assert "drawn for each run: drag_coefficient, force_std, flow" in lines
 
 
+@pytest.mark.slow
 def test_options_reach_the_simulation(tmp_path: Path) -> None:
     words = ["assemble", "--flow", FLOW, *SIZE, "--json"]
     plain = json.loads(here(*words, "-o", tmp_path / "plain").out)
@@ -189,6 +192,7 @@ def test_options_reach_the_simulation(tmp_path: Path) -> None:
     assert found["proportions"] != plain["proportions"]
 
 
+@pytest.mark.slow
 def test_a_calibration_without_bootstrap_gives_one_distribution(
     calibrated: Path, tmp_path: Path
 ) -> None:

@@ -324,6 +324,7 @@ def unwritable(tmp_path: Path) -> Iterator[Path]:
     path.chmod(0o755)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["convert", "calibrate", "study"])
 def test_a_folder_that_cannot_be_written(command: str, unwritable: Path) -> None:
     good = unwritable / "good.csv"

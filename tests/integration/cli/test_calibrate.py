@@ -148,6 +148,7 @@ def test_a_finished_run_is_kept_as_it_is(finished: tuple[Path, Done], study: Pat
     assert contents(folder) == before
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_overwrite_moves_the_finished_run_aside(study: Path, tmp_path: Path) -> None:
     folder = tmp_path / "run"
@@ -198,6 +199,7 @@ def test_a_force_without_bootstrap_says_that_it_has_no_interval(
     assert found["force_std_N_interval"] is None
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_options_go_over_the_study_and_flow_formats_agree(study: Path, tmp_path: Path) -> None:
     netcdf = tmp_path / "flow.nc"
@@ -216,6 +218,7 @@ def test_options_go_over_the_study_and_flow_formats_agree(study: Path, tmp_path:
     assert_same_bits(*results)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_the_field_that_driftwalk_flow_wrote_is_taken(study: Path, tmp_path: Path) -> None:
     field = tmp_path / "flow.nc"
@@ -231,6 +234,7 @@ def test_the_field_that_driftwalk_flow_wrote_is_taken(study: Path, tmp_path: Pat
     assert_same_bits(*(item.drop_vars(halves) for item in found))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_an_optimum_at_the_edge_and_a_bad_fit_are_warned_of(study: Path, tmp_path: Path) -> None:
     narrow = tmp_path / "narrow.toml"
@@ -247,6 +251,7 @@ def test_an_optimum_at_the_edge_and_a_bad_fit_are_warned_of(study: Path, tmp_pat
     assert any("edge of the grid" in text for text in warnings)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_a_setting_in_which_nothing_moves_has_distance_1_and_is_hatched(tmp_path: Path) -> None:
     """A block at rest in still water, without a force: nothing can move it."""
@@ -312,6 +317,7 @@ def test_threads_and_instruction_sets_do_not_change_a_bit(
         pytest.skip("this processor has the baseline's instructions only")
 
 
+@pytest.mark.slow
 def test_progress_through_a_pipe_is_plain_lines(study: Path, tmp_path: Path) -> None:
     done = apart(*words(study, tmp_path / "run"), "--flow", FLOW, before=NO_FIGURES + CHATTY)
     assert done.code == 0

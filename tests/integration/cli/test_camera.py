@@ -175,6 +175,7 @@ def test_board_to_metres_and_poses(boards: Path, tmp_path: Path) -> None:
         assert np.degrees(np.abs(np.angle(np.exp(1j * turned)))).max() < 1.0
 
 
+@pytest.mark.slow
 def test_the_rim_gives_the_centre_where_the_board_lay_aside(boards: Path, tmp_path: Path) -> None:
     """The board's middle is moved by 2 cm in the file; the tank is found where it is."""
     toml = tmp_path / "camera.toml"

@@ -39,6 +39,7 @@ def test_the_check_is_written_with_its_figures(fitted: tuple[Path, Done]) -> Non
         assert stored["x"].attrs["units"] == "m"
 
 
+@pytest.mark.slow
 def test_people_are_told_and_the_check_can_be_left_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -51,6 +52,7 @@ def test_people_are_told_and_the_check_can_be_left_out(
     assert not (tmp_path / "run" / "figures" / "check_map.png").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_a_recording_that_is_not_explained_gets_the_reasons(tmp_path: Path) -> None:
     """The bundled recording with bursts of noise on it: every tenth second five times as much."""
@@ -72,6 +74,7 @@ def test_a_recording_that_is_not_explained_gets_the_reasons(tmp_path: Path) -> N
     assert "noise floor" in done.out
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_a_check_that_cannot_be_made_says_so_and_the_fit_is_kept(tmp_path: Path) -> None:
     """Synthetic: a body that rests, but for a jump in every eighth of 110 intervals."""

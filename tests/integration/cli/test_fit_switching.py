@@ -39,6 +39,7 @@ def answer(done: Done) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.slow
 def test_the_model_with_the_switch_explains_the_recording(finished: tuple[Path, Done]) -> None:
     """A right model fails once in fifty; C_d within 4 of its standard deviations."""
     found = answer(finished[1])
@@ -49,6 +50,7 @@ def test_the_model_with_the_switch_explains_the_recording(finished: tuple[Path, 
     assert abs(np.log(found["drag_coefficient"] / DRAG)) < 4.0 * sd
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_without_the_switch_it_does_not(
     recording: Path, finished: tuple[Path, Done], tmp_path: Path
@@ -59,6 +61,7 @@ def test_without_the_switch_it_does_not(
     assert found["ks_distance"] > 2.0 * answer(finished[1])["ks_distance"]
 
 
+@pytest.mark.slow
 def test_the_run_directory_holds_every_flow(finished: tuple[Path, Done]) -> None:
     folder = finished[0]
     for name in ("flow_A", "flow_B", "trajectory", "check_map"):
@@ -78,12 +81,14 @@ def test_the_run_directory_holds_every_flow(finished: tuple[Path, Done]) -> None
         assert bool(check["explained"])
 
 
+@pytest.mark.slow
 def test_others_take_the_flow(finished: tuple[Path, Done], tmp_path: Path) -> None:
     flow = finished[0] / "flow.nc"
     done = here("simulate", "--flow", flow, "--duration", "5s", "-o", tmp_path / "run.nc")
     assert done.code == 0, done.err
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_people_read_which_flow_was_when(recording: Path, tmp_path: Path) -> None:
     middle = START_S + SWITCH_S

@@ -74,6 +74,7 @@ def assert_whole(folder: Path, expected: xr.Dataset) -> None:
     assert not list(folder.rglob("*partial*"))
 
 
+@pytest.mark.slow
 def test_interrupted_and_continued(study: Path, uninterrupted: xr.Dataset, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     done = apart(*words(study, folder), before=PLAIN + after_units(signal.SIGINT, 2))

@@ -36,6 +36,7 @@ def test_a_name_that_is_not_utf8_is_spelled_in_a_recording(recording: Path) -> N
     assert load(recording).attrs["source"] == "K\\xe4fer.csv"
 
 
+@pytest.mark.slow
 def test_a_name_that_is_not_utf8_is_spelled_in_a_manifest_and_on_the_page(recording: Path) -> None:
     run = recording.parent / os.fsdecode(b"run\xfc")
     study = recording.with_name("study.toml")

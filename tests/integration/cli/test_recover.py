@@ -105,9 +105,8 @@ def test_the_run_directory_is_whole(finished: tuple[Path, Done]) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize(
-    "sent", [signal.SIGKILL, pytest.param(signal.SIGINT, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGINT])
 def test_killed_and_continued_with_another_number_of_processes(
     sent: signal.Signals, truth: Path, finished: tuple[Path, Done], tmp_path: Path
 ) -> None:
@@ -135,6 +134,7 @@ def shards(folder: Path) -> dict[Path, int]:
     return {path: path.stat().st_mtime_ns for path in folder.glob(".shards/*/[0-9]*.npz")}
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_people_read_a_table_of_random_flows_without_orientation(tmp_path: Path) -> None:
     text = TRUTH.replace('"flow/true.csv"', '"random"').replace("recordings = 3", "recordings = 2")
@@ -195,6 +195,7 @@ def test_wrong_options_are_one_line(
     assert message in refusal(here(*words(truth, tmp_path / "run", *options)))
 
 
+@pytest.mark.slow
 def test_python_gives_the_same(truth: Path, finished: tuple[Path, Done]) -> None:
     """Not bit for bit: this process may use more threads for its linear algebra."""
     study = dw.apply_overrides(

@@ -123,6 +123,7 @@ def test_the_example_of_the_docs_reads_it(
     np.testing.assert_array_equal(decode_array(names["array"]), names["values"])
 
 
+@pytest.mark.slow
 def test_a_fit(tmp_path: Path) -> None:
     made = here(
         *("fit", RECORDING, "--to", "60s", *TANK, "--spline-spacing", "4cm", "--no-check"),
@@ -170,6 +171,7 @@ def test_self_assembly(assembled: Path, tmp_path: Path) -> None:
     assert names == ["parameters found", "parameters drawn"]
 
 
+@pytest.mark.slow
 def test_a_sensitivity_analysis(run: Path, tmp_path: Path) -> None:
     made = here(
         *("sensitivity", run, "--runs", "15", "--realisations", "3", "--duration", "60s"),
@@ -186,6 +188,7 @@ def test_a_sensitivity_analysis(run: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(values(part["shares"]), found["proportion"].values, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_recovery_study(tmp_path: Path) -> None:
     (tmp_path / "truth.toml").write_text(TRUTH, encoding="utf-8")
     made = here(

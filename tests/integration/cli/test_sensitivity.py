@@ -116,6 +116,7 @@ def test_the_run_directory_is_complete(whole: tuple[Path, Done], calibrated: Pat
         assert listed[name] == hashlib.sha256((folder / name).read_bytes()).hexdigest()
 
 
+@pytest.mark.slow
 def test_a_study_file_says_what_is_simulated(calibrated: Path, tmp_path: Path) -> None:
     """The form of the issue's example; the same by options; the model is the calibration's."""
     study = tmp_path / "study.toml"

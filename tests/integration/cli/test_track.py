@@ -122,6 +122,7 @@ def test_one_dark_object_among_brighter_ones(tmp_path: Path) -> None:
     assert x == pytest.approx((columns - 99.5) / 500, abs=0.5e-3)
 
 
+@pytest.mark.slow
 def test_explained_frame(folder: Path, tmp_path: Path) -> None:
     done = tracked(folder, tmp_path / "r.nc", "--explain", "3")
     assert done.code == 0, done.err
@@ -228,6 +229,7 @@ def test_watching_tells_dropped_frames(folder: Path, gappy: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_live_client_gets_poses_and_joins(folder: Path, tmp_path: Path, port: int) -> None:
     with socket.create_server(("127.0.0.1", port)):
         words = ("--bodies", "2", "--live", str(port))
@@ -259,6 +261,7 @@ def test_live_client_gets_poses_and_joins(folder: Path, tmp_path: Path, port: in
     assert {key for key in missing if f"`{key}`" not in page} == set()
 
 
+@pytest.mark.slow
 def test_interrupted_run_keeps_what_it_had(folder: Path, tmp_path: Path) -> None:
     """The detector presses Ctrl-C at the twentieth frame."""
     out = tmp_path / "r.nc"
@@ -285,6 +288,7 @@ TwoColourDetector.detect = detect
     assert recording.attrs["complete"] == "no"
 
 
+@pytest.mark.slow
 def test_mistakes_are_said_in_one_line(folder: Path, tmp_path: Path) -> None:
     video, markers, out = folder / "video.mkv", folder / "m.toml", tmp_path / "r.nc"
     assert "no scale: state --tank-diameter" in refusal(

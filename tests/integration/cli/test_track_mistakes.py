@@ -30,6 +30,7 @@ def image_folder(folder: Path, images: list[np.ndarray]) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_what_is_no_video_or_holds_no_frame(words: list[object], tmp_path: Path) -> None:
     """In a process of its own: what OpenCV's libraries print would not be seen otherwise."""
     text, none, cut = (tmp_path / name for name in ("text.mp4", "none.avi", "cut.mkv"))
@@ -156,6 +157,7 @@ def test_a_second_run_does_not_replace_the_first(words: list[object], tmp_path: 
     assert here(*track, "--overwrite").code == 0
 
 
+@pytest.mark.slow
 def test_a_file_that_breaks_off_keeps_what_came_before(words: list[object], tmp_path: Path) -> None:
     cut, out = tmp_path / "cut.mkv", tmp_path / "r.nc"
     whole = Path(str(words[0])).read_bytes()
@@ -170,6 +172,7 @@ def test_a_file_that_breaks_off_keeps_what_came_before(words: list[object], tmp_
     assert recording.attrs["complete"] == "no"
 
 
+@pytest.mark.slow
 def test_a_camera_that_disappears(words: list[object], tmp_path: Path) -> None:
     """A camera in the network, looked at for the scale first, ends after 45 frames."""
     out = tmp_path / "r.nc"
@@ -203,6 +206,7 @@ def test_a_tag_too_many_does_not_end_the_run(tmp_path: Path) -> None:
     assert done.err.count("is one more than --bodies") == 1
 
 
+@pytest.mark.slow
 def test_a_killed_run_leaves_a_recording_that_can_be_read(
     words: list[object], tmp_path: Path
 ) -> None:

@@ -175,6 +175,7 @@ def test_so_many_browsers_and_no_more(server: PageServer) -> None:
         received(channel, "page")
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_it(finished: Path) -> None:
     with served("view", finished) as started, started.socket() as channel:
         received(channel, "page")
@@ -183,6 +184,7 @@ def test_ctrl_c_ends_it(finished: Path) -> None:
         assert "Traceback" not in words
 
 
+@pytest.mark.slow
 def test_away_from_loopback_a_token_is_asked_for(finished: Path) -> None:
     with served("view", finished, "--host", "0.0.0.0") as started:
         token = started.parts.query
@@ -249,6 +251,7 @@ def test_no_such_address(finished: Path, words: list[str], said: str) -> None:
     assert "while attempting" not in told
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not socket.has_ipv6, reason="this machine has no IPv6")
 @pytest.mark.parametrize("host", ["::1", "[::1]"])
 def test_the_other_loopback_address(finished: Path, host: str) -> None:
@@ -290,6 +293,7 @@ def test_a_run_of_a_later_version(finished: Path, tmp_path: Path) -> None:
     assert "manifest version 99" in words
 
 
+@pytest.mark.slow
 def test_a_finished_run_that_lost_its_results(finished: Path, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     shutil.copytree(finished, folder)
@@ -302,6 +306,7 @@ def test_a_finished_run_that_lost_its_results(finished: Path, tmp_path: Path) ->
     assert "empty" in kinds
 
 
+@pytest.mark.slow
 def test_a_sweep_that_has_not_begun(tmp_path: Path) -> None:
     specification = {"study": dw.Study().to_dict(), "body": None, "recording_sha256": "0"}
     with (
@@ -317,6 +322,7 @@ def test_a_sweep_that_has_not_begun(tmp_path: Path) -> None:
         assert received(channel, "cell")["excerpt_x"] is None
 
 
+@pytest.mark.slow
 def test_play_shows_a_tank_and_speaks_as_a_tracker() -> None:
     with held_port() as port, served("play", "--blocks", 3, "--live", port) as started:
         with started.socket() as channel:
@@ -348,6 +354,7 @@ def test_play_shows_a_tank_and_speaks_as_a_tracker() -> None:
             assert received(channel, "frame")["time_s"] > frame["time_s"]
 
 
+@pytest.mark.slow
 def test_play_does_without_a_bundled_flow(tmp_path: Path) -> None:
     with served("play", "--tank-diameter", "60cm", "--blocks", 2) as started:
         with started.socket() as channel:

@@ -40,6 +40,7 @@ def classes(found: xr.Dataset) -> np.ndarray:
     return np.array([*found["class"].values.astype(str), ""])[found["outcome"].values]
 
 
+@pytest.mark.slow
 def test_tracked_and_simulated_assembly_agree(tmp_path: Path) -> None:
     """Four blocks that latch, simulated, drawn and tracked: events within two frames."""
     runs = 4
@@ -77,6 +78,7 @@ def three_blocks() -> xr.Dataset:
     return build_trajectory(time, x, y, theta)
 
 
+@pytest.mark.slow
 def test_a_hidden_block_never_makes_the_class_wrong(tmp_path: Path) -> None:
     """One of the joined blocks is hidden for 2 s, later the third one: `watch` and `observe`."""
     truth = three_blocks()

@@ -250,6 +250,7 @@ def gap(one: np.ndarray, other: np.ndarray) -> float:
     return float(min(distances))
 
 
+@pytest.mark.slow
 def test_blocks_that_do_not_touch_are_never_joined() -> None:
     """Face centres lie on the squares, so that they are no nearer than the squares are."""
     rng = np.random.default_rng(7)

@@ -172,6 +172,7 @@ def test_a_pair_along_the_flow_follows_the_closed_form(hidden: Any, windward: in
     assert np.abs(free.assemblies[0].motion[1:]).max() < 1e-14
 
 
+@pytest.mark.slow
 def test_a_free_pair_reaches_the_velocity_of_the_flow() -> None:
     flow = dw.uniform_flow(0.03, -0.04)
     free = World(rules(flow=flow, drag_coefficient=10.0), [rigid(0, DIMER, [0, 0, 0.7])])

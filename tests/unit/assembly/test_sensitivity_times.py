@@ -61,6 +61,7 @@ def kept(one: xr.Dataset, at: int, variable: str = "count_over_time") -> Counter
     return Counter(dict(zip(names, one[variable].values[at].tolist(), strict=True)))
 
 
+@pytest.mark.slow
 def test_every_setting_has_the_classes_of_its_runs_at_every_time(
     study: dw.Study, found: xr.Dataset
 ) -> None:

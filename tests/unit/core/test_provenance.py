@@ -100,6 +100,7 @@ def test_fingerprint_survives_json_and_order(specification: dict[str, object]) -
     assert fingerprint_of(reversed_order) == fingerprint_of(specification)
 
 
+@pytest.mark.slow
 @given(SPECIFICATIONS, SPECIFICATIONS)
 @settings(deadline=None, max_examples=200)
 def test_fingerprints_differ_exactly_when_keys_do(

@@ -25,6 +25,7 @@ def study():
     return sensitivity(3, points=(5, 4))
 
 
+@pytest.mark.slow
 def test_every_figure_of_an_experiment_is_written(tmp_path) -> None:
     folder = tmp_path / "made" / "here"
     written = write_assembly_figures(
@@ -60,6 +61,7 @@ def test_every_figure_of_a_study_is_written_the_same_each_time(study, tmp_path) 
         assert one.read_bytes() == other.read_bytes(), one.name
 
 
+@pytest.mark.slow
 def test_a_study_along_one_axis_is_written(tmp_path) -> None:
     data = one_axis("latching", ["none", "collision", "connector"])
     assert len(write_sensitivity_figures(tmp_path, sensitivity=data, formats=["png"])) == 2

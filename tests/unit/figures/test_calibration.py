@@ -57,6 +57,7 @@ def test_svg_is_well_formed_and_as_wide_as_a_column(written) -> None:
             assert "<dc:date>" not in path.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_same_datasets_give_the_same_bytes(written, datasets, tmp_path) -> None:
     calibration, flow, trajectory = datasets
     again = write_figures(
@@ -140,6 +141,7 @@ def test_a_short_recording_is_drawn_whole() -> None:
     assert figure.axes[0].get_title(loc="left") == "first 60 s of 1800 s"
 
 
+@pytest.mark.slow
 def test_every_text_lies_inside_its_figure(datasets) -> None:
     calibration, flow, trajectory = datasets
     with print_style():

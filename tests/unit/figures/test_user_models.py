@@ -94,6 +94,7 @@ def test_panels_name_what_differs_and_what_stays():
     assert panels_figure(one_parameter(), "tumble_rate").get_suptitle() == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("make", "panels"),
     [

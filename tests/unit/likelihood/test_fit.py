@@ -159,6 +159,7 @@ def test_without_angles_the_drag_is_averaged(track: xr.Dataset) -> None:
     )
 
 
+@pytest.mark.slow
 def test_force_std_follows_its_interval() -> None:
     other = apply_overrides(coarse_study(), {"forces.force_interval_s": 0.064})
     found, known = fit_facts(dw.fit_motion(recording(200.0), other)), fit_facts(fitted(200.0))

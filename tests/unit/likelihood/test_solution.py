@@ -38,6 +38,7 @@ def test_pairs_at_every_lag_by_brute_force(size: int) -> None:
     assert found == wanted
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("left_over", [3, 8])
 def test_a_last_part_shorter_than_the_lags_is_checked(left_over: int) -> None:
     """A tadpole's recording ended so: its last part had 8 samples, the check looks at 20 lags."""

@@ -114,6 +114,7 @@ def test_the_errors_of_prediction_are_white(fit: xr.Dataset) -> None:
     assert fit_facts(fit)["autocorrelation_std"] == pytest.approx(1 / np.sqrt(18_000), rel=0.05)
 
 
+@pytest.mark.slow
 def test_holes_and_missing_angles_leave_the_truth_within_the_errors(
     holed: xr.Dataset, holed_fit: xr.Dataset, fit: xr.Dataset
 ) -> None:
@@ -140,6 +141,7 @@ def test_turns_of_the_recorded_angle_do_not_matter(track: xr.Dataset) -> None:
         assert fits[1][name] == pytest.approx(fits[0][name], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_an_angle_of_the_wrong_side_is_noticed(track: xr.Dataset) -> None:
     """A tracker that takes the diagonal for a side: the diagonal meets the water otherwise."""
     short = track.isel(time=slice(0, 4000))
@@ -149,6 +151,7 @@ def test_an_angle_of_the_wrong_side_is_noticed(track: xr.Dataset) -> None:
     assert any("one drag law" in one for one in fit_facts(found)["warnings"])
 
 
+@pytest.mark.slow
 def test_an_angle_that_comes_late_shows_in_the_lever(track: xr.Dataset, fit: xr.Dataset) -> None:
     """Late by 0.3 s the turning has no cause in the flow, so it takes a force off the centre."""
     short = track.isel(time=slice(0, 4000))

@@ -42,6 +42,7 @@ def fit() -> xr.Dataset:
     return dw.fit_motion(two_flows(), coarse_study(**SWITCHED))
 
 
+@pytest.mark.slow
 def test_both_flows_and_the_parameters_are_recovered(fit: xr.Dataset) -> None:
     """4 sd for each of three parameters: once in 5000 runs, if the errors are right."""
     truth = {"drag_coefficient": DRAG, "force_std": FORCE_N, "tracking_noise": NOISE_M}

@@ -302,6 +302,7 @@ def test_a_hostile_name_is_only_text(
     assert text.count("<script") == 2
 
 
+@pytest.mark.slow
 def test_the_report_of_a_default_search_is_quick_and_small(tmp_path: Path) -> None:
     """As many settings, excerpts and bins as `driftwalk calibrate` keeps without any option."""
     search, generator = Study().calibration, np.random.default_rng(7)

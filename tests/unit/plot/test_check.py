@@ -114,6 +114,7 @@ def test_densities_in_the_units_of_a_reader(check: xr.Dataset, show: str, height
     assert edges[-1] == pytest.approx(6.0 if show == "step_length" else 180.0)
 
 
+@pytest.mark.slow
 def test_files_of_a_check_with_and_without_steps(check: xr.Dataset, tmp_path: Path) -> None:
     files = write_check_figures(tmp_path, check=check, formats=("svg",))
     names = ["check_innovations.svg", "check_map.svg", "check_time.svg", "check_steps.svg"]

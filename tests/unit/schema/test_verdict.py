@@ -111,6 +111,7 @@ def test_the_page_of_a_fit_in_memory_has_the_verdict(judged: Judged) -> None:
     assert "check" in [part["id"] for part in unchecked]
 
 
+@pytest.mark.slow
 def test_the_notebook_checks_unless_told_not_to() -> None:
     track = recording(SECONDS)
     assert "explained" in dw.fit(track, coarse_study())

@@ -68,6 +68,7 @@ def test_instruction_sets_give_the_same_bits(monkeypatch: pytest.MonkeyPatch) ->
         _same(results["baseline"], result)
 
 
+@pytest.mark.slow
 def test_instruction_set_of_a_fresh_process() -> None:
     code = (
         "import hashlib, driftwalk as dw; from driftwalk import _core;"

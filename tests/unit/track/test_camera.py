@@ -129,6 +129,7 @@ def drawn_board(turn: tuple[float, float, float], away: tuple[float, float, floa
     return np.repeat(np.clip(grey + noise, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
 
 
+@pytest.mark.slow
 def test_a_lens_is_found_from_drawn_boards() -> None:
     turns = [(0.0, 0.0, 0.0), (0.5, 0.0, 0.1), (-0.4, 0.3, 0.0), (0.1, -0.5, 0.2), (0.3, 0.4, -0.2)]
     aways = [

@@ -375,6 +375,7 @@ def test_a_body_that_is_pushed_is_not_taken_back() -> None:
     assert not (recording["ambiguous"].values > 0).any()
 
 
+@pytest.mark.slow
 def test_a_long_recording_takes_no_longer_for_each_frame() -> None:
     """Samples of one that never gets a name, and of all others, do not slow the next frame."""
     tracker = Tracker(TrackerSettings(max_speed=0.3, bodies=1))

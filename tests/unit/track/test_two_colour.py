@@ -54,6 +54,7 @@ def test_moderate_level_meets_the_stated_errors() -> None:
     assert ((spread > 0.5) & (spread < 2.0)).all(), spread
 
 
+@pytest.mark.slow
 def test_heavy_level_finds_what_can_be_seen() -> None:
     rows, recall, extra = errors("heavy", 20, seed=3)
     assert recall >= 0.95

@@ -259,6 +259,7 @@ def test_others_are_named(line: bytes, words: str) -> None:
     asyncio.run(run())
 
 
+@pytest.mark.slow
 def test_a_line_nested_too_deep_ends_nothing() -> None:
     """Some depths can be read, but not written again: the page goes on without such a line."""
 

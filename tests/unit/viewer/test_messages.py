@@ -110,6 +110,7 @@ def test_next_waits_for_a_message_to_come() -> None:
     assert json.loads(loop.run(run())) == {"type": "state"}
 
 
+@pytest.mark.slow
 @given(
     st.recursive(
         st.none() | st.floats() | st.text() | st.integers(),

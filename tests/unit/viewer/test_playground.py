@@ -289,6 +289,7 @@ def test_a_flood_of_wishes_is_one_wish(monkeypatch: pytest.MonkeyPatch) -> None:
     assert done == ["restart", "set"]
 
 
+@pytest.mark.slow
 def test_the_tank_rests_while_nobody_watches() -> None:
     async def run() -> None:
         source = PlaySource(Study(), STILL, blocks=2)

@@ -112,6 +112,7 @@ def test_it_survives_a_file(check: xr.Dataset, tmp_path: Path) -> None:
         xr.testing.assert_identical(stored.load(), check)
 
 
+@pytest.mark.slow
 def test_the_seed_moves_the_simulations_alone(
     check: xr.Dataset, fit: xr.Dataset, track: xr.Dataset
 ) -> None:
@@ -129,6 +130,7 @@ def test_a_world_of_the_model_is_explained() -> None:
     assert verdict(dw.check_model(dw.fit_motion(track, coarse_study()), track))[0] == "yes"
 
 
+@pytest.mark.slow
 def test_a_flow_that_is_reversed_half_way_is_found_with_its_time() -> None:
     pair = [swirl(1.0), swirl(1.0), swirl(-1.0), swirl(-1.0)]
     time = xr.DataArray([0.0, 199.9, 200.1, 500.0], dims="time", name="time")
@@ -143,6 +145,7 @@ def test_a_flow_that_is_reversed_half_way_is_found_with_its_time() -> None:
     assert "between 0 s and 200 s" in sentence or "between 200 s and 400 s" in sentence
 
 
+@pytest.mark.slow
 def test_errors_of_the_tracker_that_remember_are_found() -> None:
     """Noise with the correlation 0.8 from one sample to the next in place of white noise."""
     generator = np.random.default_rng(3)
@@ -160,6 +163,7 @@ def test_errors_of_the_tracker_that_remember_are_found() -> None:
     assert any("Ljung-Box statistic" in text and "expected 60" in text for text in findings)
 
 
+@pytest.mark.slow
 def test_noise_that_is_louder_in_one_half_of_the_tank_is_found() -> None:
     generator = np.random.default_rng(4)
     other = recording(200.0)

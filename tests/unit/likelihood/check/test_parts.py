@@ -277,6 +277,7 @@ def test_scan_names_the_stretch_that_differs() -> None:
     assert found.expected < 0.03
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(2.5e-3)
 def test_scan_of_steady_motion_is_not_alarmed(fresh_seed: Callable[[int], int]) -> None:
     """Twenty recordings at a level of 5 %: more than four alarms once in 400 such tests."""
