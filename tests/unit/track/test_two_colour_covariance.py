@@ -46,13 +46,13 @@ def test_errors_have_the_spread_that_is_stated(
 ) -> None:
     """Half the distance between the quantiles of one standard deviation, x, y and theta together.
 
-    Of n independent numbers it is known to 0.96 / sqrt(n), here at worst 0.062: a true spread of 1
-    leaves 0.8 to 1.3 once in 1500 times.
+    Of n independent numbers it is known to 0.96 / sqrt(n), here at worst 0.062. Over 22 seeds of
+    the heavy level it is 1.06 with a standard deviation of 0.062: the limits are 4 of them or more.
     """
     standard = scores(level, 25, seed=fresh_seed(902))
     assert standard.size >= 240
     low, high = np.quantile(standard, [0.1587, 0.8413])
-    assert 0.8 <= (high - low) / 2 <= 1.3
+    assert 0.8 <= (high - low) / 2 <= 1.34
     # No tail either: 6 of 300 beyond 4 come once in 20,000 times from a spread of 1.3.
     assert (np.abs(standard) > 4.0).sum() < 6
 
