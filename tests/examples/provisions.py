@@ -47,7 +47,7 @@ class Page:
     numbers_of: Mapping[str, Numbers] = field(default_factory=dict)
     """The same for single commands, by a pattern."""
     slow: bool = False
-    """Whether the page takes more than a few seconds."""
+    """Whether the page takes about two seconds or more."""
 
 
 def _files(*provisions: Callable[[Path], Names]) -> Callable[[Path], Names]:
@@ -319,7 +319,9 @@ PAGES: dict[str, Page] = {
     "docs/how-to/load-a-recording.md": Page(
         provide=_files(_recording(60.0), _pixels), numbers=Numbers.SAME
     ),
-    "docs/how-to/report.md": Page(provide=_files(_recording(60.0), _calibrated, _simulated)),
+    "docs/how-to/report.md": Page(
+        provide=_files(_recording(60.0), _calibrated, _simulated), slow=True
+    ),
     "docs/how-to/sensitivity.md": Page(
         provide=_files(_calibrated, _flow("flow_true.csv", "flow.nc", "piv.csv")),
         instead={
@@ -363,10 +365,13 @@ PAGES: dict[str, Page] = {
         slow=True,
     ),
     "docs/reference/datasets.md": Page(
-        provide=_files(_search("search.toml"), _with_intervals, _minutes(recording=0.5))
+        provide=_files(_search("search.toml"), _with_intervals, _minutes(recording=0.5)),
+        slow=True,
     ),
     "docs/reference/live-stream.md": Page(
-        streams=True, holds=("message['type'] == 'frame'", "printed.count('\\n') > 3")
+        streams=True,
+        holds=("message['type'] == 'frame'", "printed.count('\\n') > 3"),
+        slow=True,
     ),
     "docs/reference/page-data.md": Page(provide=_report, holds=("values.size > 1",)),
     "docs/reference/study-file.md": Page(),

@@ -161,6 +161,7 @@ def test_bodies_without_a_time_in_common_are_refused_before_the_table(tmp_path: 
     assert here("info", file, "--body", "7").code == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "start", [b"t_s,x_m,y_m\n0,1,2\n", b"$FRAMENUMBER,1\n$PARTICLE,4,1,2,0,1,2\n"]
 )

@@ -86,6 +86,7 @@ def test_both_parameters_of_a_tumbling_particle_are_found(tumbling):
     assert facts["warnings"] == []
 
 
+@pytest.mark.slow
 def test_the_bootstrap_scatters_by_no_less_than_the_information_allows(tumbling):
     rates = tumbling["bootstrap_tumble_rate"].values
     bound = TUMBLE_RATE / np.sqrt(DURATION * TUMBLE_RATE)
@@ -95,6 +96,7 @@ def test_the_bootstrap_scatters_by_no_less_than_the_information_allows(tumbling)
     assert low < tumbling["estimate"].sel(parameter="tumble_rate") < high
 
 
+@pytest.mark.slow
 def test_everything_stands_under_the_names_of_the_parameters(tumbling):
     assert tumbling["ks_distance"].dims == ("speed", "tumble_rate")
     assert tumbling["refined_surface"].dims == ("refined_speed", "refined_tumble_rate")

@@ -136,6 +136,7 @@ def calibrated(boards: Path, out: Path, *words: object) -> Done:
     return here("camera", "calibrate", *images, *size, *kind, "-o", out, *words)
 
 
+@pytest.mark.slow
 def test_board_to_metres_and_poses(boards: Path, tmp_path: Path) -> None:
     """Pixel to metre within 0.15 mm (rms 0.05 mm) where the board lay; poses within 0.2 mm."""
     toml = tmp_path / "camera.toml"
@@ -203,6 +204,7 @@ def test_the_rim_gives_the_centre_where_the_board_lay_aside(boards: Path, tmp_pa
     assert float(width[1]) == pytest.approx(30.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_boards_that_are_not_found(boards: Path, tmp_path: Path) -> None:
     toml, empty = tmp_path / "camera.toml", tmp_path / "empty.png"
     cv2.imwrite(str(empty), np.full((HEIGHT, WIDTH, 3), 120, np.uint8))

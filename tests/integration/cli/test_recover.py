@@ -70,6 +70,7 @@ def answer(done: Done) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.slow
 def test_json_holds_the_summary(finished: tuple[Path, Done]) -> None:
     found = answer(finished[1])
     assert found["truth"]["drag_coefficient"] == 0.4
@@ -91,6 +92,7 @@ def test_json_holds_the_summary(finished: tuple[Path, Done]) -> None:
     assert "1 min, 1 min 30 s" in needed["basis"]
 
 
+@pytest.mark.slow
 def test_the_run_directory_is_whole(finished: tuple[Path, Done]) -> None:
     folder = finished[0]
     for name in ("recovery.png", "recovery.svg", "error_by_length.png", "error_by_length.svg"):

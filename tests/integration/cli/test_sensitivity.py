@@ -276,6 +276,7 @@ def shards(folder: Path) -> dict[Path, int]:
     return {path: path.stat().st_mtime_ns for path in folder.glob(".shards/*/[0-9]*.npz")}
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_killed_interrupted_and_continued(
     whole: tuple[Path, Done], calibrated: Path, tmp_path: Path

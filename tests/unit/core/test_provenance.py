@@ -92,6 +92,7 @@ def test_damaged_manifest(tmp_path: Path, content: bytes, message: str) -> None:
         read_manifest(tmp_path / "manifest.json")
 
 
+@pytest.mark.slow
 @given(SPECIFICATIONS)
 @settings(deadline=None, max_examples=100)
 def test_fingerprint_survives_json_and_order(specification: dict[str, object]) -> None:

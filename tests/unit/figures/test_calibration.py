@@ -40,6 +40,7 @@ def written(datasets, tmp_path_factory) -> list[Path]:
     return write_figures(calibration, flow=flow, trajectory=trajectory, folder=folder)
 
 
+@pytest.mark.slow
 def test_every_figure_is_written_in_every_format(written) -> None:
     assert [path.name for path in written] == [
         f"{name}.{suffix}" for name in NAMES for suffix in ("png", "svg")
@@ -48,6 +49,7 @@ def test_every_figure_is_written_in_every_format(written) -> None:
         assert 10_000 < path.stat().st_size < SVG_LIMIT_BYTES
 
 
+@pytest.mark.slow
 def test_svg_is_well_formed_and_as_wide_as_a_column(written) -> None:
     for path in written:
         if path.suffix == ".svg":

@@ -125,6 +125,7 @@ def test_holes_and_missing_angles_leave_the_truth_within_the_errors(
     assert ratio[[0, 1, 2, 4]] == pytest.approx(np.full(4, 1.5), abs=0.45)
 
 
+@pytest.mark.slow
 def test_missing_angles_are_no_errors_of_prediction(holed_fit: xr.Dataset) -> None:
     """Some 10,000 numbers are there; counted as zeros, missing angles would make it 0.87."""
     assert fit_facts(holed_fit)["chi_squared_per_dof"] == pytest.approx(1.0, abs=0.06)

@@ -67,6 +67,7 @@ CASES: dict[str, tuple[xr.Dataset, Callable[[xr.Dataset], list[dict[str, Any]]]]
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_any_one_variable_or_attribute_may_be_missing(name: str) -> None:
     dataset, make = CASES[name]

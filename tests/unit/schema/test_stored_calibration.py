@@ -42,6 +42,7 @@ def stored(dataset: xr.Dataset, folder: Path) -> xr.Dataset:
     return open_netcdf(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 def test_what_is_stored_is_what_is_in_memory(form: str, tmp_path: Path) -> None:
     found = every_kind(form)
