@@ -11,6 +11,7 @@ from driftwalk.calibration.problem import Axes, Problem
 from driftwalk.calibration.region import Bootstrap, recordings_at, simulated_steps
 from driftwalk.calibration.search import Map, refined_window, run_map, window_smoother
 from driftwalk.calibration.surface import Optimum
+from driftwalk.schema.calibration_facts import is_explained
 
 FAR_ABOVE_FLOOR = 2.0
 """A distance more than this many noise floors is called far above it."""
@@ -44,7 +45,7 @@ class Quality(NamedTuple):
     @property
     def explained(self) -> bool:
         """Whether the distance is within reach of the floor."""
-        return self.distance <= max(FAR_ABOVE_FLOOR * self.floor, self.floor_upper)
+        return is_explained(self.distance, self.floor, self.floor_upper, FAR_ABOVE_FLOOR)
 
 
 def quality_of_fit(bootstrap: Bootstrap) -> Quality:

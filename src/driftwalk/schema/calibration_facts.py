@@ -76,6 +76,17 @@ def calibration_parts(
     return AnswerParts(data, coords, rest)
 
 
+def is_explained(distance: float, floor: float, floor_upper: float, far_above_floor: float) -> bool:
+    """Return whether the KS distance at the optimum is within reach of the noise floor.
+
+    Examples
+    --------
+    >>> is_explained(0.03, 0.02, 0.025, 2.0), is_explained(0.05, 0.02, 0.025, 2.0)
+    (True, False)
+    """
+    return distance <= max(far_above_floor * floor, floor_upper)
+
+
 def calibration_facts(calibration: xr.Dataset) -> dict[str, Any]:
     """Return what a calibration says under flat names, in Python's own types.
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.schema.calibration import stored_parameters
-from driftwalk.schema.calibration_facts import calibration_parts
+from driftwalk.schema.calibration_facts import calibration_parts, is_explained
 from driftwalk.schema.check import with_descriptions
 from driftwalk.schema.facts import fit_variables, texts
 from driftwalk.schema.kinds import KINDS
@@ -101,8 +101,7 @@ def _calibration_of_attributes(calibration: xr.Dataset) -> xr.Dataset:
     facts = dict(calibration.attrs)
     judged = ("ks_distance", "noise_floor", "noise_floor_upper", "far_above_floor")
     if all(name in facts for name in judged):
-        distance, floor, upper, far = (float(facts[name]) for name in judged)
-        facts["explained"] = distance <= max(far * floor, upper)
+        facts["explained"] = is_explained(*(float(facts[name]) for name in judged))
     parts = calibration_parts(facts, stored_parameters(calibration))
     found = calibration.assign(parts.data).assign_coords(parts.coords)
     found.attrs = parts.attrs
