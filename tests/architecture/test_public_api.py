@@ -10,30 +10,11 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+from api_pages import ROOMS
 
 import driftwalk
 
-STAGES = (
-    "record",
-    "flow",
-    "model",
-    "simulation",
-    "comparison",
-    "motion",
-    "sweep",
-    "calibration",
-    "likelihood",
-    "assembly",
-    "track",
-    "datasets",
-    "plot",
-    "figures",
-    "page",
-    "runs",
-    "conditions",
-    "notebook",
-    "viewer",
-)
+STAGES = ROOMS
 
 
 def stage(name: str) -> ModuleType:
