@@ -13,12 +13,13 @@ from driftwalk.conditions.reading import (
 )
 from driftwalk.conditions.recorded import Conditions, recorded_conditions
 from driftwalk.conditions.refuse import require_motion, require_positions
-from driftwalk.conditions.study import study_for
+from driftwalk.conditions.study import estimated_study, study_for
 from driftwalk.conditions.tank import require_inside, study_in_arena
 
 __all__ = [
     "Conditions",
     "ReadRecordings",
+    "estimated_study",
     "load_for_run",
     "load_with_study",
     "read_recordings",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.conditions.tank import OUTLINE, require_inside, study_in_arena
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import read_arena
+from driftwalk.schema.facts import fitted_value
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -78,6 +79,49 @@ def study_for(
     for recording in recordings if tank or needs_tank else ():
         require_inside(chosen, recording, body)
     return chosen
+
+
+def estimated_study(
+    found: xr.Dataset, overrides: Mapping[str, Any] | None = None, *, source: str = "study"
+) -> Study:
+    """Return the study of a fit or a calibration of the block, with the estimates in it.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        A `fit` or a `calibration`.
+    overrides : mapping, optional
+        Over the study, from ``"section.key"`` to the value.
+    source : str
+        Where the study is from, for an error.
+
+    Returns
+    -------
+    Study
+        With the estimated drag coefficient and stochastic force.
+
+    Raises
+    ------
+    InputError
+        When the two were not estimated.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> fit = dw.fit_motion(dw.tank30_recording())  # doctest: +SKIP
+    >>> estimated_study(fit).forces.drag_coefficient  # doctest: +SKIP
+    0.393
+    """
+    from driftwalk.model import apply_overrides, parse_study
+
+    return apply_overrides(
+        parse_study(found.attrs["study"], source=source),
+        {
+            "forces.drag_coefficient": fitted_value(found, "drag_coefficient"),
+            "forces.force_std_N": fitted_value(found, "force_std"),
+            **(overrides or {}),
+        },
+    )
 
 
 def _with_tank(study: Study, recording: xr.Dataset, *, is_stated: bool) -> Study:

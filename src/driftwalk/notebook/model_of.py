@@ -46,11 +46,11 @@ def model_of(
     InputError
         When there is no flow, or the dataset is of another kind.
     """
+    from driftwalk.conditions import estimated_study
     from driftwalk.likelihood import fitted_flow
-    from driftwalk.model import Study, apply_overrides, parse_study
+    from driftwalk.model import Study, apply_overrides
     from driftwalk.schema.calibration import is_block
     from driftwalk.schema.earlier import current_form
-    from driftwalk.schema.facts import fitted_value
 
     if isinstance(source, Study):
         return FoundModel(apply_overrides(source, overrides), _flow(flow), None)
@@ -65,14 +65,7 @@ def model_of(
             f"the calibration is about the model {source.attrs.get('model', 'of a user')}: the "
             "tank simulates blocks, so give a calibration of the block"
         )
-    study = apply_overrides(
-        parse_study(source.attrs["study"]),
-        {
-            "forces.drag_coefficient": fitted_value(source, "drag_coefficient"),
-            "forces.force_std_N": fitted_value(source, "force_std"),
-            **overrides,
-        },
-    )
+    study = estimated_study(source, overrides)
     if kind == "fit":
         return FoundModel(study, fitted_flow(source) if flow is None else _flow(flow), None)
     field = _stored_flow(source, study) if flow is None else _flow(flow)

@@ -10,7 +10,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.run_layout import state_of
 from driftwalk.schema.calibration import is_block
 from driftwalk.schema.contents import check_contents
-from driftwalk.schema.facts import fitted_value, sentences
+from driftwalk.schema.facts import sentences
 from driftwalk.schema.netcdf import open_netcdf
 
 if TYPE_CHECKING:
@@ -70,8 +70,8 @@ def read_calibrated(folder: Path) -> Calibrated:
     >>> read_calibrated(Path("run")).study.forces.drag_coefficient  # doctest: +SKIP
     0.39
     """
+    from driftwalk.conditions import estimated_study
     from driftwalk.flow import load_flow
-    from driftwalk.model import apply_overrides, parse_study
 
     files = {"calibration": folder / "calibration.nc", "flow": folder / "flow.nc"}
     _require_finished(folder, files)
@@ -82,13 +82,7 @@ def read_calibrated(folder: Path) -> Calibrated:
             f"{files['calibration']} is about the model {model}, and "
             "self-assembly simulates blocks: give a calibration of the block"
         )
-    study = apply_overrides(
-        parse_study(found.attrs["study"], source=f"{files['calibration']}: its study"),
-        {
-            "forces.drag_coefficient": fitted_value(found, "drag_coefficient"),
-            "forces.force_std_N": fitted_value(found, "force_std"),
-        },
-    )
+    study = estimated_study(found, source=f"{files['calibration']}: its study")
     flow = load_flow(files["flow"], arena=study.tank.to_arena(), own_flags="keep")
     region = found if "region_level" in found else None
     return Calibrated(study, flow, found, region, files, sentences(found, "warning"))
