@@ -27,6 +27,7 @@ from driftwalk import _core
 from driftwalk.calibration import calibrate
 from driftwalk.calibration.problem import prepare_problem
 from driftwalk.cli.demo import demo_study
+from driftwalk.core.processors import default_threads
 from driftwalk.core.seeds import world_keys
 from driftwalk.datasets import tank30_flow, tank30_recording, tank30_truth
 from driftwalk.figures import write_figures
@@ -34,7 +35,7 @@ from driftwalk.motion import BlockModel
 from driftwalk.schema import body_track
 from driftwalk.schema.calibration_facts import calibration_facts
 from driftwalk.simulation import recorded_camera
-from driftwalk.simulation.backend import default_threads, world_table
+from driftwalk.simulation.backend import world_table
 from driftwalk.simulation.initial import world_orientations
 
 TARGET_MAP_S = 60.0
