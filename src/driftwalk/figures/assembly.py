@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from driftwalk.figures.calibration import write_each
+from driftwalk.figures.write import write_each
 from driftwalk.plot.class_courses import plot_class_times, plot_survival
 from driftwalk.plot.components import plot_biplot
 from driftwalk.plot.outcome_bars import plot_outcomes

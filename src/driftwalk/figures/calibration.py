@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from driftwalk.core.atomic import atomic_path
-from driftwalk.core.errors import InputError
+from driftwalk.figures.write import write_each
 from driftwalk.plot.distances import LEGEND_ORDER, plot_ks_map, plot_refined_map
 from driftwalk.plot.flow_field import COMPONENTS, SPEED_LABEL, plot_flow, velocity_of
 from driftwalk.plot.panels import plot_density_panels, shared_setting_text
@@ -17,10 +16,8 @@ from driftwalk.plot.parts.style import (
     DOUBLE_COLUMN_MM,
     SINGLE_COLUMN_MM,
     add_colorbar,
-    add_footer,
     letter_panels,
     new_figure,
-    print_style,
 )
 from driftwalk.plot.path import plot_trajectory
 from driftwalk.plot.step_densities import plot_steps
@@ -34,12 +31,6 @@ if TYPE_CHECKING:
 FOOTER = "recording simulated by another engine (ODE)"
 # Length of the sample of the path that is drawn [s].
 EXCERPT_S = 60.0
-# What would make two files of the same figure differ (the date) or says nothing of the data.
-METADATA: dict[str, dict[str, Any]] = {
-    "png": {"Software": None},
-    "svg": {"Date": None},
-    "pdf": {"CreationDate": None},
-}
 
 
 def write_figures(
@@ -229,41 +220,3 @@ def _profiles_figure(calibration: xr.Dataset) -> Figure:
 
 def _legend_above(ax: Any) -> None:
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)
-
-
-def write_each(
-    makers: Mapping[str, Callable[[], Figure]],
-    folder: str | Path,
-    formats: Sequence[str],
-    *,
-    footer: str = "",
-) -> list[Path]:
-    """Make every figure and write it by its name; nothing is made when a format is not known."""
-    unknown = [name for name in formats if name not in METADATA]
-    if unknown:
-        raise InputError(
-            f"no figure can be written as {', '.join(unknown)}: choose from {', '.join(METADATA)}"
-        )
-    target = Path(folder)
-    target.mkdir(parents=True, exist_ok=True)
-    written: list[Path] = []
-    with print_style():
-        for name, make in makers.items():
-            figure = make()
-            if footer:
-                add_footer(figure, footer)
-            written += _save(figure, target / name, formats)
-    return written
-
-
-def _save(figure: Figure, stem: Path, formats: Sequence[str]) -> list[Path]:
-    """Lay the figure out once and write it in every format."""
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
-    written = []
-    for name in formats:
-        path = stem.with_suffix(f".{name}")
-        with atomic_path(path) as temporary:
-            figure.savefig(temporary, metadata=METADATA[name])
-        written.append(path)
-    return written

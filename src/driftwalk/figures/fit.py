@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from driftwalk.core.errors import InputError
-from driftwalk.figures.calibration import FOOTER, trajectory_figure, write_each
+from driftwalk.figures.calibration import FOOTER, trajectory_figure
+from driftwalk.figures.write import write_each
 from driftwalk.plot.flow_field import plot_flow
 from driftwalk.plot.parts.arena import arena_of, draw_arena, label_position
 from driftwalk.plot.parts.labels import in_unit

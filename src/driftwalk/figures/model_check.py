@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from driftwalk.figures.calibration import FOOTER, write_each
+from driftwalk.figures.calibration import FOOTER
+from driftwalk.figures.write import write_each
 from driftwalk.plot.model_check import (
     legend_of,
     plot_innovations,

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
-from driftwalk.figures.calibration import write_each
+from driftwalk.figures.write import write_each
 from driftwalk.plot.parts.style import (
     BLUE,
     DOUBLE_COLUMN_MM,
