@@ -198,12 +198,11 @@ def test_without_a_given_flow_it_is_extracted_from_the_recording():
 
 @pytest.mark.slow
 def test_an_interval_that_reaches_the_end_of_the_refined_grid_is_warned_of():
-    # Steps so small that the refined grid is narrower than what a minute can tell.
+    # Steps of the force so small that its refined grid is narrower than what a minute can tell.
     study = apply_overrides(
         dw.Study(),
         {
             **SMALL,
-            "calibration.refined_drag_coefficient_step": 0.002,
             "calibration.refined_force_std_step_N": 0.004e-3,
         },
     )

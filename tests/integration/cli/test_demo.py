@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -19,12 +19,42 @@ TRUTH = {
 }
 
 
+@dataclass(frozen=True)
+class Killed:
+    """What a demo had told and stored when it was killed, before its map."""
+
+    told: list[str]
+    page: str
+    files: dict[str, bytes | None]
+
+
+# No warning of a library reaches a user.
+STRICT = os.environ | {"PYTHONWARNINGS": "error"}
+
+
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Done]:
-    """Return a whole demo, with the short search."""
+def killed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Killed]:
+    """Return the folder of a demo with the short search, killed as soon as its fit was told.
+
+    It is read through a pipe: what is printed does not wait in a buffer for the end.
+    """
     folder = tmp_path_factory.mktemp("demo") / "demo"
-    strict = os.environ | {"PYTHONWARNINGS": "error"}  # no warning of a library reaches a user
-    return folder, apart("demo", "--quick", "--out", folder, env=strict)
+    told: list[str] = []
+    with start("demo", "--quick", "--out", folder, env=STRICT) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            told.append(line)
+            if line.startswith("Its page: "):
+                break
+        process.kill()
+    page = Path(told[-1].removeprefix("Its page: ").strip()).read_text(encoding="utf-8")
+    return folder, Killed(told, page, contents(folder))
+
+
+@pytest.fixture(scope="module")
+def finished(killed: tuple[Path, Killed]) -> tuple[Path, Done]:
+    """Return the demo that was killed, and continued to its end."""
+    return killed[0], apart("demo", "--quick", "--out", killed[0], env=STRICT)
 
 
 @pytest.mark.slow
@@ -53,18 +83,10 @@ def test_both_answers_stand_beside_the_truth(finished: tuple[Path, Done]) -> Non
 
 
 @pytest.mark.slow
-def test_the_fit_is_told_before_the_map_is_begun(tmp_path: Path) -> None:
-    """Through a pipe too: what is printed does not wait in a buffer for the end."""
-    folder = tmp_path / "demo"
-    process = start("demo", "--quick", "--out", folder)
-    with process:
-        assert process.stdout is not None
-        line = next(line for line in process.stdout if line.startswith("Its page: "))
-        # The map takes far longer than the reading of this line.
-        assert not (folder / "calibrate" / "manifest.json").exists()
-        page = page_in(Path(line.removeprefix("Its page: ").strip()).read_text(encoding="utf-8"))
-        assert page["subtitle"] == "fit"
-        process.kill()
+def test_the_fit_is_told_before_the_map_is_begun(killed: tuple[Path, Killed]) -> None:
+    # The map takes far longer than the reading of the line with the page of the fit.
+    assert not any(name.startswith("calibrate/manifest") for name in killed[1].files)
+    assert page_in(killed[1].page)["subtitle"] == "fit"
 
 
 @pytest.mark.slow
@@ -89,14 +111,15 @@ def test_a_finished_demo_is_read(finished: tuple[Path, Done]) -> None:
 
 
 @pytest.mark.slow
-def test_a_demo_goes_on_after_its_fit(finished: tuple[Path, Done], tmp_path: Path) -> None:
-    folder = tmp_path / "demo"
-    shutil.copytree(finished[0] / "fit", folder / "fit")
-    before = contents(folder / "fit")
-    done = apart("demo", "--quick", "--out", folder)
-    assert done.code == 0, done.err
-    assert contents(folder / "fit") == before
-    assert done.out.replace(str(folder), "") == finished[1].out.replace(str(finished[0]), "")
+def test_a_demo_goes_on_after_its_fit(
+    killed: tuple[Path, Killed], finished: tuple[Path, Done]
+) -> None:
+    folder, before = killed
+    fit = {name: data for name, data in before.files.items() if name.startswith("fit/")}
+    assert "fit/manifest.json" in fit
+    after = contents(folder)
+    assert {name: after[name] for name in fit} == fit
+    assert finished[1].out.startswith("".join(before.told))
 
 
 def test_a_folder_with_other_files_is_refused_before_any_work(tmp_path: Path) -> None:

@@ -127,7 +127,7 @@ def test_killed_between_any_two_changes(
     study: Path, uninterrupted: xr.Dataset, tmp_path: Path
 ) -> None:
     kills = 0
-    for count in range(0, 1000, 9):
+    for count in range(0, 1000, 17):
         folder = tmp_path / f"run-{count}"
         before = PLAIN + KILL.format(count=count, folder=str(folder))
         code = apart(*words(study, folder), before=before).code
