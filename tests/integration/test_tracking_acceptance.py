@@ -151,7 +151,7 @@ def test_four_blocks_with_moderate_noise(
 def test_four_blocks_with_heavy_noise(
     scenes: ModuleType, scores: ModuleType, tmp_path: Path, seed: int
 ) -> None:
-    out, _, truth = filmed(scenes, tmp_path, "heavy", seed, 200)
+    out, _, truth = filmed(scenes, tmp_path, "heavy", seed, 120)
     found = scores.score(xr.load_dataset(out), truth)
     assert found["recall_visible"] >= 0.95
     assert found["unmarked"] == 0

@@ -13,7 +13,7 @@ import pytest
 from synthetic_calibration import bundled_flow, bundled_recording, synthetic_calibration
 
 from driftwalk.core.errors import InputError
-from driftwalk.figures import calibration as figures, write_figures
+from driftwalk.figures import calibration as figures, write, write_figures
 from driftwalk.plot.parts.style import STYLE, print_style
 
 NAMES = [
@@ -109,7 +109,7 @@ def test_a_simulated_recording_is_named_so(
         seen.append(_texts(figure).count("recording simulated by another engine (ODE)"))
         return []
 
-    monkeypatch.setattr(figures, "_save", count)
+    monkeypatch.setattr(write, "_save", count)
     write_figures(changed, flow=flow, trajectory=trajectory, folder=tmp_path)
     assert seen == [expected] * len(NAMES)
 
@@ -189,8 +189,6 @@ def test_without_bootstrap_the_profiles_are_drawn_alone(datasets, tmp_path, monk
         for one, other in zip(alone.lines, beside.lines, strict=True):
             np.testing.assert_array_equal(one.get_xydata(), other.get_xydata())
     made: list[str] = []
-    monkeypatch.setattr(
-        figures, "_save", lambda figure, stem, formats: made.append(stem.name) or []
-    )
+    monkeypatch.setattr(write, "_save", lambda figure, stem, formats: made.append(stem.name) or [])
     write_figures(bare, flow=flow, trajectory=trajectory, folder=tmp_path, formats=["png"])
     assert made == NAMES
