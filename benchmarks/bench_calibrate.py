@@ -27,6 +27,7 @@ from driftwalk import _core
 from driftwalk.calibration import calibrate
 from driftwalk.calibration.problem import prepare_problem
 from driftwalk.cli.demo import demo_study
+from driftwalk.conditions import recorded_camera
 from driftwalk.core.processors import default_threads
 from driftwalk.core.seeds import world_keys
 from driftwalk.datasets import tank30_flow, tank30_recording, tank30_truth
@@ -34,7 +35,6 @@ from driftwalk.figures import write_figures
 from driftwalk.motion import BlockModel
 from driftwalk.schema import body_track
 from driftwalk.schema.calibration_facts import calibration_facts
-from driftwalk.simulation import recorded_camera
 from driftwalk.simulation.backend import world_table
 from driftwalk.simulation.initial import world_orientations
 

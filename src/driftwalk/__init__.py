@@ -56,6 +56,7 @@ _NAMES = {
         "ks_distance",
         "steps",
     ),
+    "driftwalk.conditions": ("simulate_like",),
     "driftwalk.core.errors": (
         "ConfigurationError",
         "DriftwalkError",
@@ -112,7 +113,6 @@ _NAMES = {
         "readable_formats",
         "save_trajectory",
     ),
-    "driftwalk.simulation": ("simulate_like",),
     "driftwalk.track": (
         "observe",
         "open_source",

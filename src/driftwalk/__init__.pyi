@@ -40,6 +40,9 @@ from driftwalk.comparison import (
     ks_distance as ks_distance,
     steps as steps,
 )
+from driftwalk.conditions import (
+    simulate_like as simulate_like,
+)
 from driftwalk.core.errors import (
     ConfigurationError as ConfigurationError,
     DriftwalkError as DriftwalkError,
@@ -97,9 +100,6 @@ from driftwalk.record import (
     load as load,
     readable_formats as readable_formats,
     save_trajectory as save_trajectory,
-)
-from driftwalk.simulation import (
-    simulate_like as simulate_like,
 )
 from driftwalk.track import (
     observe as observe,

@@ -30,8 +30,8 @@ from driftwalk.calibration.region import (
     simulated_steps,
 )
 from driftwalk.calibration.search import Map, window_smoother
+from driftwalk.conditions import recorded_camera
 from driftwalk.schema import body_track
-from driftwalk.simulation import recorded_camera
 
 TRUTHS = ((0.45, 0.55e-3), (0.80, 0.90e-3))
 STEPS = (0.01, 2e-5)

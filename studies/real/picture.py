@@ -17,6 +17,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from driftwalk.calibration.problem import Problem, prepare_problem, score_settings
+from driftwalk.conditions import recorded_camera
 from driftwalk.model import parse_study
 from driftwalk.plot.parts.style import (
     INK,
@@ -30,7 +31,6 @@ from driftwalk.plot.step_densities import DENSITY_LABEL, density_mesh, density_o
 from driftwalk.schema import body_track
 from driftwalk.schema.facts import fitted_value
 from driftwalk.schema.netcdf import open_netcdf
-from driftwalk.simulation import recorded_camera
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -21,8 +21,8 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "model": GROUND,
     "comparison": GROUND,
     "sweep": GROUND,
+    "simulation": GROUND | {"model"},
     # `record` for the tracking noise of a recording, which is what "estimate" stands for.
-    "simulation": GROUND | {"model", "record"},
     "conditions": GROUND | {"record", "model", "flow", "simulation"},
     "motion": GROUND | {"conditions", "simulation", "comparison", "model"},
     "calibration": GROUND
@@ -46,7 +46,8 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     | {"assembly", "calibration", "likelihood", "page", "runs"},
     # `track` for its live server, through which the playground's tank can be watched.
     "viewer": GROUND
-    | {"record", "flow", "model", "comparison", "simulation", "assembly", "track", "plot", "page"},
+    | {"record", "flow", "model", "comparison", "simulation", "conditions", "assembly", "track"}
+    | {"plot", "page"},
     "cli": GROUND
     | {"record", "flow", "model", "comparison", "sweep", "simulation", "motion", "conditions"}
     | {"assembly", "calibration", "likelihood", "track", "datasets", "plot", "figures", "page"}

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from driftwalk.calibration.problem import prepare_problem
+from driftwalk.conditions import recorded_camera
 from driftwalk.motion import BlockModel, MotionModel
 from driftwalk.schema import body_track
-from driftwalk.simulation import recorded_camera
 
 if TYPE_CHECKING:
     import xarray as xr

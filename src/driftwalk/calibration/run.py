@@ -42,10 +42,10 @@ from driftwalk.calibration.search import (
 )
 from driftwalk.calibration.surface import Optimum
 from driftwalk.comparison import Statistic
+from driftwalk.conditions import recorded_camera
 from driftwalk.core.errors import InputError
 from driftwalk.motion import BlockModel, Details, MotionModel
 from driftwalk.schema import Track, body_track
-from driftwalk.simulation import recorded_camera
 
 if TYPE_CHECKING:
     import xarray as xr

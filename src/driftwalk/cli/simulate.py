@@ -60,11 +60,11 @@ def simulate(
     json: Json = False,
 ) -> None:
     """Simulate the motion of the block."""
-    from driftwalk.conditions import study_for
+    from driftwalk.conditions import simulate_like, study_for
     from driftwalk.core.atomic import write_atomic
     from driftwalk.flow import load_flow
     from driftwalk.schema.netcdf import netcdf_bytes
-    from driftwalk.simulation import simulate as run, simulate_like
+    from driftwalk.simulation import simulate as run
 
     if backend not in ("cpu", "reference"):
         raise InputError(f"--backend takes cpu or reference, got '{backend}'")

@@ -4,6 +4,8 @@ How a recording is read when a study says so, and what is refused; the tank and 
 reconciled with the study; times and gaps, start and camera; the flow.
 """
 
+from driftwalk.conditions.camera import recorded_camera
+from driftwalk.conditions.like import simulate_like
 from driftwalk.conditions.own_flow import recording_flow
 from driftwalk.conditions.reading import (
     ReadRecordings,
@@ -13,6 +15,7 @@ from driftwalk.conditions.reading import (
 )
 from driftwalk.conditions.recorded import Conditions, recorded_conditions
 from driftwalk.conditions.refuse import require_motion, require_positions
+from driftwalk.conditions.start import recorded_start
 from driftwalk.conditions.study import estimated_study, study_for
 from driftwalk.conditions.tank import require_inside, study_in_arena
 
@@ -23,11 +26,14 @@ __all__ = [
     "load_for_run",
     "load_with_study",
     "read_recordings",
+    "recorded_camera",
     "recorded_conditions",
+    "recorded_start",
     "recording_flow",
     "require_inside",
     "require_motion",
     "require_positions",
+    "simulate_like",
     "study_for",
     "study_in_arena",
 ]

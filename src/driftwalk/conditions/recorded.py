@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.conditions.start import recorded_start
 from driftwalk.core.processors import default_threads
 from driftwalk.simulation.backend import Camera
-from driftwalk.simulation.initial import Start, recorded_start
-from driftwalk.simulation.run import without_gaps
+from driftwalk.simulation.initial import Start
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -87,7 +87,7 @@ def recorded_conditions(
     >>> import driftwalk as dw
     >>> from driftwalk.schema import body_track
     >>> track = body_track(dw.tank30_recording())
-    >>> camera = dw.simulation.recorded_camera(track, dw.Study(), position_quantum=0.0)
+    >>> camera = dw.conditions.recorded_camera(track, dw.Study(), position_quantum=0.0)
     >>> dw.conditions.recorded_conditions(track, dw.Study(), camera=camera).sample_time.size
     18001
     """
@@ -104,3 +104,12 @@ def recorded_conditions(
         flow=flow,
         threads=threads or default_threads(),
     )
+
+
+def without_gaps(time: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return even time stamps [s] over the same span, at the median interval of the given ones."""
+    if time.size < 2:
+        return time
+    interval = float(np.median(np.diff(time)))
+    count = int(np.floor(time[-1] / interval + 1e-6)) + 1
+    return np.arange(count, dtype=np.float64) * interval

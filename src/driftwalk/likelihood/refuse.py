@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from driftwalk.conditions import recorded_camera
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.length import length_advice
 from driftwalk.likelihood.start import typical_speed
-from driftwalk.simulation import recorded_camera
 
 if TYPE_CHECKING:
     from driftwalk.model import Study

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from driftwalk.conditions import recorded_camera
 from driftwalk.conditions.own_flow import flow_from_track
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.filter_pass import Point
 from driftwalk.likelihood.newton import PRIOR_DRAG, PRIOR_LEVER, Weights
 from driftwalk.likelihood.spline import Floats, Spline, penalties
 from driftwalk.schema import FLAGS, Track
-from driftwalk.simulation import recorded_camera
 
 if TYPE_CHECKING:
     from driftwalk.model import Study

@@ -72,7 +72,8 @@ def simulate(
     >>> run.sizes["time"]
     2
     """
-    from driftwalk.simulation import simulate as simulate_study, simulate_like
+    from driftwalk.conditions import simulate_like
+    from driftwalk.simulation import simulate as simulate_study
 
     study, field, _ = model_of(model, flow, {})
     common: dict[str, Any] = {"replicates": replicates, "seed": seed, "threads": threads}

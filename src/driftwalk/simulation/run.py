@@ -14,7 +14,7 @@ from driftwalk.core.seeds import world_keys
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.trajectory import POSE
 from driftwalk.simulation.backend import Camera, native_model, world_table
-from driftwalk.simulation.initial import Start, random_start, recorded_start, world_orientations
+from driftwalk.simulation.initial import Start, random_start, world_orientations
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -102,86 +102,6 @@ def simulate(
         precision="double" if backend == "reference" else "single",
     )
     return _dataset(study, times, (x, y, theta), status, {"seed": chosen, "backend": backend})
-
-
-def simulate_like(
-    study: Study,
-    flow: xr.Dataset,
-    recording: xr.Dataset,
-    *,
-    body: str | None = None,
-    replicates: int | None = None,
-    seed: int | None = None,
-    threads: int | None = None,
-) -> xr.Dataset:
-    """Simulate with the start, time stamps, gaps and camera of a recording.
-
-    Parameters
-    ----------
-    study, flow
-        As in `simulate`; noise and resolution that the study leaves open are the recording's.
-    recording : xarray.Dataset
-        A `trajectory`; its present samples give the time stamps, its first samples the start.
-    body : str, optional
-        The body to follow, where there are several.
-    replicates, seed, threads
-        As in `simulate`.
-
-    Returns
-    -------
-    xarray.Dataset
-        As of `simulate`; time 0 is the recording's first sample.
-
-    Raises
-    ------
-    InputError
-        When the body is not named and there are several.
-
-    Examples
-    --------
-    >>> import driftwalk as dw
-    >>> recording, flow = dw.tank30_recording(), dw.tank30_flow()
-    >>> run = dw.simulate_like(dw.Study(), flow, recording.isel(time=slice(0, 100)))
-    >>> run.sizes["time"]
-    100
-    """
-    from driftwalk.model import apply_overrides
-    from driftwalk.schema import body_track
-    from driftwalk.simulation.camera import recorded_camera
-
-    track = body_track(recording, body)
-    quantum = float(recording.attrs.get("position_quantum_m", 0.0))
-    camera = recorded_camera(track, study, position_quantum=quantum)
-    study = apply_overrides(
-        study,
-        {
-            "observation.position_noise_m": camera.position_noise,
-            "observation.orientation_noise_rad": camera.orientation_noise,
-            "observation.position_quantum_m": camera.position_quantum,
-        },
-    )
-    begin = recorded_start(track)
-    times = track.time - track.time[0]
-    if study.observation.gaps == "none":
-        times = without_gaps(times)
-    return simulate(
-        study,
-        flow,
-        sample_time=times,
-        start=begin,
-        replicates=replicates,
-        seed=seed,
-        threads=threads,
-    )
-
-
-def without_gaps(time: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Return even time stamps [s] over the same span, at the median interval of the given ones."""
-    if time.size < 2:
-        return time
-    interval = float(np.median(np.diff(time)))
-    count = int(np.floor(time[-1] / interval + 1e-6)) + 1
-    return np.arange(count, dtype=np.float64) * interval
 
 
 def plain_camera(study: Study) -> Camera:

@@ -20,10 +20,11 @@ from driftwalk.calibration.search import (
 )
 from driftwalk.calibration.surface import Optimum
 from driftwalk.comparison import apply_steps
+from driftwalk.conditions import recorded_camera
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.schema import Track, body_track
-from driftwalk.simulation import Start, recorded_camera
+from driftwalk.simulation import Start
 from driftwalk.simulation.backend import Camera
 
 STEPS = (0.01, 2e-5)

@@ -177,7 +177,7 @@ def test_recorded_start_recovers_the_motion() -> None:
 def _recorded(recording):
     from driftwalk.schema import body_track
 
-    return dw.simulation.recorded_start(body_track(recording))
+    return dw.conditions.recorded_start(body_track(recording))
 
 
 def test_recorded_start_without_orientation_draws_one_per_world() -> None:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from driftwalk.calibration.problem import Problem, prepare_problem
 from driftwalk.comparison import apply_steps, plan_steps
+from driftwalk.conditions import recorded_camera
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.core.streams import CheckStream
@@ -23,7 +24,6 @@ from driftwalk.likelihood.result import fitted_flow
 from driftwalk.likelihood.spline import Floats
 from driftwalk.schema import Track
 from driftwalk.schema.facts import fitted_value
-from driftwalk.simulation import recorded_camera
 
 if TYPE_CHECKING:
     import xarray as xr

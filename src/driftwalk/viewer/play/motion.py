@@ -22,10 +22,10 @@ from driftwalk.comparison import (
     step_length_edges,
     turning_angle_edges,
 )
+from driftwalk.conditions import recorded_camera
 from driftwalk.core.errors import InputError
 from driftwalk.page import encode_array
 from driftwalk.schema import body_track
-from driftwalk.simulation import recorded_camera
 from driftwalk.viewer.watch.recording_steps import RecordedSteps, recorded_steps
 
 if TYPE_CHECKING:

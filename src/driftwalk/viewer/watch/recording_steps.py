@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.comparison import apply_steps, joint_density, plan_steps
+from driftwalk.conditions.recorded import without_gaps
 from driftwalk.schema import body_track
-from driftwalk.simulation.run import without_gaps
 
 if TYPE_CHECKING:
     import xarray as xr

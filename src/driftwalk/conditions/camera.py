@@ -44,7 +44,7 @@ def recorded_camera(track: Track, study: Study, *, position_quantum: float) -> C
     >>> import driftwalk as dw
     >>> from driftwalk.schema import body_track
     >>> track = body_track(dw.tank30_recording())
-    >>> camera = dw.simulation.recorded_camera(track, dw.Study(), position_quantum=0.0)
+    >>> camera = dw.conditions.recorded_camera(track, dw.Study(), position_quantum=0.0)
     >>> round(camera.position_noise, 4)
     0.0003
     """
