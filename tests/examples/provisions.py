@@ -46,6 +46,8 @@ class Page:
     """
     numbers_of: Mapping[str, Numbers] = field(default_factory=dict)
     """The same for single commands, by a pattern."""
+    draws: bool = True
+    """Whether the commands draw their figures, which take most of a small run."""
     slow: bool = False
     """Whether the page takes about two seconds or more."""
 
@@ -274,6 +276,7 @@ PAGES: dict[str, Page] = {
         },
         holds=("sizes.shape == (4,)", "times['proportion'].dims == ('time', 'class')"),
         numbers=Numbers.SAME,
+        draws=False,
         slow=True,
     ),
     "docs/how-to/calibrate-your-own-model.md": Page(
@@ -283,6 +286,7 @@ PAGES: dict[str, Page] = {
             "0 <= found['estimate'].sel(parameter='speed') <= 0.1",
             "TestTumble().model().name == 'tumble'",
         ),
+        draws=False,
         slow=True,
     ),
     "docs/how-to/design-an-experiment.md": Page(
@@ -292,6 +296,7 @@ PAGES: dict[str, Page] = {
             '["5min", "10min", "20min", "40min"]': '["1min", "2min"]',
         },
         holds=("'duration' in found['coverage'].dims",),
+        draws=False,
         slow=True,
     ),
     "docs/how-to/fit.md": Page(
@@ -311,6 +316,7 @@ PAGES: dict[str, Page] = {
             "--switching-times 40s,80s",
         },
         holds=("bool(fit['converged'])", "flow.attrs['kind'] == 'flow_field'"),
+        draws=False,
         slow=True,
     ),
     "docs/how-to/flow-field.md": Page(
@@ -336,6 +342,7 @@ PAGES: dict[str, Page] = {
             "dw.outcome_distribution(again).attrs['complete'] == float(setting['complete'])",
             "rules['l1_distance'].shape == (2,)",
         ),
+        draws=False,
         slow=True,
     ),
     "docs/how-to/track.md": Page(
@@ -348,6 +355,7 @@ PAGES: dict[str, Page] = {
             '"assembly.duration_s": 60.0': '"assembly.duration_s": 2.0',
         },
         makes=("markers.png", "recording.html", "video.mkv"),
+        draws=False,
         slow=True,
     ),
     "docs/how-to/use-as-a-library.md": Page(
@@ -362,6 +370,7 @@ PAGES: dict[str, Page] = {
         not_run={
             "ssh -L 8765:127.0.0.1:8765 cluster driftwalk view run/": "needs another machine",
         },
+        draws=False,
         slow=True,
     ),
     "docs/reference/datasets.md": Page(

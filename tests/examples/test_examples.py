@@ -8,6 +8,7 @@ from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
+from command_line import leave_out_figures
 from ports import held_port
 
 from examples.provisions import ELSEWHERE, PAGES
@@ -22,6 +23,8 @@ from examples.running import Reader, streaming
 def test_examples_of_a_page_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "Agg")
+    if not PAGES[name].draws:
+        leave_out_figures(monkeypatch)
     with held_port() as port, streaming(port) if PAGES[name].streams else nullcontext():
         reader = Reader(PAGES[name], port)
         for block in blocks_of(name):

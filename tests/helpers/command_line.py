@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import pytest
 import xarray as xr
 
 from driftwalk.cli.main import main
@@ -49,6 +50,13 @@ FIGURE_WRITERS = (
 NO_FIGURES = "import driftwalk.figures, driftwalk.plot\n" + "".join(
     f"driftwalk.{name} = lambda *folders, **datasets: []\n" for name in FIGURE_WRITERS
 )
+
+
+def leave_out_figures(patch: pytest.MonkeyPatch) -> None:
+    """Put functions that draw nothing in the place of those that a command calls."""
+    for name in FIGURE_WRITERS:
+        patch.setattr(f"driftwalk.{name}", lambda *folders, **datasets: [])
+
 
 # SIGINT is set because a program started in the background inherits that it is ignored.
 PROGRAM = """

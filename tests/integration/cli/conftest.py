@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from command_line import FIGURE_WRITERS, FIT, Done, here
+from command_line import FIT, Done, here, leave_out_figures
 
 
 @pytest.fixture(scope="session")
@@ -28,9 +28,3 @@ def undrawn() -> Iterator[None]:
 def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out figures and films in this process for one test, which does not look at them."""
     leave_out_figures(monkeypatch)
-
-
-def leave_out_figures(patch: pytest.MonkeyPatch) -> None:
-    """Put functions that draw nothing in the place of those that a command calls."""
-    for name in FIGURE_WRITERS:
-        patch.setattr(f"driftwalk.{name}", lambda *folders, **datasets: [])

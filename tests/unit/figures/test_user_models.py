@@ -12,7 +12,7 @@ from synthetic_calibration import bundled_recording
 from user_calibration import one_parameter, two_parameters
 
 from driftwalk.core.errors import InputError
-from driftwalk.figures import calibration as figures, write_figures
+from driftwalk.figures import write, write_figures
 from driftwalk.figures.calibration import panels_figure
 from driftwalk.page.sections.calibration import calibration_sections
 from driftwalk.plot import (
@@ -105,7 +105,7 @@ def test_panels_name_what_differs_and_what_stays():
 def test_every_figure_is_written_under_the_names_of_the_parameters(
     make, panels, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(figures, "_save", laid_out)
+    monkeypatch.setattr(write, "_save", laid_out)
     files = write_figures(
         make(), flow=None, trajectory=bundled_recording(rows=200), folder=tmp_path, formats=("png",)
     )

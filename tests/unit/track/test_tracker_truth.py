@@ -160,17 +160,17 @@ def test_four_blocks_with_clutter_and_gaps_never_swap(seed: int) -> None:
     assert not of_nothing(recording, world).any()
 
 
-@pytest.mark.false_alarm(3e-4)
+@pytest.mark.false_alarm(4e-4)
 @pytest.mark.slow
 def test_worlds_that_no_setting_was_chosen_on(fresh_seed: Callable[[int], int]) -> None:
-    """The same in twenty worlds whose seeds were used for nothing else.
+    """The same in ten worlds whose seeds were used for nothing else.
 
-    There is no swap. Of some 6000 detections of nothing, those that lie within a few millimetres of
+    There is no swap. Of some 3000 detections of nothing, those that lie within a few millimetres of
     where a hidden body is expected cannot be told from it: 10 in 80 worlds of other seeds were
-    taken without a mark. 10 in 20 worlds come once in 3500 times from that rate.
+    taken without a mark. 7 in 10 worlds come once in 3100 times from that rate.
     """
     nothing = 0
-    for seed in map(fresh_seed, range(600, 620)):
+    for seed in map(fresh_seed, range(600, 610)):
         world, lost = with_gaps(seed)
         settings = TrackerSettings(max_speed=0.3, bodies=4)
         recording = follow(world, settings, seed, lost=lost, false=0.5)
@@ -182,7 +182,7 @@ def test_worlds_that_no_setting_was_chosen_on(fresh_seed: Callable[[int], int]) 
         settings = TrackerSettings(max_speed=0.4, bodies=5)
         recording = follow(world, settings, seed, lost=lost, angle=False)
         assert unmarked_swaps(recording, world)[1] == 0
-    assert nothing < 10
+    assert nothing < 7
 
 
 @pytest.mark.parametrize("seed", range(3))
