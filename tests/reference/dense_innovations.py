@@ -156,7 +156,7 @@ def dense_filter(
     rows: dict[str, list[Any]] = {"innovation": [], "covariance": [], "used": [], "state": []}
     rows |= {"whitened": [], "jacobian": []}
     s = P = M = None
-    last = -np.inf
+    last, outliers = -np.inf, 0
     for k in range(time.size):
         e, S, used = np.full(d, np.nan), np.full((d, d), np.nan), False
         whitened, jacobian = np.zeros(d), np.zeros((d, width))
@@ -203,15 +203,21 @@ def dense_filter(
                 L = np.linalg.cholesky(S)
                 whitened = np.linalg.solve(L, e)
                 jacobian = np.linalg.solve(L, observe @ M)
-            if outlier and not track["excluded"][k]:
+            outliers = outliers + 1 if outlier and not track["excluded"][k] else 0
+            if outliers == 3:
+                outliers = 0
                 s, P = np.concatenate([value, s[d:]]), scipy.linalg.block_diag(noise, unknown)
                 M = np.zeros((2 * d, width))
-            else:
+            elif outliers == 0:
                 K = np.linalg.solve(S, observe @ P).T
                 keep = np.eye(2 * d) - K @ observe
                 s, P, M = s + K @ e, keep @ P @ keep.T + K @ R @ K.T, keep @ M
         elif s is None and not np.isnan(value).any():
-            s, P = np.concatenate([value, still]), scipy.linalg.block_diag(noise, unknown)
+            s, P, outliers = (
+                np.concatenate([value, still]),
+                scipy.linalg.block_diag(noise, unknown),
+                0,
+            )
             M = np.zeros((2 * d, width))
         last = time[k] if there else last
         rows["innovation"].append(e)
@@ -256,7 +262,8 @@ def make_track(time: Floats, seed: int = 5) -> dict[str, Any]:
 
 
 def difficult_track() -> dict[str, Any]:
-    """Uneven clock, missing samples, a gap of 0.7 s and one of 3 s, excluded ones, an outlier."""
+    """Uneven clock, missing samples, a gap of 0.7 s and one of 3 s, excluded ones, an outlier, two
+    in a row, and a jump."""
     rng = np.random.default_rng(11)
     time = np.cumsum(rng.uniform(0.02, 0.16, 160))
     time[60:] += 0.7
@@ -266,4 +273,6 @@ def difficult_track() -> dict[str, Any]:
     track["y"][[0, 20, 21, 22, 90, 110]] = np.nan
     track["excluded"][[30, 31, 32, 21, 91]] = 1
     track["x"][45] += 0.05
+    track["y"][[50, 51]] += [0.05, -0.04]
+    track["x"][130:] += 0.05
     return track

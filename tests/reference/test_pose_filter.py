@@ -61,8 +61,9 @@ def test_filter_is_the_dense_one():
     # The track does hold what its name says.
     unused = np.flatnonzero(got["used"] == 0).tolist()
     assert {*range(4), 20, 21, 22, 30, 31, 32, 45, 75, 90, 91, *range(110, 114), 130} < set(unused)
-    # After false values, and where the track turns as the model does not, the filter slips.
-    assert len(unused) <= 25
+    # After false values, and where the track turns as the model does not, the filter slips, three
+    # samples each time.
+    assert len(unused) <= 45
     assert np.isnan(got["state"][[0, 1, 2, 110, 111, 112]]).all()
     assert np.isfinite(got["state"][3:110]).all()
     assert np.count_nonzero(np.abs(np.diff(track["theta"])) > np.pi) >= 3
@@ -350,6 +351,6 @@ def test_a_sample_far_away_does_no_harm():
     track = make_track(np.arange(60) * 0.1)
     track["x"][30] = 1e300
     got = run_pose(track, sensitivities=True)
-    assert np.flatnonzero(got["used"] == 0).tolist() == [0, 30, 31]
+    assert np.flatnonzero(got["used"] == 0).tolist() == [0, 30]
     assert np.isfinite(got["jacobian"]).all()
     assert np.isfinite(got["state"]).all()

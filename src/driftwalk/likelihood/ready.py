@@ -13,6 +13,7 @@ from driftwalk.flow.arena import Outline, outline_of, read_arena
 from driftwalk.likelihood.angle import no_angle, smooth_angle
 from driftwalk.likelihood.filter_pass import LONGEST_GAP_S, Body, Series
 from driftwalk.likelihood.intervals import Intervals, cut_track, intervals_of
+from driftwalk.likelihood.outliers import without_mistakes
 from driftwalk.likelihood.refuse import (
     FEWEST_SAMPLES,
     require_length,
@@ -61,6 +62,13 @@ class Ready(NamedTuple):
     angle: str
     """How orientations are used."""
     wall_share: float
+    mistakes: int
+    """Samples that are left out as mistakes of the tracker."""
+
+    @property
+    def samples(self) -> int:
+        """Number of all samples, with those that are left out."""
+        return sum(one.time.size for one in self.series) + self.mistakes
 
 
 def prepare(
@@ -71,8 +79,11 @@ def prepare(
     outline = outline_of(study.tank.to_arena())
     require_size(len(intervals.labels), 2 * spline_of(study, outline).size)
     tracks, parts, places = [], [], []
+    mistakes = 0
     for index, recording in enumerate(many):
-        track, where = body_track(recording, body), _name_of(recording)
+        seen, where = body_track(recording, body), _name_of(recording)
+        track = without_mistakes(seen)
+        mistakes += seen.time.size - track.time.size
         require_length(track, study, where=where)
         require_motion(track, study, where=where)
         cut = cut_track(track, intervals, fewest=FEWEST_SAMPLES, where=where)
@@ -97,7 +108,8 @@ def prepare(
             study,
             where=f"{intervals.describe_flow(flow)}: ",
         )
-    return Ready(tracks, parts, places, intervals, series, used_angle, near_wall / count)
+    share = near_wall / count
+    return Ready(tracks, parts, places, intervals, series, used_angle, share, mistakes)
 
 
 def _name_of(recording: xr.Dataset) -> str:

@@ -33,6 +33,9 @@ INTENSITY_STEP = 0.05
 MOST_STD_RATIO = 4.0
 """A criterion that is so much flatter or sharper than the likelihood has no minimum worth the name:
 the motion does not follow the model, or tells nothing of C_d."""
+MOST_NOISE_MOVE = 1.0
+"""Nor has one along whose ridge ln(tracking noise) moves by more: nothing holds the noise there. In
+recordings of the model it moves by some hundredths."""
 
 
 class Profile(NamedTuple):
@@ -131,6 +134,8 @@ def restricted_drag(
     coefficients = _coefficients_at(found, nearest, log_drag)
     # The noises that belong to this C_d follow along the ridge of the likelihood.
     point = start.moved(slopes * (log_drag - start.log_drag))
+    if abs(point.log_noise - start.log_noise) > MOST_NOISE_MOVE:
+        return Restricted(start, sd, found, has_minimum=False)
     point = replace(
         point, log_drag=log_drag, coefficients=coefficients.reshape(start.coefficients.shape)
     )

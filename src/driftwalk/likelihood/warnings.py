@@ -88,6 +88,11 @@ def _on_the_data(
             "left out: do not trust C_d above 30 %; record where the block stays "
             "away from the wall"
         )
+    if facts["mistakes"]:
+        found.append(
+            f"{facts['mistakes']} of {facts['samples']} samples were left out: each lies far from "
+            "both of its neighbours, as mistakes of a tracker do"
+        )
     used, usable = facts["samples_used"], facts["intervals_usable"]
     if used < LEAST_USED * usable:
         found.append(

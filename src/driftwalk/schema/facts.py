@@ -55,7 +55,9 @@ FIT_NUMBERS: Final[Mapping[str, str]] = MappingProxyType(
         "recording_start_s": "recording_start",
     }
 )
-FIT_COUNTS: Final = ("samples", "samples_used", "intervals_usable", "recordings", "iterations")
+FIT_COUNTS: Final = (
+    *("samples", "mistakes", "samples_used", "intervals_usable", "recordings", "iterations"),
+)
 FIT_VERDICTS: Final = ("restricted", "converged")
 FIT_ROWS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
     {

@@ -64,6 +64,7 @@ struct FilterState {
   double covariance[2 * D][2 * D];
   double seen;       // time of the last sample that was there [s]
   bool open;         // whether there is a state at all
+  int outliers;      // samples in a row that were no noise
   std::int64_t next; // the sample that comes next
 };
 

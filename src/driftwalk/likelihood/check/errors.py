@@ -63,11 +63,10 @@ def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str 
     fit = require_fit(fit)
     study = parse_study(fit.attrs["study"])
     ready = prepare(recordings, study, fit.attrs["angle"], body)
-    samples = sum(one.time.size for one in ready.series)
-    if samples != int(fit["samples"]):
+    if ready.samples != int(fit["samples"]):
         raise InputError(
-            f"the recordings have {samples} positions, the fit was made of {int(fit['samples'])}: "
-            "check it with the recordings that it was fitted to"
+            f"the recordings have {ready.samples} positions, the fit was made of "
+            f"{int(fit['samples'])}: check it with the recordings that it was fitted to"
         )
     coefficients = np.asarray(fit["coefficient"].values, dtype=np.float64)
     x, y = fit["spline_origin"].values

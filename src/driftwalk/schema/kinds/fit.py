@@ -98,6 +98,10 @@ FIT: Final = Kind(
         Variable(
             "samples_used", "", "1", "samples that were near enough to their prediction", "int"
         ),
+        Variable(
+            "mistakes", "", "1", "samples left out as mistakes of the tracker", "int",
+            when="the fit was made by a version that looks for them",
+        ),
         Variable("intervals_usable", "", "1", "intervals that might have been used", "int"),
         Variable("duration", "", "s", "length of the recordings together"),
         Variable("recordings", "", "1", "recordings", "int"),

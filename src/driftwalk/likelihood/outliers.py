@@ -1,0 +1,97 @@
+"""Samples that are mistakes of the tracker: isolated positions far from both of their neighbours.
+
+The filter leaves out a sample that is far from its prediction. But the search of the fit begins
+with so much unrest that nothing is far; if some in a hundred samples are wrong by many times the
+noise, the noise grows until it holds them and stays there. So they are taken out before.
+
+A sample is compared with the line between its neighbours. One that is wrong by D lies D off that
+line, and each neighbour, whose line ends in it, lies D/2 off to the other side. A turn, a bounce
+off the wall or a jump to another place has no such pattern, however fast it is.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from driftwalk.likelihood.filter_pass import Flags
+from driftwalk.likelihood.spline import Floats
+from driftwalk.schema import Track
+
+FAR: Final = 6.0
+"""Robust standard deviations off the line beyond which a sample may be a mistake: of a normal law
+one in 65 million."""
+OPPOSITE: Final = 0.25
+"""Least part of its own distance by which both neighbours lie off to the other side; of a mistake
+alone it is 0.5."""
+LONG: Final = 1.5
+"""Usual intervals between neighbours up to which they are neighbours."""
+FEWEST: Final = 50
+"""Samples with neighbours without which nothing is usual."""
+
+
+def mistakes_in(track: Track) -> Flags:
+    """Return which samples of a track are mistakes of the tracker, shape (n,).
+
+    Parameters
+    ----------
+    track : Track
+        One body.
+
+    Examples
+    --------
+    >>> time = 0.1 * np.arange(1000.0)
+    >>> noise = np.random.default_rng(1).normal(0.0, 3e-4, (2, 1000))
+    >>> noise[0, 300] += 5e-3
+    >>> mistakes_in(Track(time, np.sin(time) + noise[0], noise[1], 0 * time)).nonzero()[0].tolist()
+    [300]
+    """
+    found = np.zeros(track.time.size, dtype=bool)
+    if track.time.size < FEWEST:
+        return found
+    off = _off_the_line(track)
+    known = np.isfinite(off[0])
+    if known.sum() < FEWEST:
+        return found
+    usual = 1.4826 * float(np.median(np.abs(off[:, known])))
+    if usual == 0.0:
+        return found
+    square = (off**2).sum(axis=0)
+    aside = (off[:, 1:] * off[:, :-1]).sum(axis=0)
+    middle = square[1:-1]
+    with np.errstate(invalid="ignore"):
+        found[1:-1] = (
+            (np.sqrt(middle) > FAR * usual)
+            & (aside[:-1] < -OPPOSITE * middle)
+            & (aside[1:] < -OPPOSITE * middle)
+            & (middle > square[:-2])
+            & (middle > square[2:])
+        )
+    return found
+
+
+def _off_the_line(track: Track) -> Floats:
+    """Return how far each sample is from the line between its neighbours, shape (2, n) [m].
+
+    NaN where a neighbour is missing.
+    """
+    time = track.time
+    interval = np.diff(time)
+    share = interval[:-1] / (interval[:-1] + interval[1:])
+    off = np.full((2, time.size), math.nan)
+    for row, axis in zip(off, (track.x, track.y), strict=True):
+        row[1:-1] = axis[1:-1] - (axis[:-2] + share * (axis[2:] - axis[:-2]))
+    apart = np.maximum(interval[:-1], interval[1:]) > LONG * float(np.median(interval))
+    off[:, 1:-1][:, apart] = math.nan
+    return off
+
+
+def without_mistakes(track: Track) -> Track:
+    """Return a track without the samples that are mistakes of the tracker: they become gaps."""
+    wrong = mistakes_in(track)
+    if not wrong.any():
+        return track
+    kept = ~wrong
+    return Track(track.time[kept], track.x[kept], track.y[kept], track.theta[kept])
