@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 ARGUMENTS = [
     "--no-sandbox",
     "--disable-gpu",
+    # In a container shared memory may be 64 MB, and a browser that lacks it crashes.
+    "--disable-dev-shm-usage",
     "--disable-quic",
     "--no-first-run",
     "--disable-background-networking",
@@ -35,8 +37,8 @@ PHONE = {"width": 390, "height": 844}
 
 
 @pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
-    """Start Chromium once, for all tests."""
+def launch() -> Iterator[Callable[[], Browser]]:
+    """Return a function that starts Chromium."""
     found = os.environ.get("DRIFTWALK_CHROMIUM") or shutil.which("chromium")
     if found is None:
         words = "no Chromium: install Debian's 'chromium', or name one in DRIFTWALK_CHROMIUM"
@@ -47,9 +49,23 @@ def browser() -> Iterator[Browser]:
 
     expect.set_options(timeout=PATIENCE_MS)
     with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=found, args=ARGUMENTS)
-        yield started
-        started.close()
+        yield lambda: playwright.chromium.launch(executable_path=found, args=ARGUMENTS)
+
+
+@pytest.fixture(scope="session")
+def running(launch: Callable[[], Browser]) -> Iterator[list[Browser]]:
+    """Return a list that ends with the browser that all tests share."""
+    browsers = [launch()]
+    yield browsers
+    browsers[-1].close()
+
+
+@pytest.fixture
+def browser(launch: Callable[[], Browser], running: list[Browser]) -> Browser:
+    """Return Chromium; a new one after a test in which it crashed, so that the others still run."""
+    if not running[-1].is_connected():
+        running.append(launch())
+    return running[-1]
 
 
 class Visit:
