@@ -120,9 +120,8 @@ def fit_one(case: Case, folder: Path, angle: str) -> dict[str, Any]:
 
 def estimator() -> str:
     """Return a number that is another one for another version of the estimator's source."""
-    files = [*ROOT.glob("src/driftwalk/calibrate/fit*.py"), *ROOT.glob(f"{INFER}/*.hpp")]
-    sources = [file for file in files if not file.name.startswith("fit_check")]
-    content = b"".join(source.read_bytes() for source in sorted(sources))
+    files = [*ROOT.glob("src/driftwalk/likelihood/*.py"), *ROOT.glob(f"{INFER}/*.hpp")]
+    content = b"".join(file.read_bytes() for file in sorted(files))
     return hashlib.sha256(content).hexdigest()[:12]
 
 

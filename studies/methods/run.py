@@ -44,7 +44,11 @@ SEARCH: Final = {
 }
 """The paper's box (C_d to 2, sigma_F to 2 mN) in coarser steps, with fewer simulations."""
 ROOT: Final = Path(__file__).resolve().parents[2]
-SOURCES: Final = ("src/driftwalk/calibrate/*.py", "cpp/include/driftwalk/**/*.hpp")
+SOURCES: Final = (
+    "src/driftwalk/calibration/*.py",
+    "src/driftwalk/likelihood/**/*.py",
+    "cpp/include/driftwalk/**/*.hpp",
+)
 PARAMETERS: Final = ("drag_coefficient", "force_std_N")
 
 

@@ -13,8 +13,8 @@ from typing import Any, Final
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 ASIDE: Final = (
-    "__init__", "boards", "explain", "live", "live_camera", "observer", "overlay", "possible",
-    "tags",
+    "__init__", "boards", "explain", "live", "live_camera", "observer", "overlay", "pair_state",
+    "possible", "tags",
 )  # fmt: skip
 """Modules of the tracking that make no difference to these recordings."""
 
@@ -47,6 +47,6 @@ def driftwalk_json(*words: object) -> tuple[dict[str, Any], float]:
 
 def tracker_version() -> str:
     """Return a number that is another one for another version of what measures."""
-    files = [file for file in ROOT.glob("src/driftwalk/track/*.py") if file.stem not in ASIDE]
+    files = [file for file in ROOT.glob("src/driftwalk/track/**/*.py") if file.stem not in ASIDE]
     content = b"".join(file.read_bytes() for file in sorted(files))
     return hashlib.sha256(content).hexdigest()[:12]

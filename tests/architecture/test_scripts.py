@@ -35,6 +35,28 @@ def test_what_a_script_uses_exists(path: Path) -> None:
             import_module(f"{module}.{name}")  # a module of a package
 
 
+SOURCES_OF_STUDIES = (
+    "src/driftwalk/likelihood/*.py",
+    "src/driftwalk/calibration/*.py",
+    "src/driftwalk/likelihood/**/*.py",
+    "src/driftwalk/track/**/*.py",
+)
+
+
+def test_results_are_named_after_sources_that_exist() -> None:
+    """Results carry a number of the sources that made them; made of no file it says nothing."""
+    patterns = {
+        node.value
+        for path in SCRIPTS
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        if node.value.startswith("src/driftwalk/") and node.value.endswith(".py")
+    }
+    assert patterns == set(SOURCES_OF_STUDIES)
+    for pattern in patterns:
+        assert len(list(ROOT.glob(pattern))) > 5, pattern
+
+
 def test_names_that_scripts_use_are_found() -> None:
     found = set(used_names(ROOT / "benchmarks" / "bench_simulate.py"))
     assert {("driftwalk", "_core"), ("twin.block", "simulate_reference")} <= found
