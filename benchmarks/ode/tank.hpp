@@ -31,7 +31,19 @@ struct Start {
   double x, y, theta, vx, vy, omega, drag_coefficient, force_std;
 };
 
+// How the world differs from driftwalk's model; as it stands, not at all.
+struct Law {
+  double added_mass = 0;        // as a share of the block's mass; of its inertia alike
+  double pressure_gradient = 0; // 1: the water's acceleration pushes the block and its added mass
+  double drag_power = 2;        // of the speed; the drag is that of C_d at 3 cm/s
+  double flow_growth = 0;       // of the flow's strength a second, as a share of that at the start
+  double pulse = 0;             // amplitude of its pulses, as a share
+  double pulse_period = 10;     // [s]
+};
+inline constexpr double reference_speed = 0.03; // [m/s]
+
 struct Case {
+  Law law;
   double side, mass, depth, density, radius, restitution, friction, bounce_speed, dt;
   int period;
   int nodes;
@@ -82,6 +94,20 @@ inline Planar flow_at(const Case& c, double x, double y) {
           w00 * c.v[at] + w10 * c.v[at + 1] + w01 * c.v[up] + w11 * c.v[up + 1]};
 }
 
+// (u . grad) u in the middle of the block: what the water's own acceleration is in a steady flow.
+inline Planar acceleration_at(const Case& c, double x, double y) {
+  const double h = c.spacing;
+  const Planar here = flow_at(c, x, y);
+  const Planar right = flow_at(c, x + h, y), left = flow_at(c, x - h, y);
+  const Planar above = flow_at(c, x, y + h), below = flow_at(c, x, y - h);
+  return {(here.x * (right.x - left.x) + here.y * (above.x - below.x)) / (2 * h),
+          (here.x * (right.y - left.y) + here.y * (above.y - below.y)) / (2 * h)};
+}
+
+inline double strength_at(const Law& law, double time) {
+  return 1 + law.flow_growth * time + law.pulse * std::sin(2 * pi * time / law.pulse_period);
+}
+
 struct State {
   double x, y, cosine, sine, vx, vy, omega;
 };
@@ -97,7 +123,15 @@ struct Wrench {
   double x, y, torque;
 };
 
-inline Wrench drag(const Case& c, double drag_coefficient, const State& s) {
+// What the drag of a strip is multiplied with where it does not go with the square of the speed.
+inline double bend(const Law& law, double wx, double wy) {
+  if (law.drag_power == 2) {
+    return 1;
+  }
+  return std::pow(std::hypot(wx, wy) / reference_speed, law.drag_power - 2);
+}
+
+inline Wrench drag(const Case& c, double drag_coefficient, const State& s, double strength) {
   const double half = c.side / 2, width = c.side / strips;
   const double scale = 0.5 * c.density * drag_coefficient * width * c.depth;
   Wrench sum{0, 0, 0};
@@ -107,10 +141,12 @@ inline Wrench drag(const Case& c, double drag_coefficient, const State& s) {
       const double offset = (k + 0.5) * width - half;
       const double rx = nx * half - ny * offset, ry = ny * half + nx * offset;
       const Planar water = flow_at(c, s.x + rx, s.y + ry);
-      const double wx = water.x - (s.vx - s.omega * ry), wy = water.y - (s.vy + s.omega * rx);
+      const double wx = strength * water.x - (s.vx - s.omega * ry);
+      const double wy = strength * water.y - (s.vy + s.omega * rx);
       const double facing = -(nx * wx + ny * wy);
       if (facing > 0) {
-        const double fx = scale * facing * wx, fy = scale * facing * wy;
+        const double size = scale * facing * bend(c.law, wx, wy);
+        const double fx = size * wx, fy = size * wy;
         sum.x += fx;
         sum.y += fy;
         sum.torque += rx * fy - ry * fx;
@@ -174,7 +210,7 @@ public:
         contacts_(dJointGroupCreate(0)), blocks_(dSimpleSpaceCreate(nullptr)) {
     dWorldSetGravity(world_, 0, 0, 0);
     dMass mass;
-    dMassSetBoxTotal(&mass, c.mass, c.side, c.side, c.side);
+    dMassSetBoxTotal(&mass, c.mass * (1 + c.law.added_mass), c.side, c.side, c.side);
     for (std::size_t b = 0; b < c.blocks; ++b) {
       const dBodyID body = dBodyCreate(world_);
       dBodySetMass(body, &mass);
@@ -213,8 +249,16 @@ public:
 
   template <class Noise>
   void step(const Start* start, Noise& noise) {
+    const double strength = strength_at(c_.law, time_);
+    time_ += c_.dt;
     for (const dBodyID body : bodies_) {
-      const Wrench w = drag(c_, start->drag_coefficient, state_of(body));
+      const State s = state_of(body);
+      const Wrench w = drag(c_, start->drag_coefficient, s, strength);
+      if (c_.law.pressure_gradient != 0) {
+        const Planar a = acceleration_at(c_, s.x, s.y);
+        const double mass = c_.law.pressure_gradient * c_.mass * (1 + c_.law.added_mass);
+        dBodyAddForce(body, mass * strength * strength * a.x, mass * strength * strength * a.y, 0);
+      }
       const double noise_x = noise() * start->force_std, noise_y = noise() * start->force_std;
       dBodyAddForce(body, w.x + noise_x, w.y + noise_y, 0);
       dBodyAddTorque(body, 0, 0, w.torque);
@@ -270,6 +314,7 @@ private:
   }
 
   const Case& c_;
+  double time_ = 0;
   bool boxes_, collides_;
   dWorldID world_;
   dJointGroupID contacts_;

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -35,9 +36,18 @@ def build_ode(folder: Path) -> Path:
 
 
 def ode_poses(
-    program: Path, world: World, *, duration: float, seed: int, time_step: float = STEP_S
+    program: Path,
+    world: World,
+    *,
+    duration: float,
+    seed: int,
+    time_step: float = STEP_S,
+    law: Sequence[str] = (),
 ) -> Poses:
-    """Simulate with ODE; a minute to settle, then the duration [s]."""
+    """Simulate with ODE; a minute to settle, then the duration [s].
+
+    `law` says what is not as in the model, as NAME=NUMBER: see `Law` in benchmarks/ode/tank.hpp.
+    """
     study = dw.apply_overrides(
         world.study(time_step=time_step), {"tank.wall_friction": WALL_FRICTION}
     )
@@ -59,6 +69,6 @@ def ode_poses(
             worlds=np.array([[start]]),
             steps_per_sample=round(INTERVAL_S / time_step),
         )
-        command = [program, case, *map(str, numbers)]
+        command = [program, case, *map(str, numbers), *law]
         done = subprocess.run(command, check=True, capture_output=True, text=True)
     return Poses(*np.array(done.stdout.split(), dtype=np.float64).reshape(-1, 3).T)

@@ -1,0 +1,194 @@
+"""Fit recordings of worlds that are not as the model says, a line of JSON for each.
+
+    python studies/misfit/run.py OUT [--worlds 8] [--minutes 10] [--workers 2] [--case NAME ...]
+
+OUT keeps the motions (`motions/`) and `results.jsonl`. What is in there is not done again, so a
+study that was stopped goes on where it was; a line names the version of the fit's source, and
+lines of other versions are done anew. The motions come from the Open Dynamics Engine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import multiprocessing
+import os
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from cases import CASES, Case, Seen
+
+ROOT: Final = Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "studies" / "likelihood"))
+
+from ode import PROGRAM, build_ode, ode_poses, peer  # noqa: E402
+from tracks import Poses, wall_share  # noqa: E402
+from worlds import FAMILIES, RADIUS_M, World, draw_flow  # noqa: E402
+
+import driftwalk as dw  # noqa: E402
+from driftwalk.core.errors import DriftwalkError  # noqa: E402
+from driftwalk.likelihood import check_model  # noqa: E402
+from driftwalk.model import Tank  # noqa: E402
+from driftwalk.schema import build_trajectory  # noqa: E402
+
+INTERVAL_S: Final = 0.1
+NOISE: Final = (0.3e-3, 0.3e-3, np.deg2rad(0.5))
+"""Of x, y [m] and theta [rad]."""
+FIRST_SEED: Final = 40_000
+"""Of the first world; no other study uses it."""
+MOST_WALL_SHARE: Final = 0.25
+SOURCES: Final = ("src/driftwalk/likelihood/**/*.py", "cpp/include/driftwalk/infer/*.hpp")
+SKIPPED: Final = 77
+
+
+def main() -> None:
+    """Make the motions that are not there, then fit what is not in the results."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--worlds", type=int, default=8)
+    parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--case", dest="names", action="append", choices=CASES)
+    options = parser.parse_args()
+    motions, results = options.out / "motions", options.out / "results.jsonl"
+    motions.mkdir(parents=True, exist_ok=True)
+    try:
+        build_ode(motions)
+    except peer().PeerMissing as reason:
+        print(f"skipped: {reason}")
+        sys.exit(SKIPPED)
+    done = {(one["case"], one["world"]) for one in read_lines(results) if one["fit"] == version()}
+    wanted = [(name, k) for k in range(options.worlds) for name in options.names or CASES]
+    missing = [one for one in wanted if one not in done]
+    # The workers begin afresh and read this before they load numpy.
+    os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
+    fresh = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(options.workers, mp_context=fresh) as pool:
+        jobs = [pool.submit(fit_one, *one, motions, options.minutes) for one in missing]
+        for job in as_completed(jobs):
+            line = job.result()
+            with results.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(line, allow_nan=False, ensure_ascii=False) + "\n")
+            print(in_words(line), flush=True)
+
+
+def fit_one(name: str, number: int, motions: Path, minutes: float) -> dict[str, Any]:
+    """Fit one recording, check the model, and hold both beside the truth."""
+    case = CASES[name]
+    world, poses = motion(case, number, motions, minutes)
+    recording = record(case, poses, number)
+    study = dw.Study()
+    wrong = {key: factor * _number_at(study, key) for key, factor in case.told.items()}
+    facts: dict[str, Any] = {
+        "fit": version(),
+        "case": name,
+        "world": number,
+        "minutes": minutes,
+        "wall_share": round(wall_share(poses), 3),
+    }
+    begin = time.process_time()
+    try:
+        fit = dw.fit_motion(recording, dw.apply_overrides(study, wrong), angle=case.angle)
+    except DriftwalkError as error:
+        return {**facts, "error": str(error)}
+    facts["seconds"] = round(time.process_time() - begin, 1)
+    truth = {
+        "drag_coefficient": world.drag_coefficient,
+        "force_std": world.force_std_N,
+        "tracking_noise": NOISE[0],
+    }
+    for parameter, true in truth.items():
+        value = float(fit["estimate"].sel(parameter=parameter))
+        low, high = (float(bound) for bound in fit["interval"].sel(parameter=parameter))
+        facts[f"{parameter}_error"] = value / true - 1.0
+        facts[f"{parameter}_covered"] = bool(low <= true <= high)
+    try:
+        check = check_model(fit, recording)
+        facts["explained"] = bool(check["explained"])
+        facts["findings"] = [str(text) for text in check["finding"].values]
+    except DriftwalkError as error:
+        facts["explained"], facts["findings"] = None, [str(error)]
+    facts["warnings"] = [str(text) for text in fit["warning"].values]
+    return facts
+
+
+def motion(case: Case, number: int, folder: Path, minutes: float) -> tuple[World, Poses]:
+    """Return a world and the block's motion in it; both are kept."""
+    world = world_of(number)
+    words = [f"{name}={value:.9g}" for name, value in case.law.items()]
+    label = hashlib.sha256(" ".join([*words, f"{minutes:g}"]).encode()).hexdigest()[:12]
+    path = folder / f"{number:03d}-{label}.npz"
+    if not path.exists():
+        poses = ode_poses(
+            folder / PROGRAM, world, duration=60.0 * minutes, seed=FIRST_SEED + number, law=words
+        )
+        partial = path.with_suffix(f".{os.getpid()}.npz")
+        np.savez(partial, **poses._asdict())
+        partial.replace(path)
+    with np.load(path) as stored:
+        return world, Poses(*(stored[name] for name in Poses._fields))
+
+
+def world_of(number: int) -> World:
+    """Draw a world: C_d 0.4 to 0.5, sigma_F 0.5 to 0.7 mN, a flow of one of the two families."""
+    rng = np.random.default_rng(FIRST_SEED + number)
+    drag, force = float(rng.uniform(0.4, 0.5)), float(rng.uniform(0.5e-3, 0.7e-3))
+    return World(drag, force, *draw_flow(rng, FAMILIES[number % len(FAMILIES)]))
+
+
+def record(case: Case, poses: Poses, number: int) -> Any:
+    """Return the `trajectory` that the camera of a case makes of the motion."""
+    rng = np.random.default_rng([FIRST_SEED, number])
+    time = INTERVAL_S * np.arange(poses.x.size)
+    noisy = [
+        part + std * rng.normal(size=time.size) for part, std in zip(poses, NOISE, strict=True)
+    ]
+    seen = Seen(time, *noisy)
+    if case.mistake is not None:
+        seen = case.mistake(seen, rng)
+    return build_trajectory(
+        *seen,
+        attrs={
+            "arena": Tank(diameter_m=2.0 * RADIUS_M).to_arena_json(),
+            "source": "simulated",
+            "simulated": "yes",
+        },
+    )
+
+
+def version() -> str:
+    """Return a number that is another one for another version of the fit's source."""
+    files = sorted(file for pattern in SOURCES for file in ROOT.glob(pattern))
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:12]
+
+
+def read_lines(path: Path) -> list[dict[str, Any]]:
+    """Return the lines of a file of results, none where there is no file."""
+    if not path.exists():
+        return []
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+
+
+def in_words(line: dict[str, Any]) -> str:
+    """Return a result on one line."""
+    head = f"{line['case']}, world {line['world']}: "
+    if "error" in line:
+        return head + line["error"]
+    verdict = {True: "explained", False: "not explained", None: "not checked"}[line["explained"]]
+    return head + (
+        f"C_d {line['drag_coefficient_error']:+.1%}, σ_F {line['force_std_error']:+.1%}, {verdict}"
+    )
+
+
+def _number_at(study: dw.Study, key: str) -> float:
+    section, name = key.split(".")
+    return float(getattr(getattr(study, section), name))
+
+
+if __name__ == "__main__":
+    main()
