@@ -382,7 +382,7 @@ PAGES: dict[str, Page] = {
         holds=("message['type'] == 'frame'", "printed.count('\\n') > 3"),
         slow=True,
     ),
-    "docs/reference/page-data.md": Page(provide=_report, holds=("values.size > 1",)),
+    "docs/reference/page-data.md": Page(provide=_report, holds=("values.size > 1",), slow=True),
     "docs/reference/study-file.md": Page(),
     "docs/tutorials/first-calibration.md": Page(
         provide=_search("small.toml"),

@@ -101,7 +101,7 @@ def test_fields_are_counted_as_by_splitting(text: bytes, delimiter: str) -> None
     assert _field_counts(b"\n".join(lines) + b"\n", delimiter).tolist() == expected
 
 
-@settings(deadline=None, max_examples=12)
+@settings(deadline=None, max_examples=8)
 @given(data=st.data(), bodies=st.integers(1, 3), count=st.integers(1, 12))
 def test_round_trip_through_both_formats_is_exact(
     data: st.DataObject, bodies: int, count: int

@@ -279,6 +279,7 @@ def test_what_does_not_go_together(calibrated: Path, tmp_path: Path) -> None:
     assert "no such file" in refusal(missing)
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_a_finished_run_is_kept_until_overwrite(calibrated: Path, tmp_path: Path) -> None:
     words = ["assemble", calibrated, *SIZE, "-o", tmp_path / "run"]
     assert here(*words).code == 0

@@ -159,6 +159,7 @@ def test_flows_of_a_study_lie_beside_it(tmp_path: Path) -> None:
     assert {"flow", "study", "flow one.csv", "flow two.csv"} == set(manifest["inputs"])
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_other_axes_and_the_answer_for_people(tmp_path: Path) -> None:
     words = ["--vary", "blocks=2:3:1", "--vary", "tank_diameter=25cm,30cm", "--sobol", "8"]
     done = here("sensitivity", "--flow", FLOW, *SIZE, *words, "-o", tmp_path / "run")
@@ -238,6 +239,7 @@ def test_sources_that_cannot_be_used(calibrated: Path, tmp_path: Path) -> None:
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_a_finished_run_is_kept_until_overwrite(tmp_path: Path) -> None:
     words = ["sensitivity", "--flow", FLOW, *SIZE, "--vary", "blocks=2,3", "-o", tmp_path / "run"]
     assert here(*words).code == 0
@@ -247,6 +249,7 @@ def test_a_finished_run_is_kept_until_overwrite(tmp_path: Path) -> None:
     assert here(*words, "--overwrite", "--seed", "2").code == 0
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_an_unfinished_run_whose_units_keep_less_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
