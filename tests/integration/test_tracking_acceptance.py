@@ -161,7 +161,7 @@ def test_four_blocks_with_heavy_noise(
 def test_a_fit_of_tracked_poses_is_that_of_the_true_ones(
     scenes: ModuleType, scores: ModuleType, tmp_path: Path
 ) -> None:
-    out, motion, truth = filmed(scenes, tmp_path, "closed-loop", 301, 1200)
+    out, motion, truth = filmed(scenes, tmp_path, "closed-loop", 301, 900)
     errors = scores.score(xr.load_dataset(out), truth)
     sizes = 1e-3 * errors["position_sd_per_axis_mm"], np.radians(errors["angle_sd_deg"])
     loop = import_module("closed_loop")
