@@ -4,7 +4,7 @@
 
 OUT keeps the motions (`motions/`) and `results.jsonl`. What is in there is not done again, so a
 study that was stopped goes on where it was; a line names the version of the fit's source, and
-lines of other versions are done anew. The motions come from the Open Dynamics Engine.
+results of other versions are computed again. The motions come from the Open Dynamics Engine.
 """
 
 from __future__ import annotations
