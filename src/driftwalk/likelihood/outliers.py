@@ -45,7 +45,8 @@ def mistakes_in(track: Track) -> Flags:
     >>> time = 0.1 * np.arange(1000.0)
     >>> noise = np.random.default_rng(1).normal(0.0, 3e-4, (2, 1000))
     >>> noise[0, 300] += 5e-3
-    >>> mistakes_in(Track(time, np.sin(time) + noise[0], noise[1], 0 * time)).nonzero()[0].tolist()
+    >>> x = 0.1 * np.sin(0.5 * time) + noise[0]
+    >>> mistakes_in(Track(time, x, noise[1], 0 * time)).nonzero()[0].tolist()
     [300]
     """
     found = np.zeros(track.time.size, dtype=bool)
