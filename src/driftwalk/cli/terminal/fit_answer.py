@@ -51,6 +51,7 @@ _KEYS: Final = (
     "drag_coefficient_precision",
     "needed_duration_s",
     "switching_times_s",
+    "mistakes",
 )
 """The last ones where they are in the fit."""
 
