@@ -97,7 +97,9 @@ def _texts(figure) -> list[str]:
     return [text.get_text() for text in figure.findobj(matplotlib.text.Text)]
 
 
-@pytest.mark.parametrize(("simulated", "expected"), [("yes", 1), ("no", 0)])
+@pytest.mark.parametrize(
+    ("simulated", "expected"), [("yes", 1), pytest.param("no", 0, marks=pytest.mark.slow)]
+)
 def test_a_simulated_recording_is_named_so(
     datasets, tmp_path, monkeypatch, simulated, expected
 ) -> None:

@@ -40,7 +40,7 @@ def scores(level: str, frames: int, seed: int) -> np.ndarray:
 
 
 @pytest.mark.false_alarm(1e-3)
-@pytest.mark.parametrize("level", ["moderate", "heavy"])
+@pytest.mark.parametrize("level", [pytest.param("moderate", marks=pytest.mark.slow), "heavy"])
 def test_errors_have_the_spread_that_is_stated(
     level: str, fresh_seed: Callable[[int], int]
 ) -> None:

@@ -125,6 +125,7 @@ def test_the_seed_moves_the_simulations_alone(
     assert verdict(other)[0] == "yes"
 
 
+@pytest.mark.slow
 def test_a_world_of_the_model_is_explained() -> None:
     track = simulated(swirl(1.0), seconds=300.0, seed=11)
     assert verdict(dw.check_model(dw.fit_motion(track, coarse_study()), track))[0] == "yes"
