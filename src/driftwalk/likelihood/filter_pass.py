@@ -33,6 +33,8 @@ LONGEST_GAP_S = 1.0
 """Longest gap that is predicted over; after a longer one the filter restarts."""
 STEP = 1e-4
 """Relative change of a noise for the derivatives by it."""
+MOST_CHANGE = 100 * STEP
+"""Of a variance by such a step. Where it is more, one pass restarted and the other did not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +202,9 @@ class Passes:
         for name in names:
             more: dict[str, Any] = {name: point.noises[name] + STEP}
             others.append(self._run(series, replace(point, **more)))
-        used = np.logical_and.reduce([_used(one) for one in (base, *others)])
+        used = np.logical_and.reduce(
+            [*(_used(one) for one in (base, *others)), *(_beside(base, one) for one in others)]
+        )
         white, changes, spreads = _noise_derivatives(base, others, used)
         right = np.zeros((used.size, white.shape[1], 1 + len(changes)))
         right[used] = np.stack([white, *changes], axis=-1)
@@ -278,6 +282,15 @@ def _whitened(found: dict[str, Any]) -> Floats:
 
 def _used(found: dict[str, Any]) -> Flags:
     return np.asarray(found["used"], dtype=bool)
+
+
+def _beside(base: dict[str, Any], other: dict[str, Any]) -> Flags:
+    """Return which innovations have nearly the variances that they have in the other pass."""
+    lower = base["covariance"]
+    diagonal = [0, 2, 5] if lower.shape[1] == 6 else [0, 2]
+    with np.errstate(invalid="ignore"):
+        change = np.abs(other["covariance"][:, diagonal] - lower[:, diagonal])
+        return np.asarray((change <= MOST_CHANGE * lower[:, diagonal]).all(axis=1), dtype=bool)
 
 
 def _noise_derivatives(

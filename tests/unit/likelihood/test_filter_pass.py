@@ -10,7 +10,7 @@ import pytest
 from fit_worlds import coarse_study, recording
 
 from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.filter_pass import Passes, Point, Sums
+from driftwalk.likelihood.filter_pass import Passes, Point, Sums, _beside
 from driftwalk.likelihood.newton import Prior, Weights, inverse, limited, newton_step
 from driftwalk.likelihood.ready import body_of, series_of
 from driftwalk.likelihood.spline import lay_spline
@@ -129,3 +129,11 @@ def test_a_wrong_variance_is_found_in_one_step() -> None:
     for ratio in (0.2, 1.0, 7.0):
         step = limited(np.array([0.0, ratio - 1.0, 0.5 * (ratio - 1.0)]), 0)
         assert step[1:] == pytest.approx([math.log(ratio), 0.5 * math.log(ratio)])
+
+
+def test_where_one_pass_restarted_the_noises_tell_nothing() -> None:
+    """A step of a ten-thousandth in a noise changes a variance by as much, not by a factor."""
+    base = {"covariance": np.array([[1.0, 0.2, 2.0], [1.0, 0.2, 2.0], [1.0, np.nan, np.nan]])}
+    other = {"covariance": np.array([[1.0001, 0.2, 2.0], [1.0, 0.2, 1e12], [1.0, 0.2, 2.0]])}
+    assert _beside(base, other).tolist() == [True, False, False]
+    assert _beside(other, base).tolist() == [True, False, False]
