@@ -21,6 +21,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any, Final, get_args
 
+from lines import read_lines
 from study_sets import WORLDS, Case, cases_of, keep_motion, load_motion, record
 
 import driftwalk as dw
@@ -123,13 +124,6 @@ def estimator() -> str:
     files = [*ROOT.glob("src/driftwalk/likelihood/*.py"), *ROOT.glob(f"{INFER}/*.hpp")]
     content = b"".join(file.read_bytes() for file in sorted(files))
     return hashlib.sha256(content).hexdigest()[:12]
-
-
-def read_lines(path: Path) -> list[dict[str, Any]]:
-    """Return the lines of a file of results, none where there is no file."""
-    if not path.exists():
-        return []
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
 
 
 def in_words(line: dict[str, Any]) -> str:

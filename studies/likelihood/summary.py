@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from run import read_lines
+from lines import read_lines
 from study_sets import FIRST_SEED
 
 import driftwalk as dw

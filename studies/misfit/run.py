@@ -26,6 +26,7 @@ from cases import CASES, Case, Seen
 ROOT: Final = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "studies" / "likelihood"))
 
+from lines import read_lines  # noqa: E402
 from ode import PROGRAM, build_ode, ode_poses, peer  # noqa: E402
 from tracks import Poses, wall_share  # noqa: E402
 from worlds import FAMILIES, RADIUS_M, World, draw_flow  # noqa: E402
@@ -165,13 +166,6 @@ def version() -> str:
     """Return a number that is another one for another version of the fit's source."""
     files = sorted(file for pattern in SOURCES for file in ROOT.glob(pattern))
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:12]
-
-
-def read_lines(path: Path) -> list[dict[str, Any]]:
-    """Return the lines of a file of results, none where there is no file."""
-    if not path.exists():
-        return []
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
 
 
 def in_words(line: dict[str, Any]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from driftwalk.conditions.camera import recorded_camera
-from driftwalk.conditions.recorded import without_gaps
+from driftwalk.conditions.recorded import sample_times
 from driftwalk.conditions.start import recorded_start
 from driftwalk.simulation import simulate
 
@@ -71,13 +71,10 @@ def simulate_like(
         },
     )
     begin = recorded_start(track)
-    times = track.time - track.time[0]
-    if study.observation.gaps == "none":
-        times = without_gaps(times)
     return simulate(
         study,
         flow,
-        sample_time=times,
+        sample_time=sample_times(track, study),
         start=begin,
         replicates=replicates,
         seed=seed,

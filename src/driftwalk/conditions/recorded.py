@@ -92,11 +92,8 @@ def recorded_conditions(
     18001
     """
     start = recorded_start(track, window=study.flow.smoothing_window_s)
-    time = track.time - track.time[0]
-    if study.observation.gaps == "none":
-        time = without_gaps(time)
     return Conditions(
-        sample_time=time,
+        sample_time=sample_times(track, study),
         start=start,
         camera=camera,
         tank=study.tank,
@@ -106,7 +103,16 @@ def recorded_conditions(
     )
 
 
-def without_gaps(time: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def sample_times(track: Track, study: Study) -> Floats:
+    """Return the time stamps of a world [s]: the recording's, from its first sample on.
+
+    Without its gaps, where the study leaves them out.
+    """
+    time = track.time - track.time[0]
+    return _without_gaps(time) if study.observation.gaps == "none" else time
+
+
+def _without_gaps(time: Floats) -> Floats:
     """Return even time stamps [s] over the same span, at the median interval of the given ones."""
     if time.size < 2:
         return time

@@ -286,11 +286,9 @@ def _used(found: dict[str, Any]) -> Flags:
 
 def _beside(base: dict[str, Any], other: dict[str, Any]) -> Flags:
     """Return which innovations have nearly the variances that they have in the other pass."""
-    lower = base["covariance"]
-    diagonal = [0, 2, 5] if lower.shape[1] == 6 else [0, 2]
+    one, two = (np.einsum("aan->an", unpacked(found["covariance"])) for found in (base, other))
     with np.errstate(invalid="ignore"):
-        change = np.abs(other["covariance"][:, diagonal] - lower[:, diagonal])
-        return np.asarray((change <= MOST_CHANGE * lower[:, diagonal]).all(axis=1), dtype=bool)
+        return np.asarray((np.abs(two - one) <= MOST_CHANGE * one).all(axis=0), dtype=bool)
 
 
 def _noise_derivatives(

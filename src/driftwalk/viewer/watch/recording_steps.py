@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.comparison import apply_steps, joint_density, plan_steps
-from driftwalk.conditions.recorded import without_gaps
+from driftwalk.conditions.recorded import sample_times
 from driftwalk.schema import body_track
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def recorded_steps(
     angle_limit = ANGLE_REACH * float(np.quantile(np.abs(points[:, 1]), ANGLE_SHARE))
     angle_limit = min(np.pi, angle_limit) or np.pi
     # The samples of the worlds, which need not have the recording's gaps.
-    sampled = without_gaps(time) if study.observation.gaps == "none" else time
+    sampled = sample_times(track, study)
     return RecordedSteps(
         name=str(recording.attrs.get("source", "recording")),
         step_interval=plan.step_interval,
