@@ -45,6 +45,7 @@ double read_law(int count, char** words, Law& law) {
   double memory = 0;
   const std::map<std::string, double*> known = {
       {"added_mass", &law.added_mass}, {"pressure_gradient", &law.pressure_gradient},
+      {"water_spin", &law.water_spin}, {"linear_drag", &law.linear_drag},
       {"drag_power", &law.drag_power}, {"flow_growth", &law.flow_growth},
       {"pulse", &law.pulse},           {"pulse_period", &law.pulse_period},
       {"force_memory", &memory},

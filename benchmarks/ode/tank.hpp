@@ -35,6 +35,8 @@ struct Start {
 struct Law {
   double added_mass = 0;        // as a share of the block's mass; of its inertia alike
   double pressure_gradient = 0; // 1: the water's acceleration pushes the block and its added mass
+  double water_spin = 0;        // 1: its curl turns them, as rigid water would be turned
+  double linear_drag = 0;       // [kg/s], of the whole block; each strip of any face has its part
   double drag_power = 2;        // of the speed; the drag is that of C_d at 3 cm/s
   double flow_growth = 0;       // of the flow's strength a second, as a share of that at the start
   double pulse = 0;             // amplitude of its pulses, as a share
@@ -104,6 +106,14 @@ inline Planar acceleration_at(const Case& c, double x, double y) {
           (here.x * (right.y - left.y) + here.y * (above.y - below.y)) / (2 * h)};
 }
 
+// Half the curl of that acceleration: how fast the water around the block gains spin [rad/s^2].
+inline double spin_gain_at(const Case& c, double x, double y) {
+  const double h = c.spacing;
+  const double across = acceleration_at(c, x + h, y).y - acceleration_at(c, x - h, y).y;
+  const double along = acceleration_at(c, x, y + h).x - acceleration_at(c, x, y - h).x;
+  return (across - along) / (4 * h);
+}
+
 inline double strength_at(const Law& law, double time) {
   return 1 + law.flow_growth * time + law.pulse * std::sin(2 * pi * time / law.pulse_period);
 }
@@ -134,6 +144,7 @@ inline double bend(const Law& law, double wx, double wy) {
 inline Wrench drag(const Case& c, double drag_coefficient, const State& s, double strength) {
   const double half = c.side / 2, width = c.side / strips;
   const double scale = 0.5 * c.density * drag_coefficient * width * c.depth;
+  const double linear = c.law.linear_drag / (4 * strips);
   Wrench sum{0, 0, 0};
   double nx = s.cosine, ny = s.sine;
   for (int face = 0; face < 4; ++face) {
@@ -144,13 +155,12 @@ inline Wrench drag(const Case& c, double drag_coefficient, const State& s, doubl
       const double wx = strength * water.x - (s.vx - s.omega * ry);
       const double wy = strength * water.y - (s.vy + s.omega * rx);
       const double facing = -(nx * wx + ny * wy);
-      if (facing > 0) {
-        const double size = scale * facing * bend(c.law, wx, wy);
-        const double fx = size * wx, fy = size * wy;
-        sum.x += fx;
-        sum.y += fy;
-        sum.torque += rx * fy - ry * fx;
-      }
+      const double windward = facing > 0 ? scale * facing * bend(c.law, wx, wy) : 0;
+      const double size = linear + windward;
+      const double fx = size * wx, fy = size * wy;
+      sum.x += fx;
+      sum.y += fy;
+      sum.torque += rx * fy - ry * fx;
     }
     const double turned = nx;
     nx = -ny;
@@ -258,6 +268,11 @@ public:
         const Planar a = acceleration_at(c_, s.x, s.y);
         const double mass = c_.law.pressure_gradient * c_.mass * (1 + c_.law.added_mass);
         dBodyAddForce(body, mass * strength * strength * a.x, mass * strength * strength * a.y, 0);
+      }
+      if (c_.law.water_spin != 0) {
+        const double inertia = c_.mass * (1 + c_.law.added_mass) * c_.side * c_.side / 6;
+        const double gain = strength * strength * spin_gain_at(c_, s.x, s.y);
+        dBodyAddTorque(body, 0, 0, c_.law.water_spin * inertia * gain);
       }
       const double noise_x = noise() * start->force_std, noise_y = noise() * start->force_std;
       dBodyAddForce(body, w.x + noise_x, w.y + noise_y, 0);

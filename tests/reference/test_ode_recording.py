@@ -49,17 +49,19 @@ def simulate(peer: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Simu
         hold: int = 1,
         period: int = 1,
         turning: float = 0.0,
+        water: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]] | None = None,
         law: tuple[str, ...] = (),
     ) -> np.ndarray:
         study = dw.apply_overrides(dw.Study(), {"simulation.time_step_s": step})
         x, y = np.meshgrid(AXIS, AXIS)
+        u, v = (-turning * y, turning * x) if water is None else water(x, y)
         case = folder / "case.txt"
         peer.write_case(
             case,
             study,
             axis=AXIS,
-            u=-turning * y,
-            v=turning * x,
+            u=u,
+            v=v,
             worlds=np.array([[start]]),
             steps_per_sample=period,
         )
@@ -162,6 +164,68 @@ def test_the_water_s_acceleration_keeps_a_block_on_its_circle(
     angle = turning * 0.5e-3 * np.arange(len(poses))
     circle = radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     assert np.abs(poses[:, :2] - circle).max() < 2e-3 * radius
+
+
+@pytest.mark.parametrize("added_mass", [0.0, 0.5])
+def test_water_that_gains_spin_turns_a_block(simulate: Simulate, added_mass: float) -> None:
+    """u = (U, b x^2) has the vorticity 2 b x, so water gains the spin b U a second, everywhere.
+
+    Without drag a block gains the same, with whatever added inertia, and stays where it is. The
+    nodes' central differences are exact for a parabola, and first-order steps add b U t dt/2.
+    """
+    along, bend, seconds, step = 0.05, 2.0, 4.0, 0.5e-3
+    law = ("water_spin=1", f"added_mass={added_mass}")
+    poses = simulate(
+        start=[0.0, 0.01, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0],
+        step=step,
+        seconds=seconds,
+        water=lambda x, y: (along + 0 * x, bend * x**2),
+        law=law,
+    )
+    turned = np.unwrap(poses[:, 2])[-1] - 0.3
+    assert turned == pytest.approx(0.5 * bend * along * seconds * (seconds + step), rel=1e-5)
+    assert np.abs(poses[:, :2] - [0.0, 0.01]).max() < 1e-12
+
+
+@pytest.mark.parametrize("added_mass", [0.0, 0.5])
+def test_a_drag_linear_in_the_slip_brings_a_block_to_rest(
+    simulate: Simulate, added_mass: float
+) -> None:
+    """(m + m_a) dv/dt = -k v at any angle, and (I + I_a) domega/dt = -k <r^2> omega.
+
+    <r^2> is the mean of strips at offsets o on faces h from the middle: h^2 + <o^2>.
+    """
+    drag, speed, spin, seconds, step = 5e-3, 0.05, 2.0, 3.0, 0.25e-3
+    poses = simulate(
+        start=[-0.02, 0.0, 0.5, 0.6 * speed, 0.8 * speed, spin, 0.0, 0.0],
+        step=step,
+        seconds=seconds,
+        law=(f"linear_drag={drag}", f"added_mass={added_mass}"),
+    )
+    rate = drag / (MASS * (1 + added_mass))
+    way = speed / rate * -np.expm1(-rate * seconds)
+    moved = poses[-1, :2] - poses[0, :2]
+    assert moved == pytest.approx([0.6 * way, 0.8 * way], rel=1e-3)
+    offsets = (np.arange(8) + 0.5) * SIDE / 8 - SIDE / 2
+    spin_rate = rate * (SIDE**2 / 4 + np.mean(offsets**2)) / (SIDE**2 / 6)
+    turned = np.unwrap(poses[:, 2])[-1] - 0.5
+    assert turned == pytest.approx(spin / spin_rate * -np.expm1(-spin_rate * seconds), rel=1e-3)
+
+
+def test_a_drag_linear_in_the_slip_takes_a_block_along(simulate: Simulate) -> None:
+    """In water of one speed U the slip falls off exponentially, whichever faces are windward."""
+    drag, along, seconds = 5e-3, 0.02, 3.0
+    poses = simulate(
+        start=[-0.05, 0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0],
+        step=0.25e-3,
+        seconds=seconds,
+        water=lambda x, y: (along + 0 * x, 0 * x),
+        law=(f"linear_drag={drag}",),
+    )
+    rate = drag / MASS
+    way = along * (seconds + np.expm1(-rate * seconds) / rate)
+    assert poses[-1, 0] - poses[0, 0] == pytest.approx(way, rel=1e-3)
+    assert np.abs(poses[:, 1:] - [0.0, 0.3]).max() < 1e-9
 
 
 def test_a_force_that_remembers_keeps_its_intensity(simulate: Simulate) -> None:
