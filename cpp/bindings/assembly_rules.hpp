@@ -15,8 +15,9 @@ inline driftwalk::AssemblyRules rules_of(const Model& model, std::size_t blocks)
   driftwalk::AssemblyRules rules;
   rules.blocks = static_cast<int>(blocks);
   rules.side = 2 * run.block.half_side;
-  rules.mass = run.mass;
-  rules.inertia = run.inertia;
+  // Where blocks meet only ratios of the two count, and an added share is common to both.
+  rules.mass = model.numbers().mass;
+  rules.inertia = model.numbers().inertia;
   rules.radius = run.wall.radius;
   rules.edges = run.wall.edges;
   rules.edge_count = run.wall.edge_count;

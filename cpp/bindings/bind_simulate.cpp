@@ -3,7 +3,7 @@
 
 #include "driftwalk/dispatch.hpp"
 #include "driftwalk/math/elementary.hpp"
-#include "driftwalk/physics/laws/quadratic.hpp"
+#include "driftwalk/physics/laws/mixed.hpp"
 #include "driftwalk/random/normal.hpp"
 #include "driftwalk/random/philox.hpp"
 #include "driftwalk/simulate/run.hpp"
@@ -181,10 +181,15 @@ std::tuple<double, double, double> drag(const Model& model, double drag_coeffici
   const driftwalk::Prepared<double>& run = model.twice().view();
   driftwalk::Axes<double> axes;
   driftwalk::sincos(theta, axes.sine, axes.cosine);
+  const driftwalk::Motion<double> motion{vx, vy, omega};
+  const auto sums_of = [&](const auto& law) {
+    return driftwalk::drag_sums(law, run.block, run.flow, x, y, axes, motion);
+  };
+  const auto mixed = driftwalk::MixedDrag<double>::of(drag_coefficient, run.linear_drag);
+  const bool linear = run.linear_drag > 0;
   const driftwalk::DragSums<double> sums =
-      driftwalk::drag_sums(driftwalk::QuadraticDrag{}, run.block, run.flow, x, y, axes,
-                           driftwalk::Motion<double>{vx, vy, omega});
-  const double scale = run.drag_scale * drag_coefficient;
+      linear ? sums_of(mixed) : sums_of(driftwalk::QuadraticDrag{});
+  const double scale = run.drag_scale * (linear ? 1 : drag_coefficient);
   return {sums.force_x * scale, sums.force_y * scale, sums.torque * scale};
 }
 

@@ -1,15 +1,19 @@
 // The self-assembly kernel in double precision, one world at a time: the reference of the others.
 #include "driftwalk/assembly/run.hpp"
-#include "driftwalk/physics/laws/quadratic.hpp"
+#include "driftwalk/physics/laws/mixed.hpp"
 
 namespace driftwalk {
 
 std::int64_t assemble_reference(const Prepared<double>& run, const AssemblyRules& rules,
                                 const AssemblyWorlds& worlds, const AssemblyOutputs& out,
                                 const WorldQueue& queue, AssemblyScratch& scratch) {
-  return AssemblyPack<double, double, QuadraticDrag>({}, run, rules, worlds, out, queue, scratch,
-                                                     scratch.blended_flow_twice)
-      .run();
+  const auto assembled = [&]<class Law>() {
+    return AssemblyPack<double, double, Law>(run, rules, worlds, out, queue, scratch,
+                                             scratch.blended_flow_twice)
+        .run();
+  };
+  return run.linear_drag > 0 ? assembled.template operator()<MixedDrag<double>>()
+                             : assembled.template operator()<QuadraticDrag>();
 }
 
 std::size_t assembly_reference_bytes(int blocks) {

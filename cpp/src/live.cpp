@@ -3,7 +3,7 @@
 #include "driftwalk/assembly/assemble.hpp"
 #include "driftwalk/assembly/memory.hpp"
 #include "driftwalk/assembly/pack.hpp"
-#include "driftwalk/physics/laws/quadratic.hpp"
+#include "driftwalk/physics/laws/mixed.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,7 +11,31 @@
 namespace driftwalk {
 
 namespace {
-using OneWorld = WorldPack<double, double, QuadraticDrag>;
+// The law that the study says: a world that is looked at can afford to ask at each strip.
+struct EitherDrag {
+  MixedDrag<double> mixed;
+
+  static EitherDrag of(double drag_coefficient, double linear_drag) {
+    return {MixedDrag<double>::of(drag_coefficient, linear_drag)};
+  }
+  bool is_quadratic() const { return mixed.linear == 0; }
+  double strength(double drag_coefficient) const {
+    return is_quadratic() ? QuadraticDrag{}.strength(drag_coefficient)
+                          : mixed.strength(drag_coefficient);
+  }
+  double conductance(double closing) const {
+    return is_quadratic() ? QuadraticDrag{}.conductance(closing) : mixed.conductance(closing);
+  }
+  double force(double closing) const {
+    return is_quadratic() ? QuadraticDrag{}.force(closing) : mixed.force(closing);
+  }
+};
+
+void put_drag_coefficient(EitherDrag& law, int, double value) {
+  law.mixed.quadratic = value;
+}
+
+using OneWorld = WorldPack<double, double, EitherDrag>;
 
 // Between two calls of `advance` no blocks part, so there are no more joinings in one.
 constexpr int most_events = most_blocks - 1;
@@ -22,7 +46,7 @@ struct LiveWorld::Inside {
          std::uint64_t own_key)
       : run(model.view()), rules(given), key(own_key),
         memory(most_blocks, PackMemory<double>::bytes(most_blocks), model.blended_flow_size()),
-        out(outputs()), pack({}, run, rules, start, out, memory.scratch(),
+        out(outputs()), pack(run, rules, start, out, memory.scratch(),
                              memory.scratch().blended_flow_twice, most_blocks) {
     pack.begin(0, 0, 0, start, key);
   }

@@ -48,6 +48,42 @@ int padding(double reach, double spacing) {
 } // namespace
 
 template <class T>
+void write_table(const TableGrid& grid, const double* u, const double* v, double step,
+                 typename FlowNumber<T>::type* out) {
+  using Node = typename FlowNumber<T>::type;
+  const auto node = [&](const double* values, int row, int column) {
+    row = std::clamp(row - grid.bottom, 0, grid.own_rows - 1);
+    column = std::clamp(column - grid.left, 0, grid.own_columns - 1);
+    const double rounded = std::round(values[std::int64_t(row) * grid.own_columns + column] / step);
+    return static_cast<Node>(std::is_integral_v<Node> ? rounded : rounded * step);
+  };
+  for (int row = 0; row < grid.rows; ++row) {
+    for (int column = 0; column < grid.columns; ++column, out += flow_record) {
+      out[0] = node(u, row, column);
+      out[1] = node(u, row + 1, column);
+      out[2] = node(v, row, column);
+      out[3] = node(v, row + 1, column);
+    }
+  }
+}
+
+template void write_table<float>(const TableGrid&, const double*, const double*, double,
+                                 std::int16_t*);
+template void write_table<double>(const TableGrid&, const double*, const double*, double, double*);
+
+double table_step(double largest) {
+  return largest > 0 ? largest / 32767 : 1;
+}
+
+template <class T>
+T table_unit(double step) {
+  return std::is_integral_v<typename FlowNumber<T>::type> ? static_cast<T>(step / 32767) : T(1);
+}
+
+template float table_unit<float>(double);
+template double table_unit<double>(double);
+
+template <class T>
 PreparedRun<T>::PreparedRun(const BatchModel& model) {
   view_.block.half_side = static_cast<T>(model.side / 2);
   view_.block.strip_width = static_cast<T>(model.side / model.strips);
@@ -57,8 +93,10 @@ PreparedRun<T>::PreparedRun(const BatchModel& model) {
   view_.step.per_inertia = static_cast<T>(model.mass / model.inertia);
   view_.steps_per_interval = model.steps_per_interval;
   view_.drag_scale = 0.5 * model.water_density * (model.side / model.strips) * model.depth;
-  view_.mass = model.mass;
-  view_.inertia = model.inertia;
+  view_.mass = model.mass * (1 + model.added_mass_share);
+  view_.inertia = model.inertia * (1 + model.added_mass_share);
+  view_.linear_drag = static_cast<T>(model.linear_drag / (4 * model.strips) / view_.drag_scale);
+  prepare_force(model);
   view_.position_noise = static_cast<T>(model.position_noise);
   view_.orientation_noise = static_cast<T>(model.orientation_noise);
   view_.position_quantum = static_cast<T>(model.position_quantum);
@@ -93,8 +131,6 @@ void PreparedRun<T>::prepare_view(const BatchModel& model) {
 // max|u| / 32767 in both tables, so that the reference sees the flow that the kernels see.
 template <class T>
 void PreparedRun<T>::prepare_flow(const BatchModel& model) {
-  using Node = typename FlowNumber<T>::type;
-  constexpr bool quantised = std::is_integral_v<Node>;
   FlowView<T>& flow = view_.flow;
   double low_x, high_x, low_y, high_y;
   arena_extent(model, low_x, high_x, low_y, high_y);
@@ -106,19 +142,19 @@ void PreparedRun<T>::prepare_flow(const BatchModel& model) {
   const int right_pad = padding(std::max(high_x - right, 0.0) + reach, model.spacing_x);
   const int bottom_pad = padding(std::max(model.origin_y - low_y, 0.0) + reach, model.spacing_y);
   const int top_pad = padding(std::max(high_y - top, 0.0) + reach, model.spacing_y);
-  const int rows = model.rows + bottom_pad + top_pad;
   flow.stride_bits = static_cast<int>(
       std::bit_width(static_cast<unsigned>(model.columns + left_pad + right_pad - 1)));
-  const int columns = 1 << flow.stride_bits;
+  const TableGrid grid{
+      left_pad,   bottom_pad,   model.rows + bottom_pad + top_pad, 1 << flow.stride_bits,
+      model.rows, model.columns};
 
   const std::int64_t nodes = std::int64_t(model.frames) * model.rows * model.columns;
   double largest = 0;
   for (std::int64_t k = 0; k < nodes; ++k) {
     largest = std::max({largest, std::abs(model.flow_u[k]), std::abs(model.flow_v[k])});
   }
-  const double step = largest > 0 ? largest / 32767 : 1;
-  // The float kernel's four weights sum to 32767.
-  flow.unit = quantised ? static_cast<T>(step / 32767) : T(1);
+  const double step = table_step(largest);
+  flow.unit = table_unit<T>(step);
   flow.origin_x = static_cast<T>(model.origin_x - left_pad * model.spacing_x);
   flow.origin_y = static_cast<T>(model.origin_y - bottom_pad * model.spacing_y);
   flow.per_spacing_x = static_cast<T>(1.0 / model.spacing_x);
@@ -129,32 +165,30 @@ void PreparedRun<T>::prepare_flow(const BatchModel& model) {
   flow.high_y = static_cast<T>(high_y);
 
   view_.frames = model.frames;
-  view_.frame_size = std::int64_t(rows) * columns * flow_record;
+  view_.frame_size = std::int64_t(grid.rows) * grid.columns * flow_record;
   // One more record: the last node's load reaches one beyond it.
   table_.resize(static_cast<std::size_t>(view_.frame_size * model.frames + flow_record));
-  const auto node = [&](const double* values, int frame, int row, int column) {
-    row = std::clamp(row - bottom_pad, 0, model.rows - 1);
-    column = std::clamp(column - left_pad, 0, model.columns - 1);
-    const double rounded = std::round(
-        values[(std::int64_t(frame) * model.rows + row) * model.columns + column] / step);
-    return static_cast<Node>(quantised ? rounded : rounded * step);
-  };
-  Node* out = table_.data();
   for (int frame = 0; frame < model.frames; ++frame) {
-    for (int row = 0; row < rows; ++row) {
-      for (int column = 0; column < columns; ++column, out += flow_record) {
-        out[0] = node(model.flow_u, frame, row, column);
-        out[1] = node(model.flow_u, frame, row + 1, column);
-        out[2] = node(model.flow_v, frame, row, column);
-        out[3] = node(model.flow_v, frame, row + 1, column);
-      }
-    }
+    const std::int64_t first = frame * grid.own_nodes();
+    write_table<T>(grid, model.flow_u + first, model.flow_v + first, step,
+                   table_.data() + frame * view_.frame_size);
   }
   flow.table = table_.data();
   if (model.frames > 1) {
     frame_time_.assign(model.frame_time, model.frame_time + model.frames);
   }
   view_.frame_time = frame_time_.data();
+  prepare_water(model, grid);
+}
+
+// The force forgets exponentially. What is drawn anew is so large that the sum of the forces over a
+// long time, the noise intensity, is that without memory; the first has the spread of all others.
+template <class T>
+void PreparedRun<T>::prepare_force(const BatchModel& model) {
+  const double interval = model.steps_per_interval * model.time_step;
+  const double kept = model.force_memory > 0 ? std::exp(-interval / model.force_memory) : 0;
+  view_.force_kept = static_cast<T>(kept);
+  view_.force_first = static_cast<T>(std::sqrt((1 - kept) / (1 + kept)));
 }
 
 template <class T>

@@ -451,6 +451,7 @@ public:
         {},
         run.block,
         run.flow,
+        run.water,
         run.wall,
         run.step,
         {drag * run.drag_scale / run.mass, drag * run.drag_scale / run.inertia, noise_scale}};

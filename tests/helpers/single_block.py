@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,32 @@ Velocity = Callable[[Floats, Floats], tuple[Any, Any]]
 SIDE, MASS, DENSITY, RADIUS = 0.03, 0.0116, 1000.0, 0.15
 INERTIA = MASS * SIDE**2 / 6.0
 CORNERS = SIDE / np.sqrt(2.0)
+
+# What a floating body feels beyond the paper's law: keys of [forces], one by one and together.
+BEYOND_PAPER: dict[str, dict[str, Any]] = {
+    "added mass": {"added_mass_share": 0.6},
+    "water": {"pressure_gradient": True},
+    "linear drag": {"linear_drag_kg_s": 4e-3},
+    "memory": {"force_memory_s": 0.07},
+    "all": {
+        "added_mass_share": 0.6,
+        "pressure_gradient": True,
+        "linear_drag_kg_s": 4e-3,
+        "force_memory_s": 0.07,
+    },
+}
+
+
+def numbers_of(forces: Mapping[str, Any]) -> dict[str, float]:
+    """Return the arguments of a native model, or its twin, that keys of [forces] stand for."""
+    numbers = {
+        "added_mass_share": forces.get("added_mass_share", 0.0),
+        "linear_drag": forces.get("linear_drag_kg_s", 0.0),
+        "displaced_mass": MASS if forces.get("pressure_gradient") else 0.0,
+        "force_memory": forces.get("force_memory_s", 0.0),
+    }
+    return {name: value for name, value in numbers.items() if value}
+
 
 # A flow that is linear on nodes at -31 .. 31 spacings is a whole number of quanta max|u| / 32767
 # (32767 = 31 * 1057): the table holds it exactly.
@@ -54,7 +80,10 @@ def model(
         "inertia": INERTIA,
         "depth": SIDE,
         "strips": 8,
+        "added_mass_share": 0.0,
         "water_density": DENSITY,
+        "linear_drag": 0.0,
+        "displaced_mass": 0.0,
         "radius": RADIUS,
         "edges": np.zeros((0, 3)),
         "restitution": 0.5,
@@ -69,6 +98,7 @@ def model(
         "spacing_y": float(nodes[1] - nodes[0]),
         "time_step": 0.01,
         "steps_per_interval": 1,
+        "force_memory": 0.0,
         "sample_time": np.asarray(times, dtype=np.float64),
         "position_noise": 0.0,
         "orientation_noise": 0.0,

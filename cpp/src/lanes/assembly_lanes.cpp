@@ -1,6 +1,6 @@
 // The self-assembly kernel, compiled once per instruction set.
 #include "driftwalk/assembly/run.hpp"
-#include "driftwalk/physics/laws/quadratic.hpp"
+#include "driftwalk/physics/laws/mixed.hpp"
 
 DRIFTWALK_LANES_BEGIN
 
@@ -18,9 +18,13 @@ using Real = FloatPack<assembly_lanes>;
 std::int64_t assemble(const Prepared<float>& run, const AssemblyRules& rules,
                       const AssemblyWorlds& worlds, const AssemblyOutputs& out,
                       const WorldQueue& queue, AssemblyScratch& scratch) {
-  return AssemblyPack<Real, float, QuadraticDrag>({}, run, rules, worlds, out, queue, scratch,
-                                                  scratch.blended_flow)
-      .run();
+  const auto assembled = [&]<class Law>() {
+    return AssemblyPack<Real, float, Law>(run, rules, worlds, out, queue, scratch,
+                                          scratch.blended_flow)
+        .run();
+  };
+  return run.linear_drag > 0 ? assembled.template operator()<MixedDrag<Real>>()
+                             : assembled.template operator()<QuadraticDrag>();
 }
 
 constexpr AssemblyKernel kernel{assemble, assembly_lanes, PackMemory<Real>::bytes};

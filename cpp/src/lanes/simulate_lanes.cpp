@@ -1,5 +1,5 @@
 // The simulation kernel, compiled once per instruction set.
-#include "driftwalk/physics/laws/quadratic.hpp"
+#include "driftwalk/physics/laws/mixed.hpp"
 #include "driftwalk/simulate/lanes.hpp"
 #include "driftwalk/simulate/run.hpp"
 
@@ -16,8 +16,12 @@ constexpr int float_lanes = 4;
 
 void simulate(const Prepared<float>& run, const BatchWorlds& worlds, std::int64_t first, int count,
               const SampleSink<float>& sink, std::uint32_t* status) {
-  run_worlds<FloatPack<float_lanes>, float>(QuadraticDrag{}, run, worlds, first, count, sink,
-                                            status);
+  using Real = FloatPack<float_lanes>;
+  if (run.linear_drag > 0) {
+    run_worlds<Real, float, MixedDrag<Real>>(run, worlds, first, count, sink, status);
+  } else {
+    run_worlds<Real, float, QuadraticDrag>(run, worlds, first, count, sink, status);
+  }
 }
 
 constexpr SimulateKernel kernel{simulate, float_lanes};

@@ -64,7 +64,7 @@ def native_model(
     """
     check_flow_field(flow)
     _check_sample_time(sample_time)
-    tank = study.tank
+    tank, forces = study.tank, study.forces
     x, y = flow["x"].values, flow["y"].values
     _require_table(flow, tank)
     step = study.time_step_s
@@ -74,7 +74,10 @@ def native_model(
         inertia=study.block.inertia_kg_m2,
         depth=study.wetted_depth_m,
         strips=study.block.strips_per_face,
+        added_mass_share=0.0,
         water_density=study.water.density_kg_m3,
+        linear_drag=0.0,
+        displaced_mass=0.0,
         radius=tank.radius_m or 0.0,
         edges=wall_edges(tank),
         restitution=tank.wall_restitution,
@@ -88,7 +91,8 @@ def native_model(
         spacing_x=float((x[-1] - x[0]) / (x.size - 1)),
         spacing_y=float((y[-1] - y[0]) / (y.size - 1)),
         time_step=step,
-        steps_per_interval=round(study.forces.force_interval_s / step),
+        steps_per_interval=round(forces.force_interval_s / step),
+        force_memory=0.0,
         sample_time=np.ascontiguousarray(sample_time, dtype=np.float64),
         position_noise=camera.position_noise,
         orientation_noise=camera.orientation_noise,

@@ -44,7 +44,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
 from driftwalk.simulation.backend import wall_edges
-from twin.block import TwinModel, drag, force_normals
+from twin.block import TwinModel, drag, force_normals, next_force, push_of_water
 from twin.body import Assembly, Floats, Square, cross, single_block, wrapped
 from twin.contacts import collide, overlapping_pairs, separate
 from twin.latch import Joined, Latch, Latching, candidates, latch_once
@@ -73,8 +73,8 @@ class Rules:
 
     @property
     def square(self) -> Square:
-        """The block."""
-        return Square(self.model.side, self.model.mass)
+        """The block, with the mass that it carries along."""
+        return Square(self.model.side, float(self.model.moved[0]))
 
 
 class Event(NamedTuple):
@@ -139,7 +139,8 @@ def assemble_reference(
     Parameters
     ----------
     study : Study
-        Block, tank, water and the two times; forces and the rest are not read.
+        Block, tank, water, the two times, and what [forces] adds to the paper's law; the rest is
+        not read.
     flow : xarray.Dataset
         A steady `flow_field`.
     start : array_like, shape (blocks, 3)
@@ -198,11 +199,14 @@ def assemble_reference(
     world = start_world(rules, np.asarray(start, dtype=np.float64))
     samples = [world.gather("pose")]
     sample_assemblies = [world.gather("assembly")]
+    force: Floats | None = None
     for step in range(steps):
         if world.complete and not sample_every:
             break
-        interval = step // rules.model.steps_per_interval
-        advance(world, force_std * block_normals(key, interval, world.blocks))
+        interval, within = divmod(step, rules.model.steps_per_interval)
+        if within == 0 or force is None:
+            force = next_force(rules.model, force, block_normals(key, interval, world.blocks))
+        advance(world, force_std * force)
         if sample_every and world.step % sample_every == 0:
             samples.append(world.gather("pose"))
             sample_assemblies.append(world.gather("assembly"))
@@ -335,8 +339,8 @@ def drag_sums(
         members[3:],
         hidden if rules.hidden_face_drag == "none" else None,
     )
-    scale = 0.5 * model.water_density * rules.drag_coefficient * model.side / model.strips
-    scale *= model.depth
+    pushed = push_of_water(model, members[0], members[1])
+    force_x, force_y, torque = force_x + pushed[0], force_y + pushed[1], torque + pushed[2]
     sums, first = [], 0
     for body, arm in zip(world.assemblies, arms, strict=True):
         own = slice(first, first + body.size)
@@ -346,7 +350,7 @@ def drag_sums(
         spread = 4 / 3 * body.square.half**2 + (arm**2).sum(axis=1)
         damping = np.array([conductance[own].sum()] * 2 + [(conductance[own] * spread).sum()])
         acceleration = np.array([*force.sum(axis=0), turning]) * body.inverse_mass
-        sums.append((acceleration, scale * damping * body.inverse_mass))
+        sums.append((acceleration, damping * body.inverse_mass))
     return sums
 
 

@@ -41,11 +41,20 @@ class TwinModel:
     flow_y: Floats
     flow_u: Floats
     flow_v: Floats
+    added_mass_share: float = 0.0
+    displaced_mass: float = 0.0
+    linear_drag: float = 0.0
+    force_memory: float = 0.0
 
     @property
     def inertia(self) -> float:
         """Moment of inertia about the vertical [kg m^2]."""
         return self.mass * self.side**2 / 6.0
+
+    @property
+    def moved(self) -> Floats:
+        """Mass, mass and moment of inertia of all that moves with the block, shape (3,)."""
+        return (1 + self.added_mass_share) * np.array([self.mass, self.mass, self.inertia])
 
 
 def philox(
@@ -89,8 +98,54 @@ def force_normals(
     return normal_pair(words[half], words[half + 1])
 
 
+def next_force(model: TwinModel, last: Floats | None, normals: Floats) -> Floats:
+    """Return the force of an interval, over sigma_F, from the last one and fresh normals.
+
+    A force that remembers keeps a part of the last one. The first has the spread of all others.
+    """
+    if model.force_memory == 0:
+        return normals
+    kept = np.exp(-model.steps_per_interval * model.time_step / model.force_memory)
+    if last is None:
+        return np.asarray(np.sqrt((1 - kept) / (1 + kept)) * normals)
+    return np.asarray(kept * last + (1 - kept) * normals)
+
+
 def flow_at(model: TwinModel, x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Return the bilinear flow [m/s] at points [m], the edge's value beyond the grid."""
+    return _bilinear(model, (model.flow_u, model.flow_v), x, y)
+
+
+def water_acceleration(model: TwinModel, x: Floats, y: Floats) -> Floats:
+    """Return (u . grad) u averaged over a block, and half its curl, shape (3, worlds).
+
+    The averages are those of four points at a / sqrt(12) from the middle of the block.
+    """
+    dx, dy = (axis[1] - axis[0] for axis in (model.flow_x, model.flow_y))
+    nodes = [
+        model.flow_u * np.gradient(values, dx, axis=1)
+        + model.flow_v * np.gradient(values, dy, axis=0)
+        for values in (model.flow_u, model.flow_v)
+    ]
+    total = np.zeros((3, x.size))
+    for arm_x, arm_y in model.side / np.sqrt(12) * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]]):
+        there = _bilinear(model, (nodes[0], nodes[1]), x + arm_x, y + arm_y)
+        total += [*there, 6 / model.side**2 * (arm_x * there[1] - arm_y * there[0])]
+    return total / 4
+
+
+def push_of_water(model: TwinModel, x: Floats, y: Floats) -> Floats:
+    """Return the force [N] and torque [N m] of the water's own acceleration, shape (3, worlds)."""
+    if model.displaced_mass == 0:
+        return np.zeros((3, x.size))
+    own = np.array([1, 1, model.side**2 / 6]) * model.displaced_mass
+    added = model.added_mass_share * np.array([model.mass, model.mass, model.inertia])
+    return np.asarray((own + added)[:, None] * water_acceleration(model, x, y))
+
+
+def _bilinear(
+    model: TwinModel, nodes: tuple[Floats, Floats], x: Floats, y: Floats
+) -> tuple[Floats, Floats]:
     dx = (model.flow_x[-1] - model.flow_x[0]) / (model.flow_x.size - 1)
     dy = (model.flow_y[-1] - model.flow_y[0]) / (model.flow_y.size - 1)
     column = np.clip((x - model.flow_x[0]) / dx, 0, model.flow_x.size - 1)
@@ -98,9 +153,9 @@ def flow_at(model: TwinModel, x: Floats, y: Floats) -> tuple[Floats, Floats]:
     i = np.minimum(column.astype(int), model.flow_x.size - 2)
     j = np.minimum(row.astype(int), model.flow_y.size - 2)
     fx, fy = column - i, row - j
-    step = max(np.abs(model.flow_u).max(), np.abs(model.flow_v).max()) / 32767 or 1.0
+    step = max(np.abs(values).max() for values in nodes) / 32767 or 1.0
     parts = []
-    for values in (model.flow_u, model.flow_v):
+    for values in nodes:
         a, b, c, d = (
             np.round(values[row, column] / step) * step
             for row, column in ((j, i), (j, i + 1), (j + 1, i), (j + 1, i + 1))
@@ -116,7 +171,7 @@ def drag(
     motion: Floats,
     hidden: npt.NDArray[np.bool_] | None = None,
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return force x, y [N], torque [N m] and conductance [m/s], summed face by face (Eq. 2).
+    """Return force x, y [N], torque [N m] and conductance [kg/s], summed face by face (Eq. 2).
 
     A face that is `hidden`, shape (4, worlds), adds nothing to any of them.
     """
@@ -135,13 +190,14 @@ def drag(
         relative_x = u - (vx - omega * arm_y)
         relative_y = v - (vy + omega * arm_x)
         facing = np.maximum(0.0, -(normal_x * relative_x + normal_y * relative_y))
+        own = scale * facing + model.linear_drag / (4 * model.strips)
         if hidden is not None:
-            facing = np.where(hidden[face], 0.0, facing)
-        strip_x, strip_y = scale * facing * relative_x, scale * facing * relative_y
+            own = np.where(hidden[face], 0.0, own)
+        strip_x, strip_y = own * relative_x, own * relative_y
         force_x += strip_x.sum(axis=0)
         force_y += strip_y.sum(axis=0)
         torque += (arm_x * strip_y - arm_y * strip_x).sum(axis=0)
-        conductance += facing.sum(axis=0)
+        conductance += own.sum(axis=0)
     return force_x, force_y, torque, conductance
 
 
@@ -158,30 +214,24 @@ def simulate_reference(
     """Return the poses after 0 .. steps time steps, shape (steps + 1, 3, worlds)."""
     pose, motion = pose.astype(np.float64), motion.astype(np.float64)
     before = np.zeros_like(motion)
-    per_mass = np.array([1 / model.mass, 1 / model.mass, 1 / model.inertia])[:, None]
+    per_mass = 1 / model.moved[:, None]
     dt = model.time_step
-    stiffness = 0.5 * model.water_density * drag_coefficient * model.side / model.strips
-    stiffness = stiffness * model.depth
-    spread = np.stack(
-        [
-            np.ones_like(stiffness),
-            np.ones_like(stiffness),
-            np.full_like(stiffness, model.side**2 / 3),
-        ]
-    )
+    spread = np.array([1.0, 1.0, model.side**2 / 3])[:, None]
     pose, motion, _ = meet_circle(model, pose, motion)
     path = [pose]
     noise = np.zeros_like(motion)
+    force: Floats | None = None
     for step in range(steps):
         if step % model.steps_per_interval == 0:
-            normals = force_normals(key, step // model.steps_per_interval)
-            noise = np.stack([normals[0], normals[1], np.zeros_like(normals[0])])
-            noise *= force_std / model.mass
+            normals = np.stack(force_normals(key, step // model.steps_per_interval))
+            force = next_force(model, force, normals)
+            noise[:2] = force * force_std * per_mass[0]
         ahead = motion + dt / 2 * (before + noise)
         middle = pose + dt / 4 * (motion + ahead)
         force_x, force_y, torque, conductance = drag(model, drag_coefficient, middle, ahead)
-        acceleration = np.stack([force_x, force_y, torque]) * per_mass
-        damping = 1 + dt / 2 * stiffness * spread * per_mass * conductance
+        pushed = np.stack([force_x, force_y, torque]) + push_of_water(model, middle[0], middle[1])
+        acceleration = pushed * per_mass
+        damping = 1 + dt / 2 * spread * per_mass * conductance
         mean = ahead + dt / 2 * (acceleration - before) / damping
         after = 2 * mean - motion
         before = (after - motion) / dt - noise

@@ -10,25 +10,27 @@ from typing import Any
 import numpy as np
 import pytest
 from kernel_worlds import assemble, keys, random_starts
-from single_block import NODES, flow_arrays, model, swirl
+from single_block import BEYOND_PAPER, NODES, flow_arrays, model, numbers_of, swirl
 
 from driftwalk import _core
 
 
-def changing_model(times: Any) -> _core.Model:
+def changing_model(times: Any, **changes: Any) -> _core.Model:
     """A swirl that turns round within a second."""
     u, v = flow_arrays(swirl)
     factor = np.array([1.0, 0.2, -1.0])[:, None, None]
     return model(
         swirl, times=times, nodes=NODES, u=factor * u, v=factor * v,
-        frame_time=np.array([0.0, 0.31, 1.0]), steps_per_interval=2,
+        frame_time=np.array([0.0, 0.31, 1.0]), steps_per_interval=2, **changes,
     )  # fmt: skip
 
 
+@pytest.mark.parametrize("law", ["paper", "linear drag", "memory"])
 @pytest.mark.parametrize("precision", ["single", "double"])
-def test_one_block_in_a_changing_flow_is_the_one_block_kernel(precision: str) -> None:
+def test_one_block_in_a_changing_flow_is_the_one_block_kernel(precision: str, law: str) -> None:
     steps = 150
-    native = changing_model(np.arange(steps + 1) * 0.01)
+    numbers = numbers_of(BEYOND_PAPER.get(law, {}))
+    native = changing_model(np.arange(steps + 1) * 0.01, **numbers)
     start, own_keys = random_starts(native, 1, 21)
     table = np.zeros((len(start), 8))
     table[:, :3], table[:, 6], table[:, 7] = start[:, 0], 0.8, 1e-3

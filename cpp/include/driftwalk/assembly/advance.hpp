@@ -6,6 +6,7 @@
 #include "driftwalk/assembly/member.hpp"
 #include "driftwalk/physics/drag.hpp"
 #include "driftwalk/physics/physics.hpp"
+#include "driftwalk/physics/water.hpp"
 
 DRIFTWALK_LANES_BEGIN
 
@@ -87,6 +88,19 @@ inline void sum_noise(const Physics<Real, T, Law>& physics, int half, Member<Rea
   }
 }
 
+// Turns a block's sums into accelerations of a block alone, and adds that by the water's own. Of
+// the water's, the mass that it pushes is at the block's centre, on the arm.
+template <class Real, class T, class Law>
+inline void add_water(const Physics<Real, T, Law>& physics, Real x, Real y, const Arm<Real>& arm,
+                      Sums<Real>& sums) {
+  const Motion<Real> water = water_acceleration(physics.water, physics.block, x, y);
+  const Real per_mass = physics.world.drag_per_mass, per_inertia = physics.world.drag_per_inertia;
+  sums.part[0] = sums.part[0] * per_mass + water.vx;
+  sums.part[1] = sums.part[1] * per_mass + water.vy;
+  sums.part[2] = sums.part[2] * per_inertia + water.omega +
+                 (arm.x * water.vy - arm.y * water.vx) * Real(physics.step.per_inertia);
+}
+
 // Drag of a block half a step ahead, about its assembly's centre of mass.
 template <class Real, class T, class Law>
 inline void feel_drag(const Physics<Real, T, Law>& physics, Member<Real>& m, Sums<Real>& sums) {
@@ -106,6 +120,9 @@ inline void feel_drag(const Physics<Real, T, Law>& physics, Member<Real>& m, Sum
   sums.part[2] = drag.torque + (arm_x * drag.force_y - arm_y * drag.force_x);
   sums.part[3] = drag.conductance;
   sums.part[4] = drag.conductance * (arm_x * arm_x + arm_y * arm_y);
+  if (physics.water.count > 0) {
+    add_water(physics, ahead.pose.x + arm_x, ahead.pose.y + arm_y, {arm_x, arm_y}, sums);
+  }
 }
 
 template <class Real>
@@ -121,9 +138,12 @@ inline void finish_member(const Physics<Real, T, Law>& physics, const Real* tota
                           Member<Real>& m) {
   const T half = T(0.5) * physics.step.dt, turning = turning_share(physics.block) * half;
   const Real per_mass = physics.world.drag_per_mass, per_inertia = physics.world.drag_per_inertia;
+  // Where the water pushes, the sums are accelerations.
+  const bool done = physics.water.count > 0;
+  const Real by_mass = done ? Real(T(1)) : per_mass, by_inertia = done ? Real(T(1)) : per_inertia;
   WaterPush<Real> push;
-  push.acceleration = {total[0] * per_mass * m.per_count, total[1] * per_mass * m.per_count,
-                       total[2] * per_inertia * m.lightness};
+  push.acceleration = {total[0] * by_mass * m.per_count, total[1] * by_mass * m.per_count,
+                       total[2] * by_inertia * m.lightness};
   push.stiffness = total[3] * per_mass * half * m.per_count;
   push.spin_stiffness =
       (total[3] * per_inertia * turning + total[4] * per_inertia * half) * m.lightness;

@@ -82,6 +82,9 @@ inline void load_block(const AssemblyRules& rules, const double* pose, const Pac
   for (int face = 0; face < 4; ++face) {
     put(m.covered[face], lane, false);
   }
+  for (Real& normal : m.normals) {
+    put(normal, lane, T(0));
+  }
   pack.book(block, lane) = {0, 0, 0, 0};
 }
 

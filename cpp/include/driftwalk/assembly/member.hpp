@@ -7,6 +7,7 @@
 
 #include "driftwalk/assembly/kernel.hpp"
 #include "driftwalk/physics/integrator.hpp"
+#include "driftwalk/physics/laws/mixed.hpp"
 #include "driftwalk/physics/wall.hpp"
 
 DRIFTWALK_LANES_BEGIN
@@ -84,6 +85,14 @@ inline void put(Mask<N>& a, int lane, bool value) {
 }
 inline void put(bool& a, int, bool value) {
   a = value;
+}
+
+// Tells a lane's drag coefficient to a law that has one of its own.
+template <class Law>
+inline void put_drag_coefficient(Law&, int, double) {}
+template <class Real>
+inline void put_drag_coefficient(MixedDrag<Real>& law, int lane, double value) {
+  put(law.quadratic, lane, value);
 }
 
 template <class Real>

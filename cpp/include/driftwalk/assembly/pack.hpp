@@ -20,13 +20,18 @@ public:
 
   // All lanes get the blocks at `start`; those that never begin move them along for nothing. The
   // memory holds worlds of up to `capacity` blocks. Events go to `out`.
-  WorldPack(const Law& law, const Prepared<T>& run, const AssemblyRules& rules, const double* start,
+  WorldPack(const Prepared<T>& run, const AssemblyRules& rules, const double* start,
             const AssemblyOutputs& out, AssemblyScratch& scratch, Node* blended_flow, int capacity)
       : run_(run), rules_(rules), out_(out), scratch_(scratch), blended_flow_(blended_flow),
         memory_(scratch.lanes, capacity), near_(rules), blocks_(rules.blocks),
         listed_(rules.blocks > most_blocks_all_pairs),
-        physics_{law,      run.block, run.flow,
-                 run.wall, run.step,  {Real(T(0)), Real(T(0)), Real(T(0))}} {
+        physics_{Law::of(Real(T(0)), Real(run.linear_drag)),
+                 run.block,
+                 run.flow,
+                 run.water,
+                 run.wall,
+                 run.step,
+                 {Real(T(0)), Real(T(0)), Real(T(0))}} {
     const bool has_lists = capacity > most_blocks_all_pairs;
     for (int lane = 0; lane < lanes; ++lane) {
       load_lane<Real, T>(rules_, start, memory_, lane);
@@ -34,6 +39,7 @@ public:
       put(stream_.key0, lane, 0);
       put(stream_.key1, lane, 0);
       put(draw_, lane, 0);
+      begin_force(lane);
     }
     for (int b = 0; b < blocks_; ++b) {
       memory_.listed_x[b] = memory_.listed_y[b] = Real(T(0));
@@ -61,21 +67,27 @@ public:
     put(stream_.key0, lane, static_cast<UInt32>(key));
     put(stream_.key1, lane, static_cast<UInt32>(key >> 32));
     put(draw_, lane, 0);
+    begin_force(lane);
     if (listed_) {
       list_pairs(lane);
     }
   }
 
   void set_forces(int lane, double drag_coefficient, double force_std) {
-    const WorldConstants<T> own =
-        world_constants(run_, static_cast<T>(drag_coefficient), static_cast<T>(force_std));
+    const WorldConstants<T> own = world_constants(
+        physics_.law, run_, static_cast<T>(drag_coefficient), static_cast<T>(force_std));
+    put_drag_coefficient(physics_.law, lane, drag_coefficient);
     put(physics_.world.drag_per_mass, lane, own.drag_per_mass);
     put(physics_.world.drag_per_inertia, lane, own.drag_per_inertia);
     put(physics_.world.noise_scale, lane, own.noise_scale);
   }
 
   // For all worlds: the flow times a factor.
-  void scale_flow(T factor) { physics_.flow.unit = run_.flow.unit * factor; }
+  void scale_flow(T factor) {
+    physics_.flow.unit = run_.flow.unit * factor;
+    physics_.water.strength = factor;
+    physics_.water.part[0] = factor * factor;
+  }
 
   // To be called when the rules, or the blocks of a lane, have been changed from outside.
   void renew() {
@@ -89,16 +101,21 @@ public:
     }
   }
 
-  // The normal numbers that a block has in the period under way.
-  void draw_again(int block) { draw_forces(block, draw_ - UInt(static_cast<UInt32>(1))); }
+  // The normal numbers that a block has in the period under way. A force that remembers begins
+  // anew.
+  void draw_again(int block) {
+    draw_forces(block, draw_ - UInt(static_cast<UInt32>(1)), Real(T(0)), Real(run_.force_first));
+  }
 
   // One time step of every lane; returns whether a world has become one assembly in it.
   bool step(std::int64_t step) {
     const std::int64_t phase = step % period();
     if (phase == 0) {
       for (int b = 0; b < blocks_; ++b) {
-        draw_forces(b, draw_);
+        draw_forces(b, draw_, kept_, fresh_);
       }
+      kept_ = Real(run_.force_kept);
+      fresh_ = Real(T(1) - run_.force_kept);
       draw_ = draw_ + UInt(static_cast<UInt32>(1));
     }
     if (run_.frames > 1) {
@@ -111,13 +128,25 @@ public:
   }
 
 private:
-  void draw_forces(int block, UInt draw) {
+  // The first force of a world has no last one to remember, and the spread of all that follow.
+  void begin_force(int lane) {
+    put(kept_, lane, 0);
+    put(fresh_, lane, run_.force_first);
+  }
+
+  // `kept` and `fresh` are of the first interval of the period.
+  void draw_forces(int block, UInt draw, Real kept, Real fresh) {
     UInt words[4];
     stream_(draw, UInt(static_cast<UInt32>(block)), UInt(static_cast<UInt32>(0)),
             UInt(static_cast<UInt32>(Purpose::force)), words);
     Real* const normals = memory_.members[block].normals;
+    const Real last[2] = {normals[2], normals[3]};
     normal_pair(words[0], words[1], normals[0], normals[1]);
     normal_pair(words[2], words[3], normals[2], normals[3]);
+    if (run_.force_kept > T(0)) {
+      remember(kept, fresh, last, normals);
+      remember(Real(run_.force_kept), Real(T(1) - run_.force_kept), normals, normals + 2);
+    }
   }
 
   void blend_flow(std::int64_t step) {
@@ -128,6 +157,7 @@ private:
     const double middle =
         (static_cast<double>(step - first) + 0.5) * static_cast<double>(run_.step.dt);
     physics_.flow.table = flow_table_at(run_, middle, blended_flow_);
+    look_at_water(run_, middle, physics_.water);
   }
 
   bool settle_lanes(std::int64_t step) {
@@ -235,6 +265,7 @@ private:
   Physics<Real, T, Law> physics_;
   Philox<UInt> stream_;
   UInt draw_;
+  Real kept_, fresh_; // parts of the last force and of the new numbers in the next force
   LaneBook books_[lanes];
 };
 

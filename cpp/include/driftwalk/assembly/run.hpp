@@ -12,11 +12,11 @@ public:
   static constexpr int lanes = Numbers<Real>::lanes;
   using Node = typename FlowNumber<T>::type;
 
-  AssemblyPack(const Law& law, const Prepared<T>& run, const AssemblyRules& rules,
-               const AssemblyWorlds& worlds, const AssemblyOutputs& out, const WorldQueue& queue,
-               AssemblyScratch& scratch, Node* blended_flow)
+  AssemblyPack(const Prepared<T>& run, const AssemblyRules& rules, const AssemblyWorlds& worlds,
+               const AssemblyOutputs& out, const WorldQueue& queue, AssemblyScratch& scratch,
+               Node* blended_flow)
       : run_(run), rules_(rules), worlds_(worlds), out_(out), queue_(queue),
-        pack_(law, run, rules, worlds.start, out, scratch, blended_flow, rules.blocks) {}
+        pack_(run, rules, worlds.start, out, scratch, blended_flow, rules.blocks) {}
 
   // Returns the number of block-steps of the worlds that were run.
   std::int64_t run() {

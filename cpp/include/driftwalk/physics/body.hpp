@@ -15,6 +15,11 @@ struct Motion {
   Real vx, vy, omega; // [m/s, m/s, rad/s]
 };
 
+template <class Real>
+inline Motion<Real> operator+(const Motion<Real>& a, const Motion<Real>& b) {
+  return {a.vx + b.vx, a.vy + b.vy, a.omega + b.omega};
+}
+
 // A body's axes: cosine and sine of its orientation.
 template <class Real>
 struct Axes {

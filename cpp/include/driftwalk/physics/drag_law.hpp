@@ -4,8 +4,9 @@
 // A strip with outward normal n, and w the velocity of the water relative to it, has the closing
 // speed s = -n.w and feels
 //     F = K g(s) w,   so  -n.F = K f(s)  with  f(s) = g(s) s
-// K is the same for all strips of a world. The law is g, the conductance, and f, the force. It may
-// have numbers of its own, one per lane.
+// K is the same for all strips of a world: its drag_scale times the law's strength at the drag
+// coefficient. The law is g, the conductance, and f, the force. It may have numbers of its own, one
+// per lane.
 //
 // The filter knows (s, w_t) as normal, w_t = t.w the slip along the face. It needs the means of F
 // and of its first and second derivatives by s and w_t: the moments.

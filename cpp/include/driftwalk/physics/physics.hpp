@@ -14,11 +14,12 @@ struct WorldConstants {
   Real noise_scale;      // stochastic force per normal number and mass of a block [m/s^2]
 };
 
-template <class Real, class T>
-inline WorldConstants<Real> world_constants(const Prepared<T>& run, Real drag_coefficient,
-                                            Real force_std) {
-  return {drag_coefficient * static_cast<T>(run.drag_scale / run.mass),
-          drag_coefficient * static_cast<T>(run.drag_scale / run.inertia),
+template <class Real, class T, class Law>
+inline WorldConstants<Real> world_constants(const Law& law, const Prepared<T>& run,
+                                            Real drag_coefficient, Real force_std) {
+  const Real strength = law.strength(drag_coefficient);
+  return {strength * static_cast<T>(run.drag_scale / run.mass),
+          strength * static_cast<T>(run.drag_scale / run.inertia),
           force_std * static_cast<T>(1.0 / run.mass)};
 }
 
@@ -27,6 +28,7 @@ struct Physics {
   [[no_unique_address]] Law law;
   BlockShape<T> block;
   FlowView<T> flow;
+  WaterView<T> water;
   WallView<T> wall;
   StepConstants<T> step;
   WorldConstants<Real> world;

@@ -15,10 +15,13 @@ enum class Range { any, not_negative, positive, share };
   NUMBER(double, side, "m", positive)                                                              \
   NUMBER(double, mass, "kg", positive)                                                             \
   NUMBER(double, inertia, "kg m^2", positive)                                                      \
-  NUMBER(double, depth, "m", positive) /* of the wetted sides */                                   \
-  NUMBER(int, strips, "1", positive)   /* a side */                                                \
+  NUMBER(double, depth, "m", positive)                /* of the wetted sides */                    \
+  NUMBER(int, strips, "1", positive)                  /* a side */                                 \
+  NUMBER(double, added_mass_share, "1", not_negative) /* of the mass, and of the inertia */        \
   /* water */                                                                                      \
   NUMBER(double, water_density, "kg/m^3", positive)                                                \
+  NUMBER(double, linear_drag, "kg/s", not_negative)  /* of all strips together */                  \
+  NUMBER(double, displaced_mass, "kg", not_negative) /* 0: water that accelerates does not push */ \
   /* wall */                                                                                       \
   NUMBER(double, radius, "m", not_negative)                                                        \
   NUMBER(double, restitution, "1", share)                                                          \
@@ -31,7 +34,8 @@ enum class Range { any, not_negative, positive, share };
   NUMBER(double, spacing_y, "m", positive)                                                         \
   /* time */                                                                                       \
   NUMBER(double, time_step, "s", positive)                                                         \
-  NUMBER(int, steps_per_interval, "1", positive) /* force interval / time step */                  \
+  NUMBER(int, steps_per_interval, "1", positive)  /* force interval / time step */                 \
+  NUMBER(double, force_memory, "s", not_negative) /* time after which the force has forgotten */   \
   /* camera: noise and resolution */                                                               \
   NUMBER(double, position_noise, "m", not_negative)                                                \
   NUMBER(double, orientation_noise, "rad", not_negative)                                           \

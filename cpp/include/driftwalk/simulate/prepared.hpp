@@ -64,6 +64,23 @@ struct FlowView {
   T low_y, high_y;
 };
 
+// Up to so many tables make the water's acceleration at a time.
+inline constexpr int most_water_tables = 4;
+
+// The water's acceleration Du/Dt on the nodes of the flow, and how it pushes a block: the sum of
+// `count` tables, each times its part. A steady flow has one; cpp/src/prepare_water.cpp says which
+// a flow in frames has.
+template <class T>
+struct WaterView {
+  int count;         // 0: the water's acceleration does not push
+  FlowView<T> nodes; // of the first table; its unit is in m/s^2
+  const typename FlowNumber<T>::type* table[most_water_tables];
+  T part[most_water_tables];
+  T strength; // of the flow, a factor on its velocity
+  T push;     // (m_w + m_a)/(m + m_a), m_w the displaced mass
+  T spin;     // the same of the moments of inertia
+};
+
 // Everything a kernel reads, in its own number type. Plain pointers: the kernels are compiled once
 // per instruction set and must share no container code (see config.hpp).
 template <class T>
@@ -71,14 +88,18 @@ struct Prepared {
   BlockShape<T> block;
   StepConstants<T> step;
   int steps_per_interval;
-  double drag_scale; // 1/2 rho (a/N) d [kg/m^2]: K = drag_scale * C_d
-  double mass, inertia;
+  double drag_scale;    // 1/2 rho (a/N) d [kg/m^2]: K = drag_scale * C_d
+  T linear_drag;        // of every strip in addition, per K and slip [m/s]; 0: nothing
+  double mass, inertia; // with what is added to them
   WallView<T> wall;
   // flow: the first of `frames` tables, frame_size numbers each
   FlowView<T> flow;
   std::int64_t frame_size;
   int frames;
   const double* frame_time;
+  WaterView<T> water;
+  // force: what is kept of the last one, 0 where it has no memory, and the spread of the first
+  T force_kept, force_first;
   // sampling: sample k lies in step sample_step[k], at the fraction sample_weight[k] of it
   std::int64_t samples;
   const std::int64_t* sample_step;

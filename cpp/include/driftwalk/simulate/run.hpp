@@ -72,6 +72,13 @@ inline Real quantise(Real value, T quantum) {
   return select(abs(scaled) < Real(most), rounded, value);
 }
 
+// Makes the normal numbers of a force that remembers, (x, y), out of fresh ones and the last.
+template <class Real>
+inline void remember(Real kept, Real fresh, const Real* last, Real* normals) {
+  normals[0] = kept * last[0] + fresh * normals[0];
+  normals[1] = kept * last[1] + fresh * normals[1];
+}
+
 template <class T>
 inline bool is_seen(const Prepared<T>& run, T x, T y) {
   if (run.view_radius > T(0)) {
@@ -119,17 +126,34 @@ inline void write_sample(const Prepared<T>& run, const SampleSink<T>& sink, std:
   }
 }
 
-// The flow table at a time, blended linearly between the two frames around it.
-template <class T, class Node>
-inline const Node* flow_table_at(const Prepared<T>& run, double time, Node* scratch) {
+// Where a time is among the frames of a flow: between `frame` and the next, at a share of the span
+// that is below 0 before the first frame and above 1 after the last.
+struct AmongFrames {
+  int frame;
+  double share;
+};
+
+template <class T>
+inline AmongFrames among_frames(const Prepared<T>& run, double time) {
   int frame = 0;
   while (frame + 2 < run.frames && run.frame_time[frame + 1] <= time) {
     ++frame;
   }
   const double span = run.frame_time[frame + 1] - run.frame_time[frame];
-  const double raw = (time - run.frame_time[frame]) / span;
-  const T weight = static_cast<T>(raw < 0 ? 0 : (raw > 1 ? 1 : raw));
-  const Node* before = run.flow.table + frame * run.frame_size;
+  return {frame, (time - run.frame_time[frame]) / span};
+}
+
+template <class T>
+inline T weight_of(const AmongFrames& at) {
+  return static_cast<T>(at.share < 0 ? 0 : (at.share > 1 ? 1 : at.share));
+}
+
+// The flow table at a time, blended linearly between the two frames around it.
+template <class T, class Node>
+inline const Node* flow_table_at(const Prepared<T>& run, double time, Node* scratch) {
+  const AmongFrames at = among_frames(run, time);
+  const T weight = weight_of<T>(at);
+  const Node* before = run.flow.table + at.frame * run.frame_size;
   const Node* after = before + run.frame_size;
   for (std::int64_t k = 0; k < run.frame_size; ++k) {
     const T low = static_cast<T>(before[k]);
@@ -139,6 +163,25 @@ inline const Node* flow_table_at(const Prepared<T>& run, double time, Node* scra
     scratch[k] = static_cast<Node>(blended + copy_sign(half, blended));
   }
   return scratch;
+}
+
+// Of a flow in frames, the tables of the water's acceleration at a time (prepare_water.cpp).
+template <class T>
+inline void look_at_water(const Prepared<T>& run, double time, WaterView<T>& water) {
+  if (water.count == 0) {
+    return;
+  }
+  const AmongFrames at = among_frames(run, time);
+  const T weight = weight_of<T>(at), before = T(1) - weight;
+  const T twice = water.strength * water.strength;
+  const T part[most_water_tables] = {before * before * twice, T(2) * weight * before * twice,
+                                     // Before the first frame and after the last the flow stands.
+                                     at.share >= 0 && at.share <= 1 ? water.strength : T(0),
+                                     weight * weight * twice};
+  for (int k = 0; k < most_water_tables; ++k) {
+    water.table[k] = run.water.nodes.table + (3 * at.frame + k) * run.frame_size;
+    water.part[k] = part[k];
+  }
 }
 
 // Path length of a world in the second half of its samples, before camera noise. It reveals a
@@ -191,27 +234,38 @@ inline void write_status(const Prepared<T>& run, const Body<Real>& body,
 }
 
 template <class Real, class T, class Law>
-inline void run_worlds(const Law& law, const Prepared<T>& run, const BatchWorlds& worlds,
-                       std::int64_t first, int count, const SampleSink<T>& sink,
-                       std::uint32_t* status) {
+void run_worlds(const Prepared<T>& run, const BatchWorlds& worlds, std::int64_t first, int count,
+                const SampleSink<T>& sink, std::uint32_t* status) {
   using UInt = typename Numbers<Real>::UInt;
   Body<Real> body;
   Real drag_coefficient, force_std;
   Philox<UInt> stream;
   load_worlds(worlds, first, count, body, drag_coefficient, force_std, stream);
-  Physics<Real, T, Law> physics{law,      run.block,
-                                run.flow, run.wall,
-                                run.step, world_constants(run, drag_coefficient, force_std)};
+  const Law law = Law::of(drag_coefficient, Real(run.linear_drag));
+  Physics<Real, T, Law> physics{law,
+                                run.block,
+                                run.flow,
+                                run.water,
+                                run.wall,
+                                run.step,
+                                world_constants(law, run, drag_coefficient, force_std)};
   meet_wall(run.wall, run.block.half_side, Real(run.step.per_inertia), body.pose, body.motion);
 
   Motionless<Real> rest(run);
-  Real normals[4];
+  Real normals[4], last[2] = {Real(T(0)), Real(T(0))};
   std::int64_t step_index = 0, sample = 0;
   for (std::int64_t interval = 0; sample < run.samples; ++interval) {
     // One Philox block serves two force intervals.
     const int half = static_cast<int>(interval & 1) * 2;
     if (half == 0) {
       draw_normals(stream, Purpose::force, interval >> 1, normals);
+    }
+    if (run.force_kept > T(0)) {
+      const T kept = interval == 0 ? T(0) : run.force_kept;
+      const T fresh = interval == 0 ? run.force_first : T(1) - run.force_kept;
+      remember(Real(kept), Real(fresh), last, normals + half);
+      last[0] = normals[half];
+      last[1] = normals[half + 1];
     }
     const Motion<Real> noise{normals[half] * physics.world.noise_scale,
                              normals[half + 1] * physics.world.noise_scale, Real(T(0))};
@@ -220,6 +274,7 @@ inline void run_worlds(const Law& law, const Prepared<T>& run, const BatchWorlds
         const double middle =
             (static_cast<double>(step_index) + 0.5) * static_cast<double>(run.step.dt);
         physics.flow.table = flow_table_at(run, middle, sink.blended_flow);
+        look_at_water(run, middle, physics.water);
       }
       const Pose<Real> before = body.pose;
       const Real turned = step_block(physics, noise, body);

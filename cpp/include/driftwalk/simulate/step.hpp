@@ -5,6 +5,7 @@
 #include "driftwalk/physics/integrator.hpp"
 #include "driftwalk/physics/physics.hpp"
 #include "driftwalk/physics/wall.hpp"
+#include "driftwalk/physics/water.hpp"
 
 DRIFTWALK_LANES_BEGIN
 
@@ -19,6 +20,10 @@ inline Real step_block(const Physics<Real, T, Law>& physics, const Motion<Real>&
   const Real per_mass = physics.world.drag_per_mass, per_inertia = physics.world.drag_per_inertia;
   WaterPush<Real> push;
   push.acceleration = {sums.force_x * per_mass, sums.force_y * per_mass, sums.torque * per_inertia};
+  if (physics.water.count > 0) {
+    push.acceleration = push.acceleration + water_acceleration(physics.water, physics.block,
+                                                               ahead.pose.x, ahead.pose.y);
+  }
   push.stiffness = sums.conductance * per_mass * half;
   push.spin_stiffness = sums.conductance * per_inertia * (turning_share(physics.block) * half);
   const Real turned = finish_step(physics.step, noise, ahead.motion, push, body);

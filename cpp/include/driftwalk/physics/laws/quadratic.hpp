@@ -15,6 +15,16 @@
 DRIFTWALK_LANES_BEGIN
 
 struct QuadraticDrag {
+  // The law of a world, and K over the world's drag_scale.
+  template <class Real>
+  static inline QuadraticDrag of(Real, Real) {
+    return {};
+  }
+  template <class Real>
+  inline Real strength(Real drag_coefficient) const {
+    return drag_coefficient;
+  }
+
   template <class Real>
   inline Real conductance(Real closing) const {
     return max(closing, Real(typename Numbers<Real>::Scalar(0)));
