@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from single_block import wrapped
+from single_block import BEYOND_PAPER, wrapped
 from twin.assembly import assemble_reference
 from twin_assembly import SIDE, Floats, study, swirl
 
@@ -138,6 +138,20 @@ def test_events_and_poses_agree(
     )  # fmt: skip
     assert run["first_contact_step"] > 0, "the blocks never met"
     assert (run["event_count"] > 0) == (latching != "none"), "nothing latched"
+
+
+@pytest.mark.parametrize("hidden", ["none", "full"])
+@pytest.mark.parametrize("law", BEYOND_PAPER)
+def test_events_and_poses_agree_beyond_the_paper_s_law(law: str, hidden: str) -> None:
+    forces = {"force_interval_s": 0.03, **BEYOND_PAPER[law]}
+    model = study(0.15, tank={"wall_friction": 0.1}, forces=forces)
+    flow = drain(model, inflow=2.0, spin=1.5)
+    key = world_key(104)
+    run = compare(
+        model, flow, start=placed(model, flow, 4, key), key=key, force_std=2e-3, steps=70,
+        latching="collision", hidden_face_drag=hidden,
+    )  # fmt: skip
+    assert run["event_count"] > 0, "nothing latched"
 
 
 TANKS: tuple[dict[str, Any], ...] = (

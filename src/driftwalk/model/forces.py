@@ -15,6 +15,9 @@ ForceStd = Annotated[float, Quantity("N", ge=0, le=10)]
 class Forces(Section):
     """Drag coefficient C_d and stochastic force F ~ N(0, σ_F² I₂), redrawn every interval.
 
+    That is the paper's law. The keys after the force interval add to it what a floating body feels;
+    with their defaults they add nothing.
+
     Examples
     --------
     >>> round(Forces().force_noise_intensity_N2_s, 12)
@@ -40,6 +43,40 @@ class Forces(Section):
             "Interval at which the stochastic force is redrawn. It is part of the "
             "model: a recording determines only sigma_F^2 * force_interval, so "
             "always state the two together."
+        ),
+    )
+
+    force_memory_s: Annotated[float, Quantity("s", ge=0, le=1e3)] = Field(
+        default=0.0,
+        title="Correlation time of the stochastic force.",
+        description=(
+            "Correlation time T of the stochastic force, 0 for none. With T > 0 a force keeps the "
+            "share k = exp(-force_interval / T) of the one before it, and 1 - k is new, with "
+            "standard deviation sigma_F: the noise intensity is still sigma_F^2 * force_interval."
+        ),
+    )
+    linear_drag_kg_s: Annotated[float, Quantity("kg/s", ge=0, le=1e4)] = Field(
+        default=0.0,
+        title="Drag of the block linear in the slip.",
+        description=(
+            "Drag k linear in the slip, in addition to the quadratic one: each of the 4 N strips, "
+            "windward or not, feels k / (4 N) times the velocity of the water relative to it."
+        ),
+    )
+    added_mass_share: Annotated[float, Quantity("1", ge=0, le=5)] = Field(
+        default=0.0,
+        title="Added mass as a share of the block's mass.",
+        description=(
+            "Added mass m_a of the water that moves along, as a share of the block's mass; the "
+            "moment of inertia grows by the same share."
+        ),
+    )
+    pressure_gradient: bool = Field(
+        default=False,
+        title="Whether water that accelerates pushes the block.",
+        description=(
+            "Whether the pressure that accelerates the water, Du/Dt, pushes the block too, by "
+            "(m + m_a) Du/Dt: a floating block displaces its own mass of water."
         ),
     )
 

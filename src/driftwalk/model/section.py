@@ -220,6 +220,8 @@ def _sentence(section: type[Section], problem: ErrorDetails) -> str:
         words = words_of(section, key)
         hint = did_you_mean(str(value), words)
         return f"{where} must be {quoted(words)}, got {value!r}{hint}"
+    if kind.startswith("bool_"):
+        return f"{where} must be true or false, got {value!r}"
     message = problem["msg"].replace("Input should be", "must be")
     return f"{where} {message}, got {value!r}"
 

@@ -121,6 +121,15 @@ class Study(Section):
         """Wetted depth d of a side face [m]."""
         return self.block.wetted_depth_m(self.water.density_kg_m3)
 
+    @property
+    def displaced_mass_kg(self) -> float:
+        """Mass m_w of the displaced water [kg]: the block's own, since it floats.
+
+        The wetted depth does not count. It is that of the drag, which depends on the product of
+        depth and drag coefficient alone, and may be stated as the paper's.
+        """
+        return self.block.mass_kg
+
     def load_options(self) -> dict[str, Any]:
         """Return the keyword arguments with which `driftwalk.record.load` reads the recording.
 

@@ -93,6 +93,8 @@ def _accepted(kind: type[Section], key: str) -> str:
     """Return unit, range and words of a parameter, in short."""
     quantity = quantity_of(kind, key) or item_quantity_of(kind, key)
     words = words_of(kind, key)
+    if kind.model_fields[key].annotation is bool:
+        return "true or false"
     parts = [_number_text(quantity)] if quantity is not None else []
     if words:
         parts.append(quoted(words))

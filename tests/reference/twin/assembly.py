@@ -252,6 +252,10 @@ def make_rules(
         flow_y=np.asarray(flow["y"].values, dtype=np.float64),
         flow_u=np.asarray(flow["u"].values, dtype=np.float64),
         flow_v=np.asarray(flow["v"].values, dtype=np.float64),
+        added_mass_share=study.forces.added_mass_share,
+        displaced_mass=study.displaced_mass_kg if study.forces.pressure_gradient else 0.0,
+        linear_drag=study.forces.linear_drag_kg_s,
+        force_memory=study.forces.force_memory_s,
     )
     return Rules(
         model,

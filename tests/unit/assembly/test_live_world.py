@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from single_block import BEYOND_PAPER
 from twin.assembly import advance, block_normals, make_rules, start_world
+from twin.block import next_force
 from twin.latch import Latch
 from twin_assembly import study as tank_study, swirl
 
@@ -214,11 +216,15 @@ def test_without_drag_forces_before_and_after_a_change_add_up() -> None:
     np.testing.assert_allclose(early + late, whole, rtol=0, atol=1e-13)
 
 
-@pytest.mark.parametrize("hidden_face_drag", ["none", "full"])
-def test_changes_are_those_of_the_twin(hidden_face_drag: Any) -> None:
+@pytest.mark.parametrize(
+    ("hidden_face_drag", "law"), [("none", "paper"), ("full", "paper"), ("none", "all")]
+)
+def test_changes_are_those_of_the_twin(hidden_face_drag: Any, law: str) -> None:
     # The NumPy twin with other rules from the same step on; two seconds, in which rounding does not
     # grow to the tolerance.
-    study = tank_study(forces={"force_interval_s": 0.03, "drag_coefficient": 0.4})
+    forces = {"force_interval_s": 0.03, "drag_coefficient": 0.4, **BEYOND_PAPER.get(law, {})}
+    connector = {"connector_distance_m": 0.02, "connector_axis_rad": 0.4}
+    study = tank_study(forces=forces, assembly=connector)
     flow = swirl(study)
     tank = dw.LiveTank(study, flow, blocks=5, seed=3, start=START)
     rules = make_rules(
@@ -233,15 +239,18 @@ def test_changes_are_those_of_the_twin(hidden_face_drag: Any) -> None:
         latch=Latch("connector", 0.02, 0.4),
     )  # fmt: skip
     tank.set(force_std=1e-3)
+    force = None
     for step in range(200):
         if step == 99:
             world.rules = changed
+        if step % 3 == 0:
+            force = next_force(rules.model, force, block_normals(key, step // 3, 5))
         if step == 98:
             tank.set(
-                drag_coefficient=1.3, force_std=4e-3, flow_scale=0.5,
+                drag_coefficient=1.3, force_std=4e-3, flow_scale=0.5, latching="connector",
                 hidden_face_drag=hidden_face_drag,
             )  # fmt: skip
-        advance(world, (4e-3 if step >= 99 else 1e-3) * block_normals(key, step // 3, 5))
+        advance(world, (4e-3 if step >= 99 else 1e-3) * force)
         tank.advance(0.01)
         pose = world.gather("pose")
         np.testing.assert_allclose(np.stack([tank.x, tank.y], axis=1), pose[:, :2], atol=1e-9)

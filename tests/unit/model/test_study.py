@@ -81,7 +81,7 @@ def _companions(key: str) -> dict[str, object]:
 
 
 def test_every_number_declares_a_unit_that_its_name_repeats() -> None:
-    suffixes = {"m", "kg", "s", "N", "rad", "Hz", "m_s", "kg_m3", "Pa_s"}
+    suffixes = {"m", "kg", "s", "N", "rad", "Hz", "m_s", "kg_m3", "kg_s", "Pa_s"}
     for name in Study.model_fields:
         kind = type(getattr(Study(), name))
         for key, field in kind.model_fields.items():
@@ -91,6 +91,32 @@ def test_every_number_declares_a_unit_that_its_name_repeats() -> None:
                 suffix = quantity.unit.replace("/", "_").replace(" ", "_")
                 assert suffix in suffixes
                 assert key.endswith(f"_{suffix}"), key
+
+
+def test_truth_values_survive_the_file_and_nothing_else_is_one() -> None:
+    for wanted in (True, False):
+        study = Study(forces={"pressure_gradient": wanted})
+        assert f"pressure_gradient = {str(wanted).lower()}" in study.to_toml()
+        assert parse_study(study.to_toml()) == study
+        assert parse_study(study_template(study)) == study
+    with pytest.raises(
+        ConfigurationError, match=r"\[forces\] pressure_gradient must be true or false, got 'maybe'"
+    ):
+        parse_study('[forces]\npressure_gradient = "maybe"\n')
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "sentence"),
+    [
+        ("added_mass_share", 5.1, "must be at most 5, got 5.1"),
+        ("added_mass_share", -0.1, "must be at least 0, got -0.1"),
+        ("linear_drag_kg_s", -1e-6, "must be at least 0 kg/s, got -1e-06"),
+        ("force_memory_s", "-1ms", "must be at least 0 s, got -1ms"),
+    ],
+)
+def test_a_force_law_beyond_its_bounds_is_refused(key: str, value: object, sentence: str) -> None:
+    with pytest.raises(ConfigurationError, match=rf"\[forces\] {key}: {sentence}"):
+        Study(forces={key: value})
 
 
 def test_study_is_frozen_and_hashable() -> None:

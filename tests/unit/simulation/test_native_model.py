@@ -38,6 +38,23 @@ def test_the_numbers_of_a_study_come_back():
     assert native.samples == 2
 
 
+def test_the_law_of_forces_of_a_study_comes_back():
+    paper = native_model(study(), dw.tank30_flow(), np.array(TIMES), Camera())
+    names = ("added_mass_share", "linear_drag", "displaced_mass", "force_memory")
+    assert [getattr(paper, name) for name in names] == [0.0] * 4
+    floating = study(
+        block={"mass_kg": 0.02},
+        forces={
+            "added_mass_share": 0.5,
+            "linear_drag_kg_s": "5g/s",
+            "pressure_gradient": True,
+            "force_memory_s": "100ms",
+        },
+    )
+    native = native_model(floating, dw.tank30_flow(), np.array(TIMES), Camera())
+    assert [getattr(native, name) for name in names] == [0.5, 0.005, 0.02, 0.1]
+
+
 @pytest.mark.parametrize("name", NUMBERS)
 def test_no_number_may_be_something_else(name: str):
     missing = "is missing or not a number"
@@ -55,6 +72,10 @@ def test_no_number_may_be_something_else(name: str):
     ("change", "sentence"),
     [
         ({"depth": 0.0}, r"depth \[m\] must be finite and positive, not 0"),
+        ({"added_mass_share": -0.1}, r"added_mass_share \[1\] must be finite and not negative"),
+        ({"linear_drag": -1e-9}, r"linear_drag \[kg/s\] must be finite and not negative"),
+        ({"displaced_mass": -0.01}, r"displaced_mass \[kg\] must be finite and not negative"),
+        ({"force_memory": -0.01}, r"force_memory \[s\] must be finite and not negative"),
         ({"strips": 0}, r"strips \[1\] must be finite and positive, not 0"),
         ({"friction": -0.1}, r"friction \[1\] must be finite and not negative, not -0.1"),
         ({"restitution": 1.01}, r"restitution \[1\] must be from 0 to 1, not 1.01"),
