@@ -90,7 +90,7 @@ def ks_matrix(
     threads: int,
 ) -> _Floats: ...
 
-# Force x, y [N] and torque [N m].
+# Drag force x, y [N] and torque [N m], the linear part included.
 def drag(
     model: Model,
     *,

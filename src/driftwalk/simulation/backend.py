@@ -66,7 +66,7 @@ def native_model(
     _check_sample_time(sample_time)
     tank, forces = study.tank, study.forces
     x, y = flow["x"].values, flow["y"].values
-    _require_table(flow, tank)
+    _require_table(flow, tank, accelerating=forces.pressure_gradient)
     step = study.time_step_s
     return _core.Model(
         side=study.block.side_m,
@@ -110,8 +110,11 @@ def _check_sample_time(time: Floats) -> None:
         )
 
 
-def _require_table(flow: xr.Dataset, tank: Outline) -> None:
-    """Refuse a grid so fine that its table, which reaches to the wall, would not fit."""
+def _require_table(flow: xr.Dataset, tank: Outline, *, accelerating: bool) -> None:
+    """Refuse a grid so fine that its tables, which reach to the wall, would not fit.
+
+    The water's acceleration has one table for each frame and two for each step between frames.
+    """
     width, height = tank.extent_m
     sides = []
     for axis, extent in (("x", width), ("y", height)):
@@ -119,12 +122,14 @@ def _require_table(flow: xr.Dataset, tank: Outline) -> None:
         spacing = (nodes[-1] - nodes[0]) / (nodes.size - 1)
         sides.append(nodes.size + 2.0 * extent / spacing)
     frames = flow.sizes.get("time", 1)
-    if max(sides) > MOST_NODES_PER_SIDE or frames * sides[0] * sides[1] > MOST_NODES:
+    tables = 4 * frames - 2 if accelerating else frames
+    if max(sides) > MOST_NODES_PER_SIDE or tables * sides[0] * sides[1] > MOST_NODES:
+        of_water = f" (with the water's acceleration {tables} tables)" if accelerating else ""
         raise InputError(
             f"the flow field's grid is too fine for the tank: {sides[0]:.0f} x {sides[1]:.0f} "
-            f"nodes and {frames} frames would reach its wall, at most {MOST_NODES_PER_SIDE} a side "
-            f"and {MOST_NODES:.0e} in all are possible; use a coarser grid (a block feels nothing "
-            "much finer than its strips)"
+            f"nodes and {frames} frames{of_water} would reach its wall, at most "
+            f"{MOST_NODES_PER_SIDE} a side and {MOST_NODES:.0e} in all are possible; use a coarser "
+            "grid (a block feels nothing much finer than its strips)"
         )
 
 

@@ -39,7 +39,7 @@ def simulate(
 
     Drag on vertical strips of the four side faces (Eq. 2 of the paper, windward strips), a
     stochastic force N(0, sigma_F^2 I) on the centre of mass redrawn every force interval, and
-    impacts on the wall. Second order in time.
+    impacts on the wall; what [forces] of the study adds to that law. Second order in time.
 
     Parameters
     ----------

@@ -84,6 +84,15 @@ def test_a_grid_too_fine_for_the_tank_is_refused():
         dw.simulate(dw.Study(), fine, sample_time=[0.0, 0.1])
 
 
+def test_the_water_s_acceleration_counts_as_tables_too():
+    # 6,002 nodes a side fit once, but not twice.
+    fine = dw.tank30_flow().isel(x=slice(0, 2), y=slice(0, 2))
+    fine = fine.assign_coords(x=[0.0, 1e-4], y=[0.0, 1e-4])
+    pushed = dw.Study(forces={"pressure_gradient": True})
+    with pytest.raises(InputError, match=r"1 frames \(with the water's acceleration 2 tables\)"):
+        dw.simulate(pushed, fine, sample_time=[0.0, 0.1])
+
+
 @pytest.mark.parametrize("seed", [-1, 2**63])
 def test_a_seed_out_of_range_is_refused(seed):
     with pytest.raises(InputError, match="seed"):
