@@ -32,6 +32,14 @@ struct Tank {
     model.steps_per_interval = 1;
   }
 
+  // All that a floating body feels beyond the paper's law. A share of 1 is exact in ratios.
+  void let_float() {
+    model.added_mass_share = 1;
+    model.displaced_mass = model.mass;
+    model.linear_drag = 4e-3;
+    model.force_memory = 0.05;
+  }
+
   template <class Velocity>
   void set_flow(const Velocity& velocity) {
     u.clear();

@@ -79,8 +79,7 @@ struct Look {
 
 // --- the same bits as a whole run ---
 
-void check_same_as_whole_runs(int blocks, Latching latching) {
-  Tank tank;
+void check_same_as_whole_runs(Tank tank, int blocks, Latching latching) {
   tank.model.radius = 0.03 * std::sqrt(blocks + 3.0);
   tank.model.steps_per_interval = 3;
   tank.set_flow(swirl);
@@ -437,8 +436,11 @@ void check_any_sequence() {
 int main() {
   for (const Latching latching : {Latching::none, Latching::collision, Latching::connector}) {
     for (const int blocks : {1, 4, 30}) {
-      check_same_as_whole_runs(blocks, latching);
+      check_same_as_whole_runs(Tank(), blocks, latching);
     }
+    Tank floating;
+    floating.let_float();
+    check_same_as_whole_runs(floating, 4, latching);
   }
   check_removal();
   check_parting();

@@ -199,8 +199,7 @@ void check_equal_frames() {
 }
 
 // The same bits on every instruction set of this machine.
-void check_instruction_sets() {
-  Tank tank;
+void check_instruction_sets(Tank tank) {
   tank.set_flow(swirl);
   tank.sample_every(0.1, 101);
   tank.model.position_noise = 1e-4;
@@ -216,6 +215,10 @@ void check_instruction_sets() {
       CHECK(paths.x == baseline.x && paths.y == baseline.y && paths.theta == baseline.theta);
     }
   }
+  unsetenv("DRIFTWALK_INSTRUCTION_SET");
+}
+
+void check_unknown_instruction_set() {
   setenv("DRIFTWALK_INSTRUCTION_SET", "quantum", 1);
   bool refused = false;
   try {
@@ -236,6 +239,10 @@ int main() {
   check_rounding_keeps_failures();
   check_start_angle();
   check_equal_frames();
-  check_instruction_sets();
+  Tank floating;
+  floating.let_float();
+  check_instruction_sets(Tank());
+  check_instruction_sets(floating);
+  check_unknown_instruction_set();
   return check::result();
 }

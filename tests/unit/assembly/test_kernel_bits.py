@@ -25,7 +25,7 @@ def changing_model(times: Any, **changes: Any) -> _core.Model:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("law", ["paper", "linear drag", "memory"])
+@pytest.mark.parametrize("law", ["paper", *BEYOND_PAPER])
 @pytest.mark.parametrize("precision", ["single", "double"])
 def test_one_block_in_a_changing_flow_is_the_one_block_kernel(precision: str, law: str) -> None:
     steps = 150
