@@ -15,6 +15,13 @@ import driftwalk as dw
 from driftwalk import _core
 from driftwalk.model import Study, apply_overrides
 
+FLOATING = {
+    "forces.added_mass_share": 0.5,
+    "forces.pressure_gradient": True,
+    "forces.linear_drag_kg_s": 5e-3,
+    "forces.force_memory_s": 0.1,
+}
+
 
 def tell(name: str, dataset: xr.Dataset) -> None:
     """Print the attributes in full, of each variable the first number and a digest of all."""
@@ -44,7 +51,9 @@ def main() -> None:
         path = dw.simulate(study, flow, sample_time=recording["time"].values, seed=1)
         tell("simulate", path)
         tell("compare", dw.compare(recording, path.isel(replicate=0)))
-        tell("assemble", dw.assemble(study, flow, blocks=4, runs=20, duration=60.0, seed=1))
+        for name, chosen in (("", study), (" floating", apply_overrides(study, FLOATING))):
+            found = dw.assemble(chosen, flow, blocks=4, runs=20, duration=60.0, seed=1)
+            tell(f"assemble{name}", found)
 
 
 if __name__ == "__main__":
