@@ -106,12 +106,30 @@ inline Planar acceleration_at(const Case& c, double x, double y) {
           (here.x * (right.y - left.y) + here.y * (above.y - below.y)) / (2 * h)};
 }
 
-// Half the curl of that acceleration: how fast the water around the block gains spin [rad/s^2].
-inline double spin_gain_at(const Case& c, double x, double y) {
-  const double h = c.spacing;
-  const double across = acceleration_at(c, x + h, y).y - acceleration_at(c, x - h, y).y;
-  const double along = acceleration_at(c, x, y + h).x - acceleration_at(c, x, y - h).x;
-  return (across - along) / (4 * h);
+// What the water's own acceleration does to a block that it carries along: its mean over the block,
+// and the spin that the block gains [rad/s^2]. Taken on a lattice that turns with the block.
+struct Carried {
+  Planar acceleration;
+  double spin_gain;
+};
+
+inline Carried carried_at(const Case& c, double x, double y, double cosine, double sine) {
+  constexpr int points = 4;
+  Carried sum{{0, 0}, 0};
+  double square = 0;
+  for (int i = 0; i < points; ++i) {
+    for (int j = 0; j < points; ++j) {
+      const double a = ((i + 0.5) / points - 0.5) * c.side, b = ((j + 0.5) / points - 0.5) * c.side;
+      const double rx = a * cosine - b * sine, ry = a * sine + b * cosine;
+      const Planar here = acceleration_at(c, x + rx, y + ry);
+      sum.acceleration.x += here.x / (points * points);
+      sum.acceleration.y += here.y / (points * points);
+      sum.spin_gain += rx * here.y - ry * here.x;
+      square += rx * rx + ry * ry;
+    }
+  }
+  sum.spin_gain /= square;
+  return sum;
 }
 
 inline double strength_at(const Law& law, double time) {
@@ -264,15 +282,13 @@ public:
     for (const dBodyID body : bodies_) {
       const State s = state_of(body);
       const Wrench w = drag(c_, start->drag_coefficient, s, strength);
-      if (c_.law.pressure_gradient != 0) {
-        const Planar a = acceleration_at(c_, s.x, s.y);
-        const double mass = c_.law.pressure_gradient * c_.mass * (1 + c_.law.added_mass);
-        dBodyAddForce(body, mass * strength * strength * a.x, mass * strength * strength * a.y, 0);
-      }
-      if (c_.law.water_spin != 0) {
-        const double inertia = c_.mass * (1 + c_.law.added_mass) * c_.side * c_.side / 6;
-        const double gain = strength * strength * spin_gain_at(c_, s.x, s.y);
-        dBodyAddTorque(body, 0, 0, c_.law.water_spin * inertia * gain);
+      if (c_.law.pressure_gradient != 0 || c_.law.water_spin != 0) {
+        const Carried push = carried_at(c_, s.x, s.y, s.cosine, s.sine);
+        const double mass = c_.mass * (1 + c_.law.added_mass) * strength * strength;
+        const double force = mass * c_.law.pressure_gradient;
+        const double torque = mass * c_.side * c_.side / 6 * c_.law.water_spin;
+        dBodyAddForce(body, force * push.acceleration.x, force * push.acceleration.y, 0);
+        dBodyAddTorque(body, 0, 0, torque * push.spin_gain);
       }
       const double noise_x = noise() * start->force_std, noise_y = noise() * start->force_std;
       dBodyAddForce(body, w.x + noise_x, w.y + noise_y, 0);
