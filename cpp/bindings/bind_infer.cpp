@@ -3,9 +3,11 @@
 
 #include "driftwalk/infer/innovations.hpp"
 
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 
 #include <algorithm>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -32,14 +34,14 @@ driftwalk::Angle angle_of(const std::string& orientation) {
 DragModel drag_model(double side, double mass, double depth, int strips, double water_density,
                      double origin_x, double origin_y, double spacing, int columns, int rows,
                      const In<double, 3>& coefficients, double drag_coefficient,
-                     const std::string& orientation) {
+                     const std::string& orientation, const driftwalk::ForceLaw& law) {
   if (coefficients.shape(0) != 2 || coefficients.shape(1) != std::size_t(rows) ||
       coefficients.shape(2) != std::size_t(columns)) {
     throw std::invalid_argument("coefficients must have shape (2, rows, columns)");
   }
   return DragModel({side, mass, depth, strips, water_density},
                    {nullptr, origin_x, origin_y, spacing, columns, rows}, coefficients.data(),
-                   drag_coefficient, angle_of(orientation));
+                   drag_coefficient, angle_of(orientation), law);
 }
 
 // Left as it comes: the filter writes every number of it, and the Jacobian is large.
@@ -139,10 +141,12 @@ nb::dict expected_drag(double side, double mass, double depth, int strips, doubl
                        double origin_x, double origin_y, double spacing, int columns, int rows,
                        const In<double, 3>& coefficients, double drag_coefficient,
                        const std::string& orientation, const In<double, 1>& mean, double theta,
-                       double omega, const In<double, 2>& covariance) {
+                       double omega, const In<double, 2>& covariance, double quadratic,
+                       double linear, double water_acceleration, double water_spin) {
   const DragModel model =
       drag_model(side, mass, depth, strips, water_density, origin_x, origin_y, spacing, columns,
-                 rows, coefficients, drag_coefficient, orientation);
+                 rows, coefficients, drag_coefficient, orientation,
+                 {quadratic, linear, water_acceleration, water_spin});
   return model.angle() == driftwalk::Angle::state
              ? response_of<3>(model, coefficients, mean, theta, omega, covariance)
              : response_of<2>(model, coefficients, mean, theta, omega, covariance);
@@ -161,19 +165,24 @@ void register_infer(nb::module_& module) {
              double origin_y, double spacing, int columns, int rows, In<double, 3> coefficients,
              double drag_coefficient, double noise_intensity, double position_noise,
              double force_lever, double angle_noise, double largest_step, double longest_gap,
-             const std::string& orientation, bool sensitivities) {
+             const std::string& orientation, bool sensitivities,
+             const std::optional<In<double, 1>>& strength, double quadratic, double linear,
+             double water_acceleration, double water_spin, double time_noise, double force_memory) {
             const std::size_t n = time.size();
             if (x.size() != n || y.size() != n || theta.size() != n || omega.size() != n ||
-                excluded.size() != n) {
-              throw std::invalid_argument("time, x, y, theta, omega and excluded differ in length");
+                excluded.size() != n || (strength && strength->size() != n)) {
+              throw std::invalid_argument(
+                  "time, x, y, theta, omega, excluded and strength differ in length");
             }
             new (self) InnovationsFilter(
-                {time.data(), x.data(), y.data(), theta.data(), omega.data(), excluded.data(),
+                {time.data(), x.data(), y.data(), theta.data(), omega.data(),
+                 strength ? strength->data() : nullptr, excluded.data(),
                  static_cast<std::int64_t>(n)},
                 drag_model(side, mass, depth, strips, water_density, origin_x, origin_y, spacing,
-                           columns, rows, coefficients, drag_coefficient, orientation),
+                           columns, rows, coefficients, drag_coefficient, orientation,
+                           {quadratic, linear, water_acceleration, water_spin}),
                 {noise_intensity, position_noise, force_lever, angle_noise, largest_step,
-                 longest_gap},
+                 longest_gap, time_noise, force_memory},
                 sensitivities);
           },
           "time"_a, "x"_a, "y"_a, "theta"_a, "omega"_a, "excluded"_a, nb::kw_only(), "side"_a,
@@ -181,7 +190,9 @@ void register_infer(nb::module_& module) {
           "spacing"_a, "columns"_a, "rows"_a, "coefficients"_a, "drag_coefficient"_a,
           "noise_intensity"_a, "position_noise"_a, "force_lever"_a = 0.0, "angle_noise"_a = 0.01,
           "largest_step"_a = 0.05, "longest_gap"_a = 1.0, "orientation"_a = "given",
-          "sensitivities"_a = false)
+          "sensitivities"_a = false, "strength"_a = nb::none(), "quadratic"_a = 1.0,
+          "linear"_a = 0.0, "water_acceleration"_a = 0.0, "water_spin"_a = 0.0,
+          "time_noise"_a = 0.0, "force_memory"_a = 0.0)
       .def_prop_ro("samples", &InnovationsFilter::samples)
       .def_prop_ro("remaining", &InnovationsFilter::remaining)
       .def_prop_ro("parameters", &InnovationsFilter::parameters)
@@ -191,5 +202,6 @@ void register_infer(nb::module_& module) {
   module.def("expected_drag", &expected_drag, nb::kw_only(), "side"_a, "mass"_a, "depth"_a,
              "strips"_a, "water_density"_a, "origin_x"_a, "origin_y"_a, "spacing"_a, "columns"_a,
              "rows"_a, "coefficients"_a, "drag_coefficient"_a, "orientation"_a, "mean"_a, "theta"_a,
-             "omega"_a, "covariance"_a);
+             "omega"_a, "covariance"_a, "quadratic"_a = 1.0, "linear"_a = 0.0,
+             "water_acceleration"_a = 0.0, "water_spin"_a = 0.0);
 }

@@ -37,6 +37,8 @@ void check(const Track& track, Angle angle) {
     require(!std::isinf(track.x[k]) && !std::isinf(track.y[k]),
             "positions must be finite, or NaN where a sample is missing");
   }
+  require(track.strength == nullptr || all_finite(track.strength, track.samples),
+          "the strength of the flow must be finite");
   if (angle == Angle::given) {
     require(all_finite(track.theta, track.samples) && all_finite(track.omega, track.samples),
             "angles and their rates must be finite, missing samples included: interpolate them");
@@ -64,13 +66,16 @@ InferKernel chosen_infer_kernel() {
 }
 
 DragModel::DragModel(const FloatingBlock& block, const SplineView& flow, const double* coefficients,
-                     double drag_coefficient, Angle angle)
-    : flow_(flow), angle_(angle) {
+                     double drag_coefficient, Angle angle, const ForceLaw& law)
+    : flow_(flow), law_(law), angle_(angle) {
   require(positive(block.side) && positive(block.mass) && positive(block.depth) &&
               positive(block.water_density),
           "side, mass, depth and water density must be positive");
   require(block.strips >= 1, "a side has at least one strip");
   require(positive(drag_coefficient), "the drag coefficient must be positive");
+  require(std::isfinite(law.quadratic) && std::isfinite(law.linear) &&
+              std::isfinite(law.water_acceleration) && std::isfinite(law.water_spin),
+          "the numbers of the force law must be finite");
   require(positive(flow.spacing) && std::isfinite(flow.origin_x) && std::isfinite(flow.origin_y),
           "the flow's spacing must be positive and its origin finite");
   require(flow.rows >= 4 && flow.columns >= 4, "a bicubic flow needs at least 4 rows and columns");
@@ -99,6 +104,7 @@ FilterProblem DragModel::problem() const {
   problem.flow = flow_;
   problem.flow.nodes = nodes_.data();
   problem.block = block_;
+  problem.law = law_;
   problem.orientations = {cosine_.data(), sine_.data(), angle_ == Angle::none ? orientations : 0};
   return problem;
 }
@@ -122,9 +128,11 @@ template <int D>
 DragResponse<D> DragModel::drag(double theta, double omega, const double* mean,
                                 const double (*covariance)[2 * D], double* by_coefficients) const {
   std::vector<StripShare<D>> room(by_coefficients == nullptr ? 0 : std::size_t(shares()));
+  std::vector<PointShare<D>> points(room.empty() ? 0 : std::size_t(water_points));
   const InferKernel kernel = chosen_infer_kernel();
   return kernel_of<D>(kernel).drag(problem(), theta, omega, mean, covariance,
-                                   room.empty() ? nullptr : room.data(), by_coefficients);
+                                   room.empty() ? nullptr : room.data(),
+                                   room.empty() ? nullptr : points.data(), by_coefficients);
 }
 template DragResponse<2> DragModel::drag(double, double, const double*, const double (*)[4],
                                          double*) const;
@@ -138,6 +146,10 @@ InnovationsFilter::InnovationsFilter(const Track& track, DragModel model,
           "the noise intensity must not be negative");
   require(positive(settings.position_noise), "the position noise must be positive");
   require(positive(settings.largest_step), "the largest step must be positive");
+  require(std::isfinite(settings.time_noise) && settings.time_noise >= 0,
+          "the noise of the time stamps must not be negative");
+  require(std::isfinite(settings.force_memory) && settings.force_memory >= 0,
+          "the memory of the force must not be negative");
   require(settings.longest_gap > 0, "the longest gap must be positive");
   require(settings.longest_gap / settings.largest_step <= 1e6,
           "the longest gap must not be above a million of the largest steps");
@@ -149,8 +161,10 @@ InnovationsFilter::InnovationsFilter(const Track& track, DragModel model,
   problem_.variance[0] = problem_.variance[1] = position;
   problem_.largest_step = settings.largest_step;
   problem_.longest_gap = settings.longest_gap;
+  problem_.time_variance = settings.time_noise * settings.time_noise;
+  problem_.force_memory = settings.force_memory;
   if (model_.angle() != Angle::state) {
-    make_memory<2>();
+    make_memory_for<2>(settings.force_memory);
     return;
   }
   require(std::isfinite(settings.force_lever) && settings.force_lever >= 0,
@@ -159,20 +173,31 @@ InnovationsFilter::InnovationsFilter(const Track& track, DragModel model,
   const double per_inertia = problem_.block.mass_by_inertia * settings.force_lever;
   problem_.intensity[2] = q * per_inertia * per_inertia;
   problem_.variance[2] = settings.angle_noise * settings.angle_noise;
-  make_memory<3>();
+  make_memory_for<3>(settings.force_memory);
 }
 
 template <int D>
+void InnovationsFilter::make_memory_for(double force_memory) {
+  if (force_memory > 0) {
+    make_memory<D, 2>();
+  } else {
+    make_memory<D, 0>();
+  }
+}
+
+template <int D, int F>
 void InnovationsFilter::make_memory() {
-  Memory<D>& memory = memory_.emplace<Memory<D>>();
+  Memory<D, F>& memory = memory_.emplace<Memory<D, F>>();
   memory.state = {};
   memory.scratch = {};
   if (sensitivities_) {
     memory.shares.resize(std::size_t(model_.shares()));
     memory.scratch.shares = memory.shares.data();
+    memory.points.resize(std::size_t(water_points));
+    memory.scratch.points = memory.points.data();
     memory.scratch.parameters = parameters();
     memory.scratch.stride = (parameters() + 7) / 8 * 8;
-    memory.sensitivity.assign(std::size_t(2 * D * memory.scratch.stride), 0.0);
+    memory.sensitivity.assign(std::size_t((2 * D + F) * memory.scratch.stride), 0.0);
     memory.row.resize(std::size_t(D * memory.scratch.stride));
     memory.touched.assign(std::size_t(memory.scratch.stride / 8), 0);
     memory.active.resize(std::size_t(memory.scratch.stride / 8));
@@ -188,10 +213,19 @@ void InnovationsFilter::copy(const Track& track) {
   for (const double* column : columns) {
     track_.insert(track_.end(), column, column + track.samples);
   }
-  excluded_.assign(track.excluded, track.excluded + track.samples);
-  const double* const first = track_.data();
   const std::int64_t n = track.samples;
-  problem_.track = {first, first + n, first + 2 * n, first + 3 * n, first + 4 * n, excluded_.data(),
+  if (track.strength != nullptr) {
+    track_.insert(track_.end(), track.strength, track.strength + n);
+  }
+  excluded_.assign(track.excluded, track.excluded + n);
+  const double* const first = track_.data();
+  problem_.track = {first,
+                    first + n,
+                    first + 2 * n,
+                    first + 3 * n,
+                    first + 4 * n,
+                    track.strength == nullptr ? nullptr : first + 5 * n,
+                    excluded_.data(),
                     n};
 }
 
@@ -207,8 +241,13 @@ void InnovationsFilter::run(std::int64_t count, const FilterOutputs& out, const 
   const InferKernel kernel = chosen_infer_kernel();
   const std::int64_t now = std::min(count, remaining());
   std::visit(
-      [&]<int D>(Memory<D>& memory) {
-        kernel_of<D>(kernel).run(problem_, memory.state, memory.scratch, out, sums, now);
+      [&]<int D, int F>(Memory<D, F>& memory) {
+        if constexpr (F == 2) {
+          kernel_of<D>(kernel).run_with_memory(problem_, memory.state, memory.scratch, out, sums,
+                                               now);
+        } else {
+          kernel_of<D>(kernel).run(problem_, memory.state, memory.scratch, out, sums, now);
+        }
       },
       memory_);
 }

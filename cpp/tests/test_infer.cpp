@@ -218,13 +218,8 @@ struct Circle {
     }
   }
   driftwalk::Track view() const {
-    return {time.data(),
-            x.data(),
-            y.data(),
-            theta.data(),
-            omega.data(),
-            excluded.data(),
-            std::int64_t(time.size())};
+    return {time.data(),  x.data(), y.data(),        theta.data(),
+            omega.data(), nullptr,  excluded.data(), std::int64_t(time.size())};
   }
 };
 

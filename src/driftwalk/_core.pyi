@@ -173,7 +173,10 @@ class InnovationsFilter:
     # orientation: "given": theta [rad], without jumps by 2 pi, and omega [rad/s] are inputs, finite
     # everywhere; "none": the drag is averaged over the angle; "state": theta is measured like x and
     # y, NaN where missing, with angle_noise [rad], and the force acts force_lever [m] from the
-    # centre.
+    # centre. strength: of the flow at the samples, 1 without. quadratic, linear [m/s]: a strip's
+    # drag is K (quadratic max(0, closing) + linear) times its slip. water_acceleration and
+    # water_spin: how strongly Du/Dt and half its curl push the block, 0 or 1. time_noise: of the
+    # stamps [s]. force_memory: correlation time of the force [s].
     def __init__(
         self,
         time: _Floats,
@@ -203,6 +206,13 @@ class InnovationsFilter:
         longest_gap: float = 1.0,
         orientation: str = "given",
         sensitivities: bool = False,
+        strength: _Floats | None = None,
+        quadratic: float = 1.0,
+        linear: float = 0.0,
+        water_acceleration: float = 0.0,
+        water_spin: float = 0.0,
+        time_noise: float = 0.0,
+        force_memory: float = 0.0,
     ) -> None: ...
     @property
     def samples(self) -> int: ...
@@ -248,4 +258,8 @@ def expected_drag(
     theta: float,
     omega: float,
     covariance: _Floats,
+    quadratic: float = 1.0,
+    linear: float = 0.0,
+    water_acceleration: float = 0.0,
+    water_spin: float = 0.0,
 ) -> dict[str, _Floats]: ...

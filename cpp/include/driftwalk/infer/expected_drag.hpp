@@ -23,6 +23,8 @@ template <int D>
 struct UncertainBlock {
   double x, y, vx, vy, omega;
   const double (*covariance)[2 * D]; // symmetric
+  double strength = 1;               // of the flow
+  double strength_rate = 0;          // its derivative [1/s]
 };
 
 struct Side {
@@ -78,16 +80,16 @@ inline void add_bend(const Eight (&closing)[D], const Eight (&slip)[D], const St
 }
 
 template <int D>
-inline void keep_shares(const StripsOnGrid& grid, const Eight (&response)[D][2], Eight::Mask part,
-                        StripShare<D>* shares, int& count) {
+inline void keep_shares(const StripsOnGrid& grid, const Eight (&response)[D][2], double strength,
+                        Eight::Mask part, StripShare<D>* shares, int& count) {
   for (int lane = 0; lane < 8; ++lane) {
     if (!part[lane]) {
       continue;
     }
     StripShare<D>& share = shares[count++];
     for (int a = 0; a < D; ++a) {
-      share.response[a][0] = response[a][0][lane];
-      share.response[a][1] = response[a][1][lane];
+      share.response[a][0] = strength * response[a][0][lane];
+      share.response[a][1] = strength * response[a][1][lane];
     }
     for (int k = 0; k < 4; ++k) {
       share.weight_y[k] = grid.weight_y[k][lane];
@@ -110,7 +112,11 @@ inline void add_strips(const Law& law, const SplineView& flow, const StripBlock&
   const Eight offset = (select(real, strip, Eight(0)) + 0.5) * block.strip_width - h;
   const Eight arm_x = nx * h + tx * offset, arm_y = ny * h + ty * offset;
   StripsOnGrid grid;
-  const FlowAtStrips at = flow_at_strips(flow, state.x + arm_x, state.y + arm_y, grid);
+  FlowAtStrips at = flow_at_strips(flow, state.x + arm_x, state.y + arm_y, grid);
+  Eight* const numbers[] = {&at.u, &at.v, &at.u_x, &at.u_y, &at.v_x, &at.v_y};
+  for (Eight* number : numbers) {
+    *number *= state.strength;
+  }
   const Eight wx = at.u - (state.vx - state.omega * arm_y);
   const Eight wy = at.v - (state.vy + state.omega * arm_x);
   // q of the head of this file.
@@ -191,7 +197,7 @@ inline void add_strips(const Law& law, const SplineView& flow, const StripBlock&
   }
   add_bend<D>(closing_by, slip_by, m, by_force, by_slip, sums);
   if (shares != nullptr) {
-    keep_shares<D>(grid, response, part, shares, count);
+    keep_shares<D>(grid, response, state.strength, part, shares, count);
   }
 }
 
@@ -228,7 +234,7 @@ inline DragResponse<D> expected_drag(const Law& law, const SplineView& flow,
     }
   }
   DragResponse<D> response;
-  response.shares = 0;
+  response.shares = response.points = 0;
   if (orientations.count == 0) {
     add_orientation<D>(law, flow, block, state, __builtin_cos(theta), __builtin_sin(theta),
                        block.drag_scale, sums, shares, response.shares);
@@ -240,7 +246,7 @@ inline DragResponse<D> expected_drag(const Law& law, const SplineView& flow,
                        block.drag_scale / orientations.count, sums, shares, response.shares);
   }
   for (int a = 0; a < D; ++a) {
-    response.acceleration[a] = sum(sums.acceleration[a]);
+    response.acceleration[a] = response.drag[a] = sum(sums.acceleration[a]);
     for (int b = 0; b < D; ++b) {
       response.by_position[a][b] = sum(sums.by_position[a][b]);
       response.by_velocity[a][b] = sum(sums.by_velocity[a][b]);

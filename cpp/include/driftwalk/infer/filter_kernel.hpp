@@ -1,5 +1,6 @@
 // The innovations filter on one instruction set: an extended Kalman filter on the samples of a
-// track, of (x, y, vx, vy) with the angle an input, or of (x, y, theta, vx, vy, omega).
+// track, of (x, y, vx, vy) with the angle an input, or of (x, y, theta, vx, vy, omega). With F = 2
+// the force on the centre remembers, and its acceleration is a part of the state too.
 //
 // Between samples the state goes in equal steps not above the largest one, each a half drift, a
 // kick by the mean drag over the covariance at its middle, and a half drift.
@@ -9,6 +10,7 @@
 #include "driftwalk/infer/kalman.hpp"
 #include "driftwalk/infer/products.hpp"
 #include "driftwalk/infer/sensitivity.hpp"
+#include "driftwalk/infer/water_acceleration.hpp"
 
 DRIFTWALK_LANES_BEGIN
 
@@ -26,11 +28,11 @@ inline constexpr int most_outliers = 2;
 inline constexpr double variance_of_nothing = 1e12;
 inline constexpr double full_turn = 6.283185307179586;
 
-template <int D, DragLawWithMoments Law>
+template <int D, int F, DragLawWithMoments Law>
 class FilterRun {
 public:
   // With sums derivatives are added up there instead of handed out.
-  FilterRun(const Law& law, const FilterProblem& problem, FilterState<D>& state,
+  FilterRun(const Law& law, const FilterProblem& problem, FilterState<D, F>& state,
             const FilterScratch<D>& scratch, const FilterOutputs& out, const ProductSums* sums)
       : law_(law), problem_(problem), track_(problem.track), state_(state), scratch_(scratch),
         out_(out), sensitivity_(scratch), sums_(sums),
@@ -114,6 +116,11 @@ private:
       state_.covariance[a][a] = problem_.variance[a];
       state_.covariance[a + D][a + D] = unknown_velocity(a) * unknown_velocity(a);
     }
+    if constexpr (F == 2) {
+      for (int f = 2 * D; f < 2 * D + 2; ++f) {
+        state_.covariance[f][f] = problem_.intensity[0] / (2 * problem_.force_memory);
+      }
+    }
     if (with_sensitivities()) {
       sensitivity_.clear();
     }
@@ -143,14 +150,24 @@ private:
     drift_mean(state_, h / 2);
     drift_covariance(state_, h / 2);
     Square<2 * D> middle;
-    __builtin_memcpy(middle, state_.covariance, sizeof middle);
-    for (int a = 0; a < D; ++a) {
-      middle[a + D][a + D] += problem_.intensity[a] * h / 2;
+    for (int a = 0; a < 2 * D; ++a) {
+      for (int b = 0; b < 2 * D; ++b) {
+        middle[a][b] = state_.covariance[a][b];
+      }
     }
-    const DragResponse<D> drag = drag_at(middle, k, share);
-    const Kick<D> kick = make_kick(drag, h);
+    for (int a = 0; a < D; ++a) {
+      middle[a + D][a + D] += white_intensity(a) * h / 2;
+    }
+    if constexpr (F == 2) {
+      add_half_push(middle, h / 2);
+    }
+    const DragResponse<D> drag = response_at(middle, k, share);
+    Kick<D> kick = make_kick(drag, h);
     for (int a = 0; a < D; ++a) {
       state_.mean[a + D] += kick.change[a];
+    }
+    if constexpr (F == 2) {
+      remember(kick, h);
     }
     drift_mean(state_, h / 2);
     kick_covariance(state_, kick);
@@ -163,18 +180,65 @@ private:
       for (int b = 0; b < D; ++b) {
         intensity[a][b] *= interval;
       }
-      intensity[a][a] += problem_.intensity[a];
+      intensity[a][a] += white_intensity(a);
     }
     add_noise<D>(state_, kick.inverse, intensity, h);
+    if constexpr (F == 2) {
+      add_memory_noise<D>(state_, kick.inverse, problem_.intensity[0], h, problem_.force_memory);
+    }
     if (with_sensitivities()) {
       sensitivity_.drift_and_kick(sensitivity_drift, kick);
-      sensitivity_.add_flow(scratch_.shares, drag.shares, problem_.flow.columns, kick, h);
+      sensitivity_.add_flow(scratch_, drag, problem_.flow.columns, kick, h);
     }
   }
 
-  DragResponse<D> drag_at(const Square<2 * D>& covariance, std::int64_t k, double share) const {
+  // Of what has no memory.
+  double white_intensity(int a) const { return F == 2 && a < 2 ? 0 : problem_.intensity[a]; }
+
+  // What the remembered force does to the velocities' covariance in a time h.
+  void add_half_push(Square<2 * D>& covariance, double h) const {
+    const double memory = problem_.force_memory;
+    const double time = memory * (1 - __builtin_exp(-h / memory));
+    const Square<2 * D + F>& P = state_.covariance;
+    for (int a = 0; a < 2; ++a) {
+      for (int b = 0; b < 2; ++b) {
+        covariance[a + D][b + D] += time * (P[a + D][b + 2 * D] + P[a + 2 * D][b + D]) +
+                                    time * time * P[a + 2 * D][b + 2 * D];
+      }
+      covariance[a + D][a + D] += problem_.intensity[0] * memory_noise(h, memory).vv;
+    }
+  }
+
+  // Takes the mean through what the remembered force does in a step, and completes the kick.
+  void remember(Kick<D>& kick, double h) {
+    const double memory = problem_.force_memory;
+    kick.force_kept = __builtin_exp(-h / memory);
+    kick.force_time = memory * (1 - kick.force_kept);
+    kick.force_lag = memory * (h - kick.force_time) - h / 2 * kick.force_time;
+    double force[2], coordinates[D], velocities[D];
+    for (int f = 0; f < 2; ++f) {
+      force[f] = state_.mean[2 * D + f];
+      state_.mean[2 * D + f] *= kick.force_kept;
+    }
+    for (int a = 0; a < D; ++a) {
+      coordinates[a] = state_.mean[a];
+      velocities[a] = state_.mean[a + D];
+    }
+    push_linear<D, double>(kick, force, coordinates, velocities);
+    for (int a = 0; a < D; ++a) {
+      state_.mean[a] = coordinates[a];
+      state_.mean[a + D] = velocities[a];
+    }
+  }
+
+  DragResponse<D> response_at(const Square<2 * D>& covariance, std::int64_t k, double share) const {
     UncertainBlock<D> block{state_.mean[0], state_.mean[1], state_.mean[D], state_.mean[D + 1], 0,
                             covariance};
+    if (track_.strength != nullptr) {
+      const double before = track_.strength[k - 1], after = track_.strength[k];
+      block.strength = before + (after - before) * share;
+      block.strength_rate = (after - before) / (track_.time[k] - track_.time[k - 1]);
+    }
     double theta;
     if constexpr (D == 3) {
       theta = state_.mean[2];
@@ -184,13 +248,17 @@ private:
       theta = angle[-1] + (angle[0] - angle[-1]) * share;
       block.omega = spin[-1] + (spin[0] - spin[-1]) * share;
     }
-    return expected_drag<D>(law_, problem_.flow, problem_.block, problem_.orientations, theta,
-                            block, scratch_.shares);
+    DragResponse<D> response = expected_drag<D>(
+        law_, problem_.flow, problem_.block, problem_.orientations, theta, block, scratch_.shares);
+    add_water_acceleration<D>(problem_.flow, problem_.block, problem_.law, block, scratch_.points,
+                              response);
+    return response;
   }
 
   void take_sample(std::int64_t row, std::int64_t k, const Sample& found) {
     const bool excluded = track_.excluded[k] != 0;
-    const Innovation<D> e = innovation_of<D>(state_, found.value, found.variance);
+    const Innovation<D> e =
+        innovation_of(state_, found.value, found.variance, problem_.time_variance);
     const bool fits = e.chi_squared() < outlier_chi_squared;
     write_innovation(row, e);
     write_likelihood(row, fits && !excluded ? &e : nullptr);
@@ -211,7 +279,7 @@ private:
       return;
     }
     state_.outliers = 0;
-    const Gain<D> gain = gain_of<D>(state_.covariance, e);
+    const Gain<D, F> gain = gain_of(state_, e);
     update(state_, e, gain);
     if (with_sensitivities()) {
       sensitivity_.update(gain);
@@ -291,10 +359,10 @@ private:
   [[no_unique_address]] Law law_;
   const FilterProblem& problem_;
   const Track& track_;
-  FilterState<D>& state_;
+  FilterState<D, F>& state_;
   const FilterScratch<D>& scratch_;
   const FilterOutputs& out_;
-  Sensitivity<D> sensitivity_;
+  Sensitivity<D, F> sensitivity_;
   const ProductSums* sums_;
   Products products_;
 };

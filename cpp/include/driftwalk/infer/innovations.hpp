@@ -31,14 +31,14 @@ public:
   // `flow.nodes` is not read; coefficients are [2][rows][columns], of u and of v.
   // Throws std::invalid_argument.
   DragModel(const FloatingBlock& block, const SplineView& flow, const double* coefficients,
-            double drag_coefficient, Angle angle);
+            double drag_coefficient, Angle angle, const ForceLaw& law = {});
 
   // Orientations between 0 and a quarter turn that represent an unknown angle. With eight the drag
   // is within 1 % of that of many, mostly 0.1 % (cpp/tests/test_infer.cpp).
   static constexpr int orientations = 8;
 
   Angle angle() const { return angle_; }
-  // Flow, block and orientations, with pointers into this object.
+  // Flow, block, law and orientations, with pointers into this object.
   FilterProblem problem() const;
   std::int64_t coefficients() const { return 2 * std::int64_t(flow_.rows) * flow_.columns; }
   // The most strips that can take part at once.
@@ -53,18 +53,21 @@ public:
 private:
   SplineView flow_;
   StripBlock block_;
+  ForceLaw law_;
   Angle angle_;
   std::vector<double> nodes_;
   std::array<double, orientations> cosine_, sine_;
 };
 
 struct FilterSettings {
-  double noise_intensity; // [m^2/s^3]
-  double position_noise;  // [m]
-  double force_lever;     // rms distance from the centre at which the force acts [m]
-  double angle_noise;     // [rad]; read with Angle::state only, as the lever is
-  double largest_step;    // [s]
-  double longest_gap;     // [s]
+  double noise_intensity;  // [m^2/s^3]
+  double position_noise;   // [m]
+  double force_lever;      // rms distance from the centre at which the force acts [m]
+  double angle_noise;      // [rad]; read with Angle::state only, as the lever is
+  double largest_step;     // [s]
+  double longest_gap;      // [s]
+  double time_noise = 0;   // of the time stamps [s]
+  double force_memory = 0; // correlation time of the force [s]
 };
 
 class InnovationsFilter {
@@ -94,19 +97,22 @@ public:
   Sums sums(const std::uint8_t* kept, const double* right, int columns);
 
 private:
-  template <int D>
+  template <int D, int F>
   struct Memory {
-    FilterState<D> state;
+    FilterState<D, F> state;
     FilterScratch<D> scratch;
     std::vector<StripShare<D>> shares;
+    std::vector<PointShare<D>> points;
     std::vector<double> sensitivity, row;
     std::vector<std::uint8_t> touched;
     std::vector<std::int32_t> active;
   };
 
   void copy(const Track& track);
-  template <int D>
+  template <int D, int F>
   void make_memory();
+  template <int D>
+  void make_memory_for(double force_memory);
   void run(std::int64_t count, const FilterOutputs& out, const ProductSums* sums);
 
   DragModel model_;
@@ -114,7 +120,7 @@ private:
   std::vector<double> track_;
   std::vector<std::uint8_t> excluded_;
   FilterProblem problem_;
-  std::variant<Memory<2>, Memory<3>> memory_;
+  std::variant<Memory<2, 0>, Memory<3, 0>, Memory<2, 2>, Memory<3, 2>> memory_;
 };
 
 } // namespace driftwalk

@@ -10,21 +10,21 @@ template <int N>
 using Square = double[N][N];
 
 // Coordinates move by `dt` times their velocities.
-template <int D>
-inline void drift_mean(FilterState<D>& state, double dt) {
+template <int D, int F>
+inline void drift_mean(FilterState<D, F>& state, double dt) {
   for (int a = 0; a < D; ++a) {
     state.mean[a] += dt * state.mean[a + D];
   }
 }
-template <int D>
-inline void drift_covariance(FilterState<D>& state, double dt) {
-  Square<2 * D>& P = state.covariance;
+template <int D, int F>
+inline void drift_covariance(FilterState<D, F>& state, double dt) {
+  Square<2 * D + F>& P = state.covariance;
   for (int a = 0; a < D; ++a) {
-    for (int b = 0; b < 2 * D; ++b) {
+    for (int b = 0; b < 2 * D + F; ++b) {
       P[a][b] += dt * P[a + D][b];
     }
   }
-  for (int a = 0; a < 2 * D; ++a) {
+  for (int a = 0; a < 2 * D + F; ++a) {
     for (int b = 0; b < D; ++b) {
       P[a][b] += dt * P[a][b + D];
     }
@@ -60,8 +60,14 @@ template <int D>
 struct Kick {
   Square<D> inverse;     // W
   double change[D];      // of the velocity
+  double by_log_drag[D]; // the part of it that the drag has: its derivative by ln C_d
   Square<D> by_position; // d(v')/d(coordinates)
   Square<D> by_velocity; // d(v')/d(v)
+  // What a force that remembers adds: to the velocity W times it by `force_time`, to the
+  // coordinates, beyond what the drift does, W times it by `force_lag`.
+  double force_time = 0; // [s]
+  double force_lag = 0;  // [s^2]
+  double force_kept = 1; // what the step leaves of it
 };
 
 template <int D>
@@ -79,6 +85,7 @@ inline Kick<D> make_kick(const DragResponse<D>& drag, double h) {
     for (int c = 0; c < D; ++c) {
       const double w = h * kick.inverse[a][c];
       kick.change[a] += w * drag.acceleration[c];
+      kick.by_log_drag[a] += w * drag.drag[c];
       for (int b = 0; b < D; ++b) {
         kick.by_position[a][b] += w * drag.by_position[c][b];
         kick.by_velocity[a][b] += w * drag.by_velocity[c][b];
@@ -105,29 +112,49 @@ inline void kick_linear(const Kick<D>& kick, const Real (&coordinates)[D],
   }
 }
 
-template <int D>
-inline void kick_covariance(FilterState<D>& state, const Kick<D>& kick) {
-  Square<2 * D>& P = state.covariance;
-  double coordinates[D], velocities[D], after[D];
-  for (int b = 0; b < 2 * D; ++b) {
-    for (int a = 0; a < D; ++a) {
-      coordinates[a] = P[a][b];
-      velocities[a] = P[a + D][b];
-    }
-    kick_linear<D, double>(kick, coordinates, velocities, after);
-    for (int a = 0; a < D; ++a) {
-      P[a + D][b] = after[a];
-    }
+// What a remembered force (x and y of it) does to velocities and coordinates in a kick, before it
+// fades: adds to `velocities` and `coordinates`.
+template <int D, class Real>
+inline void push_linear(const Kick<D>& kick, const Real (&force)[2], Real (&coordinates)[D],
+                        Real (&velocities)[D]) {
+  for (int a = 0; a < D; ++a) {
+    const Real damped = kick.inverse[a][0] * force[0] + kick.inverse[a][1] * force[1];
+    velocities[a] = velocities[a] + kick.force_time * damped;
+    coordinates[a] = coordinates[a] + kick.force_lag * damped;
   }
-  for (int b = 0; b < 2 * D; ++b) {
+}
+
+// One column or row of the covariance, number a of it at `at(a)`.
+template <int D, int F, class At>
+inline void kick_line(const Kick<D>& kick, const At& at) {
+  double coordinates[D], velocities[D], after[D];
+  for (int a = 0; a < D; ++a) {
+    coordinates[a] = at(a);
+    velocities[a] = at(a + D);
+  }
+  kick_linear<D, double>(kick, coordinates, velocities, after);
+  if constexpr (F == 2) {
+    const double force[2] = {at(2 * D), at(2 * D + 1)};
+    push_linear<D, double>(kick, force, coordinates, after);
     for (int a = 0; a < D; ++a) {
-      coordinates[a] = P[b][a];
-      velocities[a] = P[b][a + D];
+      at(a) = coordinates[a];
     }
-    kick_linear<D, double>(kick, coordinates, velocities, after);
-    for (int a = 0; a < D; ++a) {
-      P[b][a + D] = after[a];
-    }
+    at(2 * D) *= kick.force_kept;
+    at(2 * D + 1) *= kick.force_kept;
+  }
+  for (int a = 0; a < D; ++a) {
+    at(a + D) = after[a];
+  }
+}
+
+template <int D, int F>
+inline void kick_covariance(FilterState<D, F>& state, const Kick<D>& kick) {
+  Square<2 * D + F>& P = state.covariance;
+  for (int b = 0; b < 2 * D + F; ++b) {
+    kick_line<D, F>(kick, [&](int a) -> double& { return P[a][b]; });
+  }
+  for (int b = 0; b < 2 * D + F; ++b) {
+    kick_line<D, F>(kick, [&](int a) -> double& { return P[b][a]; });
   }
 }
 
@@ -162,10 +189,10 @@ inline void bend_covariance(const DragResponse<D>& drag, const Square<2 * D>& P,
 
 // White acceleration over a step h, damped by W as the kick is. Without W the force came out up to
 // 6 % low.
-template <int D>
-inline void add_noise(FilterState<D>& state, const Square<D>& W, const Square<D>& intensity,
+template <int D, int F>
+inline void add_noise(FilterState<D, F>& state, const Square<D>& W, const Square<D>& intensity,
                       double h) {
-  Square<2 * D>& P = state.covariance;
+  Square<2 * D + F>& P = state.covariance;
   for (int a = 0; a < D; ++a) {
     for (int b = 0; b < D; ++b) {
       double damped = 0;
@@ -179,6 +206,51 @@ inline void add_noise(FilterState<D>& state, const Square<D>& W, const Square<D>
       P[a + D][b] += h * h / 2 * damped;
       P[a + D][b + D] += h * damped;
     }
+  }
+}
+
+// The covariances, over its intensity, of what a force of memory T that starts from zero has done
+// after a step h: to the coordinate x, the velocity v and itself, f.
+struct MemoryNoise {
+  double xx, xv, vv, xf, vf, ff;
+};
+
+inline MemoryNoise memory_noise(double h, double T) {
+  const double e = __builtin_exp(-h / T), gone = 1 - e, square_gone = 1 - e * e;
+  const double mean = h - T * gone;
+  return {h * h * h / 3 - T * h * h + T * T * h + 2 * T * T * (T * gone - h * e) -
+              2 * T * T * T * gone + T * T * T / 2 * square_gone,
+          mean * mean / 2,
+          h - 2 * T * gone + T / 2 * square_gone,
+          T * square_gone / 2 - h * e,
+          gone * gone / 2,
+          square_gone / (2 * T)};
+}
+
+// The force that remembers, of white intensity q, over a step h.
+template <int D>
+inline void add_memory_noise(FilterState<D, 2>& state, const Square<D>& W, double q, double h,
+                             double memory) {
+  const MemoryNoise noise = memory_noise(h, memory);
+  Square<2 * D + 2>& P = state.covariance;
+  for (int a = 0; a < D; ++a) {
+    for (int b = 0; b < D; ++b) {
+      const double damped = q * (W[a][0] * W[b][0] + W[a][1] * W[b][1]);
+      P[a][b] += noise.xx * damped;
+      P[a][b + D] += noise.xv * damped;
+      P[a + D][b] += noise.xv * damped;
+      P[a + D][b + D] += noise.vv * damped;
+    }
+    for (int f = 0; f < 2; ++f) {
+      const double x = q * noise.xf * W[a][f], v = q * noise.vf * W[a][f];
+      P[a][2 * D + f] += x;
+      P[2 * D + f][a] += x;
+      P[a + D][2 * D + f] += v;
+      P[2 * D + f][a + D] += v;
+    }
+  }
+  for (int f = 2 * D; f < 2 * D + 2; ++f) {
+    P[f][f] += q * noise.ff;
   }
 }
 
@@ -200,14 +272,16 @@ struct Innovation {
   }
 };
 
-template <int D>
-inline Innovation<D> innovation_of(const FilterState<D>& state, const double (&sample)[D],
-                                   const double (&variance)[D]) {
+// The error of its time stamp moves a sample along the velocity.
+template <int D, int F>
+inline Innovation<D> innovation_of(const FilterState<D, F>& state, const double (&sample)[D],
+                                   const double (&variance)[D], double time_variance) {
   Innovation<D> out{};
   for (int a = 0; a < D; ++a) {
     out.e[a] = sample[a] - state.mean[a];
     for (int b = 0; b < D; ++b) {
-      out.S[a][b] = state.covariance[a][b] + (a == b ? variance[a] : 0);
+      out.S[a][b] = state.covariance[a][b] + (a == b ? variance[a] : 0) +
+                    time_variance * state.mean[a + D] * state.mean[b + D];
     }
   }
   for (int a = 0; a < D; ++a) {
@@ -228,15 +302,16 @@ inline Innovation<D> innovation_of(const FilterState<D>& state, const double (&s
 }
 
 // K = P H' S^-1
-template <int D>
+template <int D, int F>
 struct Gain {
-  double by[2 * D][D];
+  double by[2 * D + F][D];
 };
 
-template <int D>
-inline Gain<D> gain_of(const Square<2 * D>& P, const Innovation<D>& e) {
-  Gain<D> gain;
-  for (int row = 0; row < 2 * D; ++row) {
+template <int D, int F>
+inline Gain<D, F> gain_of(const FilterState<D, F>& state, const Innovation<D>& e) {
+  const Square<2 * D + F>& P = state.covariance;
+  Gain<D, F> gain;
+  for (int row = 0; row < 2 * D + F; ++row) {
     double (&g)[D] = gain.by[row];
     for (int a = 0; a < D; ++a) {
       g[a] = P[row][a];
@@ -255,11 +330,11 @@ inline Gain<D> gain_of(const Square<2 * D>& P, const Innovation<D>& e) {
   return gain;
 }
 
-template <int D>
-inline void update(FilterState<D>& state, const Innovation<D>& e, const Gain<D>& gain) {
-  Square<2 * D> after;
-  for (int a = 0; a < 2 * D; ++a) {
-    for (int b = 0; b < 2 * D; ++b) {
+template <int D, int F>
+inline void update(FilterState<D, F>& state, const Innovation<D>& e, const Gain<D, F>& gain) {
+  Square<2 * D + F> after;
+  for (int a = 0; a < 2 * D + F; ++a) {
+    for (int b = 0; b < 2 * D + F; ++b) {
       after[a][b] = state.covariance[a][b];
       for (int c = 0; c < D; ++c) {
         after[a][b] -= gain.by[a][c] * state.covariance[c][b];
@@ -269,8 +344,8 @@ inline void update(FilterState<D>& state, const Innovation<D>& e, const Gain<D>&
       state.mean[a] += gain.by[a][c] * e.e[c];
     }
   }
-  for (int a = 0; a < 2 * D; ++a) {
-    for (int b = 0; b < 2 * D; ++b) {
+  for (int a = 0; a < 2 * D + F; ++a) {
+    for (int b = 0; b < 2 * D + F; ++b) {
       state.covariance[a][b] = 0.5 * (after[a][b] + after[b][a]);
     }
   }

@@ -9,13 +9,17 @@ template <int D>
 struct InferKernelOf {
   // Takes the filter over the next `count` samples. With sums, which may be null, whitened
   // innovations and derivatives are not handed out.
-  void (*run)(const FilterProblem&, FilterState<D>&, const FilterScratch<D>&, const FilterOutputs&,
-              const ProductSums*, std::int64_t count);
-  // The mean drag at one state, and its derivative by the coefficients (D rows of rows * columns *
-  // 2 numbers, zero before) through `shares`. `mean` and `covariance` as in UncertainBlock.
+  template <int F>
+  using Run = void (*)(const FilterProblem&, FilterState<D, F>&, const FilterScratch<D>&,
+                       const FilterOutputs&, const ProductSums*, std::int64_t count);
+  Run<0> run;
+  Run<2> run_with_memory; // of the force
+  // The mean acceleration at one state, and its derivative by the coefficients (D rows of rows *
+  // columns * 2 numbers, zero before) through `shares` and `points`. `mean` and `covariance` as in
+  // UncertainBlock.
   DragResponse<D> (*drag)(const FilterProblem&, double theta, double omega, const double* mean,
                           const double (*covariance)[2 * D], StripShare<D>* shares,
-                          double* by_coefficients);
+                          PointShare<D>* points, double* by_coefficients);
 };
 
 struct InferKernel {

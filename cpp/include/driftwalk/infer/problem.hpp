@@ -27,6 +27,16 @@ struct StripBlock {
   double mass_by_inertia; // m/I [1/m^2]
 };
 
+// How the block answers the water.
+struct ForceLaw {
+  double quadratic = 1; // share of the drag on windward strips that goes with the closing speed
+  double linear = 0;    // the drag of every strip is this times its slip, over that scale [m/s]
+  // The water's own acceleration Du/Dt, and half its curl, push the block so strongly; 1 for a body
+  // that displaces its own mass.
+  double water_acceleration = 0;
+  double water_spin = 0;
+};
+
 // The orientations over which the drag is averaged: those of a block whose angle is not known.
 struct Orientations {
   const double* cosine;
@@ -42,6 +52,7 @@ struct Track {
   const double* y;              // [m]
   const double* theta;          // [rad]; an input has no jumps by 2 pi
   const double* omega;          // [rad/s]
+  const double* strength;       // of the flow, linear between samples; null: 1 all the time
   const std::uint8_t* excluded; // 1: the interval that ends here says nothing about the water
   std::int64_t samples;
 };
@@ -49,19 +60,24 @@ struct Track {
 struct FilterProblem {
   SplineView flow;
   StripBlock block;
+  ForceLaw law;
   Orientations orientations;
   Track track;
-  double intensity[3]; // the variances of vx, vy, omega grow by it times dt [m^2/s^3, rad^2/s^3]
-  double variance[3];  // of a sample's x, y, theta [m^2, rad^2]
-  double largest_step; // [s]
-  double longest_gap;  // [s] since the last sample; beyond it the state restarts
+  double intensity[3];  // the variances of vx, vy, omega grow by it times dt [m^2/s^3, rad^2/s^3]
+  double force_memory;  // correlation time of the force on x and y [s]; 0: none
+  double variance[3];   // of a sample's x, y, theta [m^2, rad^2]
+  double time_variance; // of its time stamp [s^2]
+  double largest_step;  // [s]
+  double longest_gap;   // [s] since the last sample; beyond it the state restarts
 };
 
-// What the filter knows: D coordinates, x, y and for D = 3 theta, then their D velocities.
-template <int D>
+// What the filter knows: D coordinates, x, y and for D = 3 theta, their D velocities, and with F =
+// 2 the acceleration by a force that remembers.
+template <int D, int F>
 struct FilterState {
-  double mean[2 * D];
-  double covariance[2 * D][2 * D];
+  static constexpr int size = 2 * D + F;
+  double mean[size];
+  double covariance[size][size];
   double seen;       // time of the last sample that was there [s]
   bool open;         // whether there is a state at all
   int outliers;      // samples in a row that were no noise
@@ -77,11 +93,25 @@ struct StripShare {
   std::int32_t node;     // row * columns + column of the first of the 4 x 4 nodes
 };
 
+// A point at which the water's acceleration is taken, and its part in
+// d(acceleration)/d(coefficients). With w the spline's value there and g = u . grad of it, a
+// coefficient of the velocity along c adds by_value[a][c] w + by_slope[a][c] g.
+template <int D>
+struct PointShare {
+  double by_value[D][2], by_slope[D][2];
+  double u, v;                     // the flow there, without its strength [m/s]
+  double weight_x[4], weight_y[4]; // B at the four columns and rows of nodes
+  double slope_x[4], slope_y[4];   // its derivatives [1/m]
+  std::int32_t node;               // as of a StripShare
+};
+inline constexpr int water_points = 4;
+
 // Memory of a filter, made once.
 template <int D>
 struct FilterScratch {
   StripShare<D>* shares;   // one for each strip of each orientation; null without sensitivities
-  double* sensitivity;     // [2 D][stride]: d(state)/d(parameters)
+  PointShare<D>* points;   // [water_points]; null without sensitivities
+  double* sensitivity;     // [2 D + F][stride]: d(state)/d(parameters)
   double* row;             // [D][stride]
   std::uint8_t* touched;   // [stride / 8]: whether eight columns are not zero
   std::int32_t* active;    // [stride / 8]: the groups of eight columns that are not
@@ -119,10 +149,12 @@ struct ProductSums {
 template <int D>
 struct DragResponse {
   double acceleration[D];   // [m/s^2, rad/s^2]
+  double drag[D];           // the part of it that the drag has
   double by_position[D][D]; // [axis of the acceleration][coordinate]
   double by_velocity[D][D];
   double bend[D][D][D]; // second derivatives by velocities
   int shares;           // strips that take part
+  int points;           // of the water's acceleration
 };
 
 } // namespace driftwalk

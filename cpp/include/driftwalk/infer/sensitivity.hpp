@@ -37,14 +37,33 @@ inline void add_share(const StripShare<D>& share, int columns, std::int64_t node
 inline constexpr double forgotten = 1e-10;
 inline constexpr int samples_between_forgetting = 16;
 
+// Adds a point of the water's acceleration, with factors for the spline's value and its derivative
+// along the flow.
 template <int D>
+inline void add_point(const PointShare<D>& point, int columns, std::int64_t nodes,
+                      const double (&by_value)[D][2], const double (&by_slope)[D][2],
+                      double* const* rows) {
+  const Four weight_x = Four::load(point.weight_x), slope_x = Four::load(point.slope_x);
+  for (int row = 0; row < 4; ++row) {
+    const Four value = point.weight_y[row] * weight_x;
+    const Four slope =
+        (point.u * point.weight_y[row]) * slope_x + (point.v * point.slope_y[row]) * weight_x;
+    const std::int64_t u = point.node + std::int64_t(row) * columns, v = u + nodes;
+    for (int a = 0; a < D; ++a) {
+      add_four(rows[a] + u, by_value[a][0] * value + by_slope[a][0] * slope);
+      add_four(rows[a] + v, by_value[a][1] * value + by_slope[a][1] * slope);
+    }
+  }
+}
+
+template <int D, int F>
 class Sensitivity {
 public:
   // The sensitivities are those of an earlier run of the same scratch, or zero.
   explicit Sensitivity(const FilterScratch<D>& scratch)
       : parameters_(scratch.parameters), stride_(scratch.stride), touched_(scratch.touched),
         active_(scratch.active) {
-    for (int a = 0; a < 2 * D; ++a) {
+    for (int a = 0; a < 2 * D + F; ++a) {
       rows_[a] = scratch.sensitivity + a * scratch.stride;
     }
     list_active();
@@ -68,32 +87,24 @@ public:
         coordinates[a].store(rows_[a] + p);
       }
       kick_linear<D, Eight>(kick, coordinates, velocities, after);
+      if constexpr (F == 2) {
+        push(kick, p, coordinates, after);
+      }
       for (int a = 0; a < D; ++a) {
         after[a].store(rows_[a + D] + p);
       }
     }
   }
 
-  // What the parameters themselves add to the velocity in a kick: the flow at each strip, and the
-  // drag as a whole.
-  void add_flow(const StripShare<D>* shares, int count, int columns, const Kick<D>& kick,
-                double h) {
-    const std::int64_t nodes = (parameters_ - 1) / 2;
-    for (int k = 0; k < count; ++k) {
-      touch(shares[k].node, columns);
-      touch(shares[k].node + nodes, columns);
-      double damped[D][2] = {};
-      for (int a = 0; a < D; ++a) {
-        for (int c = 0; c < D; ++c) {
-          damped[a][0] += kick.inverse[a][c] * shares[k].response[c][0];
-          damped[a][1] += kick.inverse[a][c] * shares[k].response[c][1];
-        }
-      }
-      add_share<D>(shares[k], columns, nodes, damped, -h, rows_ + D);
-    }
+  // What the parameters themselves add to the velocity in a kick: the flow at each strip and point,
+  // and the drag as a whole.
+  void add_flow(const FilterScratch<D>& scratch, const DragResponse<D>& drag, int columns,
+                const Kick<D>& kick, double h) {
+    add_strips(scratch.shares, drag.shares, columns, kick, h);
+    add_points(scratch.points, drag.points, columns, kick, h);
     touch_group((parameters_ - 1) / 8);
     for (int a = 0; a < D; ++a) {
-      rows_[a + D][parameters_ - 1] += kick.change[a];
+      rows_[a + D][parameters_ - 1] += kick.by_log_drag[a];
     }
   }
 
@@ -123,14 +134,14 @@ public:
     }
   }
 
-  void update(const Gain<D>& gain) {
+  void update(const Gain<D, F>& gain) {
     Eight coordinates[D];
     for (int k = 0; k < count_; ++k) {
       const std::int64_t p = 8 * std::int64_t(active_[k]);
       for (int a = 0; a < D; ++a) {
         coordinates[a] = Eight::load(rows_[a] + p);
       }
-      for (int row = 0; row < 2 * D; ++row) {
+      for (int row = 0; row < 2 * D + F; ++row) {
         Eight change = gain.by[row][0] * coordinates[0];
         for (int a = 1; a < D; ++a) {
           change += gain.by[row][a] * coordinates[a];
@@ -159,6 +170,55 @@ public:
   }
 
 private:
+  void add_strips(const StripShare<D>* shares, int count, int columns, const Kick<D>& kick,
+                  double h) {
+    const std::int64_t nodes = (parameters_ - 1) / 2;
+    for (int k = 0; k < count; ++k) {
+      touch(shares[k].node, columns);
+      touch(shares[k].node + nodes, columns);
+      double damped[D][2] = {};
+      for (int a = 0; a < D; ++a) {
+        for (int c = 0; c < D; ++c) {
+          damped[a][0] += kick.inverse[a][c] * shares[k].response[c][0];
+          damped[a][1] += kick.inverse[a][c] * shares[k].response[c][1];
+        }
+      }
+      add_share<D>(shares[k], columns, nodes, damped, -h, rows_ + D);
+    }
+  }
+
+  void add_points(const PointShare<D>* points, int count, int columns, const Kick<D>& kick,
+                  double h) {
+    const std::int64_t nodes = (parameters_ - 1) / 2;
+    for (int k = 0; k < count; ++k) {
+      touch(points[k].node, columns);
+      touch(points[k].node + nodes, columns);
+      double by_value[D][2] = {}, by_slope[D][2] = {};
+      for (int a = 0; a < D; ++a) {
+        for (int c = 0; c < D; ++c) {
+          for (int along = 0; along < 2; ++along) {
+            by_value[a][along] += h * kick.inverse[a][c] * points[k].by_value[c][along];
+            by_slope[a][along] += h * kick.inverse[a][c] * points[k].by_slope[c][along];
+          }
+        }
+      }
+      add_point<D>(points[k], columns, nodes, by_value, by_slope, rows_ + D);
+    }
+  }
+
+  // The remembered force's part of a kick in eight columns.
+  void push(const Kick<D>& kick, std::int64_t p, Eight (&coordinates)[D], Eight (&after)[D]) {
+    Eight force[2];
+    for (int f = 0; f < 2; ++f) {
+      force[f] = Eight::load(rows_[2 * D + f] + p);
+      (kick.force_kept * force[f]).store(rows_[2 * D + f] + p);
+    }
+    push_linear<D, Eight>(kick, force, coordinates, after);
+    for (int a = 0; a < D; ++a) {
+      coordinates[a].store(rows_[a] + p);
+    }
+  }
+
   void list_active() {
     count_ = 0;
     for (std::int64_t group = 0; group < stride_ / 8; ++group) {
@@ -194,7 +254,7 @@ private:
   std::uint8_t* touched_;
   std::int32_t* active_;
   int count_ = 0;
-  double* rows_[2 * D];
+  double* rows_[2 * D + F];
 };
 
 DRIFTWALK_LANES_END

@@ -36,8 +36,9 @@ struct MixedDrag {
   // Of a law in plain numbers.
   inline StripMoments moments(Eight mean, Eight slip, Eight variance, Eight cross) const {
     StripMoments m = QuadraticDrag{}.moments(mean, slip, variance, cross);
-    for (Eight* moment : {&m.force, &m.slip_force, &m.conductance, &m.slope, &m.slope_force,
-                          &m.slope_slip, &m.bend_force, &m.bend_slip}) {
+    Eight* const moments[] = {&m.force,       &m.slip_force, &m.conductance, &m.slope,
+                              &m.slope_force, &m.slope_slip, &m.bend_force,  &m.bend_slip};
+    for (Eight* moment : moments) {
       *moment = select(m.takes_part, quadratic * *moment, Eight(0));
     }
     if (linear != 0) {
