@@ -14,14 +14,15 @@ one flow and adds to the block of that flow alone, and to the parameters that al
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.likelihood.departures import NUMBERS, STRENGTH_TERMS
 from driftwalk.likelihood.spline import Floats, Spline
 
 Flags = npt.NDArray[np.bool_]
@@ -35,6 +36,10 @@ STEP = 1e-4
 """Relative change of a noise for the derivatives by it."""
 MOST_CHANGE = 100 * STEP
 """Of a variance by such a step. Where it is more, one pass restarted and the other did not."""
+
+LARGE_STEP = 1e-3
+"""From here on a step is no derivative but goes to another value of a number."""
+MOST_CHANGE_FAR = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +59,10 @@ class Series:
     """Number of the recording, which may be cut into several series."""
     near_wall: int = 0
     """Intervals that are left out because the block may touch the wall."""
+    angle: Floats = field(default_factory=lambda: np.zeros(0))
+    """The angle, with holes filled in; zeros where there is none."""
+    span: float = 0.0
+    """Time of the recording's last sample, counted from its first [s]."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +74,8 @@ class Body:
     depth: float
     strips: int
     water_density: float
+    linear_speed: float
+    """Speed [m/s] at which linear drag is as strong as the quadratic one in its place."""
     orientation: str
     """"state", "given" or "none": the track's angle is measured like the position, is an input, or
     is not used."""
@@ -87,6 +98,10 @@ class Point:
     the angle in the state only."""
     log_angle_noise: float | None = None
     """Logarithm of the noise of the angle [rad]; with the angle in the state only."""
+    opened: Mapping[str, float] = field(default_factory=dict)
+    """Numbers of departures from the model that are estimated too (`NUMBERS`)."""
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    """Those that have a known value other than the model's."""
 
     @property
     def noises(self) -> dict[str, float]:
@@ -95,6 +110,22 @@ class Point:
         found = {name: getattr(self, name) for name in names}
         return {name: value for name, value in found.items() if value is not None}
 
+    @property
+    def extras(self) -> dict[str, float]:
+        """Names and values of everything but coefficients and ln C_d, in the parameters' order."""
+        return {**self.noises, **self.opened}
+
+    def number(self, name: str) -> float:
+        """Return a number of a departure, that of the model where nothing else is said."""
+        return self.opened.get(name, self.fixed.get(name, NUMBERS[name].model))
+
+    def with_extra(self, name: str, value: float) -> Point:
+        """Return the point with another value of a noise or of a number."""
+        if name in NUMBERS:
+            return replace(self, opened={**self.opened, name: value})
+        changed: dict[str, Any] = {name: value}
+        return replace(self, **changed)
+
     def in_flow(self, flow: int) -> Point:
         """Return the point with the coefficients of one flow alone."""
         if self.coefficients.ndim == 3:
@@ -102,16 +133,19 @@ class Point:
         return replace(self, coefficients=self.coefficients[flow])
 
     def moved(self, step: Floats) -> Point:
-        """Return the point after a step in (coefficients, ln C_d, noises)."""
+        """Return the point after a step in (coefficients, ln C_d, noises, numbers)."""
         size = self.coefficients.size
-        noises = zip(self.noises.items(), step[size + 1 :], strict=True)
-        changed: dict[str, Any] = {name: old + float(change) for (name, old), change in noises}
-        return replace(
+        moved = replace(
             self,
             coefficients=self.coefficients + step[:size].reshape(self.coefficients.shape),
             log_drag=self.log_drag + float(step[size]),
-            **changed,
         )
+        for (name, old), change in zip(self.extras.items(), step[size + 1 :], strict=True):
+            value = old + float(change)
+            if name in NUMBERS:
+                value = min(max(value, NUMBERS[name].low), NUMBERS[name].high)
+            moved = moved.with_extra(name, value)
+        return moved
 
 
 class Sums(NamedTuple):
@@ -170,7 +204,7 @@ class Passes:
             (slice(count, count + others), slice(shared, shared + others)),
         )
 
-    def sums(self, point: Point, *, noise: str = "with") -> Sums:
+    def sums(self, point: Point, *, noise: str = "with", tried: Sequence[str] = ()) -> Sums:
         """Return likelihood, score and information at a point.
 
         Parameters
@@ -178,10 +212,12 @@ class Passes:
         point : Point
             Where.
         noise : {"with", "without"}
-            Whether the noises have derivatives; without them score and information end with
-            ln C_d.
+            Whether the noises and opened numbers have derivatives; without them score and
+            information end with ln C_d.
+        tried : sequence of str
+            Closed numbers that have derivatives too, after all the others.
         """
-        names = list(point.noises) if noise == "with" else []
+        names = [*point.extras, *tried] if noise == "with" else []
         others = 1 + len(names)
         size = 2 * self.spline.size * self.flows + others
         deviance, used = 0.0, 0
@@ -198,12 +234,11 @@ class Passes:
 
     def _sums_of(self, series: Series, point: Point, names: list[str]) -> Sums:
         base = self._run(series, point)
-        others = []
-        for name in names:
-            more: dict[str, Any] = {name: point.noises[name] + STEP}
-            others.append(self._run(series, replace(point, **more)))
+        others = [self._beside_base(series, point, name, base) for name in names]
         used = np.logical_and.reduce(
-            [*(_used(one) for one in (base, *others)), *(_beside(base, one) for one in others)]
+            [_used(base)]
+            + [_used(one) for pair in others for one in pair[:2]]
+            + [_beside(*pair) for pair in others]
         )
         white, changes, spreads = _noise_derivatives(base, others, used)
         right = np.zeros((used.size, white.shape[1], 1 + len(changes)))
@@ -228,6 +263,23 @@ class Passes:
                 ).sum()
         return Sums(deviance, score, information, int(used.sum()))
 
+    def _beside_base(
+        self, series: Series, point: Point, name: str, base: dict[str, Any]
+    ) -> tuple[dict[str, Any], dict[str, Any], float]:
+        """Return two passes that differ in one parameter alone, and by how much."""
+        if name not in NUMBERS:
+            step, at = STEP, point.extras[name]
+        elif name in point.opened:
+            step, at = NUMBERS[name].step, point.opened[name]
+        else:
+            low, high = NUMBERS[name].tried_from(point.number(name))
+            closed = base if low == point.number(name) else self._at(series, point, name, low)
+            return closed, self._at(series, point, name, high), high - low
+        return base, self._at(series, point, name, at + step), step
+
+    def _at(self, series: Series, point: Point, name: str, value: float) -> dict[str, Any]:
+        return self._run(series, point.with_extra(name, value))
+
     def innovations(self, point: Point) -> list[tuple[Floats, Flags]]:
         """Return each recording's whitened innovations, shape (n, D), and which were used.
 
@@ -235,6 +287,24 @@ class Passes:
         """
         found = [self._run(series, point.in_flow(series.flow)) for series in self.series]
         return [(_whitened(one), _used(one)) for one in found]
+
+    def strength_products(self, series: Series, point: Point) -> tuple[Floats, Floats]:
+        """Return products of the errors with their derivatives by the strength of the flow.
+
+        Returns
+        -------
+        products, squares : ndarray, shape (n,)
+            Of whitened errors and derivatives, and of the derivatives with themselves; 0 where a
+            sample is not used.
+        """
+        base = self._run(series, point)
+        pair = self._beside_base(series, point, "strength_0", base)
+        used = _used(base) & _used(pair[1]) & _beside(*pair)
+        white, (change,), _ = _noise_derivatives(base, [pair], used)
+        products, squares = np.zeros(used.size), np.zeros(used.size)
+        products[used] = (white * change).sum(axis=1)
+        squares[used] = (change**2).sum(axis=1)
+        return products, squares
 
     def _run(self, series: Series, point: Point) -> dict[str, Any]:
         return dict(self._filter(series, point).run(series.time.size))
@@ -245,11 +315,13 @@ class Passes:
         if point.log_lever is not None and point.log_angle_noise is not None:
             pose["force_lever"] = math.exp(point.log_lever)
             pose["angle_noise"] = math.exp(point.log_angle_noise)
+        x, y, theta = _corrected(series, point)
+        share = point.number("linear_share")
         return _core.InnovationsFilter(
             series.time,
-            series.x,
-            series.y,
-            series.theta,
+            x,
+            y,
+            theta,
             series.omega,
             series.excluded,
             side=body.side,
@@ -270,8 +342,43 @@ class Passes:
             longest_gap=LONGEST_GAP_S,
             orientation=body.orientation,
             sensitivities=sensitivities,
+            strength=_strength(series, point),
+            quadratic=1.0 - share,
+            linear=0.25 * share * body.linear_speed,
+            water_acceleration=point.number("water_acceleration"),
+            water_spin=point.number("water_spin"),
+            time_noise=math.sqrt(point.number("time_variance")),
+            force_memory=point.number("force_memory"),
             **pose,
         )
+
+
+def _corrected(series: Series, point: Point) -> tuple[Floats, Floats, Floats]:
+    """Return the centre of mass and the angle of its faces, for what the camera says."""
+    across, along = point.number("marker_x"), point.number("marker_y")
+    offset = point.number("angle_offset")
+    x, y, theta = series.x, series.y, series.theta
+    if across or along:
+        cosine, sine = np.cos(series.angle), np.sin(series.angle)
+        x = x - (across * cosine - along * sine)
+        y = y - (across * sine + along * cosine)
+    if offset:
+        theta = theta - offset
+    return x, y, theta
+
+
+def _strength(series: Series, point: Point) -> Floats | None:
+    """Return the strength of the flow at the samples; nothing where it is 1 all the time."""
+    terms = {k: point.number(f"strength_{k}") for k in range(STRENGTH_TERMS + 1)}
+    waves = point.number("pulse_cosine"), point.number("pulse_sine")
+    if not any(terms.values()) and not any(waves):
+        return None
+    place = np.pi * series.time / max(series.span, 1e-300)
+    strength = np.ones_like(series.time)
+    for k, term in terms.items():
+        strength += term * np.cos(k * place)
+    phase = 2.0 * np.pi * point.number("pulse_frequency") * series.time
+    return np.asarray(strength + waves[0] * np.cos(phase) + waves[1] * np.sin(phase))
 
 
 def _whitened(found: dict[str, Any]) -> Floats:
@@ -284,15 +391,16 @@ def _used(found: dict[str, Any]) -> Flags:
     return np.asarray(found["used"], dtype=bool)
 
 
-def _beside(base: dict[str, Any], other: dict[str, Any]) -> Flags:
+def _beside(base: dict[str, Any], other: dict[str, Any], step: float) -> Flags:
     """Return which innovations have nearly the variances that they have in the other pass."""
+    most = MOST_CHANGE if step < LARGE_STEP else MOST_CHANGE_FAR
     one, two = (np.einsum("aan->an", unpacked(found["covariance"])) for found in (base, other))
     with np.errstate(invalid="ignore"):
-        return np.asarray((np.abs(two - one) <= MOST_CHANGE * one).all(axis=0), dtype=bool)
+        return np.asarray((np.abs(two - one) <= most * one).all(axis=0), dtype=bool)
 
 
 def _noise_derivatives(
-    base: dict[str, Any], others: list[dict[str, Any]], used: Flags
+    base: dict[str, Any], others: list[tuple[dict[str, Any], dict[str, Any], float]], used: Flags
 ) -> tuple[Floats, list[Floats], list[Floats]]:
     """Return whitened innovations (n, D), their derivatives by the noises, and those of S.
 
@@ -301,10 +409,10 @@ def _noise_derivatives(
     root = factor(base["covariance"][used])
     white = forward(root, base["innovation"][used].T).T
     changes, spreads = [], []
-    for other in others:
-        change = (base["innovation"][used] - other["innovation"][used]) / STEP
+    for one, other, step in others:
+        change = (one["innovation"][used] - other["innovation"][used]) / step
         changes.append(forward(root, change.T).T)
-        widening = unpacked((other["covariance"][used] - base["covariance"][used]) / STEP)
+        widening = unpacked((other["covariance"][used] - one["covariance"][used]) / step)
         half = forward(root, widening)
         spreads.append(forward(root, half.transpose(1, 0, 2)))
     return white, changes, spreads

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from driftwalk.likelihood.departures import NUMBERS
 from driftwalk.likelihood.filter_pass import Passes, Point, Sums
 from driftwalk.likelihood.solution import cholesky
 from driftwalk.likelihood.spline import Floats, penalties
@@ -82,6 +83,9 @@ class Prior:
         if point.log_angle_noise is not None:
             off = point.log_angle_noise - math.log(PRIOR_ANGLE_NOISE)
             single.append((drag + ANGLE_NOISE, off, PRIOR_LOG_ANGLE_NOISE_STD))
+        first = drag + 1 + len(point.noises)
+        for index, (name, value) in enumerate(point.opened.items(), first):
+            single.append((index, value - NUMBERS[name].model, NUMBERS[name].prior_std))
         for index, off, std in single:
             deviance += 0.5 * (off / std) ** 2
             # Without derivatives by the noises there is no row of the lever.
@@ -120,6 +124,19 @@ class Mode:
     used: int
     iterations: int
     converged: bool
+    deviance: float
+    """Negative log likelihood with the priors, at the last step."""
+
+
+def known_numbers_variance(mode: Mode) -> float:
+    """Return the variance of ln C_d by theory, were the opened numbers known."""
+    drag = mode.point.coefficients.size
+    first = drag + 1 + len(mode.point.noises)
+    own = mode.covariance[drag, drag]
+    if first == len(mode.covariance):
+        return float(own)
+    across = mode.covariance[drag, first:]
+    return float(own - across @ np.linalg.solve(mode.covariance[first:, first:], across))
 
 
 Tell = Callable[[int, int, str], None]
@@ -161,27 +178,29 @@ def find_mode(
     """
     point, used, converged = start, 0, False
     covariance = np.zeros((0, 0))
-    last = np.zeros(start.coefficients.size + 1 + len(start.noises))
+    deviance = math.inf
+    last = np.zeros(start.coefficients.size + 1 + len(start.extras))
     for index in range(iterations):
         tell(index, iterations, "likelihood")
         sums = prior.add(passes.sums(point), point, weights)
-        used = sums.used
+        used, deviance = sums.used, sums.deviance
         drag = point.coefficients.size
         held = [drag + k for k in (HELD[index] if hold_first and index < len(HELD) else ())]
-        held = [one for one in held if one < sums.score.size]
+        held = [one for one in held if one <= drag + len(point.noises)]
         covariance = inverse(sums.information)
-        step = limited(newton_step(sums, covariance, held=held), drag)
+        step = limited(newton_step(sums, covariance, held=held), drag, list(point.opened))
         step = last = damped(step, last, sums.information)
         point = point.moved(step)
         weights = prior.updated(weights, point, covariance)
         moves = np.abs(step) / np.sqrt(np.diag(covariance))
         # A lever that is known from its prior alone may go to and fro without moving anything else.
-        moves[drag + LEVER : drag + LEVER + 1] = 0.0
+        if point.log_lever is not None:
+            moves[drag + LEVER] = 0.0
         near = max(float(moves[drag:].max()), float(np.sqrt((moves[:drag] ** 2).mean())))
         if len(held) == 0 and near < CLOSE:
             converged = True
             break
-    return Mode(point, weights, covariance, used, index + 1, converged)
+    return Mode(point, weights, covariance, used, index + 1, converged, deviance)
 
 
 def newton_step(sums: Sums, covariance: Floats, *, held: Sequence[int] = ()) -> Floats:
@@ -205,7 +224,7 @@ def damped(step: Floats, last: Floats, information: Floats) -> Floats:
     return step / (1.0 - ratio) if ratio < 0.0 else step
 
 
-def limited(step: Floats, drag: int) -> Floats:
+def limited(step: Floats, drag: int, opened: Sequence[str] = ()) -> Floats:
     """Return the step, shortened where it would jump, with q and r taken as factors.
 
     The step is the same whether it is made in the logarithm of a variance or in the variance; made
@@ -216,15 +235,22 @@ def limited(step: Floats, drag: int) -> Floats:
     Parameters
     ----------
     step : ndarray
-        In (coefficients, ln C_d, noises).
+        In (coefficients, ln C_d, noises, numbers).
     drag : int
         Where ln C_d stands in it.
+    opened : sequence of str
+        The numbers, at its end.
     """
     shorter = step * min(1.0, MOST_LOG_DRAG_STEP / max(abs(float(step[drag])), 1e-300))
     for index, power in ((1, 1.0), (2, 2.0)):
         factor = np.clip(1.0 + power * step[drag + index], 1.0 / MOST_FACTOR, MOST_FACTOR)
         shorter[drag + index] = math.log(factor) / power
-    shorter[drag + LEVER :] = np.clip(step[drag + LEVER :], -MOST_LOG_STEP, MOST_LOG_STEP)
+    numbers = step.size - len(opened)
+    levers = slice(drag + LEVER, numbers)
+    shorter[levers] = np.clip(step[levers], -MOST_LOG_STEP, MOST_LOG_STEP)
+    for index, name in enumerate(opened, numbers):
+        most = NUMBERS[name].most
+        shorter[index] = min(max(float(step[index]), -most), most)
     return np.asarray(shorter)
 
 

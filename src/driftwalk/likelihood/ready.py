@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 ORIENTED_SHARE = 0.5
 """Share of samples with an orientation from which on "auto" uses it."""
 
+LINEAR_TIME_S = 1.0
+"""Linear and quadratic drag are compared at the speed of one side of the block in this time."""
+
 AngleUse = Literal["auto", "state", "given", "none"]
 
 
@@ -171,6 +174,9 @@ def series_of(
     """
     found: list[Series] = []
     first = 0.0
+    ends: dict[int, float] = {}
+    for number, track in enumerate(tracks):
+        ends[number if places is None else places[number][1]] = float(track.time[-1])
     for number, track in enumerate(tracks):
         flow, recording = (0, number) if places is None else places[number]
         if not found or found[-1].recording != recording:
@@ -201,6 +207,8 @@ def series_of(
                 flow,
                 recording,
                 int(wall.sum()),
+                smooth.theta,
+                ends[recording] - first,
             )
         )
     return found
@@ -242,5 +250,6 @@ def body_of(study: Study, used_angle: str) -> Body:
         depth=study.wetted_depth_m,
         strips=study.block.strips_per_face,
         water_density=study.water.density_kg_m3,
+        linear_speed=study.block.side_m / LINEAR_TIME_S,
         orientation=used_angle,
     )

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from driftwalk.likelihood.filter_pass import Passes, Point
-from driftwalk.likelihood.newton import Mode, Prior
+from driftwalk.likelihood.newton import Mode, Prior, known_numbers_variance
 from driftwalk.likelihood.solution import cholesky
 from driftwalk.likelihood.spline import Floats
 
@@ -110,7 +110,8 @@ def restricted_drag(
     """
     start = mode.point
     drag = start.coefficients.size
-    sd = math.sqrt(float(mode.covariance[drag, drag]))
+    # The profile is that of a C_d beside numbers that are known.
+    sd = math.sqrt(known_numbers_variance(mode))
     slopes = mode.covariance[:, drag] / mode.covariance[drag, drag]
     found = [profile_at(passes, mode, prior, start.log_drag, start.coefficients.ravel())]
 

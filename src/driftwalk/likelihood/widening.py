@@ -22,6 +22,8 @@ WITH_ANGLE: Final = (1.3, 1.3, 1.4, 1.0, 1.4)
 of the noise of the angle."""
 WITHOUT_ANGLE: Final = (1.4, 1.4, 1.1)
 """The same with the angle as an input or not used."""
+NUMBER: Final = 1.3
+"""Factor of the numbers of departures."""
 
 
 def widened(covariance: Floats, point: Point) -> Floats:
@@ -30,7 +32,7 @@ def widened(covariance: Floats, point: Point) -> Floats:
     Parameters
     ----------
     covariance : ndarray, shape (k, k)
-        By theory, k = 5 with the angle in the state, else 3.
+        By theory, k = 5 with the angle in the state, else 3, and one more for each opened number.
     point : Point
         The estimate; tells whether the angle is in the state.
 
@@ -39,5 +41,6 @@ def widened(covariance: Floats, point: Point) -> Floats:
     >>> widened(np.eye(3), Point(np.zeros((2, 4, 4)), -0.7, -9.0, -8.0)).diagonal().round(2)
     array([1.96, 1.96, 1.21])
     """
-    factors = np.array(WITHOUT_ANGLE if point.log_lever is None else WITH_ANGLE)
+    noises = WITHOUT_ANGLE if point.log_lever is None else WITH_ANGLE
+    factors = np.array([*noises, *[NUMBER] * len(point.opened)])
     return np.asarray(covariance * np.outer(factors, factors))
