@@ -29,6 +29,7 @@ RecordingFiles = Annotated[
     FIT_KEYS,
     *("tank_diameter", "side", "mass", "depth", "force_interval"),
     *("angle", "spline_spacing", "confidence", "switching_times", "flow_labels", "precision"),
+    *("law", "pressure_gradient", "added_mass", "force_memory", "flow_strength", "camera"),
 )
 def fit(
     recordings: RecordingFiles,

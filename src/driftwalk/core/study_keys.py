@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.uncertain import Uncertain, split_uncertain
 
 STUDY_KEYS: Final[dict[str, str]] = {
     "tank_diameter": "tank.diameter_m",
@@ -82,6 +83,15 @@ FIT_KEYS: Final[dict[str, str]] = {
     "switching_times": "fit.switching_times_s",
     "flow_labels": "fit.flow_labels",
     "precision": "fit.drag_coefficient_precision",
+    "law": "fit.law",
+    "pressure_gradient": "fit.pressure_gradient",
+    "added_mass": "fit.added_mass_share",
+    "added_mass_std": "fit.added_mass_share_std",
+    "mass_std": "fit.mass_std_kg",
+    "side_std": "fit.side_std_m",
+    "force_memory": "fit.force_memory_s",
+    "flow_strength": "fit.flow_strength",
+    "camera": "fit.camera",
 }
 """The same for a likelihood fit."""
 
@@ -120,13 +130,27 @@ def study_overrides(*, keys: Mapping[str, str] = STUDY_KEYS, **options: Any) -> 
     --------
     >>> study_overrides(tank_diameter=0.5, seed=None)
     {'tank.diameter_m': 0.5}
+    >>> study_overrides(keys=FIT_KEYS, mass="11.6±0.2 g")
+    {'block.mass_kg': '11.6 g', 'fit.mass_std_kg': '0.2 g'}
     """
     unknown = [name for name in options if name not in keys]
     if unknown:
         advice = did_you_mean(unknown[0], keys) or f"; there are {', '.join(keys)}"
         raise ConfigurationError(f"there is no argument '{unknown[0]}'{advice}")
-    overrides = {keys[name]: value for name, value in options.items() if value is not None}
+    overrides: dict[str, Any] = {}
+    for name, value in options.items():
+        overrides.update(_stated(name, value, keys))
     depth = overrides.get("block.depth")
     if depth is not None and depth not in ("immersed", "archimedes"):
         overrides["block.depth_m"] = overrides.pop("block.depth")
     return overrides
+
+
+def _stated(name: str, value: Any, keys: Mapping[str, str]) -> dict[str, Any]:
+    """Return the keys that one argument sets, with that of its standard deviation."""
+    both = split_uncertain(value) if isinstance(value, str) else value
+    if not isinstance(both, Uncertain):
+        return {} if value is None else {keys[name]: value}
+    if f"{name}_std" not in keys:
+        raise ConfigurationError(f"'{name}' takes no standard deviation, only a number")
+    return {keys[name]: both.value, keys[f"{name}_std"]: both.std}

@@ -80,6 +80,70 @@ class Fit(Section):
         ),
         examples=['["A", "B", "A"]'],
     )
+    law: Literal["auto", "paper", "quadratic", "linear", "mixed"] = Field(
+        default="auto",
+        title="Law of the drag.",
+        description=(
+            'How the drag goes with the speed: "quadratic", "linear", or "mixed" of both. "paper" '
+            'is quadratic without pressure gradient. "auto" is quadratic unless the recording '
+            "asks for a linear part."
+        ),
+    )
+    pressure_gradient: Literal["auto", "on", "off"] = Field(
+        default="auto",
+        title="Push of the water's own acceleration.",
+        description=(
+            "Whether the water's own acceleration pushes the block and its added mass, as it does "
+            'a floating body. "auto" takes what the recording supports.'
+        ),
+    )
+    added_mass_share: Annotated[
+        float | Literal["auto"], Quantity("1", ge=0, le=5, words=("auto",))
+    ] = Field(
+        default="auto",
+        title="Added mass as a share of the block's mass.",
+        description=(
+            "Added mass as a share of the block's mass; of its inertia alike. A recording tells "
+            "drag and force over the mass with what is added to it. "
+            '"auto" is 0.5 with a standard deviation of 0.2 where the acceleration of the water '
+            "pushes the block, else 0."
+        ),
+    )
+    added_mass_share_std: Annotated[float, Quantity("1", ge=0, le=5)] = Field(
+        default=0.0, description="Standard deviation of the added mass that is stated."
+    )
+    mass_std_kg: Annotated[float, Quantity("kg", ge=0, le=100)] = Field(
+        default=0.0, description="Standard deviation of the mass of the block."
+    )
+    side_std_m: Annotated[float, Quantity("m", ge=0, le=10)] = Field(
+        default=0.0, description="Standard deviation of the side of the block."
+    )
+    force_memory_s: Annotated[
+        float | Literal["auto", "white"], Quantity("s", gt=0, le=10, words=("auto", "white"))
+    ] = Field(
+        default="auto",
+        title="Correlation time of the stochastic force.",
+        description=(
+            'Correlation time of the stochastic force, or "white" for none. "auto" estimates one '
+            "where the recording asks for it."
+        ),
+    )
+    flow_strength: Literal["auto", "constant", "smooth"] = Field(
+        default="auto",
+        title="Strength of the flow over time.",
+        description=(
+            'Strength of the flow over time: "constant", or "smooth". "auto" is constant unless '
+            "the recording asks for more; pulses are looked for, too."
+        ),
+    )
+    camera: Literal["auto", "exact"] = Field(
+        default="auto",
+        title="Mistakes of the camera that are estimated.",
+        description=(
+            '"auto" estimates jitter of the time stamps, an offset of the orientation and of the '
+            'marker where the recording asks for it; "exact" takes what is recorded.'
+        ),
+    )
     drag_coefficient_precision: Annotated[float | None, Quantity("1", gt=0, lt=1)] = Field(
         default=None,
         title="Wanted relative standard error of C_d.",

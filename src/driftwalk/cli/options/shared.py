@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.uncertain import Uncertain, split_uncertain
 from driftwalk.core.units import parse_quantity
 
 PANEL: Final = "Parameters"
@@ -16,6 +17,8 @@ PANEL: Final = "Parameters"
 
 def quantity_parser(unit: str, *words: str) -> Callable[[str], Any]:
     """Return a function that reads a quantity such as ``0.55mN``, or one of the words.
+
+    One with a standard deviation, ``11.6±0.2 g``, becomes an `Uncertain`.
 
     Parameters
     ----------
@@ -30,6 +33,9 @@ def quantity_parser(unit: str, *words: str) -> Callable[[str], Any]:
         if not isinstance(text, str) or text in words:
             return text
         try:
+            both = split_uncertain(text)
+            if both is not None:
+                return Uncertain(*(parse_quantity(str(part), unit) for part in both))
             return parse_quantity(text, unit)
         except ConfigurationError as error:
             or_words = f" (or {', '.join(words)})" if words else ""

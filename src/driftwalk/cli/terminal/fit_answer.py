@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -19,9 +20,31 @@ from driftwalk.schema.facts import fit_facts, sentences
 if TYPE_CHECKING:
     import xarray as xr
 
+_LAW_ROWS: Final = {
+    "added_mass_share": ("added mass / mass", 1.0, ""),
+    "effective_drag_coefficient": ("C_d per effective mass", 1.0, ""),
+    "effective_force_std_N": ("σ_F per effective mass", 1e3, " mN"),
+    "linear_drag_kg_s": ("linear drag", 1e3, " g/s"),
+    "force_memory_s": ("memory of the force", 1.0, " s"),
+    "time_stamp_noise_s": ("jitter of the stamps", 1e3, " ms"),
+    "orientation_offset_rad": ("orientation offset", 57.29577951308232, "°"),
+    "marker_x_m": ("marker off by, x", 1e3, " mm"),
+    "marker_y_m": ("marker off by, y", 1e3, " mm"),
+    "flow_strength_change": ("change of the flow", 1e2, " %"),
+    "pulse_amplitude": ("pulses of the flow", 1e2, " %"),
+    "pulse_frequency_Hz": ("frequency of pulses", 1.0, " Hz"),
+}
+"""Name, factor and unit of the rows of a law's numbers."""
 MOST_FINDINGS: Final = 2
 """Findings that are printed; all are in the file."""
 FAR_ABOVE_FLOOR: Final = 2.0
+LAW_ESTIMATES: Final = (
+    *("added_mass_share", "effective_drag_coefficient", "effective_force_std_N"),
+    *("linear_drag_kg_s", "force_memory_s", "time_stamp_noise_s"),
+    *("orientation_offset_rad", "marker_x_m", "marker_y_m"),
+    *("flow_strength_change", "pulse_amplitude", "pulse_frequency_Hz"),
+)
+"""Estimates that stand in a fit where the recording or the user asks for them."""
 _KEYS: Final = (
     "drag_coefficient",
     "drag_coefficient_interval",
@@ -52,6 +75,11 @@ _KEYS: Final = (
     "needed_duration_s",
     "switching_times_s",
     "mistakes",
+    "force_law",
+    "law_settled_by",
+    *(f"{name}{end}" for name in LAW_ESTIMATES for end in ("", "_interval")),
+    "drag_coefficient_any_added_mass_interval",
+    "force_std_any_added_mass_interval_N",
 )
 """The last ones where they are in the fit."""
 
@@ -91,6 +119,7 @@ def print_answer(fit: xr.Dataset, check: xr.Dataset | None, folder: Path) -> Non
     print_origin(fit)
     print_estimates(fit, "drag_coefficient", "force_std", "tracking_noise")
     print_intensity(facts["force_noise_intensity_N2_s"])
+    print_law(facts)
     print_row("intervals at the wall", f"{facts['wall_share']:.1%}, left out")
     if "flow" in fit.dims:
         names = fit["flow"].values[fit["interval_flow"].values]
@@ -100,6 +129,25 @@ def print_answer(fit: xr.Dataset, check: xr.Dataset | None, folder: Path) -> Non
     print_row("flow", folder / "flow.nc")
     _print_verdict(check, fit)
     print_page(folder)
+
+
+def print_law(facts: Mapping[str, Any]) -> None:
+    """Print the force law, by how much the recording supports it, and what was opened."""
+    words = {"paper": "the paper's", "floating body": "a floating body's (pushed by Du/Dt)"}
+    settled = facts.get("law_settled_by")
+    support = ""
+    if settled is not None:
+        support = (
+            f", {settled:.0f} nats of evidence over the other"
+            if settled > 3.0
+            else ", which the recording cannot tell from the other"
+        )
+    if "force_law" in facts:
+        print_row("force law", words[str(facts["force_law"])] + support)
+    for key, (name, scale, unit) in _LAW_ROWS.items():
+        if key in facts:
+            low, high = (scale * end for end in facts[f"{key}_interval"])
+            print_row(name, f"{scale * facts[key]:.3g}{unit} ({low:.3g} to {high:.3g})")
 
 
 def _print_verdict(check: xr.Dataset | None, fit: xr.Dataset) -> None:
