@@ -15,6 +15,12 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
+LAW_KEYS: Final = {
+    "added_mass_share": "added_mass_share",
+    "linear_drag_kg_s": "linear_drag",
+    "force_memory_s": "force_memory",
+}
+"""Keys of [forces], and the parameters of a fit that they hold."""
 _SAME: Final = 1e-9
 """Relative difference of two lengths up to which they are the same statement."""
 
@@ -98,7 +104,7 @@ def estimated_study(
     Returns
     -------
     Study
-        With the estimated drag coefficient and stochastic force.
+        With the estimated drag coefficient and stochastic force, under the law of a fit.
 
     Raises
     ------
@@ -119,9 +125,34 @@ def estimated_study(
         {
             "forces.drag_coefficient": fitted_value(found, "drag_coefficient"),
             "forces.force_std_N": fitted_value(found, "force_std"),
+            **fitted_law(found),
             **(overrides or {}),
         },
     )
+
+
+def fitted_law(found: xr.Dataset) -> dict[str, Any]:
+    """Return the keys of the section [forces] that say what force law a fit has found.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        A `fit`; another kind has the law of its study, and no keys.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> fitted_law(xr.Dataset(attrs={"force_law": "floating body"}, coords={"parameter": []}))
+    {'forces.pressure_gradient': True}
+    """
+    if "force_law" not in found.attrs:
+        return {}
+    law: dict[str, Any] = {"forces.pressure_gradient": found.attrs["force_law"] == "floating body"}
+    known = {str(name) for name in found["parameter"].values}
+    for key, name in LAW_KEYS.items():
+        if name in known:
+            law[f"forces.{key}"] = max(fitted_value(found, name), 0.0)
+    return law
 
 
 def _with_tank(study: Study, recording: xr.Dataset, *, is_stated: bool) -> Study:

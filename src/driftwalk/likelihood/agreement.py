@@ -45,19 +45,21 @@ def angle_given_facts(
         difference of the two ln C_d in combined standard deviations, NaN where the second fit has
         no solution.
     """
-    start = replace(restricted.point, log_lever=None, log_angle_noise=None)
+    found = restricted.point
+    known = {**found.fixed, **found.opened}
+    start = replace(found, log_lever=None, log_angle_noise=None, opened={}, fixed=known)
     prior = Prior(passes)
     try:
         other = find_mode(
             passes, start, mode.weights, prior, iterations=study.fit.iterations, hold_first=False
         )
-        found = restricted_drag(passes, other, prior, intensity=False)
+        again = restricted_drag(passes, other, prior, intensity=False)
     except BREAKDOWN:
         return {"angle_disagreement_std": math.nan}
-    covariance = parameter_covariance(other, found)
+    covariance = parameter_covariance(other, again)
     own = parameter_covariance(mode, restricted)
-    apart = abs(found.point.log_drag - restricted.point.log_drag)
-    facts = parameter_facts(found.point, covariance, study)
+    apart = abs(again.point.log_drag - found.log_drag)
+    facts = parameter_facts(again.point, covariance, study)
     return {
         "drag_coefficient_angle_given": facts["drag_coefficient"],
         "drag_coefficient_angle_given_interval": facts["drag_coefficient_interval"],

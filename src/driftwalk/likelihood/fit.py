@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.agreement import angle_given_facts
+from driftwalk.likelihood.assumptions import assumptions_of
 from driftwalk.likelihood.filter_pass import Passes
-from driftwalk.likelihood.newton import Mode, Prior, Tell, find_mode, silent
+from driftwalk.likelihood.law_facts import law_facts
+from driftwalk.likelihood.law_search import LawFound, LawSearch
+from driftwalk.likelihood.newton import Prior, Tell, silent
 from driftwalk.likelihood.ready import (
     AngleUse,
     Ready,
@@ -104,7 +107,8 @@ def fit_motion(
     spline = spline_of(chosen, outline)
     flows = len(intervals.labels)
     passes = Passes(series, body_of(chosen, used_angle), spline, flows)
-    mode, restricted = _search(passes, ready, chosen, tell or silent)
+    law, restricted = _search(passes, ready, chosen, tell or silent)
+    mode = law.mode
     with solved():
         innovations = passes.innovations(restricted.point)
     whiteness = whiteness_of(innovations)
@@ -120,6 +124,7 @@ def fit_motion(
         **parameter_facts(restricted.point, covariance, chosen),
         "maximum_likelihood_drag_coefficient": math.exp(mode.point.log_drag),
         **precision_facts(math.sqrt(covariance[0, 0]), duration, chosen),
+        **law_facts(law),
         "wetted_depth_m": chosen.wetted_depth_m,
         "wall_share": ready.wall_share,
         "angle": used_angle,
@@ -148,6 +153,7 @@ def fit_motion(
         oriented=used_angle != "none",
         intervals=intervals,
         first=float(ready.tracks[0].time[0]),
+        law=law,
         facts=facts,
     )
     shares = visited_shares(fit)
@@ -196,8 +202,8 @@ def _longest_in(ready: Ready, flow: int) -> Track:
     )
 
 
-def _search(passes: Passes, ready: Ready, study: Study, tell: Tell) -> tuple[Mode, Restricted]:
-    """Return the maximum of the likelihood and that of the restricted one."""
+def _search(passes: Passes, ready: Ready, study: Study, tell: Tell) -> tuple[LawFound, Restricted]:
+    """Return the law with the maximum of its likelihood, and that of the restricted one."""
     prior = Prior(passes)
     start = first_point(
         ready.tracks,
@@ -207,10 +213,13 @@ def _search(passes: Passes, ready: Ready, study: Study, tell: Tell) -> tuple[Mod
         in_flows=[_longest_in(ready, flow) for flow in range(passes.flows)],
     )
     weights = first_weights(ready.tracks, passes.spline)
+    assumptions = assumptions_of(
+        study, passes.body.orientation, recordings=len(ready.tracks), flows=passes.flows
+    )
     with solved():
-        mode = find_mode(passes, start, weights, prior, iterations=study.fit.iterations, tell=tell)
-        tell(mode.iterations, mode.iterations, "drag")
-        restricted = restricted_drag(passes, mode, prior)
+        law = LawSearch(passes, prior, assumptions, study.fit.iterations, tell).find(start, weights)
+        tell(law.mode.iterations, law.mode.iterations, "drag")
+        restricted = restricted_drag(passes, law.mode, prior)
         noise = math.exp(restricted.point.log_noise)
     require_noise_below_motion(noise, ready.tracks)
-    return mode, restricted
+    return law, restricted

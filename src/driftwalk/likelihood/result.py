@@ -23,7 +23,14 @@ from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.flow.grid import Grid, make_grid
 from driftwalk.likelihood.filter_pass import Series
 from driftwalk.likelihood.intervals import Intervals, fitted_intervals, switched_frames
-from driftwalk.likelihood.newton import Mode
+from driftwalk.likelihood.law_facts import (
+    inertia_facts,
+    inertia_of,
+    number_facts,
+    number_variables,
+)
+from driftwalk.likelihood.law_search import LawFound
+from driftwalk.likelihood.newton import Mode, known_numbers_variance
 from driftwalk.likelihood.reml import Restricted
 from driftwalk.likelihood.spline import Floats, Spline
 from driftwalk.likelihood.widening import widened
@@ -88,14 +95,16 @@ def whiteness_of(innovations: list[tuple[Floats, npt.NDArray[np.bool_]]]) -> Whi
 
 
 def parameter_covariance(mode: Mode, restricted: Restricted) -> Floats:
-    """Return the covariance of ln C_d and the noises, C_d's variance from its own criterion.
+    """Return the covariance of ln C_d, the noises and opened numbers.
 
-    It is that of theory, with the factors that were measured.
+    C_d's variance comes from its own criterion, in which the numbers are known; it is made larger
+    by the share that they add to it. The rest is that of theory, with the factors that were
+    measured.
     """
     drag = mode.point.coefficients.size
     covariance = mode.covariance[drag:, drag:].copy()
     scale = np.ones(len(covariance))
-    scale[0] = restricted.log_drag_std / math.sqrt(covariance[0, 0])
+    scale[0] = restricted.log_drag_std / math.sqrt(known_numbers_variance(mode))
     return widened(covariance * np.outer(scale, scale), mode.point)
 
 
@@ -107,21 +116,29 @@ def parameter_facts(point: Any, covariance: Floats, study: Study) -> dict[str, A
     interval = study.forces.force_interval_s
     mass = study.block.mass_kg
     intensity = mass**2 * math.exp(point.log_intensity)
-    reach = float(ndtri(0.5 + 0.5 * confidence)) * np.sqrt(np.diag(covariance))
+    normal = float(ndtri(0.5 + 0.5 * confidence))
+    reach = normal * np.sqrt(np.diag(covariance))
+    heavier = inertia_of(study, floating=point.number("water_acceleration") != 0.0)
+    of_drag, of_force = (math.hypot(one, normal * heavier.log_std) for one in reach[:2] * (1, 0.5))
+    total = heavier.share**2 * intensity
+    drag = (1.0 - point.number("linear_share")) * math.exp(point.log_drag)
     values = {
-        "drag_coefficient": (math.exp(point.log_drag), reach[0]),
-        "force_std_N": (math.sqrt(intensity / interval), 0.5 * reach[1]),
-        "force_noise_intensity_N2_s": (intensity, reach[1]),
+        "drag_coefficient": (heavier.share * drag, of_drag),
+        "force_std_N": (math.sqrt(total / interval), of_force),
+        "force_noise_intensity_N2_s": (total, 2.0 * of_force),
         "tracking_noise_m": (math.exp(point.log_noise), reach[2]),
     }
     if point.log_lever is not None:
         values["force_lever_m"] = (math.exp(point.log_lever), reach[3])
         values["orientation_noise_rad"] = (math.exp(point.log_angle_noise), reach[4])
+    if heavier.share != 1.0 or heavier.log_std > 0.0:
+        values["effective_drag_coefficient"] = (drag, reach[0])
+        values["effective_force_std_N"] = (math.sqrt(intensity / interval), 0.5 * reach[1])
     facts: dict[str, Any] = {"force_interval_s": interval, "confidence": confidence}
     for name, (value, width) in values.items():
         facts[name] = value
         facts[f"{name}_interval"] = [value * math.exp(-width), _upper(value, width)]
-    return facts
+    return {**facts, **inertia_facts(heavier, facts, normal), **number_facts(point, reach, study)}
 
 
 def _upper(value: float, log_width: float) -> float:
@@ -139,6 +156,7 @@ def build_fit(
     oriented: bool,
     intervals: Intervals,
     first: float,
+    law: LawFound,
     facts: dict[str, Any],
 ) -> xr.Dataset:
     """Assemble the dataset of a fit, without warnings and the share of the tank that was visited.
@@ -166,7 +184,8 @@ def build_fit(
     least = min(one.deviance for one in profiles)
     flat = profiles[0].half_log_determinant
     uncertainty = parameter_covariance(mode, restricted)
-    names = np.array(PARAMETERS[: len(uncertainty)], dtype=object)
+    noises = 1 + len(mode.point.noises)
+    names = np.array([*PARAMETERS[:noises], *mode.point.opened], dtype=object)
     data: dict[str, Any] = {
         **(flows[0] if intervals.steady else _stacked(flows)),
         "covariance": (
@@ -202,11 +221,13 @@ def build_fit(
         facts["switching_times_s"] = list(intervals.times)
         facts["recording_start_s"] = first
     numbers, names_of = fit_variables(facts)
+    found, names_found = number_variables(restricted.point, law)
+    data, coords = data | found, coords | names_found
     attrs = {
         "kind": "fit",
         "schema_version": KINDS["fit"].version,
         "arena": json.dumps(study.tank.to_arena()),
-        **{name: facts[name] for name in ("angle", "source", "simulated_recording")},
+        **{name: facts[name] for name in ("angle", "source", "simulated_recording", "force_law")},
         "study": study.to_toml(),
     }
     return xr.Dataset(data | numbers, coords | names_of, attrs)

@@ -26,9 +26,22 @@ ESTIMATES: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
         "tracking_noise_m": ("tracking_noise", "m"),
         "force_lever_m": ("force_lever", "m"),
         "orientation_noise_rad": ("orientation_noise", "rad"),
+        "added_mass_share": ("added_mass_share", "1"),
+        "effective_drag_coefficient": ("effective_drag_coefficient", "1"),
+        "effective_force_std_N": ("effective_force_std", "N"),
+        "linear_drag_kg_s": ("linear_drag", "kg s-1"),
+        "force_memory_s": ("force_memory", "s"),
+        "time_stamp_noise_s": ("time_stamp_noise", "s"),
+        "orientation_offset_rad": ("orientation_offset", "rad"),
+        "marker_x_m": ("marker_x", "m"),
+        "marker_y_m": ("marker_y", "m"),
+        "flow_strength_change": ("flow_strength_change", "1"),
+        "pulse_amplitude": ("pulse_amplitude", "1"),
+        "pulse_frequency_Hz": ("pulse_frequency", "Hz"),
     }
 )
-"""Flat name to the parameter and its unit. The last two with the angle in the state only."""
+"""Flat name to the parameter and its unit. Lever and noise of the orientation with the angle in the
+state only; what comes after them where it was estimated."""
 BOUNDS: Final = ("lower", "upper")
 
 FIT_NUMBERS: Final[Mapping[str, str]] = MappingProxyType(
@@ -53,6 +66,7 @@ FIT_NUMBERS: Final[Mapping[str, str]] = MappingProxyType(
         "spline_spacing_m": "spline_spacing",
         "cell_size_m": "cell_size",
         "recording_start_s": "recording_start",
+        "law_settled_by": "law_settled_by",
     }
 )
 FIT_COUNTS: Final = (
@@ -64,6 +78,11 @@ FIT_ROWS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
         "drag_coefficient_angle_given_interval": ("drag_coefficient_angle_given_interval", "bound"),
         "spline_origin_m": ("spline_origin", "axis"),
         "switching_times_s": ("switching_time", "switch"),
+        "drag_coefficient_any_added_mass_interval": (
+            "drag_coefficient_any_added_mass_interval",
+            "bound",
+        ),
+        "force_std_any_added_mass_interval_N": ("force_std_any_added_mass_interval", "bound"),
     }
 )
 

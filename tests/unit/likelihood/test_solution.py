@@ -12,6 +12,7 @@ from fit_worlds import coarse_study, recording
 import driftwalk as dw
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.check.errors import used_pairs
+from driftwalk.likelihood.filter_pass import Point
 from driftwalk.likelihood.result import parameter_facts
 from driftwalk.likelihood.solution import cholesky, require_noise_below_motion, solved
 from driftwalk.model import Study, apply_overrides
@@ -99,10 +100,8 @@ def test_an_interval_without_an_end_is_infinite() -> None:
     track = recording(60.0)
     fit = dw.fit_motion(track, coarse_study())
 
-    class Point:
-        log_drag, log_intensity, log_noise, log_lever = 0.0, -700.0, -8.0, None
-
-    attrs = parameter_facts(Point, np.diag([0.01, 1e6, 0.01]), coarse_study())
+    point = Point(np.zeros((2, 4, 4)), log_drag=0.0, log_intensity=-700.0, log_noise=-8.0)
+    attrs = parameter_facts(point, np.diag([0.01, 1e6, 0.01]), coarse_study())
     assert attrs["force_std_N_interval"][1] == np.inf
     assert 0.0 <= attrs["force_std_N_interval"][0] < attrs["force_std_N"]
     assert np.isfinite(fit_facts(fit)["force_std_N_interval"]).all()

@@ -17,8 +17,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.conditions.study import fitted_law
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.filter_pass import Passes, Place, Point, Series, Sums
+from driftwalk.likelihood.law_facts import effective_logs, stored_numbers
 from driftwalk.likelihood.newton import Prior, Weights
 from driftwalk.likelihood.ready import body_of, prepare
 from driftwalk.likelihood.result import require_fit
@@ -58,10 +60,11 @@ class Estimate:
 
 def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str | None) -> Estimate:
     """Return what a fit found, with the recordings it was fitted to."""
-    from driftwalk.model import parse_study
+    from driftwalk.model import apply_overrides, parse_study
 
     fit = require_fit(fit)
     study = parse_study(fit.attrs["study"])
+    study = apply_overrides(study, fitted_law(fit))
     ready = prepare(recordings, study, fit.attrs["angle"], body)
     if ready.samples != int(fit["samples"]):
         raise InputError(
@@ -71,12 +74,13 @@ def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str 
     coefficients = np.asarray(fit["coefficient"].values, dtype=np.float64)
     x, y = fit["spline_origin"].values
     spline = Spline(float(x), float(y), float(fit["spline_spacing"]), *coefficients.shape[:-3:-1])
-    intensity = fitted_value(fit, "force_noise_intensity") / study.block.mass_kg**2
+    numbers = stored_numbers(fit)
     point = Point(
         coefficients,
-        math.log(fitted_value(fit, "drag_coefficient")),
-        math.log(intensity),
+        *effective_logs(fit, study),
         math.log(fitted_value(fit, "tracking_noise")),
+        opened=numbers.opened,
+        fixed=numbers.fixed,
     )
     if ready.angle == "state":
         point = replace(

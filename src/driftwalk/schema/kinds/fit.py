@@ -20,6 +20,9 @@ _SWITCHED: Final = "with switching times"
 _TURNING: Final = "the angle is in the state"
 _ASKED: Final = "a precision of C_d is asked for"
 _CHECKED: Final = "the model was checked"
+_LAWS: Final = "the fit was made by a version that looks for the force law"
+_COMPARED_LAWS: Final = "two laws were fitted"
+_NO_ADDED_MASS: Final = "no added mass was stated, and the paper's law was found"
 _COMPARED: Final = "the angle is in the state, and the second fit has a solution"
 
 FIT: Final = Kind(
@@ -46,13 +49,17 @@ FIT: Final = Kind(
         "switch": "switching times",
         "profile": "values of C_d, by their value",
         "flow_interval": "between the switching times",
+        "number": "numbers of departures from the model, by name",
+        "law": "force laws that were fitted, by name",
+        "departure": "numbers of departures that were tested, by name",
     },
     variables=(
         Variable(
             "estimate", "parameter", None, "estimates of the parameters",
             note="drag_coefficient C_d, force_std σ_F, force_noise_intensity σ_F² times the force "
             "interval, tracking_noise; with the angle in the state also force_lever and "
-            "orientation_noise; in the units of the coordinate unit",
+            "orientation_noise; where they were estimated or stated, the numbers of the force law and of "
+            "the camera; in the units of the coordinate unit",
         ),
         Variable(
             "interval", "parameter bound", None, "intervals of the parameters",
@@ -129,6 +136,46 @@ FIT: Final = Kind(
             "difference of the two ln C_d in combined standard deviations", when=_TURNING,
             note="NaN where the second fit has no solution",
         ),
+        Variable(
+            "law_settled_by", "", "1",
+            "difference of the logarithms of the evidence for the law and for the other one",
+            when=_COMPARED_LAWS, note="below 3 the recording cannot tell them apart",
+        ),
+        Variable(
+            "law_log_evidence", "law", "1", "logarithm of the evidence for each law",
+            when=_LAWS, note="without its constant, in the beginning of the recordings",
+        ),
+        Variable(
+            "filter_drag_coefficient", "", "1", "C_d of the filter, without added mass",
+            when=_LAWS,
+        ),
+        Variable(
+            "number_value", "number", None, "numbers of departures from the model",
+            when=_LAWS, note="as the filter takes them, in SI units",
+        ),
+        Variable(
+            "number_opened", "number", None, "whether the number was estimated", "bool",
+            when=_LAWS,
+        ),
+        Variable(
+            "departure_estimate", "departure", None,
+            "estimates of closed numbers by score tests at the end of the search",
+            when=_LAWS, note="in SI units; the model is 0",
+        ),
+        Variable(
+            "departure_std", "departure", None, "their standard deviations", when=_LAWS
+        ),
+        Variable(
+            "drag_coefficient_any_added_mass_interval", "bound", "1",
+            "interval of C_d if the block may carry the usual added mass", when=_NO_ADDED_MASS,
+        ),
+        Variable(
+            "force_std_any_added_mass_interval", "bound", "N",
+            "the same of σ_F", when=_NO_ADDED_MASS,
+        ),
+        Variable("number", "number", None, "number", "text", when=_LAWS),
+        Variable("law", "law", None, "force law", "text", when=_LAWS),
+        Variable("departure", "departure", None, "number that was tested", "text", when=_LAWS),
         Variable("parameter", "parameter", None, "parameter", "text"),
         Variable("unit", "parameter", None, "unit of the parameter", "text"),
         Variable("bound", "bound", None, "end of an interval", "text"),

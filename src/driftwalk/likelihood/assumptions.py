@@ -1,0 +1,95 @@
+"""The assumptions of a study on the force law and the camera, for the search over laws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from driftwalk.likelihood.departures import STRENGTH_TERMS
+
+if TYPE_CHECKING:
+    from driftwalk.model import Study
+
+FLOATING: Final[Mapping[str, float]] = {"water_acceleration": 1.0, "water_spin": 1.0}
+"""Numbers of a body that floats: it displaces its own mass of water."""
+USUAL_ADDED_MASS: Final = (0.5, 0.2)
+"""Added mass of a floating body as a share of its mass, and its standard deviation, where nobody
+says more."""
+CAMERA: Final = ("time_variance", "angle_offset", "marker_x", "marker_y")
+FIRST_MEMORY_S: Final = 0.1
+
+
+@dataclass(frozen=True)
+class Assumptions:
+    """Numbers that are known before the fit, and those that are left to it."""
+
+    pressure_gradient: str
+    """"on", "off" or "auto"."""
+    opened: Mapping[str, float]
+    """Numbers that are estimated in any case, with their first values."""
+    fixed: Mapping[str, float]
+    """Numbers that are known, and not those of the model."""
+    tried: tuple[str, ...]
+    """Numbers that are opened where the recording asks for it."""
+    words: frozenset[str]
+    """"pulses": whether pulses of the flow are looked for."""
+
+
+def assumptions_of(study: Study, angle: str, *, recordings: int, flows: int) -> Assumptions:
+    """Return what a study leaves to the fit.
+
+    The section [forces] states the law where it sets its keys and [fit] says "auto".
+
+    Parameters
+    ----------
+    study : Study
+        Its section [fit].
+    angle : {"state", "given", "none"}
+        How orientations are used.
+    recordings, flows : int
+        Their numbers: a strength over time belongs to one recording in one flow.
+    """
+    fit = study.fit
+    opened: dict[str, float] = {}
+    fixed: dict[str, float] = {}
+    tried: list[str] = []
+    words = set()
+    if fit.law == "linear":
+        fixed["linear_share"] = 1.0
+    elif fit.law == "mixed":
+        opened["linear_share"] = 0.3
+    elif fit.law == "auto":
+        tried.append("linear_share")
+    if fit.force_memory_s == "auto" and study.forces.force_memory_s > 0.0:
+        fixed["force_memory"] = study.forces.force_memory_s
+    elif fit.force_memory_s == "auto":
+        tried.append("force_memory")
+    elif fit.force_memory_s != "white":
+        fixed["force_memory"] = fit.force_memory_s
+    if fit.camera == "auto":
+        tried += [name for name in CAMERA if angle == "state" or name == "time_variance"]
+    alone = recordings == 1 and flows == 1
+    strengths = [f"strength_{k}" for k in range(1, STRENGTH_TERMS + 1)]
+    if fit.flow_strength == "smooth":
+        opened.update(dict.fromkeys(strengths, 0.0))
+    elif fit.flow_strength == "auto" and alone:
+        tried += strengths
+    if fit.flow_strength != "constant" and alone:
+        words.add("pulses")
+    gradient = "off" if fit.law == "paper" else fit.pressure_gradient
+    if gradient == "auto" and "pressure_gradient" in study.forces.model_fields_set:
+        gradient = "on" if study.forces.pressure_gradient else "off"
+    return Assumptions(gradient, opened, fixed, tuple(tried), frozenset(words))
+
+
+def added_mass_of(study: Study, *, floating: bool) -> tuple[float, float]:
+    """Return the added mass as a share of the block's mass, and its standard deviation."""
+    stated = study.fit.added_mass_share
+    if stated == "auto" and "added_mass_share" in study.forces.model_fields_set:
+        stated = study.forces.added_mass_share
+    if stated != "auto":
+        return stated, study.fit.added_mass_share_std
+    if study.fit.law == "paper" or not floating:
+        return 0.0, 0.0
+    return USUAL_ADDED_MASS

@@ -1,0 +1,265 @@
+"""The force law and the departures from the model that a recording supports.
+
+The search of the likelihood is made for the paper's law, and for that of a floating body where the
+first one does not settle the matter. At the better one, score tests say which further numbers the
+recording asks for (`driftwalk.likelihood.trial`). Those are opened and fitted, and closed again
+where nothing comes of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from driftwalk.likelihood.assumptions import FLOATING, Assumptions
+from driftwalk.likelihood.departures import NUMBERS, STRENGTH_TERMS
+from driftwalk.likelihood.filter_pass import Passes, Point, Series
+from driftwalk.likelihood.newton import Mode, Prior, Tell, Weights, find_mode
+from driftwalk.likelihood.solution import BREAKDOWN
+from driftwalk.likelihood.trial import Trial, find_pulses, try_numbers
+
+LAW_SAMPLES: Final = 3000
+"""Laws are compared on so many samples from the beginning of the recordings."""
+TRIAL_ITERATIONS: Final = 12
+"""Most steps of the searches of such a comparison."""
+CANNOT_TELL: Final = 3.0
+"""Difference of the logarithms of the evidence below which two laws may both be right."""
+OPENED_SIGMAS: Final = 6.0
+"""A number is opened when its score test finds it so far from the model,"""
+KEPT_SIGMAS: Final = 3.0
+"""and stays open when the fit does, with half of what is worth it as an error of the filter."""
+OPENED_STRENGTH: Final = 50.0
+"""Chi squared (6 degrees of freedom) of the strength of the flow from which on it is opened."""
+ROUNDS: Final = 3
+STRENGTHS: Final = tuple(f"strength_{k}" for k in range(1, STRENGTH_TERMS + 1))
+PULSES: Final = ("pulse_cosine", "pulse_sine")
+
+
+@dataclass(frozen=True, eq=False)
+class LawFound:
+    """Result of a search over laws."""
+
+    mode: Mode
+    floating: bool
+    """Whether the water's own acceleration pushes the body."""
+    evidence: Mapping[str, float]
+    """Logarithm of the evidence for each law that was fitted, without its constant."""
+    settled_by: float
+    """Difference of the logarithms of the evidence; infinite where one law alone was fitted."""
+    trial: Trial | None
+    """The last score tests of what is closed; nothing where they broke down."""
+
+
+def worth(side: float) -> dict[str, float]:
+    """Return from which size on a departure is worth a number, by name, for a block's side [m].
+
+    Below it the filter's own errors may be what is seen.
+    """
+    return {
+        "linear_share": 0.15,
+        "force_memory": 0.04,
+        "time_variance": 0.003**2,
+        "angle_offset": math.radians(0.7),
+        "marker_x": 0.012 * side,
+        "marker_y": 0.012 * side,
+        **dict.fromkeys(STRENGTHS, 0.01),
+        **dict.fromkeys(PULSES, 0.02),
+    }
+
+
+def evidence_of(mode: Mode, prior: Prior) -> float:
+    """Return the logarithm of the evidence by Laplace's approximation, without its constant."""
+    components = mode.point.coefficients.reshape(-1, len(prior.roughness)).shape[0]
+    precision = np.linalg.slogdet(prior.matrix(mode.weights))[1]
+    return float(
+        -mode.deviance
+        + 0.5 * np.linalg.slogdet(mode.covariance)[1]
+        + 0.5 * components * float(precision)
+    )
+
+
+def beginning(passes: Passes) -> Sequence[Series]:
+    """Return the first series, with some `LAW_SAMPLES` samples together; all with several flows."""
+    total = sum(one.time.size for one in passes.series)
+    if passes.flows > 1 or total <= 1.2 * LAW_SAMPLES:
+        return passes.series
+    found, count = [], 0
+    for one in passes.series:
+        if count >= LAW_SAMPLES:
+            break
+        kept = slice(0, LAW_SAMPLES - count)
+        columns = ("time", "x", "y", "theta", "omega", "excluded", "angle")
+        found.append(replace(one, **{name: getattr(one, name)[kept] for name in columns}))
+        count += found[-1].time.size
+    return found
+
+
+class LawSearch:
+    """Searches over laws for the recordings of one fit."""
+
+    def __init__(
+        self, passes: Passes, prior: Prior, assumptions: Assumptions, iterations: int, tell: Tell
+    ) -> None:
+        self.passes, self.prior, self.assumptions = passes, prior, assumptions
+        self.iterations, self.tell = iterations, tell
+        self.worth = worth(passes.body.side)
+
+    def find(self, start: Point, weights: Weights) -> LawFound:
+        """Return the law and the mode that the recording supports."""
+        start = replace(start, opened=self.assumptions.opened, fixed=self.assumptions.fixed)
+        found = self._base(start, weights)
+        return self._with_departures(found)
+
+    def _mode(self, start: Point, weights: Weights, *, hold_first: bool = True) -> Mode:
+        return find_mode(
+            self.passes,
+            start,
+            weights,
+            self.prior,
+            iterations=self.iterations,
+            tell=self.tell,
+            hold_first=hold_first,
+        )
+
+    def _base(self, start: Point, weights: Weights) -> LawFound:
+        floating = replace(start, fixed={**start.fixed, **FLOATING})
+        if self.assumptions.pressure_gradient == "on":
+            mode = self._mode(floating, weights)
+            return self._alone(mode, floating=True)
+        if self.assumptions.pressure_gradient == "off":
+            return self._alone(self._mode(start, weights), floating=False)
+        return self._compared({"paper": start, "floating": floating}, weights)
+
+    def _compared(self, starts: Mapping[str, Point], weights: Weights) -> LawFound:
+        """Return the law with the larger evidence in the beginning of the recordings."""
+        begin = replace(self.passes, series=beginning(self.passes))
+        tried = {
+            name: self._try_mode(begin, point, weights, min(self.iterations, TRIAL_ITERATIONS))
+            for name, point in starts.items()
+        }
+        found = {name: mode for name, mode in tried.items() if mode is not None}
+        if not found:
+            raise np.linalg.LinAlgError("no law has a solution")
+        evidence = {name: evidence_of(mode, self.prior) for name, mode in found.items()}
+        best = max(evidence, key=evidence.__getitem__)
+        rest = [value for name, value in evidence.items() if name != best]
+        apart = evidence[best] - rest[0] if rest else math.inf
+        if apart < CANNOT_TELL and "paper" in found:
+            best = "paper"
+        mode = found[best]
+        if not mode.converged or begin.series is not self.passes.series:
+            mode = self._mode(mode.point, mode.weights, hold_first=False)
+        return LawFound(mode, best == "floating", evidence, apart, None)
+
+    def _alone(self, mode: Mode, *, floating: bool) -> LawFound:
+        name = "floating" if floating else "paper"
+        return LawFound(mode, floating, {name: evidence_of(mode, self.prior)}, math.inf, None)
+
+    def _try_mode(
+        self, passes: Passes, start: Point, weights: Weights, iterations: int
+    ) -> Mode | None:
+        """Return the mode; nothing where the search breaks down, as under a wrong law it may."""
+        try:
+            with np.errstate(all="ignore"):
+                return find_mode(
+                    passes, start, weights, self.prior, iterations=iterations, tell=self.tell
+                )
+        except (*BREAKDOWN, ValueError):
+            return None
+
+    def _with_departures(self, found: LawFound) -> LawFound:
+        """Return the law found, with the departures that the recording asks for."""
+        mode, trial = found.mode, None
+        closed: set[str] = set()
+        for _ in range(ROUNDS):
+            names = [
+                name
+                for name in self.assumptions.tried
+                if name not in mode.point.opened and name not in closed
+            ]
+            try:
+                trial = try_numbers(self.passes, mode, self.prior, names) if names else None
+            except BREAKDOWN:
+                trial = None
+            asked = self._asked(mode, trial)
+            if not asked:
+                break
+            mode, dropped = self._opened(mode, asked)
+            closed |= dropped
+        return replace(found, mode=mode, trial=trial)
+
+    def _asked(self, mode: Mode, trial: Trial | None) -> dict[str, float]:
+        """Return the numbers to open, with the values to begin with."""
+        asked: dict[str, float] = {}
+        if trial is None:
+            return asked
+        for name, sigmas in trial.sigmas.items():
+            estimate, _ = trial.of(name)
+            if name not in STRENGTHS and self._is_asked(name, sigmas, estimate):
+                asked[name] = _within(name, estimate)
+        strengths = [name for name in STRENGTHS if name in trial.names]
+        if strengths:
+            joint = trial.chi_squared(dict.fromkeys(strengths, 0.0))
+            estimates = {name: trial.of(name)[0] for name in strengths}
+            if joint > OPENED_STRENGTH and max(map(abs, estimates.values())) > 0.01:
+                asked.update({name: _within(name, value) for name, value in estimates.items()})
+        if "pulses" in self.assumptions.words and not set(PULSES) & set(mode.point.opened):
+            pulses = find_pulses(self.passes, mode)
+            if pulses is not None and pulses.significant and pulses.amplitude > 0.02:
+                asked.update({"pulse_cosine": 0.0, "pulse_sine": 0.0})
+                asked["pulse_frequency"] = pulses.frequency
+        return asked
+
+    def _is_asked(self, name: str, sigmas: float, estimate: float) -> bool:
+        if name in ("force_memory", "time_variance", "linear_share") and estimate < 0.0:
+            return False
+        return abs(sigmas) > OPENED_SIGMAS and abs(estimate) > self.worth.get(name, 0.0)
+
+    def _opened(self, mode: Mode, asked: Mapping[str, float]) -> tuple[Mode, set[str]]:
+        """Return the mode with numbers opened, and those that were closed again."""
+        asked = dict(asked)
+        fixed = dict(mode.point.fixed)
+        frequency = asked.pop("pulse_frequency", None)
+        if frequency is not None:
+            fixed["pulse_frequency"] = frequency
+        point = replace(mode.point, opened={**mode.point.opened, **asked}, fixed=fixed)
+        mode = self._mode(point, mode.weights, hold_first=False)
+        if frequency is not None:
+            # A frequency has a derivative only once there are pulses.
+            fixed.pop("pulse_frequency")
+            opened = {**mode.point.opened, "pulse_frequency": frequency}
+            point = replace(mode.point, opened=opened, fixed=fixed)
+            mode = self._mode(point, mode.weights, hold_first=False)
+        dropped = {name for name in asked if not self._is_kept(mode, name)}
+        strengths = set(STRENGTHS) & set(mode.point.opened)
+        if strengths - dropped:
+            dropped -= strengths
+        if set(PULSES) & set(asked) and not set(PULSES) <= dropped:
+            dropped -= set(PULSES)
+        if dropped:
+            kept = {name: value for name, value in mode.point.opened.items() if name not in dropped}
+            mode = self._mode(replace(mode.point, opened=kept), mode.weights, hold_first=False)
+        return mode, dropped
+
+    def _is_kept(self, mode: Mode, name: str) -> bool:
+        value, std = opened_number(mode, name)
+        error = math.hypot(std, 0.5 * self.worth.get(name, 0.0))
+        return abs(value - NUMBERS[name].model) > KEPT_SIGMAS * error
+
+
+def opened_number(mode: Mode, name: str) -> tuple[float, float]:
+    """Return the value of an opened number and its standard deviation by theory."""
+    names: Sequence[str] = list(mode.point.extras)
+    at = mode.point.coefficients.size + 1 + names.index(name)
+    return mode.point.opened[name], math.sqrt(float(mode.covariance[at, at]))
+
+
+def _within(name: str, value: float) -> float:
+    """Return a first value that is one step of the search away at most."""
+    number = NUMBERS[name]
+    value = min(max(value, number.model - number.most), number.model + number.most)
+    return min(max(value, number.low), number.high)

@@ -1,0 +1,139 @@
+"""Which numbers of departures a recording asks to be opened: score tests at the end of a search.
+
+At the mode the derivatives of the likelihood by all fitted parameters are zero. Those by a closed
+number are not, if the number is not what the model says. With the information of all parameters the
+derivative gives, without another search, an estimate of the number and its standard deviation
+(Rao's score test).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from driftwalk.likelihood.filter_pass import Passes, Series
+from driftwalk.likelihood.newton import Mode, Prior
+from driftwalk.likelihood.solution import cholesky
+from driftwalk.likelihood.spline import Floats
+
+OVERSAMPLED: Final = 4
+"""Frequencies of the spectrum for each period that the recording holds."""
+LEAST_PERIODS: Final = 6.0
+"""Periods that a recording must hold; a slower change is one of the strength over time."""
+FALSE_PULSES: Final = 1e-6
+"""Chance that a steady flow seems to pulse at any frequency."""
+MEDIAN_OF_TWO: Final = 1.3863
+"""Median of chi squared with two degrees of freedom."""
+
+
+class Trial(NamedTuple):
+    """Estimates of some closed numbers, near the values that they have."""
+
+    names: tuple[str, ...]
+    estimate: Floats
+    """Each alone, the others closed."""
+    std: Floats
+    information: Floats
+    score: Floats
+
+    @property
+    def sigmas(self) -> Mapping[str, float]:
+        """Return the estimates in standard deviations."""
+        found = zip(self.names, self.estimate / self.std, strict=True)
+        return {name: float(value) for name, value in found}
+
+    def of(self, name: str) -> tuple[float, float]:
+        """Return estimate and standard deviation of a number."""
+        at = self.names.index(name)
+        return float(self.estimate[at]), float(self.std[at])
+
+    def chi_squared(self, values: Mapping[str, float]) -> float:
+        """Return how far the joint estimate is from some values of these numbers alone."""
+        at = [self.names.index(name) for name in values]
+        information = self.information[np.ix_(at, at)]
+        apart = np.linalg.solve(information, self.score[at]) - np.array(list(values.values()))
+        return float(apart @ information @ apart)
+
+
+def try_numbers(passes: Passes, mode: Mode, prior: Prior, names: Sequence[str]) -> Trial:
+    """Return the score tests of closed numbers at the mode.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        When the information is not positive definite.
+    """
+    from scipy.linalg import cho_solve
+
+    sums = prior.add(passes.sums(mode.point, tried=names), mode.point, mode.weights)
+    fitted = sums.score.size - len(names)
+    factor = cholesky(sums.information[:fitted, :fitted])
+    right = np.column_stack([sums.information[:fitted, fitted:], sums.score[:fitted]])
+    found = cho_solve(factor, right)
+    across = sums.information[fitted:, :fitted]
+    information = sums.information[fitted:, fitted:] - across @ found[:, :-1]
+    score = sums.score[fitted:] - across @ found[:, -1]
+    own = np.diag(information)
+    if not (np.isfinite(own).all() and (own > 0.0).all()):
+        raise np.linalg.LinAlgError("the information on a number is not positive")
+    return Trial(tuple(names), score / own, 1.0 / np.sqrt(own), information, score)
+
+
+class Pulses(NamedTuple):
+    """The strongest pulse of the flow's strength that the errors show."""
+
+    frequency: float
+    """[Hz]"""
+    amplitude: float
+    significant: bool
+
+
+def find_pulses(passes: Passes, mode: Mode) -> Pulses | None:
+    """Return the strongest pulse of the flow, or nothing where the recording is too short.
+
+    The derivative of the errors by a constant change of the flow's strength is, at each sample,
+    nearly that by a change then. So the products of errors and derivatives have a line in their
+    spectrum where the strength pulses. The median of the spectrum is its height without pulses.
+    """
+    found = [_highest_line(passes, mode, series) for series in passes.series]
+    lines = [line for line in found if line is not None]
+    if not lines:
+        return None
+    line = max(lines, key=lambda one: one.height)
+    least = 2.0 * float(np.log(line.count / FALSE_PULSES))
+    return Pulses(line.frequency, line.amplitude, line.height > least)
+
+
+class _Line(NamedTuple):
+    """The highest line of a spectrum."""
+
+    height: float
+    """Of chi squared with two degrees of freedom."""
+    frequency: float
+    amplitude: float
+    count: int
+    """Number of frequencies."""
+
+
+def _highest_line(passes: Passes, mode: Mode, series: Series) -> _Line | None:
+    """Return the highest line of one series; nothing where it is too short."""
+    products, squares = passes.strength_products(series, mode.point.in_flow(series.flow))
+    time = series.time - series.time[0]
+    interval = float(np.median(np.diff(time)))
+    place = np.round(time / interval).astype(np.intp)
+    padded = OVERSAMPLED * (int(place[-1]) + 1)
+    wave = np.fft.rfft(np.bincount(place, weights=products), padded)
+    frequencies = np.fft.rfftfreq(padded, interval)
+    slowest = LEAST_PERIODS / max(float(time[-1]), interval)
+    kept = (frequencies > slowest) & (frequencies < 0.5 / interval)
+    if np.count_nonzero(kept) < OVERSAMPLED * LEAST_PERIODS:
+        return None
+    wave, frequencies = wave[kept], frequencies[kept]
+    total = float(squares.sum())
+    heights = 2.0 * np.abs(wave) ** 2 / total
+    heights *= MEDIAN_OF_TWO / float(np.median(heights))
+    best = int(heights.argmax())
+    amplitude = 2.0 * float(np.abs(wave[best])) / total
+    return _Line(float(heights[best]), float(frequencies[best]), amplitude, frequencies.size)
