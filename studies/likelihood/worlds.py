@@ -62,16 +62,19 @@ def draw_parameters(rng: np.random.Generator) -> tuple[float, float]:
     return float(rng.uniform(0.2, 1.0)), float(rng.uniform(0.2e-3, 1.2e-3))
 
 
-def draw_flow(rng: np.random.Generator, family: str) -> tuple[Floats, Floats]:
-    """Draw u and v [m/s] at the nodes of AXIS."""
+def draw_flow(
+    rng: np.random.Generator, family: str, *, sink_share: float = 1.0
+) -> tuple[Floats, Floats]:
+    """Draw u and v [m/s] at the nodes of AXIS, with a share of the sink that is drawn."""
     x, y = np.meshgrid(AXIS, AXIS)
-    return _regular(rng, x, y) if family == "regular" else _irregular(rng, x, y)
+    draw = _regular if family == "regular" else _irregular
+    return draw(rng, x, y, sink_share)
 
 
-def _regular(rng: np.random.Generator, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+def _regular(rng: np.random.Generator, x: Floats, y: Floats, share: float) -> tuple[Floats, Floats]:
     turning = rng.uniform(0.25, 0.6) * rng.choice([-1.0, 1.0])
     swirl = turning * np.exp(-((np.hypot(x, y) / 0.14) ** 4))
-    sink = rng.uniform(0.05, 0.25)
+    sink = share * rng.uniform(0.05, 0.25)
     u, v = -swirl * y - sink * x, swirl * x - sink * y
     for _ in range(JETS):
         at = rng.uniform(0.0, 2.0 * np.pi)
@@ -83,7 +86,9 @@ def _regular(rng: np.random.Generator, x: Floats, y: Floats) -> tuple[Floats, Fl
     return u, v
 
 
-def _irregular(rng: np.random.Generator, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+def _irregular(
+    rng: np.random.Generator, x: Floats, y: Floats, share: float
+) -> tuple[Floats, Floats]:
     stream = np.zeros_like(x)
     for _ in range(WAVES):
         along_x, along_y = rng.normal(0.0, 25.0, 2)
@@ -94,5 +99,5 @@ def _irregular(rng: np.random.Generator, x: Floats, y: Floats) -> tuple[Floats, 
     along_y, along_x = np.gradient(stream, AXIS, AXIS)
     u, v = along_y, -along_x
     rms = np.sqrt(np.mean((u**2 + v**2)[radius < RADIUS_M]))
-    scale, sink = rng.uniform(0.03, 0.07) / rms, rng.uniform(0.1, 0.3)
+    scale, sink = rng.uniform(0.03, 0.07) / rms, share * rng.uniform(0.1, 0.3)
     return scale * u - sink * x, scale * v - sink * y

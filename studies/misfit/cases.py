@@ -41,7 +41,12 @@ class Case:
     """Made of the poses with their noise."""
     told: Mapping[str, float] = field(default_factory=dict)
     """Keys of the study that are stated wrongly, as factors of the true value."""
+    stated: Mapping[str, float] = field(default_factory=dict)
+    """Keys of the study that the user knows, and states."""
     angle: str = "state"
+    carried: bool = False
+    """Whether the water carries the block along. In a sink, or in a small vortex, such a block
+    stays in one place, and nothing is learned: its flow is a swirl with jets, without a sink."""
 
 
 def outliers(share: float, size_m: float, run: int = 1) -> Mistake:
@@ -125,10 +130,17 @@ def smoothed(frames: int) -> Mistake:
     return made
 
 
+FLOATING = {"pressure_gradient": 1.0, "water_spin": 1.0}
+
 CASES: dict[str, Case] = {
     "control": Case(),
-    "floating body, added mass 0.5 m": Case({"added_mass": 0.5, "pressure_gradient": 1.0}),
-    "the water's acceleration alone": Case({"pressure_gradient": 1.0}),
+    "floating body, added mass 0.5 m": Case({"added_mass": 0.5, **FLOATING}, carried=True),
+    "the same, its spin left out": Case(
+        {"added_mass": 0.5, "pressure_gradient": 1.0}, carried=True
+    ),
+    "the water's acceleration alone": Case(
+        FLOATING, stated={"fit.added_mass_share": 0.0}, carried=True
+    ),
     "added mass 0.5 m in the inertia alone": Case({"added_mass": 0.5}),
     "drag ∝ speed": Case({"drag_power": 1.0}),
     "drag ∝ speed^1.5": Case({"drag_power": 1.5}),

@@ -44,6 +44,7 @@ FIRST_SEED: Final = 40_000
 """Of the first world; no other study uses it."""
 MOST_WALL_SHARE: Final = 0.25
 SOURCES: Final = ("src/driftwalk/likelihood/**/*.py", "cpp/include/driftwalk/infer/*.hpp")
+ODE: Final = ROOT / "benchmarks" / "ode"
 SKIPPED: Final = 77
 
 
@@ -94,7 +95,8 @@ def fit_one(name: str, number: int, motions: Path, minutes: float) -> dict[str, 
     }
     begin = time.process_time()
     try:
-        fit = dw.fit_motion(recording, dw.apply_overrides(study, wrong), angle=case.angle)
+        told = dw.apply_overrides(study, wrong | dict(case.stated))
+        fit = dw.fit_motion(recording, told, angle=case.angle)
     except DriftwalkError as error:
         return {**facts, "error": str(error)}
     facts["seconds"] = round(time.process_time() - begin, 1)
@@ -120,9 +122,12 @@ def fit_one(name: str, number: int, motions: Path, minutes: float) -> dict[str, 
 
 def motion(case: Case, number: int, folder: Path, minutes: float) -> tuple[World, Poses]:
     """Return a world and the block's motion in it; both are kept."""
-    world = world_of(number)
+    world = world_of(number, case)
     words = [f"{name}={value:.9g}" for name, value in case.law.items()]
-    label = hashlib.sha256(" ".join([*words, f"{minutes:g}"]).encode()).hexdigest()[:12]
+    program = "".join(path.read_text() for path in sorted(ODE.glob("*.?pp")))
+    label = hashlib.sha256(
+        " ".join([*words, f"{minutes:g}", str(case.carried), program]).encode()
+    ).hexdigest()[:12]
     path = folder / f"{number:03d}-{label}.npz"
     if not path.exists():
         poses = ode_poses(
@@ -135,10 +140,12 @@ def motion(case: Case, number: int, folder: Path, minutes: float) -> tuple[World
         return world, Poses(*(stored[name] for name in Poses._fields))
 
 
-def world_of(number: int) -> World:
+def world_of(number: int, case: Case) -> World:
     """Draw a world: C_d 0.4 to 0.5, sigma_F 0.5 to 0.7 mN, a flow of one of the two families."""
     rng = np.random.default_rng(FIRST_SEED + number)
     drag, force = float(rng.uniform(0.4, 0.5)), float(rng.uniform(0.5e-3, 0.7e-3))
+    if case.carried:
+        return World(drag, force, *draw_flow(rng, "regular", sink_share=0.0))
     return World(drag, force, *draw_flow(rng, FAMILIES[number % len(FAMILIES)]))
 
 
