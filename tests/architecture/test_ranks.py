@@ -28,9 +28,10 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "calibration": GROUND
     | {"conditions", "motion", "simulation", "comparison", "flow", "model", "sweep"},
     # `calibration` for the check of a fit: how far simulated steps are from the recording's.
+    # `record` for the noise of a track, which tells what its camera got wrong.
     "likelihood": GROUND
     | {"conditions", "motion", "simulation", "comparison", "flow", "model", "sweep"}
-    | {"calibration"},
+    | {"calibration", "record"},
     "assembly": GROUND | {"simulation", "comparison", "flow", "model", "sweep"},
     # `assemble` for the observer: what is seen is classified by the rules of simulated runs.
     "track": GROUND | {"record", "model", "assembly"},

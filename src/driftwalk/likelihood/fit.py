@@ -132,6 +132,8 @@ def fit_motion(
         "restricted": "yes" if restricted.has_minimum else "no",
         "samples": ready.samples,
         "mistakes": ready.mistakes,
+        "dropped_frames": ready.dropped_frames,
+        "dropped_places": ready.dropped_places,
         "samples_used": mode.used,
         "intervals_usable": usable_intervals(series),
         "duration_s": duration,

@@ -11,6 +11,7 @@ from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import Outline, outline_of, read_arena
 from driftwalk.likelihood.angle import no_angle, smooth_angle
+from driftwalk.likelihood.dropped import DroppedFrames, find_dropped_frames, places_of, with_gaps
 from driftwalk.likelihood.filter_pass import LONGEST_GAP_S, Body, Series
 from driftwalk.likelihood.intervals import Intervals, cut_track, intervals_of
 from driftwalk.likelihood.outliers import without_mistakes
@@ -67,6 +68,10 @@ class Ready(NamedTuple):
     wall_share: float
     mistakes: int
     """Samples that are left out as mistakes of the tracker."""
+    dropped_frames: int
+    """Frames that are missing though the stamps say a constant rate; their time is put in."""
+    dropped_places: str
+    """Where they are, in words; empty where there are none."""
 
     @property
     def samples(self) -> int:
@@ -82,11 +87,13 @@ def prepare(
     outline = outline_of(study.tank.to_arena())
     require_size(len(intervals.labels), 2 * spline_of(study, outline).size)
     tracks, parts, places = [], [], []
-    mistakes = 0
+    mistakes, dropped = 0, list[DroppedFrames]()
     for index, recording in enumerate(many):
         seen, where = body_track(recording, body), _name_of(recording)
         track = without_mistakes(seen)
         mistakes += seen.time.size - track.time.size
+        dropped.append(find_dropped_frames(track, recording["time"].values))
+        track = with_gaps(track, dropped[-1])
         require_length(track, study, where=where)
         require_motion(track, study, where=where)
         cut = cut_track(track, intervals, fewest=FEWEST_SAMPLES, where=where)
@@ -112,7 +119,22 @@ def prepare(
             where=f"{intervals.describe_flow(flow)}: ",
         )
     share = near_wall / count
-    return Ready(tracks, parts, places, intervals, series, used_angle, share, mistakes)
+    return Ready(
+        tracks,
+        parts,
+        places,
+        intervals,
+        series,
+        used_angle,
+        share,
+        mistakes,
+        sum(one.frames for one in dropped),
+        "; ".join(
+            _name_of(recording) + places_of(one)
+            for recording, one in zip(many, dropped, strict=True)
+            if one.frames
+        ),
+    )
 
 
 def _name_of(recording: xr.Dataset) -> str:

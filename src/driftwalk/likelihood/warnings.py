@@ -93,6 +93,12 @@ def _on_the_data(
             f"{facts['mistakes']} of {facts['samples']} samples were left out: each lies far from "
             "both of its neighbours, as mistakes of a tracker do"
         )
+    if facts["dropped_frames"]:
+        found.append(
+            f"{facts['dropped_frames']} frames are missing although the time stamps say a constant "
+            f"rate, {facts['dropped_places']}: the steps across them are two or more times as long "
+            "as their neighbours; their time was put in. Record the time of every frame"
+        )
     used, usable = facts["samples_used"], facts["intervals_usable"]
     if used < LEAST_USED * usable:
         found.append(

@@ -109,6 +109,11 @@ FIT: Final = Kind(
             "mistakes", "", "1", "samples left out as mistakes of the tracker", "int",
             when="the fit was made by a version that looks for them",
         ),
+        Variable(
+            "dropped_frames", "", "1", "frames that the recording lacks although its stamps do not "
+            "say so", "int", when="the fit was made by a version that looks for them",
+            note="their time is put in",
+        ),
         Variable("intervals_usable", "", "1", "intervals that might have been used", "int"),
         Variable("duration", "", "s", "length of the recordings together"),
         Variable("recordings", "", "1", "recordings", "int"),
