@@ -23,6 +23,7 @@ from driftwalk.likelihood.refuse import (
     require_size,
     require_usable,
 )
+from driftwalk.likelihood.smoothed import require_raw
 from driftwalk.likelihood.spline import Spline, lay_spline
 from driftwalk.likelihood.wall import wall_intervals
 from driftwalk.schema import Track, body_track
@@ -92,10 +93,11 @@ def prepare(
         seen, where = body_track(recording, body), _name_of(recording)
         track = without_mistakes(seen)
         mistakes += seen.time.size - track.time.size
-        dropped.append(find_dropped_frames(track, recording["time"].values))
-        track = with_gaps(track, dropped[-1])
         require_length(track, study, where=where)
         require_motion(track, study, where=where)
+        require_raw(track, where=where)
+        dropped.append(find_dropped_frames(track, recording["time"].values))
+        track = with_gaps(track, dropped[-1])
         cut = cut_track(track, intervals, fewest=FEWEST_SAMPLES, where=where)
         for number, part in enumerate(cut):
             if len(cut) > 1:

@@ -1,0 +1,203 @@
+"""Positions that are not what the camera saw: a tracker has smoothed them.
+
+A moving average, or a parabola through some frames (Savitzky and Golay), takes certain frequencies
+out of a track altogether, of the motion and of the tracking noise alike; averages over three frames
+have nothing left at a third of the frame rate. No motion with white noise on it has such holes: its
+spectrum only falls, and ends in the floor of the noise. The spectrum of the second differences is
+compared with that of a motion and its noise, smoothed in each of these ways and not at all.
+
+An exponential filter leaves no holes. It turns a motion with its noise into one whose force seems
+to remember, and is not looked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from driftwalk.core.errors import InputError
+from driftwalk.likelihood.spline import Floats
+from driftwalk.schema import Track
+
+SEGMENT: Final = 64
+"""Second differences in a segment; segments overlap by half."""
+FEWEST: Final = 8
+"""Segments of x and y together without which nothing is said."""
+LOWEST: Final = 0.08
+"""Cycles per sample: below, the flow rules the motion."""
+ENOUGH: Final = 50.0
+"""Evidence from which on positions are smoothed. Recordings of the model reach 2, those of
+animals and robots 110, but see `MOST_LEFT`; smoothed ones reach 50 in half a minute at 10 Hz."""
+MOST_LEFT: Final = 0.15
+"""Part of the misfit of a motion and its noise that smoothing may leave, or the reason is another:
+smoothed recordings of the model leave 0.01 of it, those of animals and robots 0.25 and more."""
+CLEARLY: Final = 10.0
+"""Evidence by which a way of smoothing is ahead of all others when it is named."""
+INDEPENDENT: Final = 0.36
+"""Degrees of freedom of the spectrum in one of its numbers: neighbours in frequency and
+overlapping segments are correlated by the taper."""
+STEPS: Final = 200
+GRID: Final = 1024
+MEMORIES: Final = (0.3, 0.5, 0.7, 0.85, 0.95)
+"""Correlation of a remembering force from one sample to the next."""
+AVERAGED: Final = (2, 3, 4, 5, 6, 7, 9, 11)
+"""Frames of the plain averages that are looked for."""
+POLYNOMIALS: Final = ((5, 2), (7, 2), (9, 2), (11, 2), (7, 4), (9, 4), (11, 4))
+"""Frames and degrees of the smoothing by Savitzky and Golay; a degree of 3 is that of 2."""
+
+
+class Smoothing(NamedTuple):
+    """How positions seem to be smoothed."""
+
+    way: str
+    """In words, such as "averages over 3 frames"."""
+    evidence: float
+    """Logarithm of the likelihood ratio of this over no smoothing."""
+
+
+def find_smoothing(track: Track) -> Smoothing | None:
+    """Return how the positions of a track are smoothed; None where they do not seem to be.
+
+    Parameters
+    ----------
+    track : Track
+        One body, without samples that are mistakes. Gaps are passed over.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(1).normal(0.0, 3e-4, (2, 1000))
+    >>> time = 0.1 * np.arange(1000)
+    >>> x, y = 0.1 * np.cos(0.2 * time) + noise[0], 0.1 * np.sin(0.2 * time) + noise[1]
+    >>> theta = np.zeros(1000)
+    >>> find_smoothing(Track(time, x, y, theta)) is None
+    True
+    >>> x, y = (np.convolve(axis, np.full(3, 1 / 3), mode="same") for axis in (x, y))
+    >>> find_smoothing(Track(time, x, y, theta)).way
+    'averages over 3 frames'
+    """
+    seen, segments = _spectrum(track)
+    if segments < FEWEST or not seen.all():
+        return None
+    weight = np.full(seen.size, INDEPENDENT * segments)
+    weight[-1] *= 0.5  # the highest frequency has no phase
+    best = -float((weight * (np.log(seen) + 1.0)).sum())
+    plain = _likelihood(seen, _expected()[""], weight)
+    if best - plain < ENOUGH:
+        return None
+    found = {
+        way: _likelihood(seen, parts, weight) - plain for way, parts in _expected().items() if way
+    }
+    way, *others = sorted(found, key=lambda name: -found[name])
+    evidence = found[way]
+    if evidence < ENOUGH or best - plain - evidence > MOST_LEFT * (best - plain):
+        return None
+    clear = evidence - found[others[0]] > CLEARLY
+    return Smoothing(way if clear else "averages over some frames", evidence)
+
+
+def require_raw(track: Track, *, where: str) -> None:
+    """Refuse positions that a tracker has smoothed.
+
+    Raises
+    ------
+    InputError
+        With how they seem to be smoothed, and what to do.
+    """
+    found = find_smoothing(track)
+    if found is not None:
+        raise InputError(
+            f"{where}the positions look like {found.way}: the fit would take the missing noise and "
+            "the lost quick motion for drag; switch the smoothing of the tracker off, or export "
+            "the raw positions"
+        )
+
+
+def _spectrum(track: Track) -> tuple[Floats, int]:
+    """Return the mean spectrum of second differences above `LOWEST`, and how many it is made of."""
+    interval = np.diff(track.time)
+    taper = _taper()
+    if interval.size < SEGMENT + 1:
+        return np.zeros(0), 0
+    usual = float(np.median(interval))
+    breaks = np.flatnonzero(np.abs(interval - usual) > 0.1 * usual) + 1
+    total, count = np.zeros(SEGMENT // 2 + 1), 0
+    for first, last in zip([0, *breaks], [*breaks, track.time.size], strict=True):
+        for axis in (track.x, track.y):
+            change = np.diff(axis[first:last], 2)
+            if change.size < SEGMENT:
+                continue
+            parts = np.lib.stride_tricks.sliding_window_view(change, SEGMENT)[:: SEGMENT // 2]
+            total += (np.abs(np.fft.rfft(parts * taper, axis=1)) ** 2).sum(axis=0)
+            count += len(parts)
+    mean: Floats = total / max(count, 1)
+    return mean[_band()], count
+
+
+def _taper() -> Floats:
+    taper: Floats = np.hanning(SEGMENT + 2)[1:-1]
+    taper /= np.sqrt((taper**2).sum())
+    return taper
+
+
+def _band() -> slice:
+    return slice(int(np.ceil(LOWEST * SEGMENT)), None)
+
+
+@cache
+def _expected() -> Mapping[str, Floats]:
+    """Return what spectra are made of, by the way of smoothing; "" is none. Shapes (f, parts)."""
+    turn = 2.0 * np.pi * np.arange(GRID) / GRID
+    difference = np.abs(1.0 - np.exp(1j * turn)) ** 2
+    motion = (2.0 + np.cos(turn)) / 3.0
+    forgetting = [
+        motion * (1.0 - one) ** 2 / np.abs(1.0 - one * np.exp(1j * turn)) ** 2 for one in MEMORIES
+    ]
+    # Tracking noise, jumps of the position, of the velocity, and of an acceleration that lasts.
+    parts = np.stack([difference**2, difference, motion, *forgetting])
+    found = {"": _tapered(parts)}
+    for way, weights in _ways().items():
+        gain = np.abs(np.exp(-1j * np.outer(turn, np.arange(weights.size))) @ weights) ** 2
+        # Rounding comes after the smoothing.
+        found[way] = _tapered(np.concatenate([gain * parts, parts[:1]]))
+    return found
+
+
+def _ways() -> dict[str, Floats]:
+    from scipy.signal import savgol_coeffs
+
+    ways = {f"averages over {n} frames": np.full(n, 1.0 / n) for n in AVERAGED}
+    ways["weighted averages over 3 frames"] = np.array([0.25, 0.5, 0.25])
+    ways["weighted averages over 5 frames"] = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0
+    for frames, degree in POLYNOMIALS:
+        name = {2: "parabolas", 4: "quartics"}[degree]
+        ways[f"{name} through {frames} frames (Savitzky-Golay)"] = savgol_coeffs(frames, degree)
+    return ways
+
+
+def _tapered(spectra: Floats) -> Floats:
+    """Return the mean of tapered spectra of a segment whose true ones are given, (f, parts)."""
+    taper = _taper()
+    covariance = np.fft.ifft(spectra, axis=1).real[:, :SEGMENT]
+    covariance *= np.correlate(taper, taper, mode="full")[SEGMENT - 1 :]
+    covariance[:, 1:] *= 2.0
+    turn = 2.0 * np.pi * np.arange(SEGMENT // 2 + 1) / SEGMENT
+    found: Floats = np.cos(np.outer(turn, np.arange(SEGMENT))) @ covariance.T
+    return found[_band()]
+
+
+def _likelihood(seen: Floats, parts: Floats, weight: Floats) -> float:
+    """Return Whittle's log likelihood of a spectrum that is a sum of parts, at its maximum.
+
+    The shares of the parts are above zero, and each step raises the likelihood.
+    """
+    share = np.array([float(np.median(seen / np.maximum(part, 1e-12))) for part in parts.T])
+    share /= share.size
+    for _ in range(STEPS):
+        expected = parts @ share
+        up = parts.T @ (weight * seen / expected**2)
+        share *= np.sqrt(up / (parts.T @ (weight / expected)))
+    expected = parts @ share
+    return -float((weight * (np.log(expected) + seen / expected)).sum())
