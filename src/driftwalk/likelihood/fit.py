@@ -132,6 +132,7 @@ def fit_motion(
         "restricted": "yes" if restricted.has_minimum else "no",
         "samples": ready.samples,
         "mistakes": ready.mistakes,
+        "jumps_removed": ready.jumps_removed,
         "dropped_frames": ready.dropped_frames,
         "dropped_places": ready.dropped_places,
         "samples_used": mode.used,

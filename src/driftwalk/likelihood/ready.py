@@ -9,6 +9,7 @@ import numpy as np
 
 from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import InputError
+from driftwalk.core.json_text import parse_json
 from driftwalk.flow.arena import Outline, outline_of, read_arena
 from driftwalk.likelihood.angle import no_angle, smooth_angle
 from driftwalk.likelihood.dropped import DroppedFrames, find_dropped_frames, places_of, with_gaps
@@ -69,6 +70,8 @@ class Ready(NamedTuple):
     wall_share: float
     mistakes: int
     """Samples that are left out as mistakes of the tracker."""
+    jumps_removed: int
+    """Samples that were left out when the recordings were read: too far away for `max_speed`."""
     dropped_frames: int
     """Frames that are missing though the stamps say a constant rate; their time is put in."""
     dropped_places: str
@@ -130,6 +133,7 @@ def prepare(
         used_angle,
         share,
         mistakes,
+        sum(_jumps_removed(recording, body) for recording in many),
         sum(one.frames for one in dropped),
         "; ".join(
             _name_of(recording) + places_of(one)
@@ -143,6 +147,16 @@ def _name_of(recording: xr.Dataset) -> str:
     """Return what a message on a recording begins with."""
     name = recording.attrs.get("source", "")
     return f"{name}: " if name else ""
+
+
+def _jumps_removed(recording: xr.Dataset, body: str | None) -> int:
+    """Return how many samples of a body the reading of its recording left out as jumps."""
+    found = parse_json(str(recording.attrs.get("counts", "{}")))
+    # A file may hold other counts than those of `driftwalk.record`.
+    for key in ("per_body", str(recording["body"].values[0]) if body is None else body):
+        found = found.get(key) if isinstance(found, dict) else None
+    number = found.get("jumps_removed") if isinstance(found, dict) else None
+    return number if isinstance(number, int) else 0
 
 
 def _is_fitted_arena(recording: xr.Dataset, study: Study) -> bool:

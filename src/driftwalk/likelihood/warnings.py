@@ -93,6 +93,11 @@ def _on_the_data(
             f"{facts['mistakes']} of {facts['samples']} samples were left out: each lies far from "
             "both of its neighbours, as mistakes of a tracker do"
         )
+    if facts["jumps_removed"]:
+        found.append(
+            f"{facts['jumps_removed']} samples were left out when the recording was read: with "
+            "them the body would have been faster than the greatest speed that was given"
+        )
     if facts["dropped_frames"]:
         found.append(
             f"{facts['dropped_frames']} frames are missing although the time stamps say a constant "

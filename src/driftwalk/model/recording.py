@@ -107,7 +107,7 @@ class Recording(Section):
     )
     max_speed_m_s: Annotated[float | None, Quantity("m/s", gt=0, le=1e4)] = Field(
         default=None,
-        description="Fastest plausible speed; a faster jump becomes a gap.",
+        description="Fastest plausible speed; samples that need a faster one become gaps.",
         examples=[1.0],
     )
     arena: Literal["tank", "fit", "file"] = Field(

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
+from driftwalk.record.jumps import find_jumps
 from driftwalk.record.raw import RawBody
 from driftwalk.record.several_bodies import (
     BodyColumns,
@@ -67,8 +68,8 @@ def clean_body(
     start, stop : float, optional
         First and last time to keep [s].
     max_speed : float, optional
-        A sample that could be reached from the last good one only faster than this [m/s] becomes
-        a gap.
+        Samples without which the body was never faster than this [m/s] become gaps: see
+        `find_jumps`.
     quantum : float
         Resolution of the positions [m]: rows within it are in the same place.
     separate : bool
@@ -160,38 +161,3 @@ def _without(body: RawBody, rows: npt.NDArray[np.int64]) -> RawBody:
     x, y = body.x.copy(), body.y.copy()
     x[rows] = y[rows] = np.nan
     return RawBody(body.name, body.clock, x, y, body.theta, extra=body.extra)
-
-
-def find_jumps(body: RawBody, max_speed: float) -> npt.NDArray[np.int64]:
-    """Return the indices of samples that the body cannot have reached at `max_speed` [m/s].
-
-    Each sample is compared with the last accepted one, so an excursion to another body is removed
-    whole until it is within reach again. The first accepted sample is the first from which the
-    next can be reached.
-
-    Examples
-    --------
-    >>> time = np.arange(5.0)
-    >>> find_jumps(RawBody("0", time, np.array([0.0, 1, 90, 3, 4]), time * 0), 2.0).tolist()
-    [2]
-    """
-    present = np.flatnonzero(np.isfinite(body.x))
-    t, x, y = body.clock[present], body.x[present], body.y[present]
-    if t.size < 2:
-        return np.zeros(0, dtype=np.int64)
-    fast = np.hypot(np.diff(x), np.diff(y)) > max_speed * np.diff(t)
-    suspects = np.flatnonzero(fast)
-    slow = np.flatnonzero(~fast)
-    first = int(slow[0]) if slow.size else 0
-    removed = list(range(first))
-    last = first
-    while (place := int(np.searchsorted(suspects, last))) < suspects.size:
-        good = int(suspects[place])
-        at = good + 1
-        while at < t.size and np.hypot(x[at] - x[good], y[at] - y[good]) > max_speed * (
-            t[at] - t[good]
-        ):
-            removed.append(at)
-            at += 1
-        last = at
-    return present[np.array(removed, dtype=np.int64)]

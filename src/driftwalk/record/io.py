@@ -83,7 +83,7 @@ def load(
     y_axis : {"up", "down"}, optional
         Direction of y in the file; None: down for pixels (y and theta are negated), else up.
     max_speed : float, optional
-        Samples that could only be reached faster than this [m/s] become gaps.
+        The fewest samples without which the body was never faster than this [m/s] become gaps.
     sort : {"error", "sort"}
         Behaviour if times go backwards.
     columns : mapping, optional

@@ -70,8 +70,8 @@ FIT_NUMBERS: Final[Mapping[str, str]] = MappingProxyType(
     }
 )
 FIT_COUNTS: Final = (
-    *("samples", "mistakes", "dropped_frames", "samples_used", "intervals_usable"),
-    *("recordings", "iterations"),
+    *("samples", "mistakes", "jumps_removed", "dropped_frames", "samples_used"),
+    *("intervals_usable", "recordings", "iterations"),
 )
 FIT_VERDICTS: Final = ("restricted", "converged")
 FIT_ROWS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(

@@ -360,7 +360,7 @@ def facts(std: float, duration: float, study_settings: dict[str, object]) -> dic
     study = coarse_study(**study_settings)
     found = {"wall_share": 0.0, "converged": "yes", "restricted": "yes", "angle": "given"}
     found |= {"samples_used": 1000, "intervals_usable": 1000, "mistakes": 0}
-    found |= {"dropped_frames": 0}
+    found |= {"dropped_frames": 0, "jumps_removed": 0}
     return {**found, "duration_s": duration, **precision_facts(std, duration, study)}
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from driftwalk.core.errors import InputError
 from driftwalk.record import describe, load
-from driftwalk.record.clean import clean_body, find_jumps
+from driftwalk.record.clean import clean_body
 from driftwalk.record.raw import RawBody
 from driftwalk.schema import body_track
 
@@ -60,31 +60,6 @@ def test_a_window_in_time() -> None:
     assert counts.outside_window == 6
 
 
-def brute_force_jumps(time: Any, x: Any, max_speed: float) -> list[int]:
-    """Walk over the samples one by one, from the first whose successor is within reach."""
-    reach = [abs(x[i + 1] - x[i]) <= max_speed * (time[i + 1] - time[i]) for i in range(len(x) - 1)]
-    last = reach.index(True) if True in reach else 0
-    removed = list(range(last))
-    for at in range(last + 1, len(x)):
-        if abs(x[at] - x[last]) > max_speed * (time[at] - time[last]):
-            removed.append(at)
-        else:
-            last = at
-    return removed
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_jumps_agree_with_a_walk_over_the_samples(seed: int) -> None:
-    random = np.random.default_rng(seed)
-    time = np.cumsum(random.uniform(0.05, 0.2, 200))
-    x = np.cumsum(random.normal(0.0, 0.05, 200))
-    spoiled = random.choice(200, 15, replace=False)
-    x[spoiled] += random.normal(0.0, 3.0, 15)
-    found = find_jumps(body(time, x), 1.0).tolist()
-    assert found == brute_force_jumps(time, x, 1.0)
-    assert found
-
-
 def test_a_jump_becomes_a_gap_and_an_excursion_is_removed_whole() -> None:
     x = [0.0, 0.1, 0.2, 5.0, 5.1, 5.2, 0.6, 0.7]
     cleaned, counts = clean_body(body(range(8), x), max_speed=0.5)
@@ -93,14 +68,6 @@ def test_a_jump_becomes_a_gap_and_an_excursion_is_removed_whole() -> None:
     assert counts.missing == 0
     with pytest.raises(InputError, match="`max_speed` must be above zero"):
         clean_body(body(range(8), x), max_speed=0.0)
-
-
-def test_a_jump_in_the_first_sample() -> None:
-    assert find_jumps(body(range(4), [9.0, 0.0, 0.1, 0.2]), 0.5).tolist() == [0]
-
-
-def test_missing_samples_lie_between_and_are_not_compared() -> None:
-    assert find_jumps(body(range(4), [0.0, np.nan, 0.9, 1.3]), 0.5).size == 0
 
 
 def test_everything_is_counted_in_the_dataset(tmp_path: Path) -> None:

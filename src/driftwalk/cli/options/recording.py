@@ -80,7 +80,7 @@ class RecordingOptions:
         float | None,
         _option(
             "--max-speed",
-            "Fastest plausible speed; samples that need a faster one become gaps.",
+            "Fastest plausible speed; the fewest samples without which it is kept become gaps.",
             unit="m/s",
         ),
     ] = None

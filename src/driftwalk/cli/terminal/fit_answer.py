@@ -80,6 +80,7 @@ _KEYS: Final = (
     *(f"{name}{end}" for name in LAW_ESTIMATES for end in ("", "_interval")),
     "drag_coefficient_any_added_mass_interval",
     "force_std_any_added_mass_interval_N",
+    "jumps_removed",
     "dropped_frames",
 )
 """The last ones where they are in the fit."""

@@ -110,6 +110,11 @@ FIT: Final = Kind(
             when="the fit was made by a version that looks for them",
         ),
         Variable(
+            "jumps_removed", "", "1", "samples left out when the recordings were read, as too far "
+            "away for the greatest speed", "int",
+            when="the fit was made by a version that counts them",
+        ),
+        Variable(
             "dropped_frames", "", "1", "frames that the recording lacks although its stamps do not "
             "say so", "int", when="the fit was made by a version that looks for them",
             note="their time is put in",
