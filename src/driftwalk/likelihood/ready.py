@@ -12,10 +12,16 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.json_text import parse_json
 from driftwalk.flow.arena import Outline, outline_of, read_arena
 from driftwalk.likelihood.angle import no_angle, smooth_angle
-from driftwalk.likelihood.dropped import DroppedFrames, find_dropped_frames, places_of, with_gaps
 from driftwalk.likelihood.filter_pass import LONGEST_GAP_S, Body, Series
 from driftwalk.likelihood.intervals import Intervals, cut_track, intervals_of
-from driftwalk.likelihood.outliers import without_mistakes
+from driftwalk.likelihood.mistakes.dropped import (
+    DroppedFrames,
+    find_dropped_frames,
+    places_of,
+    with_gaps,
+)
+from driftwalk.likelihood.mistakes.outliers import without_mistakes
+from driftwalk.likelihood.mistakes.smoothed import require_raw
 from driftwalk.likelihood.refuse import (
     FEWEST_SAMPLES,
     require_length,
@@ -24,7 +30,6 @@ from driftwalk.likelihood.refuse import (
     require_size,
     require_usable,
 )
-from driftwalk.likelihood.smoothed import require_raw
 from driftwalk.likelihood.spline import Spline, lay_spline
 from driftwalk.likelihood.wall import wall_intervals
 from driftwalk.schema import Track, body_track

@@ -13,7 +13,7 @@ from fit_worlds import coarse_study, fitted, recording
 from hypothesis import given, settings, strategies as st
 
 import driftwalk as dw
-from driftwalk.likelihood.dropped import ENOUGH, find_dropped_frames, places_of, with_gaps
+from driftwalk.likelihood.mistakes.dropped import ENOUGH, find_dropped_frames, places_of, with_gaps
 from driftwalk.schema import Track, body_track, build_trajectory
 from driftwalk.schema.facts import fit_facts
 

@@ -12,7 +12,7 @@ from fit_worlds import coarse_study, fitted, recording
 from hypothesis import given, strategies as st
 
 import driftwalk as dw
-from driftwalk.likelihood.outliers import FEWEST, mistakes_in, without_mistakes
+from driftwalk.likelihood.mistakes.outliers import FEWEST, mistakes_in, without_mistakes
 from driftwalk.likelihood.ready import prepare
 from driftwalk.schema import Track, body_track
 from driftwalk.schema.facts import fit_facts

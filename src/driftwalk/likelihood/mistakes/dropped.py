@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.likelihood.interval_windows import (
+from driftwalk.likelihood.mistakes.interval_windows import (
     AT_MIDDLE,
     CLASSES,
     CLEAN,

@@ -1,0 +1,1 @@
+"""Mistakes of the camera and its tracker, as the track itself shows them."""
