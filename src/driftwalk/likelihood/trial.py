@@ -102,7 +102,7 @@ def find_pulses(passes: Passes, mode: Mode) -> Pulses | None:
     if not lines:
         return None
     line = max(lines, key=lambda one: one.height)
-    least = 2.0 * float(np.log(line.count / FALSE_PULSES))
+    least = 2.0 * float(np.log(line.frequencies / FALSE_PULSES))
     return Pulses(line.frequency, line.amplitude, line.height > least)
 
 
@@ -113,8 +113,8 @@ class _Line(NamedTuple):
     """Of chi squared with two degrees of freedom."""
     frequency: float
     amplitude: float
-    count: int
-    """Number of frequencies."""
+    frequencies: int
+    """How many were looked at."""
 
 
 def _highest_line(passes: Passes, mode: Mode, series: Series) -> _Line | None:

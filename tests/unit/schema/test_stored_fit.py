@@ -72,7 +72,8 @@ def test_the_answer_has_units_and_verdicts(fit: xr.Dataset) -> None:
     assert fit["converged"].dtype == bool
     assert bool(fit["converged"]) is True
     assert set(fit.attrs) == {
-        *("kind", "schema_version", "arena", "angle", "source", "simulated_recording", "study")
+        *("kind", "schema_version", "arena", "angle", "source", "simulated_recording", "study"),
+        "force_law",
     }
     with pytest.raises(InputError, match="the fit has no viscosity: it has drag_coefficient"):
         fitted_value(fit, "viscosity")

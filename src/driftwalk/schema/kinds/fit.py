@@ -58,8 +58,8 @@ FIT: Final = Kind(
             "estimate", "parameter", None, "estimates of the parameters",
             note="drag_coefficient C_d, force_std σ_F, force_noise_intensity σ_F² times the force "
             "interval, tracking_noise; with the angle in the state also force_lever and "
-            "orientation_noise; where they were estimated or stated, the numbers of the force law and of "
-            "the camera; in the units of the coordinate unit",
+            "orientation_noise; where they were estimated or stated, the numbers of the force law "
+            "and of the camera; in the units of the coordinate unit",
         ),
         Variable(
             "interval", "parameter bound", None, "intervals of the parameters",
@@ -262,6 +262,10 @@ FIT: Final = Kind(
     ),
     attributes=(
         Attribute("angle", "text", 'how the orientation was used: "state", "given" or "none"'),
+        Attribute(
+            "force_law", "text", 'force law that was found: "paper" or "floating body"',
+            _LAWS,
+        ),
         Attribute("check_left_out", "text", "reason why the model was not checked", "it was not"),
         SIMULATED,
         ARENA,

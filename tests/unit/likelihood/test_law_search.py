@@ -1,0 +1,130 @@
+"""Departures from the model that a fit finds, on recordings in which they are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from fit_worlds import DRAG, coarse_study, recording
+
+import driftwalk as dw
+from driftwalk.conditions import estimated_study
+from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.study_keys import FIT_KEYS, study_overrides
+from driftwalk.model import Study, apply_overrides
+from driftwalk.schema import build_flow_field, build_trajectory
+from driftwalk.schema.facts import fit_facts, fitted_value
+
+SECONDS = 300.0
+FALSE_ALARM = "an interval of 99.9 % misses once in a thousand; seeds are fixed"
+
+
+def study_with(**values: object) -> Study:
+    return apply_overrides(coarse_study(), {"fit.confidence": 0.999, **study_overrides(**values)})
+
+
+def within(fit: xr.Dataset, parameter: str, truth: float) -> bool:
+    low, high = fit["interval"].sel(parameter=parameter).values
+    return bool(low <= truth <= high)
+
+
+@pytest.fixture(scope="module")
+def floating() -> xr.Dataset:
+    """Five minutes of a body that floats, on a swirl: the water's acceleration pushes it."""
+    study = apply_overrides(
+        coarse_study(),
+        {
+            "forces.drag_coefficient": 0.45,
+            "forces.force_std_N": 0.8e-3,
+            "forces.pressure_gradient": True,
+            "forces.added_mass_share": 0.5,
+            "simulation.time_step_s": 0.002,
+            "observation.position_noise_m": 3e-4,
+            "observation.orientation_noise_rad": 0.009,
+        },
+    )
+    axis = np.linspace(-0.15, 0.15, 41)
+    x, y = np.meshgrid(axis, axis)
+    swirl = 0.5 * np.exp(-((np.hypot(x, y) / 0.14) ** 4))
+    jet = 0.05 * np.exp(-0.5 * (np.hypot(x - 0.09, y + 0.05) / 0.03) ** 2)
+    inside = np.ones(x.shape, dtype=np.int8)
+    flow = build_flow_field(axis, axis, u=-swirl * y - jet, v=swirl * x, flag=inside)
+    time = np.arange(0.0, SECONDS + 20.0, 0.1)
+    run = dw.simulate(study, flow, sample_time=time, replicates=1, seed=5)
+    seen = run.isel(replicate=0, body=0, time=slice(200, None))
+    return build_trajectory(
+        seen["time"].values - 20.0, *(seen[name].values for name in ("x", "y", "theta"))
+    )
+
+
+def test_the_law_of_a_floating_body_is_found(floating: xr.Dataset) -> None:
+    fit = dw.fit_motion(floating, study_with())
+    facts = fit_facts(fit)
+    assert facts["force_law"] == "floating body"
+    assert facts["law_settled_by"] > 20.0
+    # The added mass is the usual one, which this body has: C_d holds its uncertainty, too.
+    assert facts["added_mass_share"] == 0.5
+    assert within(fit, "effective_drag_coefficient", 0.45 / 1.5), FALSE_ALARM
+    assert within(fit, "effective_force_std", 0.8e-3 / 1.5), FALSE_ALARM
+    low, high = facts["drag_coefficient_interval"]
+    own_low, own_high = facts["effective_drag_coefficient_interval"]
+    assert high / low > own_high / own_low
+    forces = estimated_study(fit).forces
+    assert forces.pressure_gradient
+    assert forces.added_mass_share == 0.5
+    assert forces.drag_coefficient == facts["drag_coefficient"]
+
+
+@pytest.mark.slow
+def test_a_marker_that_is_off_and_turned_is_found() -> None:
+    """Where the camera says the block is, and how it is turned, is moved by known amounts."""
+    track = recording(SECONDS)
+    theta = track["theta"].values
+    track["x"].values[:] += 2e-3 * np.cos(theta) - 1e-3 * np.sin(theta)
+    track["y"].values[:] += 2e-3 * np.sin(theta) + 1e-3 * np.cos(theta)
+    track["theta"].values[:] += np.radians(6.0)
+    fit = dw.fit_motion(track, study_with())
+    # The marker's place is stated in the frame of the recorded angle.
+    turned = np.radians(6.0)
+    want = np.array([[np.cos(turned), np.sin(turned)], [-np.sin(turned), np.cos(turned)]]) @ (
+        2e-3,
+        1e-3,
+    )
+    assert fitted_value(fit, "marker_x") == pytest.approx(want[0], abs=0.5e-3)
+    assert fitted_value(fit, "marker_y") == pytest.approx(want[1], abs=0.5e-3)
+    assert fitted_value(fit, "orientation_offset") == pytest.approx(turned, abs=np.radians(1.5))
+    assert within(fit, "drag_coefficient", 1.021 * DRAG), FALSE_ALARM
+    exact = dw.fit_motion(track, study_with(), angle="none")
+    assert "marker_x" not in exact["parameter"].values
+
+
+def test_the_model_itself_opens_nothing() -> None:
+    fit = dw.fit_motion(recording(SECONDS), study_with())
+    assert fit.attrs["force_law"] == "paper"
+    assert not fit["number_opened"].values.any()
+    assert set(fit["law"].values) == {"paper", "floating"}
+    assert {"linear_share", "force_memory", "marker_x"} <= set(fit["departure"].values)
+
+
+def test_stated_uncertainty_widens_the_intervals() -> None:
+    track = recording(120.0)
+    exact = dw.fit_motion(track, study_with(keys=FIT_KEYS, law="paper"))
+    stated = {"law": "quadratic", "pressure_gradient": "off"}
+    wide = dw.fit_motion(
+        track, study_with(keys=FIT_KEYS, **stated, mass="11.6±0.6 g", added_mass="0.3±0.1")
+    )
+    assert fitted_value(wide, "drag_coefficient") == pytest.approx(
+        1.3 * fitted_value(exact, "drag_coefficient"), rel=0.02
+    )
+    widths = [
+        float(np.log(fit["interval"].sel(parameter="drag_coefficient")).diff("bound")[0])
+        for fit in (exact, wide)
+    ]
+    # 5 % of the mass and 0.1 / 1.3 of the added mass, 3.29 sd to either side.
+    added = 2.0 * 3.2905 * np.hypot(0.6 / 11.6, 0.1 / 1.3)
+    assert widths[1] == pytest.approx(np.hypot(widths[0], added), rel=0.05)
+
+
+def test_a_deviation_where_none_belongs_is_an_error() -> None:
+    with pytest.raises(ConfigurationError, match="'tank_diameter' takes no standard deviation"):
+        study_overrides(keys=FIT_KEYS, tank_diameter="30±1 cm")
