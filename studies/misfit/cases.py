@@ -142,6 +142,11 @@ CASES: dict[str, Case] = {
         FLOATING, stated={"fit.added_mass_share": 0.0}, carried=True
     ),
     "added mass 0.5 m in the inertia alone": Case({"added_mass": 0.5}),
+    "the same, stated as 0.5 ± 0.1": Case(
+        {"added_mass": 0.5},
+        stated={"fit.added_mass_share": 0.5, "fit.added_mass_share_std": 0.1},
+    ),
+    "drag with a linear part": Case({"linear_drag": 5e-3}),
     "drag ∝ speed": Case({"drag_power": 1.0}),
     "drag ∝ speed^1.5": Case({"drag_power": 1.5}),
     "flow grows by 20 %": Case({"flow_growth": 0.2 / 660.0}),

@@ -110,6 +110,19 @@ def fit_one(name: str, number: int, motions: Path, minutes: float) -> dict[str, 
         low, high = (float(bound) for bound in fit["interval"].sel(parameter=parameter))
         facts[f"{parameter}_error"] = value / true - 1.0
         facts[f"{parameter}_covered"] = bool(low <= true <= high)
+    facts["law"] = str(fit.attrs["force_law"])
+    facts["evidence"] = round(float(fit["law_settled_by"]), 1) if "law_settled_by" in fit else None
+    facts["numbers"] = {
+        str(name): [
+            float(fit["estimate"].sel(parameter=name)),
+            *fit["interval"].sel(parameter=name).values.tolist(),
+        ]
+        for name in fit["parameter"].values[6 if "force_lever" in fit["parameter"] else 4 :]
+    }
+    if "drag_coefficient_any_added_mass_interval" in fit:
+        for parameter in ("drag_coefficient", "force_std"):
+            low, high = fit[f"{parameter}_any_added_mass_interval"].values
+            facts[f"{parameter}_any_covered"] = bool(low <= truth[parameter] <= high)
     try:
         check = check_model(fit, recording)
         facts["explained"] = bool(check["explained"])

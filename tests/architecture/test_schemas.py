@@ -16,6 +16,7 @@ SOURCE = Path(__file__).resolve().parents[2] / "src" / "driftwalk"
 OF_WHAT_IS_GIVEN = {
     *("value", "low", "high", "variance"),
     *("estimate", "interval", "coarse_estimate", "first_half_estimate"),
+    *("number_value", "departure_estimate", "departure_std"),
 }
 """Numbers whose unit depends on the input, the output or the parameter."""
 

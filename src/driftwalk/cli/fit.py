@@ -30,6 +30,7 @@ RecordingFiles = Annotated[
     *("tank_diameter", "side", "mass", "depth", "force_interval"),
     *("angle", "spline_spacing", "confidence", "switching_times", "flow_labels", "precision"),
     *("law", "pressure_gradient", "added_mass", "force_memory", "flow_strength", "camera"),
+    *("added_mass_std", "mass_std", "side_std"),
 )
 def fit(
     recordings: RecordingFiles,
@@ -39,6 +40,13 @@ def fit(
     no_check: Annotated[
         bool,
         typer.Option("--no-check", help="Skip the check whether the model explains the recording."),
+    ] = False,
+    compare_laws: Annotated[
+        bool,
+        typer.Option(
+            "--compare-laws",
+            help="Compare force laws by evidence and held out prediction (takes some six fits).",
+        ),
     ] = False,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Move a finished run aside and start a new one.")
@@ -58,7 +66,7 @@ def fit(
     read = read_for_run(recordings, given, how)
     inputs = {"recording" if n == 0 else f"recording-{n + 1}": p for n, p in enumerate(recordings)}
     inputs.update({"study": given.file} if given.file is not None else {})
-    work = FitWork(read.trajectories, read.study, how.body, inputs, check=not no_check)
+    work = FitWork(read.trajectories, read.study, how.body, inputs, not no_check, compare_laws)
     with reported("fit") as told:
         found = run_fit(work, out, overwrite=overwrite, begun=tank_note(read), **told)
     if json:

@@ -3,6 +3,7 @@
 from driftwalk.figures.assembly import write_assembly_figures, write_sensitivity_figures
 from driftwalk.figures.calibration import write_figures
 from driftwalk.figures.fit import plot_flow_error, write_fit_figures
+from driftwalk.figures.laws import plot_laws, write_laws_figure
 from driftwalk.figures.model_check import write_check_figures
 from driftwalk.figures.recovery import (
     plot_flow_recovery,
@@ -14,12 +15,14 @@ from driftwalk.figures.recovery import (
 __all__ = [
     "plot_flow_error",
     "plot_flow_recovery",
+    "plot_laws",
     "plot_recovery",
     "plot_recovery_error",
     "write_assembly_figures",
     "write_check_figures",
     "write_figures",
     "write_fit_figures",
+    "write_laws_figure",
     "write_recovery_figures",
     "write_sensitivity_figures",
 ]

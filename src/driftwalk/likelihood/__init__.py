@@ -2,6 +2,7 @@
 
 from driftwalk.likelihood.check.judged import Judged, judge_fit
 from driftwalk.likelihood.check.run import check_model
+from driftwalk.likelihood.compare_laws import compare_laws
 from driftwalk.likelihood.fit import check_fit, fit_motion
 from driftwalk.likelihood.recover.check import check_recovery
 from driftwalk.likelihood.recover.run import recovery_study
@@ -13,6 +14,7 @@ __all__ = [
     "check_fit",
     "check_model",
     "check_recovery",
+    "compare_laws",
     "fit_motion",
     "fitted_flow",
     "judge_fit",

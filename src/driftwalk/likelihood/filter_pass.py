@@ -399,6 +399,21 @@ def _beside(base: dict[str, Any], other: dict[str, Any], step: float) -> Flags:
         return np.asarray((np.abs(two - one) <= most * one).all(axis=0), dtype=bool)
 
 
+def log_densities(passes: Passes, series: Series, point: Point) -> Floats:
+    """Return the logarithm of the predicted density of each sample, shape (n,); NaN without one.
+
+    Those that the filter takes for mistakes have one, too: a law pays for what it cannot predict.
+    """
+    found = passes._run(series, point)
+    there = np.isfinite(found["innovation"]).all(axis=1) & (series.excluded == 0)
+    root = factor(found["covariance"][there])
+    white = forward(root, found["innovation"][there].T)
+    size = len(white)
+    density = np.full(there.size, np.nan)
+    density[there] = -0.5 * (white**2).sum(axis=0) - np.log(np.einsum("aan->an", root)).sum(axis=0)
+    return density - 0.5 * size * math.log(2.0 * math.pi)
+
+
 def _noise_derivatives(
     base: dict[str, Any], others: list[tuple[dict[str, Any], dict[str, Any], float]], used: Flags
 ) -> tuple[Floats, list[Floats], list[Floats]]:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.agreement import angle_given_facts
 from driftwalk.likelihood.assumptions import assumptions_of
-from driftwalk.likelihood.filter_pass import Passes
-from driftwalk.likelihood.law_facts import law_facts
+from driftwalk.likelihood.filter_pass import Passes, Point
+from driftwalk.likelihood.law_facts import law_facts, side_slopes
 from driftwalk.likelihood.law_search import LawFound, LawSearch
+from driftwalk.likelihood.mistakes.mirrored import spin_correlation
 from driftwalk.likelihood.newton import Prior, Tell, silent
 from driftwalk.likelihood.ready import (
     AngleUse,
@@ -107,7 +108,8 @@ def fit_motion(
     spline = spline_of(chosen, outline)
     flows = len(intervals.labels)
     passes = Passes(series, body_of(chosen, used_angle), spline, flows)
-    law, restricted = _search(passes, ready, chosen, tell or silent)
+    start = _start(passes, ready, chosen)
+    law, restricted = _search(passes, start, ready, chosen, tell or silent)
     mode = law.mode
     with solved():
         innovations = passes.innovations(restricted.point)
@@ -121,10 +123,16 @@ def fit_motion(
     duration = sum(float(one.time[-1] - one.time[0]) for one in series)
     covariance = parameter_covariance(mode, restricted)
     facts: dict[str, Any] = {
-        **parameter_facts(restricted.point, covariance, chosen),
+        **parameter_facts(
+            restricted.point,
+            covariance,
+            chosen,
+            by_side=side_slopes(passes, law, restricted, chosen),
+        ),
         "maximum_likelihood_drag_coefficient": math.exp(mode.point.log_drag),
         **precision_facts(math.sqrt(covariance[0, 0]), duration, chosen),
         **law_facts(law),
+        **_turning(start, passes),
         "wetted_depth_m": chosen.wetted_depth_m,
         "wall_share": ready.wall_share,
         "angle": used_angle,
@@ -168,6 +176,14 @@ def fit_motion(
     )
 
 
+def _turning(start: Point, passes: Passes) -> dict[str, float]:
+    """Return how the block's spin goes with the water's, where orientations and one flow are."""
+    if passes.body.orientation == "none" or start.coefficients.ndim > 3:
+        return {}
+    found = spin_correlation(start.coefficients, passes.spline, passes.series)
+    return {"spin_correlation": found}
+
+
 def check_fit(
     recordings: xr.Dataset | Sequence[xr.Dataset],
     study: Study | None = None,
@@ -205,16 +221,22 @@ def _longest_in(ready: Ready, flow: int) -> Track:
     )
 
 
-def _search(passes: Passes, ready: Ready, study: Study, tell: Tell) -> tuple[LawFound, Restricted]:
-    """Return the law with the maximum of its likelihood, and that of the restricted one."""
-    prior = Prior(passes)
-    start = first_point(
+def _start(passes: Passes, ready: Ready, study: Study) -> Point:
+    """Return where the search begins."""
+    return first_point(
         ready.tracks,
         study,
         passes.spline,
         angle=passes.body.orientation,
         in_flows=[_longest_in(ready, flow) for flow in range(passes.flows)],
     )
+
+
+def _search(
+    passes: Passes, start: Point, ready: Ready, study: Study, tell: Tell
+) -> tuple[LawFound, Restricted]:
+    """Return the law with the maximum of its likelihood, and that of the restricted one."""
+    prior = Prior(passes)
     weights = first_weights(ready.tracks, passes.spline)
     assumptions = assumptions_of(
         study, passes.body.orientation, recordings=len(ready.tracks), flows=passes.flows

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from driftwalk.likelihood.assumptions import USUAL_ADDED_MASS, added_mass_of
 from driftwalk.likelihood.departures import STRENGTH_TERMS
-from driftwalk.likelihood.filter_pass import Point
+from driftwalk.likelihood.filter_pass import Passes, Point
 from driftwalk.schema.facts import fitted_value
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.likelihood.law_search import LawFound
+    from driftwalk.likelihood.reml import Restricted
     from driftwalk.likelihood.spline import Floats
     from driftwalk.model import Study
 
@@ -27,6 +29,10 @@ PLAIN: Final = {
     "pulse_frequency": "pulse_frequency_Hz",
 }
 """Numbers that are stated as they are."""
+
+
+SIDE_STEP: Final = 0.01
+"""Relative change of the side for the derivatives by it."""
 
 
 class Inertia(NamedTuple):
@@ -189,3 +195,29 @@ def stored_numbers(fit: xr.Dataset) -> Numbers:
     for name, value, opened in rows:
         (found.opened if opened else found.fixed)[str(name)] = float(value)
     return found
+
+
+def side_slopes(
+    passes: Passes, law: LawFound, restricted: Restricted, study: Study
+) -> tuple[float, float]:
+    """Return the derivatives of ln C_d and ln σ_F by the logarithm of the block's side.
+
+    They come from the one step that the search makes after a change of the side. (0, 0) where the
+    side is stated without an uncertainty.
+    """
+    if study.fit.side_std_m == 0.0:
+        return 0.0, 0.0
+    from driftwalk.likelihood.newton import Prior, inverse
+    from driftwalk.likelihood.ready import body_of
+    from driftwalk.model import apply_overrides
+
+    larger = apply_overrides(study, {"block.side_m": (1.0 + SIDE_STEP) * study.block.side_m})
+    prior = Prior(passes)
+    changed = replace(passes, body=body_of(larger, passes.body.orientation))
+    steps = []
+    for one in (passes, changed):
+        sums = prior.add(one.sums(restricted.point), restricted.point, law.mode.weights)
+        steps.append(inverse(sums.information) @ sums.score)
+    drag = restricted.point.coefficients.size
+    slope = (steps[1] - steps[0])[drag : drag + 2] / math.log1p(SIDE_STEP)
+    return float(slope[0]), 0.5 * float(slope[1])

@@ -96,6 +96,7 @@ def prepare(
     outline = outline_of(study.tank.to_arena())
     require_size(len(intervals.labels), 2 * spline_of(study, outline).size)
     tracks, parts, places = [], [], []
+    raws: list[Track] = []
     mistakes, dropped = 0, list[DroppedFrames]()
     for index, recording in enumerate(many):
         seen, where = body_track(recording, body), _name_of(recording)
@@ -103,7 +104,7 @@ def prepare(
         mistakes += seen.time.size - track.time.size
         require_length(track, study, where=where)
         require_motion(track, study, where=where)
-        require_raw(track, where=where)
+        raws.append(track)
         dropped.append(find_dropped_frames(track, recording["time"].values))
         track = with_gaps(track, dropped[-1])
         cut = cut_track(track, intervals, fewest=FEWEST_SAMPLES, where=where)
@@ -128,6 +129,9 @@ def prepare(
             study,
             where=f"{intervals.describe_flow(flow)}: ",
         )
+    if study.fit.camera == "auto":
+        for raw, recording in zip(raws, many, strict=True):
+            require_raw(raw, where=_name_of(recording))
     share = near_wall / count
     return Ready(
         tracks,

@@ -21,7 +21,7 @@ import numpy.typing as npt
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.flow.grid import Grid, make_grid
-from driftwalk.likelihood.filter_pass import Series
+from driftwalk.likelihood.filter_pass import Point, Series
 from driftwalk.likelihood.intervals import Intervals, fitted_intervals, switched_frames
 from driftwalk.likelihood.law_facts import (
     inertia_facts,
@@ -108,8 +108,13 @@ def parameter_covariance(mode: Mode, restricted: Restricted) -> Floats:
     return widened(covariance * np.outer(scale, scale), mode.point)
 
 
-def parameter_facts(point: Any, covariance: Floats, study: Study) -> dict[str, Any]:
-    """Return the parameters with their intervals, units in the keys."""
+def parameter_facts(
+    point: Point, covariance: Floats, study: Study, *, by_side: tuple[float, float] = (0.0, 0.0)
+) -> dict[str, Any]:
+    """Return the parameters with their intervals, units in the keys.
+
+    `by_side` holds the derivatives of ln C_d and ln σ_F by the logarithm of the block's side.
+    """
     from scipy.special import ndtri
 
     confidence = study.fit.confidence
@@ -119,7 +124,11 @@ def parameter_facts(point: Any, covariance: Floats, study: Study) -> dict[str, A
     normal = float(ndtri(0.5 + 0.5 * confidence))
     reach = normal * np.sqrt(np.diag(covariance))
     heavier = inertia_of(study, floating=point.number("water_acceleration") != 0.0)
-    of_drag, of_force = (math.hypot(one, normal * heavier.log_std) for one in reach[:2] * (1, 0.5))
+    side = normal * study.fit.side_std_m / study.block.side_m
+    of_drag, of_force = (
+        math.hypot(one, normal * heavier.log_std, side * slope)
+        for one, slope in zip(reach[:2] * (1, 0.5), by_side, strict=True)
+    )
     total = heavier.share**2 * intensity
     drag = (1.0 - point.number("linear_share")) * math.exp(point.log_drag)
     values = {
@@ -128,7 +137,7 @@ def parameter_facts(point: Any, covariance: Floats, study: Study) -> dict[str, A
         "force_noise_intensity_N2_s": (total, 2.0 * of_force),
         "tracking_noise_m": (math.exp(point.log_noise), reach[2]),
     }
-    if point.log_lever is not None:
+    if point.log_lever is not None and point.log_angle_noise is not None:
         values["force_lever_m"] = (math.exp(point.log_lever), reach[3])
         values["orientation_noise_rad"] = (math.exp(point.log_angle_noise), reach[4])
     if heavier.share != 1.0 or heavier.log_std > 0.0:

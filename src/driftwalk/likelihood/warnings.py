@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.likelihood.agreement import NOTABLE_DISAGREEMENT
 from driftwalk.likelihood.intervals import Intervals
 from driftwalk.likelihood.length import USUAL_PRECISION, in_words, needed_duration
+from driftwalk.likelihood.mistakes.mirrored import MIRRORED
 from driftwalk.likelihood.result import Whiteness
 
 if TYPE_CHECKING:
@@ -166,6 +167,13 @@ def _on_the_model(facts: Mapping[str, Any], whiteness: Whiteness) -> list[str]:
 
 def _on_the_turning(facts: Mapping[str, Any], side_m: float) -> list[str]:
     found = []
+    along = facts.get("spin_correlation", 0.0)
+    if along < MIRRORED:
+        found.append(
+            f"the block seems to turn against the water (correlation {along:.2f} of its spin with "
+            "the vorticity of the flow): the recorded orientation is likely mirrored, counted "
+            "clockwise; C_d is then meaningless; negate the angle, or turn y upwards"
+        )
     apart = facts.get("angle_disagreement_std", 0.0)
     if apart > NOTABLE_DISAGREEMENT:
         found.append(

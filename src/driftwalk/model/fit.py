@@ -141,7 +141,8 @@ class Fit(Section):
         title="Mistakes of the camera that are estimated.",
         description=(
             '"auto" estimates jitter of the time stamps, an offset of the orientation and of the '
-            'marker where the recording asks for it; "exact" takes what is recorded.'
+            'marker where the recording asks for it, and refuses smoothed positions; "exact" takes '
+            "what is recorded."
         ),
     )
     drag_coefficient_precision: Annotated[float | None, Quantity("1", gt=0, lt=1)] = Field(

@@ -46,6 +46,15 @@ class FitSettings(StudySettings, total=False):
     switching_times: list[Number]
     flow_labels: list[str]
     precision: Number
+    law: str
+    pressure_gradient: str
+    added_mass: Number
+    added_mass_std: Number
+    mass_std: Number
+    side_std: Number
+    force_memory: Number
+    flow_strength: str
+    camera: str
 
 
 class AssemblySettings(StudySettings, total=False):

@@ -33,6 +33,8 @@ class FitWork:
         The files that were read, by their role.
     check : bool
         Whether the model is checked.
+    compare_laws : bool
+        Whether force laws are compared, which takes some six fits.
     """
 
     recordings: Sequence[xr.Dataset]
@@ -40,6 +42,7 @@ class FitWork:
     body: str | None
     inputs: Mapping[str, Path]
     check: bool = True
+    compare_laws: bool = False
 
 
 class Fitted(NamedTuple):
@@ -100,8 +103,8 @@ def run_fit(
     >>> work = FitWork([dw.tank30_recording()], dw.Study(), None, {})
     >>> found = run_fit(work, Path("fit"))  # doctest: +SKIP
     """
-    from driftwalk.figures import write_check_figures, write_fit_figures
-    from driftwalk.likelihood import check_fit, fit_motion, fitted_flow, judge_fit
+    from driftwalk.figures import write_check_figures, write_fit_figures, write_laws_figure
+    from driftwalk.likelihood import check_fit, compare_laws, fit_motion, fitted_flow, judge_fit
 
     check_fit(work.recordings, work.study, body=work.body)
     with open_run(
@@ -116,6 +119,8 @@ def run_fit(
         if begun is not None:
             begun()
         found = fit_motion(work.recordings, work.study, body=work.body, tell=progress)
+        if work.compare_laws:
+            found = compare_laws(found, work.recordings, body=work.body, tell=progress)
         flow = fitted_flow(found)
         run.write("fit.nc", netcdf_bytes(found))
         run.write("flow.nc", netcdf_bytes(flow))
@@ -131,6 +136,8 @@ def run_fit(
             body=work.body,
             simulated=found.attrs["simulated_recording"] == "yes",
         )
+        if work.compare_laws:
+            write_laws_figure(run.folder("figures"), fit=found)
         check = None
         if work.check:
             progress(int(found["iterations"]), int(found["iterations"]), "check")
@@ -158,6 +165,7 @@ def steady_flows(fit: xr.Dataset) -> list[xr.Dataset]:
 def _specification(work: FitWork) -> dict[str, Any]:
     """Return what determines the numbers of a run."""
     return {
+        **({"compare_laws": True} if work.compare_laws else {}),
         "kind": "fit",
         "study": work.study.to_dict(),
         "body": work.body,

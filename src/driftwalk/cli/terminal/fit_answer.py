@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isfinite
+from math import isfinite, isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
 
 from driftwalk.cli.terminal.answer import (
     print_estimates,
@@ -38,6 +40,8 @@ _LAW_ROWS: Final = {
 MOST_FINDINGS: Final = 2
 """Findings that are printed; all are in the file."""
 FAR_ABOVE_FLOOR: Final = 2.0
+LEAST_EVIDENCE: Final = 3.0
+"""Difference of the logarithms of the evidence for two laws, below which both may be right."""
 LAW_ESTIMATES: Final = (
     *("added_mass_share", "effective_drag_coefficient", "effective_force_std_N"),
     *("linear_drag_kg_s", "force_memory_s", "time_stamp_noise_s"),
@@ -82,6 +86,7 @@ _KEYS: Final = (
     "force_std_any_added_mass_interval_N",
     "jumps_removed",
     "dropped_frames",
+    "compared_laws",
 )
 """The last ones where they are in the fit."""
 
@@ -89,10 +94,25 @@ _KEYS: Final = (
 def summary(found: xr.Dataset) -> dict[str, Any]:
     """Return the fit with units in its keys."""
     facts = fit_facts(found)
+    if "compared_law" in found.dims:
+        facts["compared_laws"] = _laws_of(found)
     return {
         **{key: facts[key] for key in _KEYS if key in facts},
         "recording": facts["source"],
         "warnings": facts["warnings"],
+    }
+
+
+def _laws_of(fit: xr.Dataset) -> dict[str, dict[str, float | None]]:
+    """Return the compared laws, by name; None where one has no solution."""
+    names = ("compared_log_evidence", "compared_log_score", "compared_log_score_std")
+    return {
+        str(law): {
+            name.removeprefix("compared_"): value if isfinite(value) else None
+            for name in names
+            for value in [float(fit[name].sel(compared_law=law))]
+        }
+        for law in fit["compared_law"].values
     }
 
 
@@ -122,6 +142,8 @@ def print_answer(fit: xr.Dataset, check: xr.Dataset | None, folder: Path) -> Non
     print_estimates(fit, "drag_coefficient", "force_std", "tracking_noise")
     print_intensity(facts["force_noise_intensity_N2_s"])
     print_law(facts)
+    if "compared_law" in fit.dims:
+        _print_laws(fit)
     print_row("intervals at the wall", f"{facts['wall_share']:.1%}, left out")
     if "flow" in fit.dims:
         names = fit["flow"].values[fit["interval_flow"].values]
@@ -133,23 +155,38 @@ def print_answer(fit: xr.Dataset, check: xr.Dataset | None, folder: Path) -> Non
     print_page(folder)
 
 
+def _law_in_words(law: str, settled: float | None) -> str:
+    """Return the force law, and by how much the recording supports it."""
+    names = ["the paper's", "a floating body's"]
+    found, other = names if law == "paper" else reversed(names)
+    if settled is None:
+        return found
+    if settled < LEAST_EVIDENCE:
+        return f"{found}; the recording cannot tell it from {other}"
+    return f"{found}; {other} is less likely by e^{settled:.0f}"
+
+
 def print_law(facts: Mapping[str, Any]) -> None:
     """Print the force law, by how much the recording supports it, and what was opened."""
-    words = {"paper": "the paper's", "floating body": "a floating body's (pushed by Du/Dt)"}
-    settled = facts.get("law_settled_by")
-    support = ""
-    if settled is not None:
-        support = (
-            f", {settled:.0f} nats of evidence over the other"
-            if settled > 3.0
-            else ", which the recording cannot tell from the other"
-        )
     if "force_law" in facts:
-        print_row("force law", words[str(facts["force_law"])] + support)
+        print_row("force law", _law_in_words(str(facts["force_law"]), facts.get("law_settled_by")))
     for key, (name, scale, unit) in _LAW_ROWS.items():
         if key in facts:
             low, high = (scale * end for end in facts[f"{key}_interval"])
             print_row(name, f"{scale * facts[key]:.3g}{unit} ({low:.3g} to {high:.3g})")
+
+
+def _print_laws(fit: xr.Dataset) -> None:
+    """Print the table of compared laws, the best first."""
+    best = float(fit["compared_log_score"].max())
+    evidence = fit["compared_log_evidence"] - fit["compared_log_evidence"].max()
+    print("force laws: held out prediction per sample, and evidence, below the best")
+    for name in fit["compared_law"].values[np.argsort(-fit["compared_log_score"].values)]:
+        law = fit.sel(compared_law=name)
+        lost, std = best - float(law["compared_log_score"]), float(law["compared_log_score_std"])
+        one = float(evidence.sel(compared_law=name))
+        words = "no solution" if isnan(lost) else f"{lost:8.4f} ± {std:.4f}   {-one:8.1f}"
+        print(f"  {name:<28}{words}")
 
 
 def _print_verdict(check: xr.Dataset | None, fit: xr.Dataset) -> None:

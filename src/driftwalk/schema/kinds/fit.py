@@ -23,6 +23,7 @@ _CHECKED: Final = "the model was checked"
 _LAWS: Final = "the fit was made by a version that looks for the force law"
 _COMPARED_LAWS: Final = "two laws were fitted"
 _NO_ADDED_MASS: Final = "no added mass was stated, and the paper's law was found"
+_TABLE: Final = "laws were compared"
 _COMPARED: Final = "the angle is in the state, and the second fit has a solution"
 
 FIT: Final = Kind(
@@ -49,6 +50,7 @@ FIT: Final = Kind(
         "switch": "switching times",
         "profile": "values of C_d, by their value",
         "flow_interval": "between the switching times",
+        "compared_law": "force laws that were compared, by name",
         "number": "numbers of departures from the model, by name",
         "law": "force laws that were fitted, by name",
         "departure": "numbers of departures that were tested, by name",
@@ -183,6 +185,24 @@ FIT: Final = Kind(
             "force_std_any_added_mass_interval", "bound", "N",
             "the same of σ_F", when=_NO_ADDED_MASS,
         ),
+        Variable(
+            "compared_log_evidence", "compared_law", "1",
+            "logarithm of the evidence in the first 70 % of the recordings", when=_TABLE,
+        ),
+        Variable(
+            "compared_log_score", "compared_law", "1",
+            "mean logarithm of the predicted density of a held out sample", when=_TABLE,
+            note="in SI units; NaN where the law has no solution",
+        ),
+        Variable(
+            "compared_log_score_std", "compared_law", "1",
+            "standard error of its difference from the best law's", when=_TABLE,
+        ),
+        Variable(
+            "compared_filter_drag_coefficient", "compared_law", "1",
+            "C_d of the filter under the law, without added mass", when=_TABLE,
+        ),
+        Variable("compared_law", "compared_law", None, "force law", "text", when=_TABLE),
         Variable("number", "number", None, "number", "text", when=_LAWS),
         Variable("law", "law", None, "force law", "text", when=_LAWS),
         Variable("departure", "departure", None, "number that was tested", "text", when=_LAWS),

@@ -1,0 +1,172 @@
+"""Force laws compared by evidence and by the prediction of what was held out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from driftwalk.likelihood.assumptions import FLOATING
+from driftwalk.likelihood.check.errors import Estimate, estimate_of
+from driftwalk.likelihood.filter_pass import Passes, Point, Series, log_densities
+from driftwalk.likelihood.law_search import evidence_of
+from driftwalk.likelihood.newton import Prior, Tell, find_mode, silent
+from driftwalk.likelihood.solution import BREAKDOWN
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.likelihood.spline import Floats
+
+TRAINING_SHARE: Final = 0.7
+"""Share of each recording, from its beginning, to which a law is fitted; the rest is predicted."""
+LAWS: Final[dict[str, tuple[bool, str]]] = {
+    "paper": (False, "quadratic"),
+    "paper, linear drag": (False, "linear"),
+    "paper, mixed drag": (False, "mixed"),
+    "floating body": (True, "quadratic"),
+    "floating body, linear drag": (True, "linear"),
+    "floating body, mixed drag": (True, "mixed"),
+}
+"""Whether the water's acceleration pushes the body, and its drag."""
+
+
+class _Compared(NamedTuple):
+    evidence: float
+    scores: Floats
+    """Logarithm of the predicted density of each sample that was held out."""
+    drag: float
+
+
+def compare_laws(
+    fit: xr.Dataset,
+    recordings: Sequence[xr.Dataset],
+    *,
+    body: str | None = None,
+    tell: Tell | None = None,
+) -> xr.Dataset:
+    """Compare force laws on the recordings of a fit.
+
+    Each law is fitted to the first 70 % of every recording, with the departures from the model
+    that the fit has found as they are there. Then the filter predicts the rest, sample by sample.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        Result of `fit_motion`.
+    recordings : sequence of xarray.Dataset
+        Those that it was fitted to.
+    body : str, optional
+        The body, where a recording has several.
+    tell : callable, optional
+        Called with the number of finished laws, their number, and the law at work.
+
+    Returns
+    -------
+    xarray.Dataset
+        The fit, with ``compared_log_evidence`` and ``compared_log_score`` by ``compared_law``: the
+        mean logarithm of the density per held out sample; ``compared_log_score_std`` is the
+        standard error of its difference from that of the best law. NaN where a law has no solution.
+
+    Raises
+    ------
+    InputError
+        When the recordings are not those of the fit.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> recording = dw.tank30_recording()
+    >>> fit = dw.fit_motion(recording)  # doctest: +SKIP
+    >>> found = compare_laws(fit, [recording])  # doctest: +SKIP
+    >>> found["compared_law"].values[found["compared_log_score"].argmax()]  # doctest: +SKIP
+    'paper'
+    """
+    estimate = estimate_of(fit, recordings, body=body)
+    said = tell or silent
+    found: dict[str, _Compared | None] = {}
+    for index, (name, law) in enumerate(LAWS.items()):
+        said(index, len(LAWS), name)
+        found[name] = _under(estimate, *law)
+    return fit.assign(_variables(found)).assign_coords(
+        compared_law=("compared_law", np.array(list(found), dtype=np.str_))
+    )
+
+
+def _under(estimate: Estimate, floating: bool, drag: str) -> _Compared | None:
+    """Fit a law to the first part and predict the rest; nothing where it has no solution."""
+    passes, prior = estimate.passes, Prior(estimate.passes)
+    training = replace(passes, series=[_part(one, TRAINING_SHARE) for one in passes.series])
+    start = _start(estimate.point, floating=floating, drag=drag)
+    try:
+        with np.errstate(all="ignore"):
+            mode = find_mode(
+                training,
+                start,
+                estimate.weights,
+                prior,
+                iterations=estimate.study.fit.iterations,
+                hold_first=True,
+            )
+            scores = _scores(passes, mode.point)
+            return _Compared(evidence_of(mode, prior), scores, math.exp(mode.point.log_drag))
+    except (*BREAKDOWN, ValueError):
+        return None
+
+
+def _start(point: Point, *, floating: bool, drag: str) -> Point:
+    """Return the fit's point under another law."""
+    known = {**point.fixed, **point.opened}
+    for name in (*FLOATING, "linear_share"):
+        known.pop(name, None)
+    known.update(FLOATING if floating else {})
+    opened = {"linear_share": 0.3} if drag == "mixed" else {}
+    if drag == "linear":
+        known["linear_share"] = 1.0
+    return replace(point, opened=opened, fixed=known)
+
+
+def _part(series: Series, share: float) -> Series:
+    """Return the first part of a series."""
+    kept = slice(0, int(share * series.time.size))
+    columns = ("time", "x", "y", "theta", "omega", "excluded", "angle")
+    return replace(series, **{name: getattr(series, name)[kept] for name in columns})
+
+
+def _scores(passes: Passes, point: Point) -> Floats:
+    """Return the logarithms of the densities of the held out samples; NaN where not predicted."""
+    parts = []
+    for series in passes.series:
+        densities = log_densities(passes, series, point.in_flow(series.flow))
+        parts.append(densities[int(TRAINING_SHARE * series.time.size) :])
+    return np.concatenate(parts)
+
+
+def _variables(found: dict[str, _Compared | None]) -> dict[str, Any]:
+    """Return the variables of a comparison."""
+    means = {name: float(np.nanmean(one.scores)) for name, one in found.items() if one is not None}
+    best = max(means, key=means.__getitem__) if means else None
+    columns = {
+        "compared_log_evidence": [
+            math.nan if one is None else one.evidence for one in found.values()
+        ],
+        "compared_log_score": [means.get(name, math.nan) for name in found],
+        "compared_log_score_std": [_difference_std(found, name, best) for name in found],
+        "compared_filter_drag_coefficient": [
+            math.nan if one is None else one.drag for one in found.values()
+        ],
+    }
+    return {name: ("compared_law", np.array(values)) for name, values in columns.items()}
+
+
+def _difference_std(found: dict[str, _Compared | None], name: str, best: str | None) -> float:
+    """Return the standard error of the difference of two mean scores, from blocks of samples."""
+    one, other = found[name], None if best is None else found[best]
+    if one is None or other is None:
+        return math.nan
+    apart = one.scores - other.scores
+    blocks = [np.nanmean(part) for part in np.array_split(apart, 20) if np.isfinite(part).any()]
+    return float(np.std(blocks, ddof=1) / math.sqrt(len(blocks))) if len(blocks) > 1 else math.nan
