@@ -52,7 +52,7 @@ def write_laws_figure(
     ``write_laws_figure("fit/figures", fit=fit)``
     """
     if "compared_law" not in fit.dims:
-        raise InputError("the fit has compared no force laws: fit with --compare-laws")
+        raise InputError("the fit has compared no force laws: `compare_laws` adds them")
     return write_each({"laws": lambda: _laws_figure(fit)}, folder, formats)
 
 
