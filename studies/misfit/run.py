@@ -22,6 +22,7 @@ from typing import Any, Final
 
 import numpy as np
 from cases import CASES, Case, Seen
+from scipy.interpolate import RegularGridInterpolator
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "studies" / "likelihood"))
@@ -29,7 +30,7 @@ sys.path.append(str(ROOT / "studies" / "likelihood"))
 from lines import read_lines  # noqa: E402
 from ode import PROGRAM, build_ode, ode_poses, peer  # noqa: E402
 from tracks import Poses, wall_share  # noqa: E402
-from worlds import FAMILIES, RADIUS_M, World, draw_flow  # noqa: E402
+from worlds import AXIS, FAMILIES, RADIUS_M, World, draw_flow  # noqa: E402
 
 import driftwalk as dw  # noqa: E402
 from driftwalk.core.errors import DriftwalkError  # noqa: E402
@@ -42,7 +43,8 @@ NOISE: Final = (0.3e-3, 0.3e-3, np.deg2rad(0.5))
 """Of x, y [m] and theta [rad]."""
 FIRST_SEED: Final = 40_000
 """Of the first world; no other study uses it."""
-MOST_WALL_SHARE: Final = 0.25
+REFERENCE_M_S: Final = 0.03
+"""Speed at which a drag of another power is that of C_d (benchmarks/ode/tank.hpp)."""
 SOURCES: Final = ("src/driftwalk/likelihood/**/*.py", "cpp/include/driftwalk/infer/*.hpp")
 ODE: Final = ROOT / "benchmarks" / "ode"
 SKIPPED: Final = 77
@@ -110,6 +112,9 @@ def fit_one(name: str, number: int, motions: Path, minutes: float) -> dict[str, 
         low, high = (float(bound) for bound in fit["interval"].sel(parameter=parameter))
         facts[f"{parameter}_error"] = value / true - 1.0
         facts[f"{parameter}_covered"] = bool(low <= true <= high)
+    if {"drag_power", "linear_drag"} & set(case.law):
+        facts["slip_m_s"] = slip = median_slip(world, poses)
+        facts["drag_force_error"] = fitted_force(fit, slip) / true_force(world, case, slip) - 1.0
     facts["law"] = str(fit.attrs["force_law"])
     facts["evidence"] = round(float(fit["law_settled_by"]), 1) if "law_settled_by" in fit else None
     facts["numbers"] = {
@@ -131,6 +136,40 @@ def fit_one(name: str, number: int, motions: Path, minutes: float) -> dict[str, 
         facts["explained"], facts["findings"] = None, [str(error)]
     facts["warnings"] = [str(text) for text in fit["warning"].values]
     return facts
+
+
+def median_slip(world: World, poses: Poses) -> float:
+    """Return the median speed of the water past the centre of the block [m/s]."""
+    velocity = [np.gradient(part, INTERVAL_S) for part in (poses.x, poses.y)]
+    places = np.stack([poses.y, poses.x], axis=1)
+    water = [
+        RegularGridInterpolator((AXIS, AXIS), part, bounds_error=False, fill_value=None)(places)
+        for part in (world.u, world.v)
+    ]
+    return float(np.median(np.hypot(water[0] - velocity[0], water[1] - velocity[1])))
+
+
+def true_force(world: World, case: Case, slip: float) -> float:
+    """Return the drag [N] at a slip, the mean over orientations, of the engine's law."""
+    power = case.law.get("drag_power", 2.0)
+    quadratic = world.drag_coefficient * (slip / REFERENCE_M_S) ** (power - 2.0)
+    return _force(quadratic, case.law.get("linear_drag", 0.0), slip)
+
+
+def fitted_force(fit: Any, slip: float) -> float:
+    """Return the same of a fit."""
+    known = {
+        str(name): float(fit["estimate"].sel(parameter=name)) for name in fit["parameter"].values
+    }
+    return _force(known["drag_coefficient"], known.get("linear_drag", 0.0), slip)
+
+
+def _force(drag_coefficient: float, linear: float, slip: float) -> float:
+    # Of one face and of two at 45 degrees, 4 / pi in the mean over the orientations.
+    study = dw.Study()
+    area = study.block.side_m * study.wetted_depth_m
+    quadratic = 0.5 * study.water.density_kg_m3 * drag_coefficient * area * slip**2
+    return 4.0 / np.pi * quadratic + linear * slip
 
 
 def motion(case: Case, number: int, folder: Path, minutes: float) -> tuple[World, Poses]:
