@@ -42,7 +42,7 @@ NUMBERS: Final[Mapping[str, Number]] = {
     "water_acceleration": Number(0.0, 1e-4, 1.0, 0.5, -1.0, 3.0),
     "water_spin": Number(0.0, 1e-5, 1.0, 0.5, -1.0, 3.0),
     "linear_share": Number(0.0, 1e-4, 1.0, 0.3, -0.5, 1.2),
-    "force_memory": Number(0.0, 1e-3, 1.0, 0.2, 2e-3, 10.0, (2e-3, 12e-3)),
+    "force_memory": Number(0.0, 1e-3, 1.0, 0.2, 2e-3, 10.0, (2e-3, 6e-2)),
     "time_variance": Number(0.0, 1e-7, 1e-3, 1e-3, 0.0, 1e-1),
     "angle_offset": Number(0.0, 1e-4, 0.5, 0.15, -1.0, 1.0),
     "marker_x": Number(0.0, 1e-6, 0.01, 3e-3, -0.05, 0.05),

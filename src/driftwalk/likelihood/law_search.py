@@ -1,9 +1,9 @@
 """The force law and the departures from the model that a recording supports.
 
-The search of the likelihood is made for the paper's law, and for that of a floating body where the
-first one does not settle the matter. At the better one, score tests say which further numbers the
-recording asks for (`driftwalk.likelihood.trial`). Those are opened and fitted, and closed again
-where nothing comes of them.
+The search of the likelihood is made for the paper's law, and for that of a floating body where
+score tests under the first cast doubt on it. At the better one, such tests say which further
+numbers the recording asks for (`driftwalk.likelihood.trial`). Those are opened and fitted, and
+closed again where nothing comes of them.
 """
 
 from __future__ import annotations
@@ -22,6 +22,10 @@ from driftwalk.likelihood.newton import Mode, Prior, Tell, Weights, find_mode
 from driftwalk.likelihood.solution import BREAKDOWN
 from driftwalk.likelihood.trial import Trial, find_pulses, try_numbers
 
+DOUBTED_CHI_SQUARED: Final = 30.0
+"""The paper's law is in doubt when the numbers of a floating body are so far from its own values,"""
+DOUBTED_LINEAR_SIGMAS: Final = 3.0
+"""when its drag seems to have a linear part, or when another number is to be opened."""
 LAW_SAMPLES: Final = 3000
 """Laws are compared on so many samples from the beginning of the recordings."""
 TRIAL_ITERATIONS: Final = 12
@@ -132,9 +136,54 @@ class LawSearch:
             return self._alone(mode, floating=True)
         if self.assumptions.pressure_gradient == "off":
             return self._alone(self._mode(start, weights), floating=False)
-        return self._compared({"paper": start, "floating": floating}, weights)
+        paper = self._try_mode(self.passes, start, weights, self.iterations)
+        if paper is not None and paper.converged:
+            trial = self._try(paper, (*FLOATING, *self.assumptions.tried))
+            if trial is not None and not self._is_doubted(trial):
+                return self._undoubted(paper, trial)
+        return self._compared({"paper": start, "floating": floating}, weights, paper)
 
-    def _compared(self, starts: Mapping[str, Point], weights: Weights) -> LawFound:
+    def _try(self, mode: Mode, names: Sequence[str]) -> Trial | None:
+        """Return the score tests of numbers; nothing where they break down."""
+        try:
+            return try_numbers(self.passes, mode, self.prior, names)
+        except BREAKDOWN:
+            return None
+
+    def _is_doubted(self, trial: Trial) -> bool:
+        """Return whether the law may be another, from the score tests under the paper's.
+
+        A body that floats seems, under the paper's law, to have a weak drag with a linear part.
+        """
+        sigmas = trial.sigmas
+        if trial.chi_squared(dict.fromkeys(self._floating_names, 0.0)) > DOUBTED_CHI_SQUARED:
+            return True
+        if sigmas.get("linear_share", 0.0) > DOUBTED_LINEAR_SIGMAS:
+            return True
+        numbers = set(sigmas) - set(FLOATING) - {"linear_share"}
+        return any(abs(sigmas[name]) > OPENED_SIGMAS for name in numbers)
+
+    @property
+    def _floating_names(self) -> tuple[str, ...]:
+        """The numbers of a floating body that the recording can test."""
+        return (
+            tuple(FLOATING) if self.passes.body.orientation == "state" else ("water_acceleration",)
+        )
+
+    def _undoubted(self, paper: Mode, trial: Trial) -> LawFound:
+        """Return the paper's law, and whether that of a floating body would do as well."""
+        names = self._floating_names
+        own = trial.chi_squared(dict.fromkeys(names, 0.0))
+        other = trial.chi_squared({name: FLOATING[name] for name in names})
+        apart = 0.5 * (other - own)
+        found = self._alone(paper, floating=False)
+        return replace(
+            found, settled_by=max(apart, 0.0) if apart < CANNOT_TELL else math.inf, trial=trial
+        )
+
+    def _compared(
+        self, starts: Mapping[str, Point], weights: Weights, paper: Mode | None
+    ) -> LawFound:
         """Return the law with the larger evidence in the beginning of the recordings."""
         begin = replace(self.passes, series=beginning(self.passes))
         tried = {
@@ -151,6 +200,8 @@ class LawSearch:
         if apart < CANNOT_TELL and "paper" in found:
             best = "paper"
         mode = found[best]
+        if best == "paper" and paper is not None and paper.converged:
+            return LawFound(paper, False, evidence, apart, None)
         if not mode.converged or begin.series is not self.passes.series:
             mode = self._mode(mode.point, mode.weights, hold_first=False)
         return LawFound(mode, best == "floating", evidence, apart, None)
@@ -173,18 +224,16 @@ class LawSearch:
 
     def _with_departures(self, found: LawFound) -> LawFound:
         """Return the law found, with the departures that the recording asks for."""
-        mode, trial = found.mode, None
+        mode, trial = found.mode, found.trial
         closed: set[str] = set()
-        for _ in range(ROUNDS):
+        for index in range(ROUNDS):
             names = [
                 name
                 for name in self.assumptions.tried
                 if name not in mode.point.opened and name not in closed
             ]
-            try:
-                trial = try_numbers(self.passes, mode, self.prior, names) if names else None
-            except BREAKDOWN:
-                trial = None
+            if index > 0 or trial is None:
+                trial = self._try(mode, names) if names else None
             asked = self._asked(mode, trial)
             if not asked:
                 break
@@ -199,7 +248,7 @@ class LawSearch:
             return asked
         for name, sigmas in trial.sigmas.items():
             estimate, _ = trial.of(name)
-            if name not in STRENGTHS and self._is_asked(name, sigmas, estimate):
+            if name not in (*STRENGTHS, *FLOATING) and self._is_asked(name, sigmas, estimate):
                 asked[name] = _within(name, estimate)
         strengths = [name for name in STRENGTHS if name in trial.names]
         if strengths:

@@ -160,7 +160,7 @@ def _law_in_words(law: str, settled: float | None) -> str:
     names = ["the paper's", "a floating body's"]
     found, other = names if law == "paper" else reversed(names)
     if settled is None:
-        return found
+        return f"{found}, as far as this recording tells" if law == "paper" else found
     if settled < LEAST_EVIDENCE:
         return f"{found}; the recording cannot tell it from {other}"
     return f"{found}; {other} is less likely by e^{settled:.0f}"
