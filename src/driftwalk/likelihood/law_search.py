@@ -23,7 +23,7 @@ from driftwalk.likelihood.solution import BREAKDOWN
 from driftwalk.likelihood.trial import Trial, find_pulses, try_numbers
 
 DOUBTED_CHI_SQUARED: Final = 30.0
-"""The paper's law is in doubt when the numbers of a floating body are so far from its own values,"""
+"""The paper's law is in doubt when the numbers of a floating body are so far from its own,"""
 DOUBTED_LINEAR_SIGMAS: Final = 3.0
 """when its drag seems to have a linear part, or when another number is to be opened."""
 LAW_SAMPLES: Final = 3000
