@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -9,10 +11,14 @@ from fit_worlds import DRAG, coarse_study, recording
 
 import driftwalk as dw
 from driftwalk.conditions import estimated_study
-from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.study_keys import FIT_KEYS, study_overrides
+from driftwalk.figures import write_laws_figure
+from driftwalk.likelihood import compare_laws
+from driftwalk.likelihood.held_out import LAWS
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema import build_flow_field, build_trajectory
+from driftwalk.schema.check import check_dataset
 from driftwalk.schema.facts import fit_facts, fitted_value
 
 SECONDS = 300.0
@@ -128,3 +134,39 @@ def test_stated_uncertainty_widens_the_intervals() -> None:
 def test_a_deviation_where_none_belongs_is_an_error() -> None:
     with pytest.raises(ConfigurationError, match="'tank_diameter' takes no standard deviation"):
         study_overrides(keys=FIT_KEYS, tank_diameter="30±1 cm")
+
+
+@pytest.mark.slow
+def test_laws_are_compared_by_what_was_held_out(tmp_path: Path) -> None:
+    """The recording has quadratic drag and no pressure gradient; mixed drag holds both."""
+    track = recording(180.0)
+    fit = compare_laws(dw.fit_motion(track, study_with(keys=FIT_KEYS, law="paper")), [track])
+    score = fit["compared_log_score"].to_series()
+    assert set(score.index) == set(LAWS)
+    best = score.idxmax()
+    assert best in ("paper", "paper, mixed drag")
+    lost = score[best] - score
+    assert lost["floating body"] > 3.0 * float(
+        fit["compared_log_score_std"].sel(compared_law="floating body")
+    )
+    check_dataset(fit)
+    assert [path.name for path in write_laws_figure(tmp_path, fit=fit, formats=["png"])] == [
+        "laws.png"
+    ]
+
+
+def test_a_fit_that_compared_nothing_has_no_figure(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="compared no force laws"):
+        write_laws_figure(tmp_path, fit=xr.Dataset())
+
+
+def test_a_mirrored_orientation_is_said() -> None:
+    track = recording(120.0)
+    assert not [text for text in warned(track) if "against the water" in text]
+    track["theta"].values[:] *= -1.0
+    assert [text for text in warned(track) if "likely mirrored" in text]
+
+
+def warned(track: xr.Dataset) -> list[str]:
+    fit = dw.fit_motion(track, study_with(keys=FIT_KEYS, law="paper", camera="exact"))
+    return [str(text) for text in fit["warning"].values]
