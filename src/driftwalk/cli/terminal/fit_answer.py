@@ -185,7 +185,7 @@ def _print_laws(fit: xr.Dataset) -> None:
         law = fit.sel(compared_law=name)
         lost, std = best - float(law["compared_log_score"]), float(law["compared_log_score_std"])
         one = float(evidence.sel(compared_law=name))
-        words = "no solution" if isnan(lost) else f"{lost:8.4f} ± {std:.4f}   {-one:8.1f}"
+        words = "no solution" if isnan(lost) else f"{lost:8.4f} ± {std:.4f}   {abs(one):8.1f}"
         print(f"  {name:<28}{words}")
 
 
