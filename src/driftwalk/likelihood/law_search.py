@@ -34,6 +34,8 @@ CANNOT_TELL: Final = 3.0
 """Difference of the logarithms of the evidence below which two laws may both be right."""
 OPENED_SIGMAS: Final = 6.0
 """A number is opened when its score test finds it so far from the model,"""
+MEMORY_SIGMAS: Final = 4.0
+"""or so far for the memory of the force, of which a fit says more than its test,"""
 KEPT_SIGMAS: Final = 3.0
 """and stays open when the fit does, with half of what is worth it as an error of the filter."""
 OPENED_STRENGTH: Final = 50.0
@@ -266,7 +268,8 @@ class LawSearch:
     def _is_asked(self, name: str, sigmas: float, estimate: float) -> bool:
         if name in ("force_memory", "time_variance", "linear_share") and estimate < 0.0:
             return False
-        return abs(sigmas) > OPENED_SIGMAS and abs(estimate) > self.worth.get(name, 0.0)
+        least = MEMORY_SIGMAS if name == "force_memory" else OPENED_SIGMAS
+        return abs(sigmas) > least and abs(estimate) > self.worth.get(name, 0.0)
 
     def _opened(self, mode: Mode, asked: Mapping[str, float]) -> tuple[Mode, set[str]]:
         """Return the mode with numbers opened, and those that were closed again."""
