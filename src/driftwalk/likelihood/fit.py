@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from driftwalk.flow.arena import outline_of
@@ -33,7 +34,7 @@ from driftwalk.likelihood.result import (
     visited_shares,
     whiteness_of,
 )
-from driftwalk.likelihood.solution import require_noise_below_motion, solved
+from driftwalk.likelihood.solution import BREAKDOWN, require_noise_below_motion, solved
 from driftwalk.likelihood.start import first_point, first_weights
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema import Track
@@ -244,7 +245,12 @@ def _search(
     with solved():
         law = LawSearch(passes, prior, assumptions, study.fit.iterations, tell).find(start, weights)
         tell(law.mode.iterations, law.mode.iterations, "drag")
-        restricted = restricted_drag(passes, law.mode, prior)
+        try:
+            restricted = restricted_drag(passes, law.mode, prior)
+        except BREAKDOWN:
+            # What was opened may have no restricted likelihood; the law without it has one.
+            law = replace(law, mode=law.base)
+            restricted = restricted_drag(passes, law.mode, prior)
         noise = math.exp(restricted.point.log_noise)
     require_noise_below_motion(noise, ready.tracks)
     return law, restricted

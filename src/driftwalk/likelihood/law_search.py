@@ -50,6 +50,8 @@ class LawFound:
     """Result of a search over laws."""
 
     mode: Mode
+    base: Mode
+    """The mode of the law alone, without departures."""
     floating: bool
     """Whether the water's own acceleration pushes the body."""
     evidence: Mapping[str, float]
@@ -201,25 +203,46 @@ class LawSearch:
         apart = evidence[best] - rest[0] if rest else math.inf
         if apart < CANNOT_TELL and "paper" in found:
             best = "paper"
-        mode = found[best]
-        if best == "paper" and paper is not None and paper.converged:
-            return LawFound(paper, False, evidence, apart, None)
-        if not mode.converged or begin.series is not self.passes.series:
-            mode = self._mode(mode.point, mode.weights, hold_first=False)
-        return LawFound(mode, best == "floating", evidence, apart, None)
+        mode: Mode | None = found[best]
+        if best == "floating" and (
+            not found[best].converged or begin.series is not self.passes.series
+        ):
+            near = found[best]
+            mode = self._try_mode(
+                self.passes, near.point, near.weights, self.iterations, hold_first=False
+            )
+        if best == "floating" and mode is not None:
+            return LawFound(mode, mode, True, evidence, apart, None)
+        if paper is None:
+            near = found.get("paper", found[best])
+            start = replace(near.point, fixed=starts["paper"].fixed)
+            paper = self._mode(start, near.weights, hold_first=False)
+        return LawFound(paper, paper, False, evidence, apart, None)
 
     def _alone(self, mode: Mode, *, floating: bool) -> LawFound:
         name = "floating" if floating else "paper"
-        return LawFound(mode, floating, {name: evidence_of(mode, self.prior)}, math.inf, None)
+        return LawFound(mode, mode, floating, {name: evidence_of(mode, self.prior)}, math.inf, None)
 
     def _try_mode(
-        self, passes: Passes, start: Point, weights: Weights, iterations: int
+        self,
+        passes: Passes,
+        start: Point,
+        weights: Weights,
+        iterations: int,
+        *,
+        hold_first: bool = True,
     ) -> Mode | None:
         """Return the mode; nothing where the search breaks down, as under a wrong law it may."""
         try:
             with np.errstate(all="ignore"):
                 return find_mode(
-                    passes, start, weights, self.prior, iterations=iterations, tell=self.tell
+                    passes,
+                    start,
+                    weights,
+                    self.prior,
+                    iterations=iterations,
+                    tell=self.tell,
+                    hold_first=hold_first,
                 )
         except (*BREAKDOWN, ValueError):
             return None
@@ -278,14 +301,18 @@ class LawSearch:
         frequency = asked.pop("pulse_frequency", None)
         if frequency is not None:
             fixed["pulse_frequency"] = frequency
+        before = mode
         point = replace(mode.point, opened={**mode.point.opened, **asked}, fixed=fixed)
-        mode = self._mode(point, mode.weights, hold_first=False)
-        if frequency is not None:
+        found = self._short(point, mode.weights)
+        if found is not None and frequency is not None:
             # A frequency has a derivative only once there are pulses.
             fixed.pop("pulse_frequency")
-            opened = {**mode.point.opened, "pulse_frequency": frequency}
-            point = replace(mode.point, opened=opened, fixed=fixed)
-            mode = self._mode(point, mode.weights, hold_first=False)
+            opened = {**found.point.opened, "pulse_frequency": frequency}
+            point = replace(found.point, opened=opened, fixed=fixed)
+            found = self._short(point, found.weights)
+        if found is None:
+            return before, set(asked)
+        mode = found
         dropped = {name for name in asked if not self._is_kept(mode, name)}
         strengths = set(STRENGTHS) & set(mode.point.opened)
         if strengths - dropped:
@@ -293,9 +320,21 @@ class LawSearch:
         if set(PULSES) & set(asked) and not set(PULSES) <= dropped:
             dropped -= set(PULSES)
         if dropped:
+            if dropped >= set(asked):
+                return before, dropped
             kept = {name: value for name, value in mode.point.opened.items() if name not in dropped}
-            mode = self._mode(replace(mode.point, opened=kept), mode.weights, hold_first=False)
+            found = self._short(replace(mode.point, opened=kept), mode.weights)
+            mode = before if found is None else found
         return mode, dropped
+
+    def _short(self, point: Point, weights: Weights) -> Mode | None:
+        """Return the mode near a point; nothing where the search does not soon come to its end.
+
+        Opened numbers must not spoil a fit that has a solution without them.
+        """
+        most = min(self.iterations, TRIAL_ITERATIONS)
+        mode = self._try_mode(self.passes, point, weights, most, hold_first=False)
+        return mode if mode is not None and mode.converged else None
 
     def _is_kept(self, mode: Mode, name: str) -> bool:
         value, std = opened_number(mode, name)

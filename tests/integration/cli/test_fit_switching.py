@@ -55,7 +55,11 @@ def test_the_model_with_the_switch_explains_the_recording(finished: tuple[Path, 
 def test_without_the_switch_it_does_not(
     recording: Path, finished: tuple[Path, Done], tmp_path: Path
 ) -> None:
-    found = answer(here("fit", recording, *COARSE, "-o", tmp_path / "steady", "--json"))
+    found = answer(
+        here(
+            "fit", recording, *COARSE, "--flow-strength", "constant", "-o", tmp_path / "s", "--json"
+        )
+    )
     assert not found["explained"]
     assert any("the motion changes" in finding for finding in found["findings"])
     assert found["ks_distance"] > 2.0 * answer(finished[1])["ks_distance"]
