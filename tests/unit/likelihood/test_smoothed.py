@@ -114,5 +114,5 @@ def test_a_fit_refuses_smoothed_positions() -> None:
     smooth = filtered(body_track(raw), averaged([1, 1, 1]))
     film = build_trajectory(*smooth[:4], attrs=raw.attrs)
     with pytest.raises(InputError, match=r"look like averages over 3 frames.*export the raw"):
-        dw.likelihood.check_fit(film, coarse_study())
-    dw.likelihood.check_fit(raw, coarse_study())
+        dw.likelihood.check_fit(film, coarse_study("auto"))
+    dw.likelihood.check_fit(raw, coarse_study("auto"))

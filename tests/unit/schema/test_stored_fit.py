@@ -24,7 +24,7 @@ FITS = ("fit_version_1.nc", "fit_of_several_flows_version_1.nc")
 
 @pytest.fixture(scope="module")
 def fit() -> xr.Dataset:
-    return dw.fit_motion(recording(120.0), coarse_study(), angle="state")
+    return dw.fit_motion(recording(120.0), coarse_study("auto"), angle="state")
 
 
 def as_stored(path: Path) -> xr.Dataset:
