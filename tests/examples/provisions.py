@@ -312,9 +312,9 @@ PAGES: dict[str, Page] = {
             "calibrate recording.csv": "calibrate recording.csv --study small.toml",
             "assemble ": f"assemble {FEW_RUNS} ",
             "fit first.csv": "fit --no-check first.csv",
-            "fit recording.csv --mass": "fit --no-check recording.csv --mass",
-            "fit recording.csv --law": "fit --no-check recording.csv --law",
-            "fit recording.csv --compare": "fit --no-check recording.csv --compare",
+            "fit recording.csv --mass": "fit --no-check first.csv --mass",
+            "fit recording.csv --law": "fit --no-check first.csv --law",
+            "fit recording.csv --compare": "fit --no-check first.csv --compare",
             "fit recording.csv --switching-times 10min,20min": "fit --no-check recording.csv "
             "--switching-times 40s,80s",
         },
