@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from driftwalk.likelihood.departures import STRENGTH_TERMS
+from driftwalk.likelihood.departures import STRENGTHS
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -17,7 +17,6 @@ USUAL_ADDED_MASS: Final = (0.5, 0.2)
 """Added mass of a floating body as a share of its mass, and its standard deviation, where nobody
 says more."""
 CAMERA: Final = ("time_variance", "angle_offset", "marker_x", "marker_y")
-FIRST_MEMORY_S: Final = 0.1
 
 
 @dataclass(frozen=True)
@@ -32,8 +31,8 @@ class Assumptions:
     """Numbers that are known, and not those of the model."""
     tried: tuple[str, ...]
     """Numbers that are opened where the recording asks for it."""
-    words: frozenset[str]
-    """"pulses": whether pulses of the flow are looked for."""
+    pulses: bool
+    """Whether pulses of the flow are looked for."""
 
 
 def assumptions_of(study: Study, angle: str, *, recordings: int, flows: int) -> Assumptions:
@@ -54,7 +53,6 @@ def assumptions_of(study: Study, angle: str, *, recordings: int, flows: int) -> 
     opened: dict[str, float] = {}
     fixed: dict[str, float] = {}
     tried: list[str] = []
-    words = set()
     if fit.law == "linear":
         fixed["linear_share"] = 1.0
     elif fit.law == "mixed":
@@ -70,17 +68,15 @@ def assumptions_of(study: Study, angle: str, *, recordings: int, flows: int) -> 
     if fit.camera == "auto":
         tried += [name for name in CAMERA if angle == "state" or name == "time_variance"]
     alone = recordings == 1 and flows == 1
-    strengths = [f"strength_{k}" for k in range(1, STRENGTH_TERMS + 1)]
     if fit.flow_strength == "smooth":
-        opened.update(dict.fromkeys(strengths, 0.0))
+        opened.update(dict.fromkeys(STRENGTHS, 0.0))
     elif fit.flow_strength == "auto" and alone:
-        tried += strengths
-    if fit.flow_strength != "constant" and alone:
-        words.add("pulses")
+        tried += STRENGTHS
+    pulses = fit.flow_strength != "constant" and alone
     gradient = "off" if fit.law == "paper" else fit.pressure_gradient
     if gradient == "auto" and "pressure_gradient" in study.forces.model_fields_set:
         gradient = "on" if study.forces.pressure_gradient else "off"
-    return Assumptions(gradient, opened, fixed, tuple(tried), frozenset(words))
+    return Assumptions(gradient, opened, fixed, tuple(tried), pulses)
 
 
 def added_mass_of(study: Study, *, floating: bool) -> tuple[float, float]:

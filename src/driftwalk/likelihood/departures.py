@@ -37,6 +37,9 @@ class Number(NamedTuple):
 
 STRENGTH_TERMS: Final = 6
 """Cosines over the recording that the strength of the flow may have."""
+STRENGTHS: Final = tuple(f"strength_{k}" for k in range(1, STRENGTH_TERMS + 1))
+"""Their numbers, in the order of the cosines."""
+PULSES: Final = ("pulse_cosine", "pulse_sine")
 
 NUMBERS: Final[Mapping[str, Number]] = {
     "water_acceleration": Number(0.0, 1e-4, 1.0, 0.5, -1.0, 3.0),

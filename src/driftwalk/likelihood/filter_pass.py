@@ -37,9 +37,8 @@ STEP = 1e-4
 MOST_CHANGE = 100 * STEP
 """Of a variance by such a step. Where it is more, one pass restarted and the other did not."""
 
-LARGE_STEP = 1e-3
-"""From here on a step is no derivative but goes to another value of a number."""
 MOST_CHANGE_FAR = 1.0
+"""The same for a number that is tried far from its value."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +62,11 @@ class Series:
     """The angle, with holes filled in; zeros where there is none."""
     span: float = 0.0
     """Time of the recording's last sample, counted from its first [s]."""
+
+    def first(self, count: int) -> Series:
+        """Return the first samples of the series."""
+        columns = ("time", "x", "y", "theta", "omega", "excluded", "angle")
+        return replace(self, **{name: getattr(self, name)[:count] for name in columns})
 
 
 @dataclass(frozen=True)
@@ -146,6 +150,23 @@ class Point:
                 value = min(max(value, NUMBERS[name].low), NUMBERS[name].high)
             moved = moved.with_extra(name, value)
         return moved
+
+
+class Pair(NamedTuple):
+    """Two passes that differ in one parameter alone."""
+
+    one: dict[str, Any]
+    other: dict[str, Any]
+    step: float
+    """By how much the parameter differs."""
+    most_change: float = MOST_CHANGE
+    """Of a variance; where it is more, the two cannot be compared."""
+
+    @property
+    def comparable(self) -> Flags:
+        """Return which samples both passes have used, with nearly the same variances."""
+        near = _beside(self.one, self.other, self.most_change)
+        return _used(self.one) & _used(self.other) & near
 
 
 class Sums(NamedTuple):
@@ -235,11 +256,7 @@ class Passes:
     def _sums_of(self, series: Series, point: Point, names: list[str]) -> Sums:
         base = self._run(series, point)
         others = [self._beside_base(series, point, name, base) for name in names]
-        used = np.logical_and.reduce(
-            [_used(base)]
-            + [_used(one) for pair in others for one in pair[:2]]
-            + [_beside(*pair) for pair in others]
-        )
+        used = np.logical_and.reduce([_used(base), *(pair.comparable for pair in others)])
         white, changes, spreads = _noise_derivatives(base, others, used)
         right = np.zeros((used.size, white.shape[1], 1 + len(changes)))
         right[used] = np.stack([white, *changes], axis=-1)
@@ -263,19 +280,18 @@ class Passes:
                 ).sum()
         return Sums(deviance, score, information, int(used.sum()))
 
-    def _beside_base(
-        self, series: Series, point: Point, name: str, base: dict[str, Any]
-    ) -> tuple[dict[str, Any], dict[str, Any], float]:
-        """Return two passes that differ in one parameter alone, and by how much."""
+    def _beside_base(self, series: Series, point: Point, name: str, base: dict[str, Any]) -> Pair:
+        """Return two passes that differ in one parameter alone."""
         if name not in NUMBERS:
-            step, at = STEP, point.extras[name]
-        elif name in point.opened:
-            step, at = NUMBERS[name].step, point.opened[name]
+            return Pair(base, self._at(series, point, name, point.extras[name] + STEP), STEP)
+        number, value = NUMBERS[name], point.number(name)
+        most = MOST_CHANGE if number.trial is None else MOST_CHANGE_FAR
+        if name in point.opened:
+            low, high = value, value + number.step
         else:
-            low, high = NUMBERS[name].tried_from(point.number(name))
-            closed = base if low == point.number(name) else self._at(series, point, name, low)
-            return closed, self._at(series, point, name, high), high - low
-        return base, self._at(series, point, name, at + step), step
+            low, high = number.tried_from(value)
+        one = base if low == value else self._at(series, point, name, low)
+        return Pair(one, self._at(series, point, name, high), high - low, most)
 
     def _at(self, series: Series, point: Point, name: str, value: float) -> dict[str, Any]:
         return self._run(series, point.with_extra(name, value))
@@ -299,7 +315,7 @@ class Passes:
         """
         base = self._run(series, point)
         pair = self._beside_base(series, point, "strength_0", base)
-        used = _used(base) & _used(pair[1]) & _beside(*pair)
+        used = pair.comparable
         white, (change,), _ = _noise_derivatives(base, [pair], used)
         products, squares = np.zeros(used.size), np.zeros(used.size)
         products[used] = (white * change).sum(axis=1)
@@ -391,9 +407,8 @@ def _used(found: dict[str, Any]) -> Flags:
     return np.asarray(found["used"], dtype=bool)
 
 
-def _beside(base: dict[str, Any], other: dict[str, Any], step: float) -> Flags:
+def _beside(base: dict[str, Any], other: dict[str, Any], most: float = MOST_CHANGE) -> Flags:
     """Return which innovations have nearly the variances that they have in the other pass."""
-    most = MOST_CHANGE if step < LARGE_STEP else MOST_CHANGE_FAR
     one, two = (np.einsum("aan->an", unpacked(found["covariance"])) for found in (base, other))
     with np.errstate(invalid="ignore"):
         return np.asarray((np.abs(two - one) <= most * one).all(axis=0), dtype=bool)
@@ -415,7 +430,7 @@ def log_densities(passes: Passes, series: Series, point: Point) -> Floats:
 
 
 def _noise_derivatives(
-    base: dict[str, Any], others: list[tuple[dict[str, Any], dict[str, Any], float]], used: Flags
+    base: dict[str, Any], others: Sequence[Pair], used: Flags
 ) -> tuple[Floats, list[Floats], list[Floats]]:
     """Return whitened innovations (n, D), their derivatives by the noises, and those of S.
 
@@ -424,7 +439,7 @@ def _noise_derivatives(
     root = factor(base["covariance"][used])
     white = forward(root, base["innovation"][used].T).T
     changes, spreads = [], []
-    for one, other, step in others:
+    for one, other, step, _ in others:
         change = (one["innovation"][used] - other["innovation"][used]) / step
         changes.append(forward(root, change.T).T)
         widening = unpacked((other["covariance"][used] - one["covariance"][used]) / step)

@@ -11,7 +11,7 @@ from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.agreement import angle_given_facts
 from driftwalk.likelihood.assumptions import assumptions_of
 from driftwalk.likelihood.filter_pass import Passes, Point
-from driftwalk.likelihood.law_facts import law_facts, side_slopes
+from driftwalk.likelihood.law_facts import law_facts, side_slopes, stated_drag
 from driftwalk.likelihood.law_search import LawFound, LawSearch
 from driftwalk.likelihood.mistakes.mirrored import spin_correlation
 from driftwalk.likelihood.newton import Prior, Tell, silent
@@ -130,7 +130,7 @@ def fit_motion(
             chosen,
             by_side=side_slopes(passes, law, restricted, chosen),
         ),
-        "maximum_likelihood_drag_coefficient": math.exp(mode.point.log_drag),
+        "maximum_likelihood_drag_coefficient": stated_drag(mode.point, chosen),
         **precision_facts(math.sqrt(covariance[0, 0]), duration, chosen),
         **law_facts(law),
         **_turning(start, passes),

@@ -99,7 +99,7 @@ def compare_laws(
 def _under(estimate: Estimate, floating: bool, drag: str) -> _Compared | None:
     """Fit a law to the first part and predict the rest; nothing where it has no solution."""
     passes, prior = estimate.passes, Prior(estimate.passes)
-    training = replace(passes, series=[_part(one, TRAINING_SHARE) for one in passes.series])
+    training = replace(passes, series=[one.first(_training(one)) for one in passes.series])
     start = _start(estimate.point, floating=floating, drag=drag)
     try:
         with np.errstate(all="ignore"):
@@ -129,11 +129,9 @@ def _start(point: Point, *, floating: bool, drag: str) -> Point:
     return replace(point, opened=opened, fixed=known)
 
 
-def _part(series: Series, share: float) -> Series:
-    """Return the first part of a series."""
-    kept = slice(0, int(share * series.time.size))
-    columns = ("time", "x", "y", "theta", "omega", "excluded", "angle")
-    return replace(series, **{name: getattr(series, name)[kept] for name in columns})
+def _training(series: Series) -> int:
+    """Return how many samples of a series a law is fitted to."""
+    return int(TRAINING_SHARE * series.time.size)
 
 
 def _scores(passes: Passes, point: Point) -> Floats:
@@ -141,7 +139,7 @@ def _scores(passes: Passes, point: Point) -> Floats:
     parts = []
     for series in passes.series:
         densities = log_densities(passes, series, point.in_flow(series.flow))
-        parts.append(densities[int(TRAINING_SHARE * series.time.size) :])
+        parts.append(densities[_training(series) :])
     return np.concatenate(parts)
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.likelihood.assumptions import USUAL_ADDED_MASS, added_mass_of
-from driftwalk.likelihood.departures import STRENGTH_TERMS
+from driftwalk.likelihood.departures import STRENGTHS
 from driftwalk.likelihood.filter_pass import Passes, Point
 from driftwalk.schema.facts import fitted_value
 
@@ -29,8 +29,6 @@ PLAIN: Final = {
     "pulse_frequency": "pulse_frequency_Hz",
 }
 """Numbers that are stated as they are."""
-
-
 SIDE_STEP: Final = 0.01
 """Relative change of the side for the derivatives by it."""
 
@@ -64,6 +62,12 @@ def inertia_of(study: Study, *, floating: bool) -> Inertia:
     return Inertia(added, std, stated, math.hypot(std / (1.0 + added), mass))
 
 
+def stated_drag(point: Point, study: Study) -> float:
+    """Return C_d of the quadratic part of the drag, with the added mass."""
+    inertia = inertia_of(study, floating=point.number("water_acceleration") != 0.0)
+    return inertia.share * (1.0 - point.number("linear_share")) * math.exp(point.log_drag)
+
+
 def inertia_facts(inertia: Inertia, facts: dict[str, Any], normal: float) -> dict[str, Any]:
     """Return the added mass, or how far C_d and the force reach where nothing is known of it."""
     if inertia.added or inertia.added_std or inertia.stated:
@@ -82,7 +86,7 @@ def inertia_facts(inertia: Inertia, facts: dict[str, Any], normal: float) -> dic
 
 
 def number_facts(point: Point, reach: Floats, study: Study) -> dict[str, Any]:
-    """Return the opened numbers with their intervals, units in the keys.
+    """Return the opened numbers with their intervals, and the stated ones, units in the keys.
 
     Parameters
     ----------
@@ -102,8 +106,8 @@ def number_facts(point: Point, reach: Floats, study: Study) -> dict[str, Any]:
         facts[f"{key}_interval"] = [scale * (value - width), scale * (value + width)]
 
     for name, key in PLAIN.items():
-        if name in widths:
-            tell(key, point.opened[name], widths[name])
+        if name in widths or name in point.fixed:
+            tell(key, point.number(name), widths.get(name, 0.0))
     if "time_variance" in widths:
         value, width = point.opened["time_variance"], widths["time_variance"]
         ends = [math.sqrt(max(one, 0.0)) for one in (value - width, value + width)]
@@ -111,10 +115,12 @@ def number_facts(point: Point, reach: Floats, study: Study) -> dict[str, Any]:
         facts["time_stamp_noise_s_interval"] = ends
     share = point.number("linear_share")
     if share:
-        tell("linear_drag_kg_s", share, widths.get("linear_share", 0.0), _linear_drag(point, study))
+        # It goes with C_d of the filter, too.
+        width = math.hypot(widths.get("linear_share", 0.0), share * float(reach[0]))
+        tell("linear_drag_kg_s", share, width, _linear_drag(point, study))
     if "strength_1" in widths:
         # From the beginning of the recording to its end the odd cosines change their signs.
-        odd = [f"strength_{k}" for k in range(1, STRENGTH_TERMS + 1, 2)]
+        odd = STRENGTHS[::2]
         change = -2.0 * sum(point.opened[name] for name in odd)
         tell("flow_strength_change", change, 2.0 * math.hypot(*(widths[name] for name in odd)))
     if "pulse_sine" in widths:

@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from driftwalk.likelihood.assumptions import FLOATING, Assumptions
-from driftwalk.likelihood.departures import NUMBERS, STRENGTH_TERMS
+from driftwalk.likelihood.departures import NUMBERS, PULSES, STRENGTHS
 from driftwalk.likelihood.filter_pass import Passes, Point, Series
 from driftwalk.likelihood.newton import Mode, Prior, Tell, Weights, find_mode
 from driftwalk.likelihood.solution import BREAKDOWN
@@ -41,8 +41,6 @@ KEPT_SIGMAS: Final = 3.0
 OPENED_STRENGTH: Final = 50.0
 """Chi squared (6 degrees of freedom) of the strength of the flow from which on it is opened."""
 ROUNDS: Final = 3
-STRENGTHS: Final = tuple(f"strength_{k}" for k in range(1, STRENGTH_TERMS + 1))
-PULSES: Final = ("pulse_cosine", "pulse_sine")
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,9 +97,7 @@ def beginning(passes: Passes) -> Sequence[Series]:
     for one in passes.series:
         if count >= LAW_SAMPLES:
             break
-        kept = slice(0, LAW_SAMPLES - count)
-        columns = ("time", "x", "y", "theta", "omega", "excluded", "angle")
-        found.append(replace(one, **{name: getattr(one, name)[kept] for name in columns}))
+        found.append(one.first(LAW_SAMPLES - count))
         count += found[-1].time.size
     return found
 
@@ -279,12 +275,17 @@ class LawSearch:
         if strengths:
             joint = trial.chi_squared(dict.fromkeys(strengths, 0.0))
             estimates = {name: trial.of(name)[0] for name in strengths}
-            if joint > OPENED_STRENGTH and max(map(abs, estimates.values())) > 0.01:
+            largest = max(map(abs, estimates.values()))
+            if joint > OPENED_STRENGTH and largest > self.worth[strengths[0]]:
                 asked.update({name: _within(name, value) for name, value in estimates.items()})
-        if "pulses" in self.assumptions.words and not set(PULSES) & set(mode.point.opened):
+        if self.assumptions.pulses and not set(PULSES) & set(mode.point.opened):
             pulses = find_pulses(self.passes, mode)
-            if pulses is not None and pulses.significant and pulses.amplitude > 0.02:
-                asked.update({"pulse_cosine": 0.0, "pulse_sine": 0.0})
+            if (
+                pulses is not None
+                and pulses.significant
+                and pulses.amplitude > self.worth[PULSES[0]]
+            ):
+                asked.update(dict.fromkeys(PULSES, 0.0))
                 asked["pulse_frequency"] = pulses.frequency
         return asked
 
@@ -322,6 +323,9 @@ class LawSearch:
         if dropped:
             if dropped >= set(asked):
                 return before, dropped
+            if set(PULSES) <= dropped:
+                # Without pulses their frequency is the frequency of nothing.
+                dropped.add("pulse_frequency")
             kept = {name: value for name, value in mode.point.opened.items() if name not in dropped}
             found = self._short(replace(mode.point, opened=kept), mode.weights)
             mode = before if found is None else found

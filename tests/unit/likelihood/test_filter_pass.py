@@ -10,7 +10,7 @@ import pytest
 from fit_worlds import coarse_study, recording
 
 from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.filter_pass import STEP, Passes, Point, Sums, _beside
+from driftwalk.likelihood.filter_pass import Passes, Point, Sums, _beside
 from driftwalk.likelihood.newton import Prior, Weights, inverse, limited, newton_step
 from driftwalk.likelihood.ready import body_of, series_of
 from driftwalk.likelihood.spline import lay_spline
@@ -135,5 +135,5 @@ def test_where_one_pass_restarted_the_noises_tell_nothing() -> None:
     """A step of a ten-thousandth in a noise changes a variance by as much, not by a factor."""
     base = {"covariance": np.array([[1.0, 0.2, 2.0], [1.0, 0.2, 2.0], [1.0, np.nan, np.nan]])}
     other = {"covariance": np.array([[1.0001, 0.2, 2.0], [1.0, 0.2, 1e12], [1.0, 0.2, 2.0]])}
-    assert _beside(base, other, STEP).tolist() == [True, False, False]
-    assert _beside(other, base, STEP).tolist() == [True, False, False]
+    assert _beside(base, other).tolist() == [True, False, False]
+    assert _beside(other, base).tolist() == [True, False, False]

@@ -172,3 +172,18 @@ def test_a_mirrored_orientation_is_said() -> None:
 def warned(track: xr.Dataset) -> list[str]:
     fit = dw.fit_motion(track, study_with(keys=FIT_KEYS, law="paper", camera="exact"))
     return [str(text) for text in fit["warning"].values]
+
+
+def test_what_is_stated_goes_with_the_fit() -> None:
+    """The simulations of a fit follow a stated memory; linear drag has C_d's uncertainty."""
+    track = recording(60.0)
+    stated = {"law": "linear", "camera": "exact", "flow_strength": "constant"}
+    fit = dw.fit_motion(track, study_with(keys=FIT_KEYS, **stated, force_memory=0.3))
+    assert fitted_value(fit, "force_memory") == 0.3
+    assert estimated_study(fit).forces.force_memory_s == 0.3
+    assert estimated_study(fit).forces.drag_coefficient == 0.0
+    low, high = fit["interval"].sel(parameter="linear_drag").values
+    assert 0.0 < low < fitted_value(fit, "linear_drag") < high
+    assert fitted_value(fit, "linear_drag") == pytest.approx(
+        estimated_study(fit).forces.linear_drag_kg_s
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isfinite, isnan
+from math import degrees, isfinite, isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -29,26 +29,20 @@ _LAW_ROWS: Final = {
     "linear_drag_kg_s": ("linear drag", 1e3, " g/s"),
     "force_memory_s": ("memory of the force", 1.0, " s"),
     "time_stamp_noise_s": ("jitter of the stamps", 1e3, " ms"),
-    "orientation_offset_rad": ("orientation offset", 57.29577951308232, "°"),
+    "orientation_offset_rad": ("orientation offset", degrees(1.0), "°"),
     "marker_x_m": ("marker off by, x", 1e3, " mm"),
     "marker_y_m": ("marker off by, y", 1e3, " mm"),
     "flow_strength_change": ("change of the flow", 1e2, " %"),
     "pulse_amplitude": ("pulses of the flow", 1e2, " %"),
     "pulse_frequency_Hz": ("frequency of pulses", 1.0, " Hz"),
 }
-"""Name, factor and unit of the rows of a law's numbers."""
+"""Name, factor and unit of the rows of estimates that stand in a fit where the recording or the
+user asks for them."""
 MOST_FINDINGS: Final = 2
 """Findings that are printed; all are in the file."""
 FAR_ABOVE_FLOOR: Final = 2.0
 LEAST_EVIDENCE: Final = 3.0
 """Difference of the logarithms of the evidence for two laws, below which both may be right."""
-LAW_ESTIMATES: Final = (
-    *("added_mass_share", "effective_drag_coefficient", "effective_force_std_N"),
-    *("linear_drag_kg_s", "force_memory_s", "time_stamp_noise_s"),
-    *("orientation_offset_rad", "marker_x_m", "marker_y_m"),
-    *("flow_strength_change", "pulse_amplitude", "pulse_frequency_Hz"),
-)
-"""Estimates that stand in a fit where the recording or the user asks for them."""
 _KEYS: Final = (
     "drag_coefficient",
     "drag_coefficient_interval",
@@ -81,7 +75,7 @@ _KEYS: Final = (
     "mistakes",
     "force_law",
     "law_settled_by",
-    *(f"{name}{end}" for name in LAW_ESTIMATES for end in ("", "_interval")),
+    *(f"{name}{end}" for name in _LAW_ROWS for end in ("", "_interval")),
     "drag_coefficient_any_added_mass_interval",
     "force_std_any_added_mass_interval_N",
     "jumps_removed",
