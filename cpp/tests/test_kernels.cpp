@@ -108,8 +108,8 @@ void check_infer(Numbers& all) {
   }
   const std::vector<std::uint8_t> excluded(time.size(), 0);
   const std::vector<double> right(3 * time.size(), 1.0);
-  const driftwalk::Track track{time.data(),  x.data(),        y.data(), theta.data(),
-                               omega.data(), excluded.data(), 60};
+  const driftwalk::Track track{time.data(),  x.data(), y.data(),        theta.data(),
+                               omega.data(), nullptr,  excluded.data(), 60};
   const double wanted =
       0.5 * 1000 * drag_coefficient * block.side * block.depth * speed * speed / block.mass;
   for (const auto angle : {driftwalk::Angle::given, driftwalk::Angle::state}) {
