@@ -142,11 +142,12 @@ nb::dict expected_drag(double side, double mass, double depth, int strips, doubl
                        const In<double, 3>& coefficients, double drag_coefficient,
                        const std::string& orientation, const In<double, 1>& mean, double theta,
                        double omega, const In<double, 2>& covariance, double quadratic,
-                       double linear, double water_acceleration, double water_spin) {
+                       double linear, double water_acceleration, double water_spin,
+                       double drag_power, double drag_speed) {
   const DragModel model =
       drag_model(side, mass, depth, strips, water_density, origin_x, origin_y, spacing, columns,
                  rows, coefficients, drag_coefficient, orientation,
-                 {quadratic, linear, water_acceleration, water_spin});
+                 {quadratic, linear, water_acceleration, water_spin, {drag_power, drag_speed}});
   return model.angle() == driftwalk::Angle::state
              ? response_of<3>(model, coefficients, mean, theta, omega, covariance)
              : response_of<2>(model, coefficients, mean, theta, omega, covariance);
@@ -167,7 +168,8 @@ void register_infer(nb::module_& module) {
              double force_lever, double angle_noise, double largest_step, double longest_gap,
              const std::string& orientation, bool sensitivities,
              const std::optional<In<double, 1>>& strength, double quadratic, double linear,
-             double water_acceleration, double water_spin, double time_noise, double force_memory) {
+             double water_acceleration, double water_spin, double drag_power, double drag_speed,
+             double time_noise, double force_memory) {
             const std::size_t n = time.size();
             if (x.size() != n || y.size() != n || theta.size() != n || omega.size() != n ||
                 excluded.size() != n || (strength && strength->size() != n)) {
@@ -178,9 +180,10 @@ void register_infer(nb::module_& module) {
                 {time.data(), x.data(), y.data(), theta.data(), omega.data(),
                  strength ? strength->data() : nullptr, excluded.data(),
                  static_cast<std::int64_t>(n)},
-                drag_model(side, mass, depth, strips, water_density, origin_x, origin_y, spacing,
-                           columns, rows, coefficients, drag_coefficient, orientation,
-                           {quadratic, linear, water_acceleration, water_spin}),
+                drag_model(
+                    side, mass, depth, strips, water_density, origin_x, origin_y, spacing, columns,
+                    rows, coefficients, drag_coefficient, orientation,
+                    {quadratic, linear, water_acceleration, water_spin, {drag_power, drag_speed}}),
                 {noise_intensity, position_noise, force_lever, angle_noise, largest_step,
                  longest_gap, time_noise, force_memory},
                 sensitivities);
@@ -192,7 +195,7 @@ void register_infer(nb::module_& module) {
           "largest_step"_a = 0.05, "longest_gap"_a = 1.0, "orientation"_a = "given",
           "sensitivities"_a = false, "strength"_a = nb::none(), "quadratic"_a = 1.0,
           "linear"_a = 0.0, "water_acceleration"_a = 0.0, "water_spin"_a = 0.0,
-          "time_noise"_a = 0.0, "force_memory"_a = 0.0)
+          "drag_power"_a = 2.0, "drag_speed"_a = 0.03, "time_noise"_a = 0.0, "force_memory"_a = 0.0)
       .def_prop_ro("samples", &InnovationsFilter::samples)
       .def_prop_ro("remaining", &InnovationsFilter::remaining)
       .def_prop_ro("parameters", &InnovationsFilter::parameters)
@@ -203,5 +206,6 @@ void register_infer(nb::module_& module) {
              "strips"_a, "water_density"_a, "origin_x"_a, "origin_y"_a, "spacing"_a, "columns"_a,
              "rows"_a, "coefficients"_a, "drag_coefficient"_a, "orientation"_a, "mean"_a, "theta"_a,
              "omega"_a, "covariance"_a, "quadratic"_a = 1.0, "linear"_a = 0.0,
-             "water_acceleration"_a = 0.0, "water_spin"_a = 0.0);
+             "water_acceleration"_a = 0.0, "water_spin"_a = 0.0, "drag_power"_a = 2.0,
+             "drag_speed"_a = 0.03);
 }

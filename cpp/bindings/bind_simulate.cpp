@@ -185,11 +185,11 @@ std::tuple<double, double, double> drag(const Model& model, double drag_coeffici
   const auto sums_of = [&](const auto& law) {
     return driftwalk::drag_sums(law, run.block, run.flow, x, y, axes, motion);
   };
-  const auto mixed = driftwalk::MixedDrag<double>::of(drag_coefficient, run.linear_drag);
-  const bool linear = run.linear_drag > 0;
+  const auto mixed = driftwalk::MixedDrag<double>::of(drag_coefficient, run.drag);
+  const bool quadratic = run.drag.is_quadratic();
   const driftwalk::DragSums<double> sums =
-      linear ? sums_of(mixed) : sums_of(driftwalk::QuadraticDrag{});
-  const double scale = run.drag_scale * (linear ? 1 : drag_coefficient);
+      quadratic ? sums_of(driftwalk::QuadraticDrag{}) : sums_of(mixed);
+  const double scale = run.drag_scale * (quadratic ? drag_coefficient : 1);
   return {sums.force_x * scale, sums.force_y * scale, sums.torque * scale};
 }
 

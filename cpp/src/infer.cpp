@@ -76,6 +76,9 @@ DragModel::DragModel(const FloatingBlock& block, const SplineView& flow, const d
   require(std::isfinite(law.quadratic) && std::isfinite(law.linear) &&
               std::isfinite(law.water_acceleration) && std::isfinite(law.water_spin),
           "the numbers of the force law must be finite");
+  require(positive(law.power.power) && positive(law.power.reference),
+          "the power of the drag and its reference speed must be positive");
+  require(law.linear == 0 || law.power.power == 2, "linear drag goes with the power 2 alone");
   require(positive(flow.spacing) && std::isfinite(flow.origin_x) && std::isfinite(flow.origin_y),
           "the flow's spacing must be positive and its origin finite");
   require(flow.rows >= 4 && flow.columns >= 4, "a bicubic flow needs at least 4 rows and columns");

@@ -15,16 +15,19 @@ namespace {
 struct EitherDrag {
   MixedDrag<double> mixed;
 
-  static EitherDrag of(double drag_coefficient, double linear_drag) {
-    return {MixedDrag<double>::of(drag_coefficient, linear_drag)};
+  static EitherDrag of(double drag_coefficient, const DragShape<double>& shape) {
+    return {MixedDrag<double>::of(drag_coefficient, shape)};
   }
-  bool is_quadratic() const { return mixed.linear == 0; }
+  bool is_quadratic() const { return mixed.linear == 0 && !mixed.bent; }
   double strength(double drag_coefficient) const {
     return is_quadratic() ? QuadraticDrag{}.strength(drag_coefficient)
                           : mixed.strength(drag_coefficient);
   }
   double conductance(double closing) const {
     return is_quadratic() ? QuadraticDrag{}.conductance(closing) : mixed.conductance(closing);
+  }
+  double conductance(double closing, double slip) const {
+    return is_quadratic() ? QuadraticDrag{}.conductance(closing) : mixed.conductance(closing, slip);
   }
   double force(double closing) const {
     return is_quadratic() ? QuadraticDrag{}.force(closing) : mixed.force(closing);

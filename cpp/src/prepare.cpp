@@ -95,7 +95,9 @@ PreparedRun<T>::PreparedRun(const BatchModel& model) {
   view_.drag_scale = 0.5 * model.water_density * (model.side / model.strips) * model.depth;
   view_.mass = model.mass * (1 + model.added_mass_share);
   view_.inertia = model.inertia * (1 + model.added_mass_share);
-  view_.linear_drag = static_cast<T>(model.linear_drag / (4 * model.strips) / view_.drag_scale);
+  view_.drag = {static_cast<T>(model.linear_drag / (4 * model.strips) / view_.drag_scale),
+                static_cast<T>(model.drag_power / 2 - 1),
+                static_cast<T>(1 / (model.drag_speed * model.drag_speed))};
   prepare_force(model);
   view_.position_noise = static_cast<T>(model.position_noise);
   view_.orientation_noise = static_cast<T>(model.orientation_noise);

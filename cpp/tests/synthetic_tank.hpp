@@ -25,6 +25,8 @@ struct Tank {
     model.depth = 0.03;
     model.strips = 8;
     model.water_density = 1000;
+    model.drag_power = 2;
+    model.drag_speed = 0.03;
     model.radius = 0.15;
     model.restitution = 0.5;
     model.bounce_speed = 0.01;

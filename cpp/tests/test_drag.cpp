@@ -144,13 +144,40 @@ struct SomeMixedDrag {
   }
 };
 
-double by_definition(SomeMixedDrag, double closing) {
+// The mixed law with another power of the speed for its first part.
+struct SomePowerDrag {
+  static constexpr double quadratic = 0.7, linear = 0.02, power = 1.4, speed = 0.04;
+
+  template <class Real>
+  Real conductance(Real closing, Real slip) const {
+    using T = typename driftwalk::Numbers<Real>::Scalar;
+    const driftwalk::DragShape<T> shape{static_cast<T>(linear), static_cast<T>(power / 2 - 1),
+                                        static_cast<T>(1 / (speed * speed))};
+    return driftwalk::MixedDrag<Real>::of(Real(static_cast<T>(quadratic)), shape)
+        .conductance(closing, slip);
+  }
+  template <class Real>
+  Real conductance(Real closing) const {
+    return conductance(closing, closing);
+  }
+  template <class Real>
+  Real force(Real closing) const {
+    return conductance(closing) * closing;
+  }
+};
+
+double by_definition(SomeMixedDrag, double closing, double) {
   return SomeMixedDrag::quadratic * std::max(0.0, closing) + SomeMixedDrag::linear;
 }
-double by_definition(driftwalk::QuadraticDrag, double closing) {
+double by_definition(SomePowerDrag, double closing, double speed) {
+  using L = SomePowerDrag;
+  const double bend = closing > 0 ? std::pow(speed / L::speed, L::power - 2) : 0;
+  return L::quadratic * std::max(0.0, closing) * bend + L::linear;
+}
+double by_definition(driftwalk::QuadraticDrag, double closing, double) {
   return std::max(0.0, closing);
 }
-double by_definition(CubicDrag, double closing) {
+double by_definition(CubicDrag, double closing, double) {
   return closing > 0 ? closing * closing : 0;
 }
 
@@ -173,7 +200,7 @@ Sums strip_sum(double side, int strips, double x, double y, double theta, double
       double u, v;
       velocity(x + rx, y + ry, u, v);
       const double wx = u - (vx - omega * ry), wy = v - (vy + omega * rx);
-      const double facing = by_definition(Law{}, -(nx * wx + ny * wy));
+      const double facing = by_definition(Law{}, -(nx * wx + ny * wy), std::hypot(wx, wy));
       sums.force_x += facing * wx;
       sums.force_y += facing * wy;
       sums.torque += rx * (facing * wy) - ry * (facing * wx);
@@ -318,6 +345,7 @@ int main() {
   check_strip_sums<driftwalk::QuadraticDrag>();
   check_strip_sums<CubicDrag>();
   check_strip_sums<SomeMixedDrag>();
+  check_strip_sums<SomePowerDrag>();
   check_covered_faces();
   check_water();
   check_at_rest_in_the_water();

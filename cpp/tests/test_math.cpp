@@ -79,6 +79,31 @@ void check_log() {
   CHECK(driftwalk::log(one)[0] == 0.0f);
 }
 
+// Powers of the speed need the logarithm of more than that, and the exponential of it.
+void check_wide_log() {
+  Worst worst;
+  for (std::uint32_t bits = 0x00800000u; bits <= 0x7f000000u; bits += 4 * 3001) {
+    float x[lanes];
+    for (int k = 0; k < lanes; ++k) {
+      x[k] = float_of_bits(bits + 3001u * std::uint32_t(k));
+    }
+    measure_log(x, worst);
+  }
+  std::printf("log of all floats: %.3f ulp\n", worst.log);
+  CHECK(worst.log < 1.0);
+}
+
+void check_exp() {
+  double worst = 0;
+  std::size_t count = 0;
+  for (double x = -87; x <= 88; x += 1.3e-4, ++count) {
+    const float value = static_cast<float>(x);
+    worst = std::max(worst, ulps(driftwalk::exp(Real(value))[0], std::exp(double(value))));
+  }
+  std::printf("exp: %.3f ulp over %zu values\n", worst, count);
+  CHECK(worst < 1.0);
+}
+
 void check_sincos() {
   Worst worst;
   std::vector<float> x;
@@ -171,6 +196,8 @@ void check_wide_products() {
 
 int main() {
   check_log();
+  check_wide_log();
+  check_exp();
   check_sincos();
   check_select_rules();
   check_wrap_angle();

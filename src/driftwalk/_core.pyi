@@ -174,9 +174,10 @@ class InnovationsFilter:
     # everywhere; "none": the drag is averaged over the angle; "state": theta is measured like x and
     # y, NaN where missing, with angle_noise [rad], and the force acts force_lever [m] from the
     # centre. strength: of the flow at the samples, 1 without. quadratic, linear [m/s]: a strip's
-    # drag is K (quadratic max(0, closing) + linear) times its slip. water_acceleration and
-    # water_spin: how strongly Du/Dt and half its curl push the block, 0 or 1. time_noise: of the
-    # stamps [s]. force_memory: correlation time of the force [s].
+    # drag is K (quadratic max(0, closing) + linear) times its slip; with another drag_power than 2,
+    # and no linear part, that times (speed past the strip / drag_speed [m/s])^(drag_power - 2).
+    # water_acceleration and water_spin: how strongly Du/Dt and half its curl push the block, 0 or
+    # 1. time_noise: of the stamps [s]. force_memory: correlation time of the force [s].
     def __init__(
         self,
         time: _Floats,
@@ -211,6 +212,8 @@ class InnovationsFilter:
         linear: float = 0.0,
         water_acceleration: float = 0.0,
         water_spin: float = 0.0,
+        drag_power: float = 2.0,
+        drag_speed: float = 0.03,
         time_noise: float = 0.0,
         force_memory: float = 0.0,
     ) -> None: ...
@@ -262,4 +265,6 @@ def expected_drag(
     linear: float = 0.0,
     water_acceleration: float = 0.0,
     water_spin: float = 0.0,
+    drag_power: float = 2.0,
+    drag_speed: float = 0.03,
 ) -> dict[str, _Floats]: ...

@@ -152,8 +152,7 @@ def median_slip(world: World, poses: Poses) -> float:
 def true_force(world: World, case: Case, slip: float) -> float:
     """Return the drag [N] at a slip, the mean over orientations, of the engine's law."""
     power = case.law.get("drag_power", 2.0)
-    quadratic = world.drag_coefficient * (slip / REFERENCE_M_S) ** (power - 2.0)
-    return _force(quadratic, case.law.get("linear_drag", 0.0), slip)
+    return _force(world.drag_coefficient, power, case.law.get("linear_drag", 0.0), slip)
 
 
 def fitted_force(fit: Any, slip: float) -> float:
@@ -161,15 +160,17 @@ def fitted_force(fit: Any, slip: float) -> float:
     known = {
         str(name): float(fit["estimate"].sel(parameter=name)) for name in fit["parameter"].values
     }
-    return _force(known["drag_coefficient"], known.get("linear_drag", 0.0), slip)
+    power = known.get("drag_power", 2.0)
+    return _force(known["drag_coefficient"], power, known.get("linear_drag", 0.0), slip)
 
 
-def _force(drag_coefficient: float, linear: float, slip: float) -> float:
+def _force(drag_coefficient: float, power: float, linear: float, slip: float) -> float:
     # Of one face and of two at 45 degrees, 4 / pi in the mean over the orientations.
     study = dw.Study()
     area = study.block.side_m * study.wetted_depth_m
-    quadratic = 0.5 * study.water.density_kg_m3 * drag_coefficient * area * slip**2
-    return 4.0 / np.pi * quadratic + linear * slip
+    scale = 0.5 * study.water.density_kg_m3 * drag_coefficient * area
+    faced = scale * REFERENCE_M_S ** (2.0 - power) * slip**power
+    return 4.0 / np.pi * faced + linear * slip
 
 
 def motion(case: Case, number: int, folder: Path, minutes: float) -> tuple[World, Poses]:

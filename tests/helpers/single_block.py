@@ -25,6 +25,7 @@ BEYOND_PAPER: dict[str, dict[str, Any]] = {
     "added mass": {"added_mass_share": 0.6},
     "water": {"pressure_gradient": True},
     "linear drag": {"linear_drag_kg_s": 4e-3},
+    "power of the drag": {"drag_power": 1.4, "drag_speed_m_s": 0.02},
     "memory": {"force_memory_s": 0.07},
     "all": {
         "added_mass_share": 0.6,
@@ -41,6 +42,8 @@ def numbers_of(forces: Mapping[str, Any]) -> dict[str, float]:
         "added_mass_share": forces.get("added_mass_share", 0.0),
         "linear_drag": forces.get("linear_drag_kg_s", 0.0),
         "displaced_mass": MASS if forces.get("pressure_gradient") else 0.0,
+        "drag_power": forces.get("drag_power", 0.0),
+        "drag_speed": forces.get("drag_speed_m_s", 0.0),
         "force_memory": forces.get("force_memory_s", 0.0),
     }
     return {name: value for name, value in numbers.items() if value}
@@ -83,6 +86,8 @@ def model(
         "added_mass_share": 0.0,
         "water_density": DENSITY,
         "linear_drag": 0.0,
+        "drag_power": 2.0,
+        "drag_speed": 0.03,
         "displaced_mass": 0.0,
         "radius": RADIUS,
         "edges": np.zeros((0, 3)),

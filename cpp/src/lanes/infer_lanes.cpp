@@ -23,8 +23,9 @@ DragResponse<D> drag_alone(const FilterProblem& problem, double theta, double om
                            const double* mean, const double (*covariance)[2 * D],
                            StripShare<D>* shares, PointShare<D>* points, double* by_coefficients) {
   const UncertainBlock<D> block{mean[0], mean[1], mean[D], mean[D + 1], omega, covariance};
-  DragResponse<D> drag = expected_drag<D>(drag_law(problem), problem.flow, problem.block,
-                                          problem.orientations, theta, block, shares);
+  DragResponse<D> drag =
+      expected_drag<D>(drag_law(problem), problem.law.power, problem.flow, problem.block,
+                       problem.orientations, theta, block, shares);
   add_water_acceleration<D>(problem.flow, problem.block, problem.law, block, points, drag);
   const std::int64_t nodes = std::int64_t(problem.flow.rows) * problem.flow.columns;
   double* rows[D];

@@ -45,7 +45,7 @@ def fit(
         bool,
         typer.Option(
             "--compare-laws",
-            help="Compare force laws by evidence and held out prediction (takes some six fits).",
+            help="Compare force laws by evidence and held out prediction (takes some eight fits).",
         ),
     ] = False,
     overwrite: Annotated[

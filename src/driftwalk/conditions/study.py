@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 LAW_KEYS: Final = {
     "added_mass_share": "added_mass_share",
     "linear_drag_kg_s": "linear_drag",
+    "drag_power": "drag_power",
     "force_memory_s": "force_memory",
 }
 """Keys of [forces], and the parameters of a fit that they hold."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from driftwalk.likelihood.departures import STRENGTHS
+from driftwalk.likelihood.departures import DRAG_SHAPES, STRENGTHS
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -50,15 +50,7 @@ def assumptions_of(study: Study, angle: str, *, recordings: int, flows: int) -> 
         Their numbers: a strength over time belongs to one recording in one flow.
     """
     fit = study.fit
-    opened: dict[str, float] = {}
-    fixed: dict[str, float] = {}
-    tried: list[str] = []
-    if fit.law == "linear":
-        fixed["linear_share"] = 1.0
-    elif fit.law == "mixed":
-        opened["linear_share"] = 0.3
-    elif fit.law == "auto":
-        tried.append("linear_share")
+    opened, fixed, tried = _drag_of(study)
     if fit.force_memory_s == "auto" and study.forces.force_memory_s > 0.0:
         fixed["force_memory"] = study.forces.force_memory_s
     elif fit.force_memory_s == "auto":
@@ -77,6 +69,20 @@ def assumptions_of(study: Study, angle: str, *, recordings: int, flows: int) -> 
     if gradient == "auto" and "pressure_gradient" in study.forces.model_fields_set:
         gradient = "on" if study.forces.pressure_gradient else "off"
     return Assumptions(gradient, opened, fixed, tuple(tried), pulses)
+
+
+def _drag_of(study: Study) -> tuple[dict[str, float], dict[str, float], list[str]]:
+    """Return the numbers of the drag that are opened, known and tried."""
+    law = study.fit.law
+    if law == "linear":
+        return {}, {"linear_share": 1.0}, []
+    if law == "mixed":
+        return {"linear_share": 0.3}, {}, []
+    if law == "power":
+        return {"drag_power": 1.8}, {}, []
+    if law == "auto" and "drag_power" in study.forces.model_fields_set:
+        return {}, {"drag_power": study.forces.drag_power}, []
+    return {}, {}, [*DRAG_SHAPES] if law == "auto" else []
 
 
 def added_mass_of(study: Study, *, floating: bool) -> tuple[float, float]:

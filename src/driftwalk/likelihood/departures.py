@@ -39,12 +39,15 @@ STRENGTH_TERMS: Final = 6
 """Cosines over the recording that the strength of the flow may have."""
 STRENGTHS: Final = tuple(f"strength_{k}" for k in range(1, STRENGTH_TERMS + 1))
 """Their numbers, in the order of the cosines."""
+DRAG_SHAPES: Final = ("linear_share", "drag_power")
+"""How the drag may go with the speed otherwise: one of them at most is opened."""
 PULSES: Final = ("pulse_cosine", "pulse_sine")
 
 NUMBERS: Final[Mapping[str, Number]] = {
     "water_acceleration": Number(0.0, 1e-4, 1.0, 0.5, -1.0, 3.0),
     "water_spin": Number(0.0, 1e-5, 1.0, 0.5, -1.0, 3.0),
     "linear_share": Number(0.0, 1e-4, 1.0, 0.3, -0.5, 1.2),
+    "drag_power": Number(2.0, 1e-4, 1.0, 0.3, 0.5, 3.5),
     "force_memory": Number(0.0, 1e-3, 1.0, 0.2, 2e-3, 10.0, (2e-3, 6e-2)),
     "time_variance": Number(0.0, 1e-7, 1e-3, 1e-3, 0.0, 1e-1),
     "angle_offset": Number(0.0, 1e-4, 0.5, 0.15, -1.0, 1.0),

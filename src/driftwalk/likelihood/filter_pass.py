@@ -80,6 +80,8 @@ class Body:
     water_density: float
     linear_speed: float
     """Speed [m/s] at which linear drag is as strong as the quadratic one in its place."""
+    drag_speed: float
+    """Speed [m/s] at which C_d holds, whatever the power of the drag."""
     orientation: str
     """"state", "given" or "none": the track's angle is measured like the position, is an input, or
     is not used."""
@@ -363,6 +365,8 @@ class Passes:
             linear=0.25 * share * body.linear_speed,
             water_acceleration=point.number("water_acceleration"),
             water_spin=point.number("water_spin"),
+            drag_power=point.number("drag_power"),
+            drag_speed=body.drag_speed,
             time_noise=math.sqrt(point.number("time_variance")),
             force_memory=point.number("force_memory"),
             **pose,

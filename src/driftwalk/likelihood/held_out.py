@@ -11,10 +11,12 @@ import numpy as np
 
 from driftwalk.likelihood.assumptions import FLOATING
 from driftwalk.likelihood.check.errors import Estimate, estimate_of
+from driftwalk.likelihood.departures import DRAG_SHAPES
 from driftwalk.likelihood.filter_pass import Passes, Point, Series, log_densities
 from driftwalk.likelihood.law_search import evidence_of
 from driftwalk.likelihood.newton import Prior, Tell, find_mode, silent
 from driftwalk.likelihood.solution import BREAKDOWN
+from driftwalk.schema.check import described
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,11 +29,15 @@ LAWS: Final[dict[str, tuple[bool, str]]] = {
     "paper": (False, "quadratic"),
     "paper, linear drag": (False, "linear"),
     "paper, mixed drag": (False, "mixed"),
+    "paper, a power of the speed": (False, "power"),
     "floating body": (True, "quadratic"),
     "floating body, linear drag": (True, "linear"),
     "floating body, mixed drag": (True, "mixed"),
+    "floating body, a power of the speed": (True, "power"),
 }
 """Whether the water's acceleration pushes the body, and its drag."""
+FIRST_SHAPES: Final = (("mixed", "linear_share", 0.3), ("power", "drag_power", 1.8))
+"""Kinds of drag with a number of their own, and its first value."""
 
 
 class _Compared(NamedTuple):
@@ -91,8 +97,9 @@ def compare_laws(
     for index, (name, law) in enumerate(LAWS.items()):
         said(index, len(LAWS), name)
         found[name] = _under(estimate, *law)
-    return fit.assign(_variables(found)).assign_coords(
-        compared_law=("compared_law", np.array(list(found), dtype=np.str_))
+    names = np.array(list(found), dtype=np.str_)
+    return described(
+        fit.assign(_variables(found)).assign_coords(compared_law=("compared_law", names))
     )
 
 
@@ -120,10 +127,10 @@ def _under(estimate: Estimate, floating: bool, drag: str) -> _Compared | None:
 def _start(point: Point, *, floating: bool, drag: str) -> Point:
     """Return the fit's point under another law."""
     known = {**point.fixed, **point.opened}
-    for name in (*FLOATING, "linear_share"):
+    for name in (*FLOATING, *DRAG_SHAPES):
         known.pop(name, None)
     known.update(FLOATING if floating else {})
-    opened = {"linear_share": 0.3} if drag == "mixed" else {}
+    opened = {name: value for kind, name, value in FIRST_SHAPES if kind == drag}
     if drag == "linear":
         known["linear_share"] = 1.0
     return replace(point, opened=opened, fixed=known)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 PLAIN: Final = {
+    "drag_power": "drag_power",
     "force_memory": "force_memory_s",
     "angle_offset": "orientation_offset_rad",
     "marker_x": "marker_x_m",

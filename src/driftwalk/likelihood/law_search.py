@@ -16,9 +16,9 @@ from typing import Final
 import numpy as np
 
 from driftwalk.likelihood.assumptions import FLOATING, Assumptions
-from driftwalk.likelihood.departures import NUMBERS, PULSES, STRENGTHS
+from driftwalk.likelihood.departures import DRAG_SHAPES, NUMBERS, PULSES, STRENGTHS
 from driftwalk.likelihood.filter_pass import Passes, Point, Series
-from driftwalk.likelihood.newton import Mode, Prior, Tell, Weights, find_mode
+from driftwalk.likelihood.newton import NOTABLE_LEVER, Mode, Prior, Tell, Weights, find_mode
 from driftwalk.likelihood.solution import BREAKDOWN
 from driftwalk.likelihood.trial import Trial, find_pulses, try_numbers
 
@@ -40,6 +40,10 @@ KEPT_SIGMAS: Final = 3.0
 """and stays open when the fit does, with half of what is worth it as an error of the filter."""
 OPENED_STRENGTH: Final = 50.0
 """Chi squared (6 degrees of freedom) of the strength of the flow from which on it is opened."""
+LEVER_SIGMAS: Final = 1.64
+"""A lever of the force counts when it is so far above what is notable."""
+FIRST_POWER: Final = 1.7
+"""Power of the drag with which a search begins."""
 ROUNDS: Final = 3
 
 
@@ -67,6 +71,7 @@ def worth(side: float) -> dict[str, float]:
     """
     return {
         "linear_share": 0.15,
+        "drag_power": 0.15,
         "force_memory": 0.04,
         "time_variance": 0.003**2,
         "angle_offset": math.radians(0.7),
@@ -116,6 +121,8 @@ class LawSearch:
         """Return the law and the mode that the recording supports."""
         start = replace(start, opened=self.assumptions.opened, fixed=self.assumptions.fixed)
         found = self._base(start, weights)
+        if "drag_power" in self.assumptions.tried and self._turns_by_itself(found.mode):
+            found = self._with_power(found, start, weights)
         return self._with_departures(found)
 
     def _mode(self, start: Point, weights: Weights, *, hold_first: bool = True) -> Mode:
@@ -160,7 +167,9 @@ class LawSearch:
             return True
         if sigmas.get("linear_share", 0.0) > DOUBTED_LINEAR_SIGMAS:
             return True
-        numbers = set(sigmas) - set(FLOATING) - {"linear_share"}
+        if sigmas.get("drag_power", 0.0) < -DOUBTED_LINEAR_SIGMAS:
+            return True
+        numbers = set(sigmas) - set(FLOATING) - set(DRAG_SHAPES)
         return any(abs(sigmas[name]) > OPENED_SIGMAS for name in numbers)
 
     @property
@@ -243,6 +252,30 @@ class LawSearch:
         except (*BREAKDOWN, ValueError):
             return None
 
+    def _turns_by_itself(self, mode: Mode) -> bool:
+        """Return whether the stochastic force seems to turn the block."""
+        if mode.point.log_lever is None:
+            return False
+        at = mode.point.coefficients.size + 1 + list(mode.point.noises).index("log_lever")
+        std = math.sqrt(float(mode.covariance[at, at]))
+        lower = math.exp(mode.point.log_lever - LEVER_SIGMAS * std)
+        return lower > NOTABLE_LEVER * self.passes.body.side
+
+    def _with_power(self, found: LawFound, start: Point, weights: Weights) -> LawFound:
+        """Return the law with another power of the drag, where it explains why the block turns.
+
+        A flow that was fitted under the power 2 can take up a drag of another one. Its score test
+        is then blind, no search from there finds it, and what is left is a block that turns
+        otherwise than its drag makes it. So the search begins again.
+        """
+        fixed = {**start.fixed, **(FLOATING if found.floating else {})}
+        point = replace(start, opened={**start.opened, "drag_power": FIRST_POWER}, fixed=fixed)
+        mode = self._try_mode(self.passes, point, weights, self.iterations)
+        if mode is None or not mode.converged or not self._is_kept(mode, "drag_power"):
+            return found
+        better = evidence_of(mode, self.prior) - evidence_of(found.mode, self.prior)
+        return replace(found, mode=mode, trial=None) if better > CANNOT_TELL else found
+
     def _with_departures(self, found: LawFound) -> LawFound:
         """Return the law found, with the departures that the recording asks for."""
         mode, trial = found.mode, found.trial
@@ -253,6 +286,8 @@ class LawSearch:
                 for name in self.assumptions.tried
                 if name not in mode.point.opened and name not in closed
             ]
+            if set(DRAG_SHAPES) & set(mode.point.opened):
+                names = [name for name in names if name not in DRAG_SHAPES]
             if index > 0 or trial is None:
                 trial = self._try(mode, names) if names else None
             asked = self._asked(mode, trial)
@@ -270,7 +305,10 @@ class LawSearch:
         for name, sigmas in trial.sigmas.items():
             estimate, _ = trial.of(name)
             if name not in (*STRENGTHS, *FLOATING) and self._is_asked(name, sigmas, estimate):
-                asked[name] = _within(name, estimate)
+                asked[name] = _within(name, NUMBERS[name].model + estimate)
+        rivals = sorted(set(DRAG_SHAPES) & set(asked), key=lambda name: abs(trial.sigmas[name]))
+        for name in rivals[:-1]:
+            del asked[name]
         strengths = [name for name in STRENGTHS if name in trial.names]
         if strengths:
             joint = trial.chi_squared(dict.fromkeys(strengths, 0.0))

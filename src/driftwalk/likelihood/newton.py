@@ -28,6 +28,9 @@ HELD = ((0, 2, 3, 4), (0,))
 settle before a step of C_d or of the other noises means anything."""
 PRIOR_LEVER = 0.01
 """Centre of the weak prior of the force's lever, in sides of the block, and its first value."""
+NOTABLE_LEVER = 0.005
+"""Lever of the force, in sides of the block, above which the turning is not that of the model: on
+recordings of the model it comes out at 0.001 to 0.004, with angles 5 degrees off at 0.015."""
 PRIOR_LOG_LEVER_STD = 1.0
 PRIOR_ANGLE_NOISE = 0.01
 """Centre of the prior of the angle's noise [rad], so weak that it counts only where the turning is

@@ -298,5 +298,6 @@ def body_of(study: Study, used_angle: str) -> Body:
         strips=study.block.strips_per_face,
         water_density=study.water.density_kg_m3,
         linear_speed=study.block.side_m / LINEAR_TIME_S,
+        drag_speed=study.forces.drag_speed_m_s,
         orientation=used_angle,
     )

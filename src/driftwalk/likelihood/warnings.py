@@ -10,6 +10,7 @@ from driftwalk.likelihood.agreement import NOTABLE_DISAGREEMENT
 from driftwalk.likelihood.intervals import Intervals
 from driftwalk.likelihood.length import USUAL_PRECISION, in_words, needed_duration
 from driftwalk.likelihood.mistakes.mirrored import MIRRORED
+from driftwalk.likelihood.newton import NOTABLE_LEVER
 from driftwalk.likelihood.result import Whiteness
 
 if TYPE_CHECKING:
@@ -21,9 +22,6 @@ LEAST_USED: Final = 0.9
 """Share of the usable intervals below which what the filter takes is not the whole motion."""
 LEAST_VISITED: Final = 0.3
 """Share of the tank's nodes below which a fitted flow is mostly made of its prior."""
-NOTABLE_LEVER: Final = 0.005
-"""Lever of the force, in sides of the block, above which the turning is not that of the model: on
-recordings of the model it comes out at 0.001 to 0.004, with angles 5 degrees off at 0.015."""
 NOTABLE_AUTOCORRELATION: Final = 0.05
 NOTABLE_STDS: Final = 4.0
 

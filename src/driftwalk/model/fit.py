@@ -80,13 +80,13 @@ class Fit(Section):
         ),
         examples=['["A", "B", "A"]'],
     )
-    law: Literal["auto", "paper", "quadratic", "linear", "mixed"] = Field(
+    law: Literal["auto", "paper", "quadratic", "linear", "mixed", "power"] = Field(
         default="auto",
         title="Law of the drag.",
         description=(
-            'How the drag goes with the speed: "quadratic", "linear", or "mixed" of both. "paper" '
-            'is quadratic without pressure gradient. "auto" is quadratic unless the recording '
-            "asks for a linear part."
+            'How the drag goes with the speed: "quadratic", "linear", "mixed" of both, or with a '
+            '"power" that is estimated. "paper" is quadratic without pressure gradient. "auto" is '
+            "quadratic unless the recording asks for a linear part or another power."
         ),
     )
     pressure_gradient: Literal["auto", "on", "off"] = Field(

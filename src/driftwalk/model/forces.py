@@ -63,6 +63,23 @@ class Forces(Section):
             "windward or not, feels k / (4 N) times the velocity of the water relative to it."
         ),
     )
+    drag_power: Annotated[float, Quantity("1", ge=0.5, le=3.5)] = Field(
+        default=2.0,
+        title="Power of the speed with which the drag goes.",
+        description=(
+            "Power p of the speed with which the drag of windward strips goes: its force is "
+            "(|w| / drag_speed)^(p - 2) times that of the quadratic law, |w| the speed of the "
+            "water relative to the strip."
+        ),
+    )
+    drag_speed_m_s: Annotated[float, Quantity("m/s", gt=0, le=1e3)] = Field(
+        default=0.03,
+        title="Speed at which C_d holds, where the power of the drag is not 2.",
+        description=(
+            "Speed of the water past a strip at which C_d is the drag coefficient, whatever the "
+            "power of the drag; for the power 2 it means nothing."
+        ),
+    )
     added_mass_share: Annotated[float, Quantity("1", ge=0, le=5)] = Field(
         default=0.0,
         title="Added mass as a share of the block's mass.",

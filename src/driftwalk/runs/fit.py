@@ -34,7 +34,7 @@ class FitWork:
     check : bool
         Whether the model is checked.
     compare_laws : bool
-        Whether force laws are compared, which takes some six fits.
+        Whether force laws are compared, which takes some eight fits.
     """
 
     recordings: Sequence[xr.Dataset]

@@ -30,6 +30,7 @@ ESTIMATES: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
         "effective_drag_coefficient": ("effective_drag_coefficient", "1"),
         "effective_force_std_N": ("effective_force_std", "N"),
         "linear_drag_kg_s": ("linear_drag", "kg s-1"),
+        "drag_power": ("drag_power", "1"),
         "force_memory_s": ("force_memory", "s"),
         "time_stamp_noise_s": ("time_stamp_noise", "s"),
         "orientation_offset_rad": ("orientation_offset", "rad"),

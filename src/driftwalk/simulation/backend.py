@@ -77,6 +77,8 @@ def native_model(
         added_mass_share=forces.added_mass_share,
         water_density=study.water.density_kg_m3,
         linear_drag=forces.linear_drag_kg_s,
+        drag_power=forces.drag_power,
+        drag_speed=forces.drag_speed_m_s,
         displaced_mass=study.displaced_mass_kg if forces.pressure_gradient else 0.0,
         radius=tank.radius_m or 0.0,
         edges=wall_edges(tank),

@@ -255,6 +255,8 @@ def make_rules(
         added_mass_share=study.forces.added_mass_share,
         displaced_mass=study.displaced_mass_kg if study.forces.pressure_gradient else 0.0,
         linear_drag=study.forces.linear_drag_kg_s,
+        drag_power=study.forces.drag_power,
+        drag_speed=study.forces.drag_speed_m_s,
         force_memory=study.forces.force_memory_s,
     )
     return Rules(

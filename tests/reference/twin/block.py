@@ -44,6 +44,8 @@ class TwinModel:
     added_mass_share: float = 0.0
     displaced_mass: float = 0.0
     linear_drag: float = 0.0
+    drag_power: float = 2.0
+    drag_speed: float = 0.03
     force_memory: float = 0.0
 
     @property
@@ -190,7 +192,9 @@ def drag(
         relative_x = u - (vx - omega * arm_y)
         relative_y = v - (vy + omega * arm_x)
         facing = np.maximum(0.0, -(normal_x * relative_x + normal_y * relative_y))
-        own = scale * facing + model.linear_drag / (4 * model.strips)
+        speed = np.maximum(np.hypot(relative_x, relative_y) / model.drag_speed, 1e-9)
+        own = scale * facing * speed ** (model.drag_power - 2.0)
+        own += model.linear_drag / (4 * model.strips)
         if hidden is not None:
             own = np.where(hidden[face], 0.0, own)
         strip_x, strip_y = own * relative_x, own * relative_y

@@ -36,16 +36,14 @@ def within(fit: xr.Dataset, parameter: str, truth: float) -> bool:
     return bool(low <= truth <= high)
 
 
-@pytest.fixture(scope="module")
-def floating() -> xr.Dataset:
-    """Five minutes of a body that floats, on a swirl: the water's acceleration pushes it."""
+def simulated(seed: int, **forces: object) -> xr.Dataset:
+    """Return five minutes of a block on a swirl with a jet, under a law of forces; synthetic."""
     study = apply_overrides(
         coarse_study(),
         {
             "forces.drag_coefficient": 0.45,
             "forces.force_std_N": 0.8e-3,
-            "forces.pressure_gradient": True,
-            "forces.added_mass_share": 0.5,
+            **{f"forces.{key}": value for key, value in forces.items()},
             "simulation.time_step_s": 0.002,
             "observation.position_noise_m": 3e-4,
             "observation.orientation_noise_rad": 0.009,
@@ -58,11 +56,36 @@ def floating() -> xr.Dataset:
     inside = np.ones(x.shape, dtype=np.int8)
     flow = build_flow_field(axis, axis, u=-swirl * y - jet, v=swirl * x, flag=inside)
     time = np.arange(0.0, SECONDS + 20.0, 0.1)
-    run = dw.simulate(study, flow, sample_time=time, replicates=1, seed=5)
+    run = dw.simulate(study, flow, sample_time=time, replicates=1, seed=seed)
     seen = run.isel(replicate=0, body=0, time=slice(200, None))
     return build_trajectory(
         seen["time"].values - 20.0, *(seen[name].values for name in ("x", "y", "theta"))
     )
+
+
+@pytest.fixture(scope="module")
+def floating() -> xr.Dataset:
+    """A body that floats: the water's acceleration pushes it."""
+    return simulated(5, pressure_gradient=True, added_mass_share=0.5)
+
+
+@pytest.mark.parametrize("power", [1.0, pytest.param(1.5, marks=pytest.mark.slow)])
+def test_the_power_of_the_drag_is_found(power: float) -> None:
+    fit = dw.fit_motion(simulated(6, drag_power=power), study_with())
+    assert within(fit, "drag_power", power), FALSE_ALARM
+    assert within(fit, "drag_coefficient", 0.45), FALSE_ALARM
+    low, high = fit["interval"].sel(parameter="drag_power").values
+    assert high - low < 0.3
+    forces = estimated_study(fit).forces
+    assert forces.drag_power == fitted_value(fit, "drag_power")
+    assert forces.drag_speed_m_s == 0.03
+
+
+def test_a_stated_power_of_the_drag_is_that_of_the_fit() -> None:
+    stated = apply_overrides(study_with(keys=FIT_KEYS, camera="exact"), {"forces.drag_power": 1.7})
+    fit = dw.fit_motion(recording(60.0), stated)
+    assert fitted_value(fit, "drag_power") == 1.7
+    assert fit["interval"].sel(parameter="drag_power").values.tolist() == [1.7, 1.7]
 
 
 def test_the_law_of_a_floating_body_is_found(floating: xr.Dataset) -> None:
@@ -146,7 +169,7 @@ def test_laws_are_compared_by_what_was_held_out(tmp_path: Path) -> None:
     score = fit["compared_log_score"].to_series()
     assert set(score.index) == set(LAWS)
     best = score.idxmax()
-    assert best in ("paper", "paper, mixed drag")
+    assert best in ("paper", "paper, mixed drag", "paper, a power of the speed")
     lost = score[best] - score
     assert lost["floating body"] > 0.0
     evidence = fit["compared_log_evidence"].to_series()

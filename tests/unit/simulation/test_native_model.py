@@ -40,8 +40,11 @@ def test_the_numbers_of_a_study_come_back():
 
 def test_the_law_of_forces_of_a_study_comes_back():
     paper = native_model(study(), dw.tank30_flow(), np.array(TIMES), Camera())
-    names = ("added_mass_share", "linear_drag", "displaced_mass", "force_memory")
-    assert [getattr(paper, name) for name in names] == [0.0] * 4
+    names = (
+        *("added_mass_share", "linear_drag", "displaced_mass", "force_memory"),
+        *("drag_power", "drag_speed"),
+    )
+    assert [getattr(paper, name) for name in names] == [0.0, 0.0, 0.0, 0.0, 2.0, 0.03]
     floating = study(
         block={"mass_kg": 0.02},
         forces={
@@ -49,10 +52,12 @@ def test_the_law_of_forces_of_a_study_comes_back():
             "linear_drag_kg_s": "5g/s",
             "pressure_gradient": True,
             "force_memory_s": "100ms",
+            "drag_power": 1.5,
+            "drag_speed_m_s": "1cm/s",
         },
     )
     native = native_model(floating, dw.tank30_flow(), np.array(TIMES), Camera())
-    assert [getattr(native, name) for name in names] == [0.5, 0.005, 0.02, 0.1]
+    assert [getattr(native, name) for name in names] == [0.5, 0.005, 0.02, 0.1, 1.5, 0.01]
 
 
 @pytest.mark.parametrize("name", NUMBERS)

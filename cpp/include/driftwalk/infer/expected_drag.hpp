@@ -99,13 +99,38 @@ inline void keep_shares(const StripsOnGrid& grid, const Eight (&response)[D][2],
   }
 }
 
+// What the drag of the law is multiplied with for another power p of the speed: (R / reference)^(p
+// - 2). R^2 is not |w|^2 of the mean alone, but such that the mean drag is right: with V the
+// variance of both components and e = p/2 - 1 it grows by (2 + e) V where |w|^2 is much larger than
+// V (second order in w), and by (Gamma((p + 3)/2) / Gamma(5/2))^(1/e) V where the mean of w is
+// nearly zero (of two faces that are both sometimes windward).
+struct SpeedFactor {
+  Eight factor;
+  Eight slope; // minus d(ln factor)/d(velocity) over w
+};
+
+inline SpeedFactor speed_factor(const DragPower& power, Eight square, Eight variance) {
+  const double e = power.power / 2 - 1;
+  const double near = __builtin_pow(__builtin_tgamma(e + 2.5) / __builtin_tgamma(2.5), 1 / e);
+  const double change = 2 + e - near;
+  const Eight share = square / (square + variance);
+  const Eight whole = square + variance * (near + change * share);
+  const Eight grows = 1.0 + change * ((1 - share) * (1 - share));
+  double factor[8];
+  for (int lane = 0; lane < 8; ++lane) {
+    factor[lane] = __builtin_pow(whole[lane] / (power.reference * power.reference), e);
+  }
+  return {Eight::load(factor), 2 * e * grows / whole};
+}
+
 inline constexpr double lane_numbers[8] = {0, 1, 2, 3, 4, 5, 6, 7};
 
 // Strips `first` .. `first + 7` of a side; `shares` may be null.
 template <int D, DragLawWithMoments Law>
-inline void add_strips(const Law& law, const SplineView& flow, const StripBlock& block,
-                       const UncertainBlock<D>& state, Side side, int first, double scale,
-                       DragSumsOfEight<D>& sums, StripShare<D>* shares, int& count) {
+inline void add_strips(const Law& law, const DragPower& power, const SplineView& flow,
+                       const StripBlock& block, const UncertainBlock<D>& state, Side side,
+                       int first, double scale, DragSumsOfEight<D>& sums, StripShare<D>* shares,
+                       int& count) {
   const double nx = side.nx, ny = side.ny, tx = -ny, ty = nx, h = block.half_side;
   const Eight strip = Eight::load(lane_numbers) + first;
   const Eight::Mask real = strip < block.strips;
@@ -145,7 +170,15 @@ inline void add_strips(const Law& law, const SplineView& flow, const StripBlock&
   if (!any(part)) {
     return;
   }
-  const Eight K = select(part, Eight(scale), Eight(0));
+  Eight K = select(part, Eight(scale), Eight(0));
+  SpeedFactor speed{Eight(1), Eight(0)};
+  if (power.power != 2) {
+    Eight slip_variance, unused;
+    spread_of<D>(state.covariance, along_t, along_n, slip_variance, unused);
+    // Known exactly it has no variance; the floor stands for 1 um/s.
+    speed = speed_factor(power, wx * wx + wy * wy, at_least(variance + slip_variance, 1e-12));
+    K *= speed.factor;
+  }
   const Eight along_normal = K * m.force, along_tangent = K * m.slip_force;
   const Eight force[2] = {tx * along_tangent - nx * along_normal,
                           ty * along_tangent - ny * along_normal};
@@ -161,6 +194,12 @@ inline void add_strips(const Law& law, const SplineView& flow, const StripBlock&
   response[0][1] = mean_x * ny;
   response[1][0] = mean_y * nx;
   response[1][1] = mean_y * ny - conductance;
+  if (power.power != 2) {
+    for (int a = 0; a < 2; ++a) {
+      response[a][0] -= force[a] * speed.slope * wx;
+      response[a][1] -= force[a] * speed.slope * wy;
+    }
+  }
   if constexpr (D == 3) {
     const Eight lever_x = block.mass_by_inertia * arm_x, lever_y = block.mass_by_inertia * arm_y;
     sums.acceleration[2] += lever_x * force[1] - lever_y * force[0];
@@ -203,14 +242,14 @@ inline void add_strips(const Law& law, const SplineView& flow, const StripBlock&
 
 // One orientation of the block, its four sides.
 template <int D, DragLawWithMoments Law>
-inline void add_orientation(const Law& law, const SplineView& flow, const StripBlock& block,
-                            const UncertainBlock<D>& state, double cosine, double sine,
-                            double scale, DragSumsOfEight<D>& sums, StripShare<D>* shares,
-                            int& count) {
+inline void add_orientation(const Law& law, const DragPower& power, const SplineView& flow,
+                            const StripBlock& block, const UncertainBlock<D>& state, double cosine,
+                            double sine, double scale, DragSumsOfEight<D>& sums,
+                            StripShare<D>* shares, int& count) {
   Side side{cosine, sine};
   for (int k = 0; k < 4; ++k) {
     for (int first = 0; first < block.strips; first += 8) {
-      add_strips<D>(law, flow, block, state, side, first, scale, sums, shares, count);
+      add_strips<D>(law, power, flow, block, state, side, first, scale, sums, shares, count);
     }
     side = {-side.ny, side.nx};
   }
@@ -219,7 +258,7 @@ inline void add_orientation(const Law& law, const SplineView& flow, const StripB
 // The drag at angle `theta`, or averaged over the orientations, without turning, if there are any.
 // `shares`, if not null, takes what each strip contributes to the derivative by the coefficients.
 template <int D, DragLawWithMoments Law>
-inline DragResponse<D> expected_drag(const Law& law, const SplineView& flow,
+inline DragResponse<D> expected_drag(const Law& law, const DragPower& power, const SplineView& flow,
                                      const StripBlock& block, const Orientations& orientations,
                                      double theta, const UncertainBlock<D>& state,
                                      StripShare<D>* shares) {
@@ -236,13 +275,13 @@ inline DragResponse<D> expected_drag(const Law& law, const SplineView& flow,
   DragResponse<D> response;
   response.shares = response.points = 0;
   if (orientations.count == 0) {
-    add_orientation<D>(law, flow, block, state, __builtin_cos(theta), __builtin_sin(theta),
+    add_orientation<D>(law, power, flow, block, state, __builtin_cos(theta), __builtin_sin(theta),
                        block.drag_scale, sums, shares, response.shares);
   }
   UncertainBlock<D> still = state;
   still.omega = 0;
   for (int k = 0; k < orientations.count; ++k) {
-    add_orientation<D>(law, flow, block, still, orientations.cosine[k], orientations.sine[k],
+    add_orientation<D>(law, power, flow, block, still, orientations.cosine[k], orientations.sine[k],
                        block.drag_scale / orientations.count, sums, shares, response.shares);
   }
   for (int a = 0; a < D; ++a) {

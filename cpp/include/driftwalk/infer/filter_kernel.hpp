@@ -248,8 +248,9 @@ private:
       theta = angle[-1] + (angle[0] - angle[-1]) * share;
       block.omega = spin[-1] + (spin[0] - spin[-1]) * share;
     }
-    DragResponse<D> response = expected_drag<D>(
-        law_, problem_.flow, problem_.block, problem_.orientations, theta, block, scratch_.shares);
+    DragResponse<D> response =
+        expected_drag<D>(law_, problem_.law.power, problem_.flow, problem_.block,
+                         problem_.orientations, theta, block, scratch_.shares);
     add_water_acceleration<D>(problem_.flow, problem_.block, problem_.law, block, scratch_.points,
                               response);
     return response;

@@ -27,6 +27,13 @@ struct StripBlock {
   double mass_by_inertia; // m/I [1/m^2]
 };
 
+// The drag's force goes with the power p of the speed |w| past a strip: it is that of the law times
+// (|w| / reference)^(p - 2). As it stands, the law's own.
+struct DragPower {
+  double power = 2;
+  double reference = 0.03; // [m/s]
+};
+
 // How the block answers the water.
 struct ForceLaw {
   double quadratic = 1; // share of the drag on windward strips that goes with the closing speed
@@ -35,6 +42,7 @@ struct ForceLaw {
   // that displaces its own mass.
   double water_acceleration = 0;
   double water_spin = 0;
+  DragPower power;
 };
 
 // The orientations over which the drag is averaged: those of a block whose angle is not known.

@@ -57,13 +57,20 @@ inline DragSums<Real> drag_sums(const Law& law, const BlockShape<T>& block, cons
     const Real raw_nx = nx * flow.unit, raw_ny = ny * flow.unit;
     const Real spin_step = motion.omega * w;
     Real closing = cover(face, (nx * motion.vx + ny * motion.vy) - motion.omega * first_offset);
+    const Real past = (tx * motion.vx + ty * motion.vy) + motion.omega * h; // along the face
     Real push{T(0)}, running{T(0)}, sum_u{T(0)}, sum_v{T(0)}, sum_g{T(0)};
     for (int k = 0; k < strips; ++k) {
       Real u, v;
       cursor.read(u, v);
       const Real s = closing - (raw_nx * u + raw_ny * v);
-      const Real g = law.conductance(s);
-      push = push + law.force(s);
+      Real g;
+      if constexpr (DragLawBySpeed<Law, Real>) {
+        g = law.conductance(s, (tx * flow.unit * u + ty * flow.unit * v) - past);
+        push = push + g * s;
+      } else {
+        g = law.conductance(s);
+        push = push + law.force(s);
+      }
       running = running + push;
       sum_u = sum_u + g * u;
       sum_v = sum_v + g * v;
@@ -71,8 +78,7 @@ inline DragSums<Real> drag_sums(const Law& law, const BlockShape<T>& block, cons
       cursor.advance();
       closing = closing - spin_step;
     }
-    const Real slip = (tx * motion.vx + ty * motion.vy) + motion.omega * h;
-    const Real tangential = (tx * sum_u + ty * sum_v) * flow.unit - slip * sum_g;
+    const Real tangential = (tx * sum_u + ty * sum_v) * flow.unit - past * sum_g;
     sums.force_x = sums.force_x + (tx * tangential - nx * push);
     sums.force_y = sums.force_y + (ty * tangential - ny * push);
     const Real lever = push * (T(0.5) * T(strips + 1)) - running;

@@ -21,6 +21,8 @@ enum class Range { any, not_negative, positive, share };
   /* water */                                                                                      \
   NUMBER(double, water_density, "kg/m^3", positive)                                                \
   NUMBER(double, linear_drag, "kg/s", not_negative)  /* of all strips together */                  \
+  NUMBER(double, drag_power, "1", positive)          /* of the speed */                            \
+  NUMBER(double, drag_speed, "m/s", positive)        /* at which C_d holds for every power */      \
   NUMBER(double, displaced_mass, "kg", not_negative) /* 0: water that accelerates does not push */ \
   /* wall */                                                                                       \
   NUMBER(double, radius, "m", not_negative)                                                        \

@@ -1,6 +1,7 @@
 // A batch made ready for the kernels: constants and tables in the kernels' number type.
 #pragma once
 
+#include "driftwalk/physics/drag_shape.hpp"
 #include "driftwalk/simulate/batch.hpp"
 
 #include <cstdint>
@@ -88,8 +89,8 @@ struct Prepared {
   BlockShape<T> block;
   StepConstants<T> step;
   int steps_per_interval;
-  double drag_scale;    // 1/2 rho (a/N) d [kg/m^2]: K = drag_scale * C_d
-  T linear_drag;        // of every strip in addition, per K and slip [m/s]; 0: nothing
+  double drag_scale; // 1/2 rho (a/N) d [kg/m^2]: K = drag_scale * C_d
+  DragShape<T> drag;
   double mass, inertia; // with what is added to them
   WallView<T> wall;
   // flow: the first of `frames` tables, frame_size numbers each

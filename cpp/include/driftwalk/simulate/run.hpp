@@ -241,7 +241,7 @@ void run_worlds(const Prepared<T>& run, const BatchWorlds& worlds, std::int64_t 
   Real drag_coefficient, force_std;
   Philox<UInt> stream;
   load_worlds(worlds, first, count, body, drag_coefficient, force_std, stream);
-  const Law law = Law::of(drag_coefficient, Real(run.linear_drag));
+  const Law law = Law::of(drag_coefficient, run.drag);
   Physics<Real, T, Law> physics{law,
                                 run.block,
                                 run.flow,

@@ -27,6 +27,7 @@ _LAW_ROWS: Final = {
     "effective_drag_coefficient": ("C_d per effective mass", 1.0, ""),
     "effective_force_std_N": ("σ_F per effective mass", 1e3, " mN"),
     "linear_drag_kg_s": ("linear drag", 1e3, " g/s"),
+    "drag_power": ("power of the drag", 1.0, ""),
     "force_memory_s": ("memory of the force", 1.0, " s"),
     "time_stamp_noise_s": ("jitter of the stamps", 1e3, " ms"),
     "orientation_offset_rad": ("orientation offset", degrees(1.0), "°"),

@@ -16,8 +16,8 @@ DRIFTWALK_LANES_BEGIN
 
 struct QuadraticDrag {
   // The law of a world, and K over the world's drag_scale.
-  template <class Real>
-  static inline QuadraticDrag of(Real, Real) {
+  template <class Real, class T>
+  static inline QuadraticDrag of(Real, const DragShape<T>&) {
     return {};
   }
   template <class Real>
