@@ -48,6 +48,12 @@ def fit(
             help="Compare force laws by evidence and held out prediction (takes some eight fits).",
         ),
     ] = False,
+    wall: Annotated[
+        bool,
+        typer.Option(
+            "--wall", help="Estimate restitution and friction of the wall from the contacts."
+        ),
+    ] = False,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Move a finished run aside and start a new one.")
     ] = False,
@@ -66,7 +72,9 @@ def fit(
     read = read_for_run(recordings, given, how)
     inputs = {"recording" if n == 0 else f"recording-{n + 1}": p for n, p in enumerate(recordings)}
     inputs.update({"study": given.file} if given.file is not None else {})
-    work = FitWork(read.trajectories, read.study, how.body, inputs, not no_check, compare_laws)
+    work = FitWork(
+        read.trajectories, read.study, how.body, inputs, not no_check, compare_laws, wall
+    )
     with reported("fit") as told:
         found = run_fit(work, out, overwrite=overwrite, begun=tank_note(read), **told)
     if json:

@@ -22,6 +22,8 @@ LAW_KEYS: Final = {
     "force_memory_s": "force_memory",
 }
 """Keys of [forces], and the parameters of a fit that they hold."""
+STICKING: Final = 10.0
+"""Friction of a wall at which every contact sticks."""
 _SAME: Final = 1e-9
 """Relative difference of two lengths up to which they are the same statement."""
 
@@ -105,7 +107,8 @@ def estimated_study(
     Returns
     -------
     Study
-        With the estimated drag coefficient and stochastic force, under the law of a fit.
+        With the estimated drag coefficient and stochastic force, under the law of a fit, and with
+        the wall where that was estimated.
 
     Raises
     ------
@@ -127,6 +130,7 @@ def estimated_study(
             "forces.drag_coefficient": fitted_value(found, "drag_coefficient"),
             "forces.force_std_N": fitted_value(found, "force_std"),
             **fitted_law(found),
+            **_fitted_wall(found),
             **(overrides or {}),
         },
     )
@@ -154,6 +158,16 @@ def fitted_law(found: xr.Dataset) -> dict[str, Any]:
         if name in known:
             law[f"forces.{key}"] = max(fitted_value(found, name), 0.0)
     return law
+
+
+def _fitted_wall(found: xr.Dataset) -> dict[str, Any]:
+    """Return the keys of [tank] that say what wall a fit has found."""
+    if "wall_friction" not in found:
+        return {}
+    return {
+        "tank.wall_restitution": float(found["wall_restitution"]),
+        "tank.wall_friction": min(float(found["wall_friction"]), STICKING),
+    }
 
 
 def _with_tank(study: Study, recording: xr.Dataset, *, is_stated: bool) -> Study:

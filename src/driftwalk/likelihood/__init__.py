@@ -2,6 +2,7 @@
 
 from driftwalk.likelihood.check.judged import Judged, judge_fit
 from driftwalk.likelihood.check.run import check_model
+from driftwalk.likelihood.contacts import estimate_wall
 from driftwalk.likelihood.fit import check_fit, fit_motion
 from driftwalk.likelihood.held_out import compare_laws
 from driftwalk.likelihood.recover.check import check_recovery
@@ -15,6 +16,7 @@ __all__ = [
     "check_model",
     "check_recovery",
     "compare_laws",
+    "estimate_wall",
     "fit_motion",
     "fitted_flow",
     "judge_fit",

@@ -306,6 +306,10 @@ class Passes:
         found = [self._run(series, point.in_flow(series.flow)) for series in self.series]
         return [(_whitened(one), _used(one)) for one in found]
 
+    def states(self, series: Series, point: Point) -> Floats:
+        """Return coordinates and velocities after each sample, shape (n, 2 D); NaN without."""
+        return np.asarray(self._run(series, point)["state"])
+
     def strength_products(self, series: Series, point: Point) -> tuple[Floats, Floats]:
         """Return products of the errors with their derivatives by the strength of the flow.
 
@@ -333,7 +337,7 @@ class Passes:
         if point.log_lever is not None and point.log_angle_noise is not None:
             pose["force_lever"] = math.exp(point.log_lever)
             pose["angle_noise"] = math.exp(point.log_angle_noise)
-        x, y, theta = _corrected(series, point)
+        x, y, theta = corrected(series, point)
         share = point.number("linear_share")
         return _core.InnovationsFilter(
             series.time,
@@ -373,7 +377,7 @@ class Passes:
         )
 
 
-def _corrected(series: Series, point: Point) -> tuple[Floats, Floats, Floats]:
+def corrected(series: Series, point: Point) -> tuple[Floats, Floats, Floats]:
     """Return the centre of mass and the angle of its faces, for what the camera says."""
     across, along = point.number("marker_x"), point.number("marker_y")
     offset = point.number("angle_offset")

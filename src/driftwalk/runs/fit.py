@@ -35,6 +35,8 @@ class FitWork:
         Whether the model is checked.
     compare_laws : bool
         Whether force laws are compared, which takes some eight fits.
+    wall : bool
+        Whether restitution and friction of the wall are estimated, which takes as long as a fit.
     """
 
     recordings: Sequence[xr.Dataset]
@@ -43,6 +45,7 @@ class FitWork:
     inputs: Mapping[str, Path]
     check: bool = True
     compare_laws: bool = False
+    wall: bool = False
 
 
 class Fitted(NamedTuple):
@@ -104,7 +107,14 @@ def run_fit(
     >>> found = run_fit(work, Path("fit"))  # doctest: +SKIP
     """
     from driftwalk.figures import write_check_figures, write_fit_figures, write_laws_figure
-    from driftwalk.likelihood import check_fit, compare_laws, fit_motion, fitted_flow, judge_fit
+    from driftwalk.likelihood import (
+        check_fit,
+        compare_laws,
+        estimate_wall,
+        fit_motion,
+        fitted_flow,
+        judge_fit,
+    )
 
     check_fit(work.recordings, work.study, body=work.body)
     with open_run(
@@ -121,6 +131,8 @@ def run_fit(
         found = fit_motion(work.recordings, work.study, body=work.body, tell=progress)
         if work.compare_laws:
             found = compare_laws(found, work.recordings, body=work.body, tell=progress)
+        if work.wall:
+            found = estimate_wall(found, work.recordings, body=work.body, tell=progress)
         flow = fitted_flow(found)
         run.write("fit.nc", netcdf_bytes(found))
         run.write("flow.nc", netcdf_bytes(flow))
@@ -166,6 +178,7 @@ def _specification(work: FitWork) -> dict[str, Any]:
     """Return what determines the numbers of a run."""
     return {
         **({"compare_laws": True} if work.compare_laws else {}),
+        **({"wall": True} if work.wall else {}),
         "kind": "fit",
         "study": work.study.to_dict(),
         "body": work.body,

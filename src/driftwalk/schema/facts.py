@@ -68,11 +68,13 @@ FIT_NUMBERS: Final[Mapping[str, str]] = MappingProxyType(
         "cell_size_m": "cell_size",
         "recording_start_s": "recording_start",
         "law_settled_by": "law_settled_by",
+        "wall_restitution": "wall_restitution",
+        "wall_friction": "wall_friction",
     }
 )
 FIT_COUNTS: Final = (
     *("samples", "mistakes", "jumps_removed", "dropped_frames", "samples_used"),
-    *("intervals_usable", "recordings", "iterations"),
+    *("intervals_usable", "recordings", "iterations", "wall_contacts"),
 )
 FIT_VERDICTS: Final = ("restricted", "converged")
 FIT_ROWS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
@@ -85,6 +87,8 @@ FIT_ROWS: Final[Mapping[str, tuple[str, str]]] = MappingProxyType(
             "bound",
         ),
         "force_std_any_added_mass_interval_N": ("force_std_any_added_mass_interval", "bound"),
+        "wall_restitution_interval": ("wall_restitution_interval", "bound"),
+        "wall_friction_interval": ("wall_friction_interval", "bound"),
     }
 )
 

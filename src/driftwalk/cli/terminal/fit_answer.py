@@ -82,6 +82,8 @@ _KEYS: Final = (
     "jumps_removed",
     "dropped_frames",
     "compared_laws",
+    "wall_contacts",
+    *(f"wall_{name}{end}" for name in ("restitution", "friction") for end in ("", "_interval")),
 )
 """The last ones where they are in the fit."""
 
@@ -140,6 +142,7 @@ def print_answer(fit: xr.Dataset, check: xr.Dataset | None, folder: Path) -> Non
     if "compared_law" in fit.dims:
         _print_laws(fit)
     print_row("intervals at the wall", f"{facts['wall_share']:.1%}, left out")
+    _print_wall(facts)
     if "flow" in fit.dims:
         names = fit["flow"].values[fit["interval_flow"].values]
         times = ", ".join(f"{time:g} s" for time in facts["switching_times_s"])
@@ -148,6 +151,18 @@ def print_answer(fit: xr.Dataset, check: xr.Dataset | None, folder: Path) -> Non
     print_row("flow", folder / "flow.nc")
     _print_verdict(check, fit)
     print_page(folder)
+
+
+def _print_wall(facts: Mapping[str, Any]) -> None:
+    """Print restitution and friction of the wall, where they were estimated."""
+    if "wall_contacts" not in facts:
+        return
+    if "wall_friction" not in facts:
+        print_row("wall", f"{facts['wall_contacts']} contacts say too little of it")
+        return
+    for name in ("restitution", "friction"):
+        low, high = facts[f"wall_{name}_interval"]
+        print_row(f"{name} of the wall", f"{facts[f'wall_{name}']:.2g} ({low:.2g} to {high:.2g})")
 
 
 def _law_in_words(law: str, settled: float | None) -> str:

@@ -21,6 +21,8 @@ _TURNING: Final = "the angle is in the state"
 _ASKED: Final = "a precision of C_d is asked for"
 _CHECKED: Final = "the model was checked"
 _LAWS: Final = "the fit was made by a version that looks for the force law"
+_WALL: Final = "the wall was estimated"
+_WALL_FOUND: Final = "the wall was estimated, from eight passages or more"
 _COMPARED_LAWS: Final = "two laws were fitted"
 _NO_ADDED_MASS: Final = "no added mass was stated, and the paper's law was found"
 _TABLE: Final = "laws were compared"
@@ -203,6 +205,18 @@ FIT: Final = Kind(
             "C_d of the filter under the law, without added mass", when=_TABLE,
         ),
         Variable("compared_law", "compared_law", None, "force law", "text", when=_TABLE),
+        Variable(
+            "wall_contacts", "", "1", "passages of the block along the wall", "int", when=_WALL
+        ),
+        Variable(
+            "wall_restitution", "", "1", "restitution of the wall", when=_WALL_FOUND
+        ),
+        Variable("wall_restitution_interval", "bound", "1", "its interval", when=_WALL_FOUND),
+        Variable("wall_friction", "", "1", "friction of the wall", when=_WALL_FOUND),
+        Variable(
+            "wall_friction_interval", "bound", "1", "its interval", when=_WALL_FOUND,
+            note="infinite where every contact may stick",
+        ),
         Variable("number", "number", None, "number", "text", when=_LAWS),
         Variable("law", "law", None, "force law", "text", when=_LAWS),
         Variable("departure", "departure", None, "number that was tested", "text", when=_LAWS),
