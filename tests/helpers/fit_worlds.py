@@ -1,17 +1,20 @@
 """Recordings for tests of the likelihood fit: parts of the bundled one, with coarse knots.
 
-They were simulated by another engine; every parameter is known.
+They were simulated by another engine; every parameter is known. `driven` makes others.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
-from typing import Literal
+from typing import Any, Literal
 
+import numpy as np
 import xarray as xr
 
 import driftwalk as dw
 from driftwalk.model import Study, apply_overrides
+from driftwalk.schema import build_flow_field, build_trajectory
 
 TRUTH = dw.tank30_truth()
 DRAG = TRUTH["drag_coefficient"]
@@ -58,3 +61,33 @@ def _fitted(seconds: float) -> xr.Dataset:
 def fitted(seconds: float) -> xr.Dataset:
     """Return the fit of the first part of the bundled recording, made once in a process."""
     return _fitted(seconds).copy(deep=True)
+
+
+def driven(seed: int, seconds: float, changes: Mapping[str, Any]) -> xr.Dataset:
+    """Return a block on a swirl, with a jet that drives it to the wall; simulated by driftwalk.
+
+    C_d is 0.45, σ_F 0.8 mN, the noise 0.3 mm and 9 mrad; `changes` are keys of the study.
+    """
+    study = apply_overrides(
+        coarse_study(),
+        {
+            "forces.drag_coefficient": 0.45,
+            "forces.force_std_N": 0.8e-3,
+            "simulation.time_step_s": 0.002,
+            "observation.position_noise_m": 3e-4,
+            "observation.orientation_noise_rad": 0.009,
+            **changes,
+        },
+    )
+    axis = np.linspace(-0.15, 0.15, 41)
+    x, y = np.meshgrid(axis, axis)
+    swirl = 0.5 * np.exp(-((np.hypot(x, y) / 0.14) ** 4))
+    jet = 0.05 * np.exp(-0.5 * (np.hypot(x - 0.09, y + 0.05) / 0.03) ** 2)
+    inside = np.ones(x.shape, dtype=np.int8)
+    flow = build_flow_field(axis, axis, u=-swirl * y - jet, v=swirl * x, flag=inside)
+    time = np.arange(0.0, seconds + 20.0, 0.1)
+    run = dw.simulate(study, flow, sample_time=time, replicates=1, seed=seed)
+    seen = run.isel(replicate=0, body=0, time=slice(200, None))
+    return build_trajectory(
+        seen["time"].values - 20.0, *(seen[name].values for name in ("x", "y", "theta"))
+    )

@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
+LEAST_QUADRATIC = 1e-6
+"""Share of the quadratic drag below which nothing is known of its C_d."""
 MOST_LOG_WIDTH: Final = 300.0
 """Beyond this an interval has no upper end: exp would not fit a double for long."""
 LEAST_COUNT: Final = 3
@@ -123,11 +125,12 @@ def parameter_facts(
     intensity = mass**2 * math.exp(point.log_intensity)
     normal = float(ndtri(0.5 + 0.5 * confidence))
     reach = normal * np.sqrt(np.diag(covariance))
+    reach_of_drag = normal * _log_drag_std(point, covariance)
     heavier = inertia_of(study, floating=point.number("water_acceleration") != 0.0)
     side = normal * study.fit.side_std_m / study.block.side_m
     of_drag, of_force = (
         math.hypot(one, normal * heavier.log_std, side * slope)
-        for one, slope in zip(reach[:2] * (1, 0.5), by_side, strict=True)
+        for one, slope in zip((reach_of_drag, 0.5 * reach[1]), by_side, strict=True)
     )
     total = heavier.share**2 * intensity
     drag = (1.0 - point.number("linear_share")) * math.exp(point.log_drag)
@@ -141,13 +144,23 @@ def parameter_facts(
         values["force_lever_m"] = (math.exp(point.log_lever), reach[3])
         values["orientation_noise_rad"] = (math.exp(point.log_angle_noise), reach[4])
     if heavier.share != 1.0 or heavier.log_std > 0.0:
-        values["effective_drag_coefficient"] = (drag, reach[0])
+        values["effective_drag_coefficient"] = (drag, reach_of_drag)
         values["effective_force_std_N"] = (math.sqrt(intensity / interval), 0.5 * reach[1])
     facts: dict[str, Any] = {"force_interval_s": interval, "confidence": confidence}
     for name, (value, width) in values.items():
         facts[name] = value
         facts[f"{name}_interval"] = [value * math.exp(-width), _upper(value, width)]
     return {**facts, **inertia_facts(heavier, facts, normal), **number_facts(point, reach, study)}
+
+
+def _log_drag_std(point: Point, covariance: Floats) -> float:
+    """Return the standard deviation of ln C_d of the quadratic part of the drag."""
+    slopes = np.zeros(len(covariance))
+    slopes[0] = 1.0
+    if "linear_share" in point.opened:
+        at = 1 + list(point.extras).index("linear_share")
+        slopes[at] = -1.0 / max(1.0 - point.opened["linear_share"], LEAST_QUADRATIC)
+    return math.sqrt(float(slopes @ covariance @ slopes))
 
 
 def _upper(value: float, log_width: float) -> float:

@@ -4,50 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import xarray as xr
-from fit_worlds import coarse_study, fitted, recording
+from fit_worlds import coarse_study, driven, fitted, recording
 
 import driftwalk as dw
 from driftwalk.conditions import estimated_study
 from driftwalk.likelihood import estimate_wall
 from driftwalk.likelihood.contacts import _answer, _drawn, _known, _Wall
 from driftwalk.model import apply_overrides
-from driftwalk.schema import build_flow_field, build_trajectory
-
-
-def at_the_wall(restitution: float, friction: float, seed: int) -> xr.Dataset:
-    """Return ten minutes of a block that a jet drives to the wall; synthetic."""
-    study = apply_overrides(
-        coarse_study(),
-        {
-            "forces.drag_coefficient": 0.45,
-            "forces.force_std_N": 0.8e-3,
-            "simulation.time_step_s": 0.002,
-            "observation.position_noise_m": 3e-4,
-            "observation.orientation_noise_rad": 0.009,
-            "tank.wall_restitution": restitution,
-            "tank.wall_friction": friction,
-        },
-    )
-    axis = np.linspace(-0.15, 0.15, 41)
-    x, y = np.meshgrid(axis, axis)
-    swirl = 0.5 * np.exp(-((np.hypot(x, y) / 0.14) ** 4))
-    jet = 0.05 * np.exp(-0.5 * (np.hypot(x - 0.09, y + 0.05) / 0.03) ** 2)
-    inside = np.ones(x.shape, dtype=np.int8)
-    flow = build_flow_field(axis, axis, u=-swirl * y - jet, v=swirl * x, flag=inside)
-    time = np.arange(0.0, 620.0, 0.1)
-    run = dw.simulate(study, flow, sample_time=time, replicates=1, seed=seed)
-    seen = run.isel(replicate=0, body=0, time=slice(200, None))
-    return build_trajectory(
-        seen["time"].values - 20.0, *(seen[name].values for name in ("x", "y", "theta"))
-    )
 
 
 @pytest.mark.slow
 def test_the_wall_of_a_simulation_is_found() -> None:
     """Intervals of 99.9 %: each misses once in a thousand; the seeds are fixed."""
     restitution, friction = 0.8, 0.3
-    track = at_the_wall(restitution, friction, seed=3)
+    wall = {"tank.wall_restitution": restitution, "tank.wall_friction": friction}
+    track = driven(3, 600.0, wall)
     study = apply_overrides(coarse_study(), {"fit.confidence": 0.999})
     found = estimate_wall(dw.fit_motion(track, study), [track])
     assert int(found["wall_contacts"]) > 50

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
-from fit_worlds import DRAG, coarse_study, recording
+from fit_worlds import DRAG, coarse_study, driven, recording
 
 import driftwalk as dw
 from driftwalk.conditions import estimated_study
@@ -15,9 +16,10 @@ from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.study_keys import FIT_KEYS, study_overrides
 from driftwalk.figures import write_laws_figure
 from driftwalk.likelihood import compare_laws
+from driftwalk.likelihood.filter_pass import Point
 from driftwalk.likelihood.held_out import LAWS
+from driftwalk.likelihood.result import _log_drag_std
 from driftwalk.model import Study, apply_overrides
-from driftwalk.schema import build_flow_field, build_trajectory
 from driftwalk.schema.check import check_dataset
 from driftwalk.schema.facts import fit_facts, fitted_value
 
@@ -36,42 +38,15 @@ def within(fit: xr.Dataset, parameter: str, truth: float) -> bool:
     return bool(low <= truth <= high)
 
 
-def simulated(seed: int, **forces: object) -> xr.Dataset:
-    """Return five minutes of a block on a swirl with a jet, under a law of forces; synthetic."""
-    study = apply_overrides(
-        coarse_study(),
-        {
-            "forces.drag_coefficient": 0.45,
-            "forces.force_std_N": 0.8e-3,
-            **{f"forces.{key}": value for key, value in forces.items()},
-            "simulation.time_step_s": 0.002,
-            "observation.position_noise_m": 3e-4,
-            "observation.orientation_noise_rad": 0.009,
-        },
-    )
-    axis = np.linspace(-0.15, 0.15, 41)
-    x, y = np.meshgrid(axis, axis)
-    swirl = 0.5 * np.exp(-((np.hypot(x, y) / 0.14) ** 4))
-    jet = 0.05 * np.exp(-0.5 * (np.hypot(x - 0.09, y + 0.05) / 0.03) ** 2)
-    inside = np.ones(x.shape, dtype=np.int8)
-    flow = build_flow_field(axis, axis, u=-swirl * y - jet, v=swirl * x, flag=inside)
-    time = np.arange(0.0, SECONDS + 20.0, 0.1)
-    run = dw.simulate(study, flow, sample_time=time, replicates=1, seed=seed)
-    seen = run.isel(replicate=0, body=0, time=slice(200, None))
-    return build_trajectory(
-        seen["time"].values - 20.0, *(seen[name].values for name in ("x", "y", "theta"))
-    )
-
-
 @pytest.fixture(scope="module")
 def floating() -> xr.Dataset:
     """A body that floats: the water's acceleration pushes it."""
-    return simulated(5, pressure_gradient=True, added_mass_share=0.5)
+    return driven(5, SECONDS, {"forces.pressure_gradient": True, "forces.added_mass_share": 0.5})
 
 
 @pytest.mark.parametrize("power", [1.0, pytest.param(1.5, marks=pytest.mark.slow)])
 def test_the_power_of_the_drag_is_found(power: float) -> None:
-    fit = dw.fit_motion(simulated(6, drag_power=power), study_with())
+    fit = dw.fit_motion(driven(6, SECONDS, {"forces.drag_power": power}), study_with())
     assert within(fit, "drag_power", power), FALSE_ALARM
     assert within(fit, "drag_coefficient", 0.45), FALSE_ALARM
     low, high = fit["interval"].sel(parameter="drag_power").values
@@ -79,6 +54,17 @@ def test_the_power_of_the_drag_is_found(power: float) -> None:
     forces = estimated_study(fit).forces
     assert forces.drag_power == fitted_value(fit, "drag_power")
     assert forces.drag_speed_m_s == 0.03
+
+
+def test_the_interval_of_the_quadratic_part_knows_its_share() -> None:
+    """ln C_d of the quadratic part is ln K + ln(1 - share); for a normal law by hand."""
+    point = Point(np.zeros((2, 4, 4)), 0.0, 0.0, 0.0, opened={"linear_share": 0.6})
+    covariance = np.diag([0.04, 1.0, 1.0, 0.01])
+    covariance[0, 3] = covariance[3, 0] = 0.015
+    want = 0.04 - 2 * 0.015 / 0.4 + 0.01 / 0.4**2
+    assert _log_drag_std(point, covariance) == pytest.approx(np.sqrt(want))
+    closed = replace(point, opened={})
+    assert _log_drag_std(closed, covariance[:3, :3]) == pytest.approx(0.2)
 
 
 def test_a_stated_power_of_the_drag_is_that_of_the_fit() -> None:
