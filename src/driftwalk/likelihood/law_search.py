@@ -9,7 +9,7 @@ closed again where nothing comes of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -290,15 +290,36 @@ class LawSearch:
                 names = [name for name in names if name not in DRAG_SHAPES]
             if index > 0 or trial is None:
                 trial = self._try(mode, names) if names else None
-            asked = self._asked(mode, trial)
+            asked = self._asked(mode, trial, closed)
             if not asked:
                 break
-            mode, dropped = self._opened(mode, asked)
+            mode, dropped = self._opened_or_strongest(mode, asked, trial)
             closed |= dropped
         return replace(found, mode=mode, trial=trial)
 
-    def _asked(self, mode: Mode, trial: Trial | None) -> dict[str, float]:
-        """Return the numbers to open, with the values to begin with."""
+    def _opened_or_strongest(
+        self, mode: Mode, asked: Mapping[str, float], trial: Trial | None
+    ) -> tuple[Mode, set[str]]:
+        """Return the mode with numbers opened, or where nothing comes of all together, with one.
+
+        One large mistake makes others seem to be there, and no search finds them all. The numbers
+        that were not opened alone are not counted as closed: without the mistake they are tested
+        again.
+        """
+        found, dropped = self._opened(mode, asked)
+        names = [] if trial is None else [name for name in asked if name in trial.names]
+        single = [name for name in names if name not in STRENGTHS]
+        if found is not mode or trial is None or not single or len(asked) == 1:
+            return found, dropped
+        strongest = max(single, key=lambda name: abs(trial.sigmas[name]))
+        alone, of_alone = self._opened(mode, {strongest: asked[strongest]})
+        return (found, dropped) if alone is mode else (alone, of_alone)
+
+    def _asked(self, mode: Mode, trial: Trial | None, closed: Set[str]) -> dict[str, float]:
+        """Return the numbers to open, with the values to begin with.
+
+        Those of `closed` were opened before, and nothing came of them.
+        """
         asked: dict[str, float] = {}
         if trial is None:
             return asked
@@ -316,14 +337,14 @@ class LawSearch:
             largest = max(map(abs, estimates.values()))
             if joint > OPENED_STRENGTH and largest > self.worth[strengths[0]]:
                 asked.update({name: _within(name, value) for name, value in estimates.items()})
-        if self.assumptions.pulses and not set(PULSES) & set(mode.point.opened):
+        if self.assumptions.pulses and not set(PULSES) & {*mode.point.opened, *closed}:
             pulses = find_pulses(self.passes, mode)
             if (
                 pulses is not None
                 and pulses.significant
                 and pulses.amplitude > self.worth[PULSES[0]]
             ):
-                asked.update(dict.fromkeys(PULSES, 0.0))
+                asked.update(zip(PULSES, (pulses.cosine, pulses.sine), strict=True))
                 asked["pulse_frequency"] = pulses.frequency
         return asked
 

@@ -8,6 +8,7 @@ derivative gives, without another search, an estimate of the number and its stan
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
@@ -86,8 +87,15 @@ class Pulses(NamedTuple):
 
     frequency: float
     """[Hz]"""
-    amplitude: float
+    cosine: float
+    sine: float
+    """Amplitudes of its parts, as of `PULSES`; too small while the flow is fitted without them."""
     significant: bool
+
+    @property
+    def amplitude(self) -> float:
+        """Return the amplitude of the pulse."""
+        return math.hypot(self.cosine, self.sine)
 
 
 def find_pulses(passes: Passes, mode: Mode) -> Pulses | None:
@@ -103,7 +111,7 @@ def find_pulses(passes: Passes, mode: Mode) -> Pulses | None:
         return None
     line = max(lines, key=lambda one: one.height)
     least = 2.0 * float(np.log(line.frequencies / FALSE_PULSES))
-    return Pulses(line.frequency, line.amplitude, line.height > least)
+    return Pulses(line.frequency, line.cosine, line.sine, line.height > least)
 
 
 class _Line(NamedTuple):
@@ -112,7 +120,8 @@ class _Line(NamedTuple):
     height: float
     """Of chi squared with two degrees of freedom."""
     frequency: float
-    amplitude: float
+    cosine: float
+    sine: float
     frequencies: int
     """How many were looked at."""
 
@@ -135,5 +144,12 @@ def _highest_line(passes: Passes, mode: Mode, series: Series) -> _Line | None:
     heights = 2.0 * np.abs(wave) ** 2 / total
     heights *= MEDIAN_OF_TWO / float(np.median(heights))
     best = int(heights.argmax())
-    amplitude = 2.0 * float(np.abs(wave[best])) / total
-    return _Line(float(heights[best]), float(frequencies[best]), amplitude, frequencies.size)
+    # The spectrum counts time from the first sample, the numbers of a pulse from time 0.
+    turned = 2.0 * wave[best] / total * np.exp(-2j * np.pi * frequencies[best] * series.time[0])
+    return _Line(
+        float(heights[best]),
+        float(frequencies[best]),
+        float(turned.real),
+        float(-turned.imag),
+        frequencies.size,
+    )
