@@ -186,7 +186,7 @@ std::tuple<double, double, double> drag(const Model& model, double drag_coeffici
     return driftwalk::drag_sums(law, run.block, run.flow, x, y, axes, motion);
   };
   const auto mixed = driftwalk::MixedDrag<double>::of(drag_coefficient, run.drag);
-  const bool quadratic = run.drag.is_quadratic();
+  const bool quadratic = run.drag.is_quadratic;
   const driftwalk::DragSums<double> sums =
       quadratic ? sums_of(driftwalk::QuadraticDrag{}) : sums_of(mixed);
   const double scale = run.drag_scale * (quadratic ? drag_coefficient : 1);

@@ -12,8 +12,8 @@ std::int64_t assemble_reference(const Prepared<double>& run, const AssemblyRules
                                              scratch.blended_flow_twice)
         .run();
   };
-  return !run.drag.is_quadratic() ? assembled.template operator()<MixedDrag<double>>()
-                                  : assembled.template operator()<QuadraticDrag>();
+  return !run.drag.is_quadratic ? assembled.template operator()<MixedDrag<double>>()
+                                : assembled.template operator()<QuadraticDrag>();
 }
 
 std::size_t assembly_reference_bytes(int blocks) {

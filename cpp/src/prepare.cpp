@@ -97,7 +97,8 @@ PreparedRun<T>::PreparedRun(const BatchModel& model) {
   view_.inertia = model.inertia * (1 + model.added_mass_share);
   view_.drag = {static_cast<T>(model.linear_drag / (4 * model.strips) / view_.drag_scale),
                 static_cast<T>(model.drag_power / 2 - 1),
-                static_cast<T>(1 / (model.drag_speed * model.drag_speed))};
+                static_cast<T>(1 / (model.drag_speed * model.drag_speed)),
+                model.linear_drag == 0 && model.drag_power == 2};
   prepare_force(model);
   view_.position_noise = static_cast<T>(model.position_noise);
   view_.orientation_noise = static_cast<T>(model.orientation_noise);

@@ -6,7 +6,7 @@ namespace driftwalk {
 
 void simulate_reference(const Prepared<double>& run, const BatchWorlds& worlds, std::int64_t world,
                         const SampleSink<double>& sink, std::uint32_t* status) {
-  if (!run.drag.is_quadratic()) {
+  if (!run.drag.is_quadratic) {
     run_worlds<double, double, MixedDrag<double>>(run, worlds, world, 1, sink, status);
   } else {
     run_worlds<double, double, QuadraticDrag>(run, worlds, world, 1, sink, status);

@@ -152,7 +152,7 @@ struct SomePowerDrag {
   Real conductance(Real closing, Real slip) const {
     using T = typename driftwalk::Numbers<Real>::Scalar;
     const driftwalk::DragShape<T> shape{static_cast<T>(linear), static_cast<T>(power / 2 - 1),
-                                        static_cast<T>(1 / (speed * speed))};
+                                        static_cast<T>(1 / (speed * speed)), false};
     return driftwalk::MixedDrag<Real>::of(Real(static_cast<T>(quadratic)), shape)
         .conductance(closing, slip);
   }

@@ -23,8 +23,8 @@ std::int64_t assemble(const Prepared<float>& run, const AssemblyRules& rules,
                                           scratch.blended_flow)
         .run();
   };
-  return !run.drag.is_quadratic() ? assembled.template operator()<MixedDrag<Real>>()
-                                  : assembled.template operator()<QuadraticDrag>();
+  return !run.drag.is_quadratic ? assembled.template operator()<MixedDrag<Real>>()
+                                : assembled.template operator()<QuadraticDrag>();
 }
 
 constexpr AssemblyKernel kernel{assemble, assembly_lanes, PackMemory<Real>::bytes};

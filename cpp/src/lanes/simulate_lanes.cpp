@@ -17,7 +17,7 @@ constexpr int float_lanes = 4;
 void simulate(const Prepared<float>& run, const BatchWorlds& worlds, std::int64_t first, int count,
               const SampleSink<float>& sink, std::uint32_t* status) {
   using Real = FloatPack<float_lanes>;
-  if (!run.drag.is_quadratic()) {
+  if (!run.drag.is_quadratic) {
     run_worlds<Real, float, MixedDrag<Real>>(run, worlds, first, count, sink, status);
   } else {
     run_worlds<Real, float, QuadraticDrag>(run, worlds, first, count, sink, status);
