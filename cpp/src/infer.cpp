@@ -79,6 +79,10 @@ DragModel::DragModel(const FloatingBlock& block, const SplineView& flow, const d
   require(positive(law.power.power) && positive(law.power.reference),
           "the power of the drag and its reference speed must be positive");
   require(law.linear == 0 || law.power.power == 2, "linear drag goes with the power 2 alone");
+  if (law.power.power != 2) {
+    const double e = law.power.power / 2 - 1;
+    law_.power.at_rest = std::pow(std::tgamma(e + 2.5) / std::tgamma(2.5), 1 / e);
+  }
   require(positive(flow.spacing) && std::isfinite(flow.origin_x) && std::isfinite(flow.origin_y),
           "the flow's spacing must be positive and its origin finite");
   require(flow.rows >= 4 && flow.columns >= 4, "a bicubic flow needs at least 4 rows and columns");

@@ -14,23 +14,17 @@ namespace {
 // The law that the study says: a world that is looked at can afford to ask at each strip.
 struct EitherDrag {
   MixedDrag<double> mixed;
+  bool is_quadratic;
 
   static EitherDrag of(double drag_coefficient, const DragShape<double>& shape) {
-    return {MixedDrag<double>::of(drag_coefficient, shape)};
+    return {MixedDrag<double>::of(drag_coefficient, shape), shape.is_quadratic};
   }
-  bool is_quadratic() const { return mixed.linear == 0 && !mixed.bent; }
   double strength(double drag_coefficient) const {
-    return is_quadratic() ? QuadraticDrag{}.strength(drag_coefficient)
-                          : mixed.strength(drag_coefficient);
-  }
-  double conductance(double closing) const {
-    return is_quadratic() ? QuadraticDrag{}.conductance(closing) : mixed.conductance(closing);
+    return is_quadratic ? QuadraticDrag{}.strength(drag_coefficient)
+                        : mixed.strength(drag_coefficient);
   }
   double conductance(double closing, double slip) const {
-    return is_quadratic() ? QuadraticDrag{}.conductance(closing) : mixed.conductance(closing, slip);
-  }
-  double force(double closing) const {
-    return is_quadratic() ? QuadraticDrag{}.force(closing) : mixed.force(closing);
+    return is_quadratic ? QuadraticDrag{}.conductance(closing) : mixed.conductance(closing, slip);
   }
 };
 

@@ -135,12 +135,8 @@ struct SomeMixedDrag {
     return {Real(static_cast<T>(quadratic)), Real(static_cast<T>(linear))};
   }
   template <class Real>
-  Real conductance(Real closing) const {
-    return law<Real>().conductance(closing);
-  }
-  template <class Real>
-  Real force(Real closing) const {
-    return law<Real>().force(closing);
+  Real conductance(Real closing, Real slip) const {
+    return law<Real>().conductance(closing, slip);
   }
 };
 
@@ -155,14 +151,6 @@ struct SomePowerDrag {
                                         static_cast<T>(1 / (speed * speed)), false};
     return driftwalk::MixedDrag<Real>::of(Real(static_cast<T>(quadratic)), shape)
         .conductance(closing, slip);
-  }
-  template <class Real>
-  Real conductance(Real closing) const {
-    return conductance(closing, closing);
-  }
-  template <class Real>
-  Real force(Real closing) const {
-    return conductance(closing) * closing;
   }
 };
 
@@ -290,9 +278,9 @@ void check_at_rest_in_the_water() {
 // A face that no water reaches feels no law.
 void check_covered_faces() {
   const driftwalk::MixedDrag<double> law{0.7, 0.02};
-  CHECK(law.conductance(driftwalk::closing_where_covered) == 0);
-  CHECK(law.force(driftwalk::closing_where_covered + 10) == 0);
-  CHECK(law.force(-3.0) == -0.06);
+  CHECK(law.conductance(driftwalk::closing_where_covered, 0.0) == 0);
+  CHECK(law.conductance(driftwalk::closing_where_covered + 10, 0.0) == 0);
+  CHECK(law.conductance(-3.0, 0.0) * -3.0 == -0.06);
 }
 
 // Of a flow u = M r that is linear in space Du/Dt = M^2 r, whose mean over a block is that at the

@@ -103,7 +103,7 @@ inline void keep_shares(const StripsOnGrid& grid, const Eight (&response)[D][2],
 // - 2). R^2 is not |w|^2 of the mean alone, but such that the mean drag is right: with V the
 // variance of both components and e = p/2 - 1 it grows by (2 + e) V where |w|^2 is much larger than
 // V (second order in w), and by (Gamma((p + 3)/2) / Gamma(5/2))^(1/e) V where the mean of w is
-// nearly zero (of two faces that are both sometimes windward).
+// nearly zero (of two faces that are both sometimes windward): `at_rest`.
 struct SpeedFactor {
   Eight factor;
   Eight slope; // minus d(ln factor)/d(velocity) over w
@@ -111,10 +111,9 @@ struct SpeedFactor {
 
 inline SpeedFactor speed_factor(const DragPower& power, Eight square, Eight variance) {
   const double e = power.power / 2 - 1;
-  const double near = __builtin_pow(__builtin_tgamma(e + 2.5) / __builtin_tgamma(2.5), 1 / e);
-  const double change = 2 + e - near;
+  const double change = 2 + e - power.at_rest;
   const Eight share = square / (square + variance);
-  const Eight whole = square + variance * (near + change * share);
+  const Eight whole = square + variance * (power.at_rest + change * share);
   const Eight grows = 1.0 + change * ((1 - share) * (1 - share));
   double factor[8];
   for (int lane = 0; lane < 8; ++lane) {

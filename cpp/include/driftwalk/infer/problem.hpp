@@ -32,6 +32,8 @@ struct StripBlock {
 struct DragPower {
   double power = 2;
   double reference = 0.03; // [m/s]
+  // What a variance of the velocity counts near rest (expected_drag.hpp); the model computes it.
+  double at_rest = 1;
 };
 
 // How the block answers the water.

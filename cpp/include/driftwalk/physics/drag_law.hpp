@@ -35,16 +35,16 @@ struct StripMoments {
   Eight::Mask takes_part;
 };
 
-template <class Law, class Real>
-concept DragLaw = requires(const Law& law, Real closing) {
-  { law.conductance(closing) } -> std::same_as<Real>;
-  { law.force(closing) } -> std::same_as<Real>;
-};
-
 // A law whose g needs the slip as well.
 template <class Law, class Real>
 concept DragLawBySpeed = requires(const Law& law, Real closing, Real slip) {
   { law.conductance(closing, slip) } -> std::same_as<Real>;
+};
+
+template <class Law, class Real>
+concept DragLaw = DragLawBySpeed<Law, Real> || requires(const Law& law, Real closing) {
+  { law.conductance(closing) } -> std::same_as<Real>;
+  { law.force(closing) } -> std::same_as<Real>;
 };
 
 // `mean` and `slip` are the means of s and w_t, `variance` is that of s, `cross` their covariance.

@@ -31,19 +31,16 @@ struct MixedDrag {
     return Number(typename Numbers<Number>::Scalar(1));
   }
 
-  inline Real conductance(Real closing) const { return of_windward(closing, windward(closing)); }
-
   inline Real conductance(Real closing, Real slip) const {
-    Real size = windward(closing);
+    Real windward = max(closing, Real(Scalar(0)));
     if (bent) {
       // At rest in the water it has no limit for p < 1; the floor is 1 um/s at U = 3 cm/s.
       const Real square = max((closing * closing + slip * slip) * per_square, Real(Scalar(1e-9)));
-      size = size * exp(exponent * log(square));
+      windward = windward * exp(exponent * log(square));
     }
-    return of_windward(closing, size);
+    const auto wet = closing > Real(static_cast<Scalar>(0.5 * closing_where_covered));
+    return select(wet, quadratic * windward + linear, Real(Scalar(0)));
   }
-
-  inline Real force(Real closing) const { return conductance(closing) * closing; }
 
   // Of a law in plain numbers.
   inline StripMoments moments(Eight mean, Eight slip, Eight variance, Eight cross) const {
@@ -60,14 +57,6 @@ struct MixedDrag {
       m.takes_part = Eight(0) < Eight(1);
     }
     return m;
-  }
-
-private:
-  static inline Real windward(Real closing) { return max(closing, Real(Scalar(0))); }
-
-  inline Real of_windward(Real closing, Real size) const {
-    const auto wet = closing > Real(static_cast<Scalar>(0.5 * closing_where_covered));
-    return select(wet, quadratic * size + linear, Real(Scalar(0)));
   }
 };
 
