@@ -269,20 +269,22 @@ InnovationsFilter::Sums InnovationsFilter::sums(const std::uint8_t* kept, const 
   std::vector<std::uint8_t> used(std::size_t(n), 0);
   std::vector<double> information(std::size_t(stride * stride), 0.0);
   std::vector<double> products(std::size_t(columns * stride), 0.0);
-  std::vector<double> rows(std::size_t(ProductSums::most_rows * stride), 0.0);
+  const auto width = std::size_t(stride), block = ProductSums::most_rows * width;
+  std::vector<double> rows(block, 0.0), dense(block, 0.0);
   std::vector<double> beside(std::size_t(ProductSums::most_rows * columns));
-  std::vector<double> size(std::size_t(stride / 8), 0.0);
-  std::vector<std::int32_t> groups(std::size_t(stride / 8));
+  std::vector<double> size(width, 0.0);
+  std::vector<std::uint8_t> written(width / 8, 0);
+  std::vector<std::int32_t> chosen(width);
   const ProductSums sums{
-      columns,         samples() - n, kept,          right,       information.data(),
-      products.data(), rows.data(),   beside.data(), size.data(), groups.data()};
+      columns,     samples() - n,  kept,        right,        information.data(), products.data(),
+      rows.data(), written.data(), size.data(), dense.data(), chosen.data(),      beside.data()};
   run(n, {innovation.data(), covariance.data(), used.data(), state.data(), nullptr, nullptr},
       &sums);
   Sums found;
   found.information.resize(std::size_t(count * count));
   for (std::int64_t i = 0; i < count; ++i) {
     for (std::int64_t j = i; j < count; ++j) {
-      // Groups of eight columns are multiplied on and above the diagonal of groups.
+      // Eight columns are multiplied with the same eight and with those after them.
       found.information[std::size_t(i * count + j)] =
           found.information[std::size_t(j * count + i)] = information[std::size_t(i * stride + j)];
     }

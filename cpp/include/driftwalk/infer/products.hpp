@@ -1,9 +1,9 @@
 // Sums over the samples of products of derivatives: J' J and J' R, J the whitened derivatives of
 // the predictions, R a few columns beside them.
 //
-// Within a second or two the block comes near some of the coefficients only, so that the samples
-// are taken some at a time and columns whose derivatives are as good as zero in all of them left
-// out.
+// Within a second or two the block comes near some of the coefficients only. So the samples are
+// taken some at a time, and the columns with derivatives that count are moved together before they
+// are multiplied.
 #pragma once
 
 #include "driftwalk/infer/problem.hpp"
@@ -33,8 +33,8 @@ public:
   // Where eight columns of a row are to be written, `ahead` rows beyond those taken over. What is
   // not written is zero.
   double* place(int ahead, std::int32_t group) {
-    sums_.size[group] = 1;
-    return block_of(group) + 8 * (rows_ + ahead);
+    sums_.written[group] = 1;
+    return block_of(sums_.rows, group) + 8 * (rows_ + ahead);
   }
 
   // Takes over the rows that were written, with what stands beside each.
@@ -50,11 +50,10 @@ public:
 
   // Multiplies what has been collected.
   void flush() {
-    const int groups = find_groups();
-    for (int i = 0; i < groups; ++i) {
-      multiply_beside(sums_.groups[i]);
-      for (int j = i; j < groups; ++j) {
-        multiply(sums_.groups[i], sums_.groups[j]);
+    const int columns = move_together(multiply_beside());
+    for (int down = 0; down < columns; down += 8) {
+      for (int across = down; across < columns; across += 8) {
+        multiply(down, across, columns);
       }
     }
     clear();
@@ -62,71 +61,97 @@ public:
 
 private:
   static constexpr int most_coordinates = 3;
+  // Sums of eight that stay in the registers.
+  static constexpr int lines = native_doubles == 8 ? 8 : 4;
 
   // Of eight columns: row by row, so that a product reads memory in order.
-  double* block_of(std::int32_t group) const {
-    return sums_.rows + std::int64_t(group) * ProductSums::most_rows * 8;
+  static double* block_of(double* rows, std::int64_t group) {
+    return rows + group * ProductSums::most_rows * 8;
   }
 
-  // Lists the groups of eight columns that count, in order.
-  int find_groups() const {
+  // Adds the products with what stands beside, of all columns. Returns the largest derivative, and
+  // notes that of each column.
+  double multiply_beside() const {
     double most = 0;
-    const auto all = static_cast<std::int32_t>(stride_ / 8);
-    for (std::int32_t group = 0; group < all; ++group) {
-      if (sums_.size[group] == 0) {
+    for (std::int64_t group = 0; group < stride_ / 8; ++group) {
+      if (sums_.written[group] == 0) {
         continue;
       }
+      const double* const rows = block_of(sums_.rows, group);
       Eight size = 0;
       for (int row = 0; row < rows_; ++row) {
-        size = at_least(size_of(Eight::load(block_of(group) + 8 * row)), size);
+        size = at_least(size_of(Eight::load(rows + 8 * row)), size);
       }
-      sums_.size[group] = largest(size);
-      most = sums_.size[group] > most ? sums_.size[group] : most;
+      size.store(sums_.size + 8 * group);
+      const double here = largest(size);
+      most = here > most ? here : most;
+      for (int column = 0; column < sums_.columns; ++column) {
+        double* const to = sums_.products + column * stride_ + 8 * group;
+        Eight sum = Eight::load(to);
+        for (int row = 0; row < rows_; ++row) {
+          sum += sums_.beside[row * sums_.columns + column] * Eight::load(rows + 8 * row);
+        }
+        sum.store(to);
+      }
     }
+    return most;
+  }
+
+  // Copies the columns that count, in order and without gaps. Returns their number.
+  int move_together(double most) const {
     int count = 0;
-    for (std::int32_t group = 0; group < all; ++group) {
-      if (sums_.size[group] > as_good_as_zero * most) {
-        sums_.groups[count++] = group;
+    for (std::int64_t group = 0; group < stride_ / 8; ++group) {
+      if (sums_.written[group] == 0) {
+        continue;
+      }
+      for (std::int64_t column = 8 * group; column < 8 * (group + 1); ++column) {
+        if (sums_.size[column] > as_good_as_zero * most) {
+          const double* from = block_of(sums_.rows, group) + column % 8;
+          double* to = block_of(sums_.dense, count / 8) + count % 8;
+          for (int row = 0; row < rows_; ++row) {
+            to[8 * row] = from[8 * row];
+          }
+          sums_.chosen[count++] = static_cast<std::int32_t>(column);
+        }
       }
     }
     return count;
   }
 
-  void multiply(std::int32_t down, std::int32_t across) const {
-    Eight block[8];
-    for (Eight& line : block) {
-      line = Eight(0);
-    }
-    const double *left = block_of(down), *right = block_of(across);
-    for (int k = 0; k < rows_; ++k, left += 8, right += 8) {
-      const Eight values = Eight::load(right);
-      for (int line = 0; line < 8; ++line) {
-        block[line] += left[line] * values;
+  // Adds the products of up to eight columns with up to eight. What stands in a block beyond the
+  // last column is multiplied, too, and not added.
+  void multiply(int down, int across, int columns) const {
+    const double* const right = block_of(sums_.dense, across / 8);
+    for (int first = 0; first < 8; first += lines) {
+      const double* const left = block_of(sums_.dense, down / 8) + first;
+      Eight block[lines];
+      for (Eight& line : block) {
+        line = Eight(0);
       }
-    }
-    for (int line = 0; line < 8; ++line) {
-      double* const to =
-          sums_.information + (8 * std::int64_t(down) + line) * stride_ + 8 * std::int64_t(across);
-      (Eight::load(to) + block[line]).store(to);
-    }
-  }
-
-  void multiply_beside(std::int32_t group) const {
-    for (int column = 0; column < sums_.columns; ++column) {
-      Eight sum = 0;
-      for (int k = 0; k < rows_; ++k) {
-        sum += sums_.beside[k * sums_.columns + column] * Eight::load(block_of(group) + 8 * k);
+      for (int row = 0; row < rows_; ++row) {
+        const Eight values = Eight::load(right + 8 * row);
+        for (int line = 0; line < lines; ++line) {
+          block[line] += left[8 * row + line] * values;
+        }
       }
-      double* const to = sums_.products + column * stride_ + 8 * std::int64_t(group);
-      (Eight::load(to) + sum).store(to);
+      for (int line = 0; line < lines && down + first + line < columns; ++line) {
+        double* const to =
+            sums_.information + std::int64_t(sums_.chosen[down + first + line]) * stride_;
+        double sums[8];
+        block[line].store(sums);
+        for (int lane = 0; lane < 8 && across + lane < columns; ++lane) {
+          to[sums_.chosen[across + lane]] += sums[lane];
+        }
+      }
     }
   }
 
   void clear() {
-    for (std::int32_t group = 0; group < stride_ / 8; ++group) {
-      if (sums_.size[group] != 0) {
-        __builtin_memset(block_of(group), 0, sizeof(double) * ProductSums::most_rows * 8);
-        sums_.size[group] = 0;
+    for (std::int64_t group = 0; group < stride_ / 8; ++group) {
+      if (sums_.written[group] != 0) {
+        __builtin_memset(block_of(sums_.rows, group), 0,
+                         sizeof(double) * ProductSums::most_rows * 8);
+        sums_.written[group] = 0;
       }
     }
     rows_ = 0;

@@ -56,6 +56,10 @@ inline void add_point(const PointShare<D>& point, int columns, std::int64_t node
   }
 }
 
+// As many columns as the processor takes at once: eight of them in two vectors are copied through
+// memory where they stand in arrays.
+using Columns = Doubles<native_doubles>;
+
 template <int D, int F>
 class Sensitivity {
 public:
@@ -78,22 +82,21 @@ public:
 
   // A drift of the coordinates, then the part of a kick that is linear in the state.
   void drift_and_kick(double dt, const Kick<D>& kick) {
-    Eight coordinates[D], velocities[D], after[D];
-    for (int k = 0; k < count_; ++k) {
-      const std::int64_t p = 8 * std::int64_t(active_[k]);
+    each_active([&](std::int64_t p) {
+      Columns coordinates[D], velocities[D], after[D];
       for (int a = 0; a < D; ++a) {
-        velocities[a] = Eight::load(rows_[a + D] + p);
-        coordinates[a] = Eight::load(rows_[a] + p) + dt * velocities[a];
-        coordinates[a].store(rows_[a] + p);
+        velocities[a] = Columns::load(rows_[a + D] + p);
+        coordinates[a] = Columns::load(rows_[a] + p) + dt * velocities[a];
       }
-      kick_linear<D, Eight>(kick, coordinates, velocities, after);
+      kick_linear<D, Columns>(kick, coordinates, velocities, after);
       if constexpr (F == 2) {
         push(kick, p, coordinates, after);
       }
       for (int a = 0; a < D; ++a) {
+        coordinates[a].store(rows_[a] + p);
         after[a].store(rows_[a + D] + p);
       }
-    }
+    });
   }
 
   // What the parameters themselves add to the velocity in a kick: the flow at each strip and point,
@@ -109,46 +112,50 @@ public:
   }
 
   void drift(double dt) {
-    for (int k = 0; k < count_; ++k) {
-      const std::int64_t p = 8 * std::int64_t(active_[k]);
+    each_active([&](std::int64_t p) {
       for (int a = 0; a < D; ++a) {
-        (Eight::load(rows_[a] + p) + dt * Eight::load(rows_[a + D] + p)).store(rows_[a] + p);
+        (Columns::load(rows_[a] + p) + dt * Columns::load(rows_[a + D] + p)).store(rows_[a] + p);
       }
-    }
+    });
   }
 
   // L^-1 d(prediction), eight columns of row a at place(a, group); other columns are zero.
   template <class Place>
   void write_whitened(const Innovation<D>& e, const Place& place) const {
-    Eight white[D];
     for (int k = 0; k < count_; ++k) {
-      const std::int32_t group = active_[k];
+      const std::int64_t first = 8 * std::int64_t(active_[k]);
+      double* to[D];
       for (int a = 0; a < D; ++a) {
-        white[a] = Eight::load(rows_[a] + 8 * std::int64_t(group));
-        for (int b = 0; b < a; ++b) {
-          white[a] -= e.L[a][b] * white[b];
+        to[a] = place(a, active_[k]);
+      }
+      for (int column = 0; column < 8; column += native_doubles) {
+        Columns white[D];
+        for (int a = 0; a < D; ++a) {
+          white[a] = Columns::load(rows_[a] + first + column);
+          for (int b = 0; b < a; ++b) {
+            white[a] -= e.L[a][b] * white[b];
+          }
+          white[a] *= e.per_root[a];
+          white[a].store(to[a] + column);
         }
-        white[a] *= e.per_root[a];
-        white[a].store(place(a, group));
       }
     }
   }
 
   void update(const Gain<D, F>& gain) {
-    Eight coordinates[D];
-    for (int k = 0; k < count_; ++k) {
-      const std::int64_t p = 8 * std::int64_t(active_[k]);
+    each_active([&](std::int64_t p) {
+      Columns coordinates[D];
       for (int a = 0; a < D; ++a) {
-        coordinates[a] = Eight::load(rows_[a] + p);
+        coordinates[a] = Columns::load(rows_[a] + p);
       }
       for (int row = 0; row < 2 * D + F; ++row) {
-        Eight change = gain.by[row][0] * coordinates[0];
+        Columns change = gain.by[row][0] * coordinates[0];
         for (int a = 1; a < D; ++a) {
           change += gain.by[row][a] * coordinates[a];
         }
-        (Eight::load(rows_[row] + p) - change).store(rows_[row] + p);
+        (Columns::load(rows_[row] + p) - change).store(rows_[row] + p);
       }
-    }
+    });
   }
 
   // Sets columns that are as good as zero to zero.
@@ -170,6 +177,17 @@ public:
   }
 
 private:
+  // Calls with the place of each few columns that are not zero.
+  template <class Call>
+  void each_active(const Call& call) const {
+    for (int k = 0; k < count_; ++k) {
+      const std::int64_t first = 8 * std::int64_t(active_[k]);
+      for (int column = 0; column < 8; column += native_doubles) {
+        call(first + column);
+      }
+    }
+  }
+
   void add_strips(const StripShare<D>* shares, int count, int columns, const Kick<D>& kick,
                   double h) {
     const std::int64_t nodes = (parameters_ - 1) / 2;
@@ -206,17 +224,14 @@ private:
     }
   }
 
-  // The remembered force's part of a kick in eight columns.
-  void push(const Kick<D>& kick, std::int64_t p, Eight (&coordinates)[D], Eight (&after)[D]) {
-    Eight force[2];
+  // The remembered force's part of a kick.
+  void push(const Kick<D>& kick, std::int64_t p, Columns (&coordinates)[D], Columns (&after)[D]) {
+    Columns force[2];
     for (int f = 0; f < 2; ++f) {
-      force[f] = Eight::load(rows_[2 * D + f] + p);
+      force[f] = Columns::load(rows_[2 * D + f] + p);
       (kick.force_kept * force[f]).store(rows_[2 * D + f] + p);
     }
-    push_linear<D, Eight>(kick, force, coordinates, after);
-    for (int a = 0; a < D; ++a) {
-      coordinates[a].store(rows_[a] + p);
-    }
+    push_linear<D, Columns>(kick, force, coordinates, after);
   }
 
   void list_active() {
