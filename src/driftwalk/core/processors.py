@@ -3,8 +3,48 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Lock
+from typing import Any
+
+_lock = Lock()
+_callers = 0
+_limits: Any = None
 
 
 def default_threads() -> int:
     """Return how many threads to use: the processors that this process may run on."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Let linear algebra run on one processor; for matrices of a few hundred rows.
+
+    More threads mostly wait for each other there, and change the last digits of results.
+
+    Examples
+    --------
+    >>> with one_blas_thread():
+    ...     solved = np.linalg.solve(2.0 * np.eye(2), np.ones(2))
+    >>> solved
+    array([0.5, 0.5])
+    """
+    # Loaded before, as a library that is loaded later is not limited.
+    import scipy.linalg  # noqa: F401
+    from threadpoolctl import threadpool_limits
+
+    # Calls in several threads may overlap: the first one limits, the last one to end restores.
+    global _callers, _limits
+    with _lock:
+        if _callers == 0:
+            _limits = threadpool_limits(limits=1, user_api="blas")
+        _callers += 1
+    try:
+        yield
+    finally:
+        with _lock:
+            _callers -= 1
+            if _callers == 0:
+                _limits.restore_original_limits()
