@@ -1,0 +1,1 @@
+"""Restitution and friction of the wall, from the contacts that a recording has."""

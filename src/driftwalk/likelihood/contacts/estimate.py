@@ -1,0 +1,132 @@
+"""Estimate of the wall, from the contacts that the fit leaves out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from driftwalk.conditions import estimated_study
+from driftwalk.likelihood.check.errors import estimate_of
+from driftwalk.likelihood.contacts.lattice import tried_walls
+from driftwalk.likelihood.contacts.parabola import answer, says_nothing
+from driftwalk.likelihood.contacts.particles import Part, Trial
+from driftwalk.likelihood.contacts.passages import passages_of, thinned
+from driftwalk.likelihood.intervals import fitted_intervals
+from driftwalk.likelihood.newton import Tell, silent
+from driftwalk.likelihood.result import fitted_flow
+from driftwalk.schema.check import described
+from driftwalk.schema.law_words import WALL_KEYS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+LEAST_CONTACTS: Final = 8
+"""Fewer passages along the wall say nothing of it."""
+MOST_CONTACTS: Final = 50
+"""More are thinned to so many, evenly."""
+
+
+def estimate_wall(
+    fit: xr.Dataset,
+    recordings: Sequence[xr.Dataset],
+    *,
+    body: str | None = None,
+    seed: int = 0,
+    tell: Tell | None = None,
+) -> xr.Dataset:
+    """Estimate restitution and friction of the wall from the contacts of the recordings of a fit.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        A `fit`; the estimate needs the orientation in its state.
+    recordings : sequence of xarray.Dataset
+        Those that it was made of.
+    body : str, optional
+        The body, where a recording has several.
+    seed : int
+        Of the particles.
+    tell : callable, optional
+        Called with the number of walls that are done, their number, and the task.
+
+    Returns
+    -------
+    xarray.Dataset
+        The fit, with ``wall_contacts``, the number of passages along the wall, and with enough of
+        them ``wall_restitution`` and ``wall_friction`` with their intervals. A wall that cannot be
+        estimated is no error: the attribute ``wall_left_out`` says why.
+
+    Raises
+    ------
+    InputError
+        When the recordings are not those of the fit.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> recording = dw.tank30_recording()
+    >>> fit = dw.fit_motion(recording)  # doctest: +SKIP
+    >>> found = estimate_wall(fit, [recording])  # doctest: +SKIP
+    >>> int(found["wall_contacts"])  # doctest: +SKIP
+    0
+    """
+    estimate = estimate_of(fit, recordings, body=body)
+    # An earlier estimate may have left some.
+    fit = fit.drop_vars(WALL_KEYS, errors="ignore")
+    fit.attrs.pop("wall_left_out", None)
+    if fit.attrs["angle"] != "state":
+        return fit.assign_attrs(wall_left_out=_no_orientation(fit.attrs["angle"]))
+    found = [passages_of(estimate, one) for one in estimate.passes.series]
+    count = sum(len(one.x) for one in found)
+    fit = described(fit.assign(wall_contacts=((), np.int64(count))))
+    if count < LEAST_CONTACTS:
+        return fit.assign_attrs(wall_left_out=_too_few(count))
+    intervals = fitted_intervals(fit)
+    parts = [
+        Part(
+            thinned(passages, min(1.0, MOST_CONTACTS / count)),
+            fitted_flow(fit, interval=intervals.of_flow(series.flow)[0]),
+            float(np.median(np.diff(series.time))),
+        )
+        for series, passages in zip(estimate.passes.series, found, strict=True)
+        if len(passages.x)
+    ]
+    trial = Trial(estimated_study(fit), estimate.point, parts, seed)
+    walls = tried_walls(trial.log_likelihood, tell or silent)
+    data = answer(walls, float(fit["confidence"]))
+    if says_nothing(data):
+        return fit.assign_attrs(wall_left_out=_all_alike(count))
+    return described(fit.assign(data))
+
+
+def _no_orientation(angle: str) -> str:
+    """Return why a fit without the orientation in its state says nothing of the wall."""
+    if angle == "given":
+        return (
+            "the estimate of the wall needs the orientation in the state of the fit, and here it "
+            'was an input: fit with `angle="state"`'
+        )
+    return (
+        "the estimate of the wall needs the orientation of the block, and this fit used none: "
+        'record it, or read the column that holds it (`columns`), and fit with `angle="state"`'
+    )
+
+
+def _too_few(count: int) -> str:
+    """Return why so few contacts say nothing of the wall."""
+    return (
+        f"the estimate of the wall needs {LEAST_CONTACTS} contacts with it, and {count} can be "
+        "followed: record for longer, at an even rate, or where the flow drives the block to the "
+        "wall"
+    )
+
+
+def _all_alike(count: int) -> str:
+    """Return why enough contacts say nothing of the wall."""
+    return (
+        f"the block passed along the wall {count} times, which does not tell one wall from "
+        "another: the block hardly touched it, or moved as none would make it move; check the "
+        "size of the tank (`tank`) and the side of the block (`side`)"
+    )

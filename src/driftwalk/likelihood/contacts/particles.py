@@ -1,0 +1,196 @@
+"""Likelihood of a wall: particles follow the block through its passages along the wall.
+
+They get the fitted flow, drag and force, and the impacts of a wall of given restitution and
+friction. The likelihood (Gordon, Salmond and Smith 1993) is the product of the mean densities of
+the recorded poses. All walls get the same random numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk import _core
+from driftwalk.core.processors import default_threads
+from driftwalk.core.seeds import world_keys
+from driftwalk.likelihood.contacts.known import known_covariance
+from driftwalk.likelihood.contacts.passages import Passages
+from driftwalk.likelihood.filter_pass import Point
+from driftwalk.likelihood.spline import Floats
+from driftwalk.schema.trajectory import wrap_angle
+from driftwalk.simulation.backend import Camera, native_model, world_table
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+PARTICLES: Final = 150
+MISTAKE: Final = 1e-3
+"""Chance that a sample is a mistake, anywhere in the tank: no particle need be near."""
+SPREAD: Final = 1.5
+"""Factor on the spread of the first states: what is too wide costs little, too narrow misleads."""
+ROUGH: Final = 0.3
+"""Noise that the particles get at each sample, as a share of the camera's, and of that a sample
+later for their rates: without it they soon are copies of a few (Gordon, Salmond and Smith 1993)."""
+WIDER: Final = 2.0
+"""Factor on the camera's noise."""
+DRAWS: Final = 2
+"""Draws of the force from sample to sample, at least."""
+
+
+class Part(NamedTuple):
+    """Passages of one series, and the water in them."""
+
+    passages: Passages
+    flow: xr.Dataset
+    """The fitted flow."""
+    interval: float
+    """Between samples [s]."""
+
+
+class Trial:
+    """Likelihoods of walls for the passages of some series.
+
+    Parameters
+    ----------
+    study : Study
+        The fitted study; its wall does not matter.
+    point : Point
+        What was estimated, with the orientation in the state.
+    parts : sequence of Part
+        The passages, by series.
+    seed : int
+        Of the particles.
+    """
+
+    def __init__(self, study: Study, point: Point, parts: Sequence[Part], seed: int) -> None:
+        assert point.log_angle_noise is not None
+        assert point.log_lever is not None
+        self.study, self.parts, self.seed = study, parts, seed
+        self.noise = WIDER * math.exp(point.log_noise)
+        self.angle_noise = WIDER * math.exp(point.log_angle_noise)
+        intensity = math.exp(point.log_intensity)
+        turning = 6.0 * math.exp(point.log_lever) / study.block.side_m**2
+        self.intensity = np.array([intensity, intensity, intensity * turning**2])
+
+    def log_likelihood(self, restitution: float, friction: float) -> float:
+        """Return the log likelihood of a wall."""
+        from driftwalk.model import apply_overrides
+
+        wall = {"tank.wall_restitution": restitution, "tank.wall_friction": friction}
+        study = apply_overrides(self.study, wall)
+        return float(sum(self._of(study, part, index) for index, part in enumerate(self.parts)))
+
+    def _of(self, study: Study, part: Part, index: int) -> float:
+        study = _fast_enough(study, part.interval)
+        passages, step = part.passages, study.time_step_s
+        generator = np.random.default_rng([self.seed, index])
+        state = self._first(passages, part.interval, generator)
+        model = native_model(
+            study, part.flow, np.array([part.interval, part.interval + step]), Camera()
+        )
+        total = 0.0
+        for k in range(passages.x.shape[1]):
+            keys = world_keys(self.seed, trial=k, replicate=np.arange(state[0].size))
+            uniform = generator.uniform(size=(len(passages.x), 1))
+            running = np.isfinite(passages.x[:, k])
+            if not running.any():
+                break
+            pose, motion = _moved(model, study, state, keys, step)
+            logs = self._densities(passages, k, pose)
+            top = logs.max(axis=1, keepdims=True)
+            weight = np.exp(logs - top)
+            total += float((np.log(weight.mean(axis=1)) + top[:, 0])[running].sum())
+            state = _drawn([*pose, *motion], weight, uniform)
+            for a, noise in enumerate((self.noise, self.noise, self.angle_noise)):
+                state[a] += ROUGH * noise * generator.normal(size=weight.shape)
+                state[a + 3] += ROUGH * noise / part.interval * generator.normal(size=weight.shape)
+        return total
+
+    def _first(
+        self, passages: Passages, interval: float, generator: np.random.Generator
+    ) -> list[Floats]:
+        """Return the first states of the particles, six of shape (passages, particles)."""
+        shape = (len(passages.x), PARTICLES)
+        state = [np.empty(shape) for _ in range(6)]
+        noises = (self.noise, self.noise, self.angle_noise)
+        for a, (noise, intensity) in enumerate(zip(noises, self.intensity, strict=True)):
+            root = SPREAD * np.linalg.cholesky(known_covariance(noise, intensity, interval))
+            drawn = np.einsum("ab,bij->aij", root, generator.normal(size=(2, *shape)))
+            state[a] = passages.state[:, a, None] + drawn[0]
+            state[a + 3] = passages.state[:, a + 3, None] + drawn[1]
+        return state
+
+    def _densities(self, passages: Passages, k: int, pose: Sequence[Floats]) -> Floats:
+        """Return the logarithms of the densities of the recorded poses at each particle."""
+        seen = (passages.x[:, k, None], passages.y[:, k, None], passages.theta[:, k, None])
+        apart = [one - own for one, own in zip(seen, pose, strict=True)]
+        turned = wrap_angle(apart[2])
+        squares = (apart[0] ** 2 + apart[1] ** 2) / self.noise**2 + (turned / self.angle_noise) ** 2
+        size = (
+            math.log(2.0 * math.pi) * 1.5 + 2.0 * math.log(self.noise) + math.log(self.angle_noise)
+        )
+        anywhere = math.log(MISTAKE / (self.study.tank.extent_m[0] ** 2 * 2.0 * math.pi))
+        # Of a passage that has ended all particles are alike.
+        squares = np.where(np.isfinite(squares), squares, 0.0)
+        return np.logaddexp(-0.5 * squares - size, anywhere)
+
+
+def _fast_enough(study: Study, interval: float) -> Study:
+    """Return a study whose force is redrawn twice or more between samples, as strong as before.
+
+    The particles get a new force at each sample. One that would be held for longer than from sample
+    to sample comes out too weak.
+    """
+    from driftwalk.model import apply_overrides
+
+    forces, held = study.forces, interval / DRAWS
+    if forces.force_interval_s <= held:
+        return study
+    return apply_overrides(
+        study,
+        {
+            "forces.force_interval_s": held,
+            "forces.force_std_N": forces.force_std_N * math.sqrt(forces.force_interval_s / held),
+            "simulation.time_step_s": "auto",
+        },
+    )
+
+
+def _moved(
+    model: Any, study: Study, state: Sequence[Floats], keys: npt.NDArray[np.uint64], step: float
+) -> tuple[list[Floats], list[Floats]]:
+    """Return poses and rates of the particles one interval later."""
+    shape = state[0].shape
+    names = ("x", "y", "theta", "vx", "vy", "omega")
+    worlds = world_table(
+        **{name: part.ravel() for name, part in zip(names, state, strict=True)},
+        drag_coefficient=np.full(keys.size, study.forces.drag_coefficient),
+        force_std=study.forces.force_std_N,
+    )
+    found = _core.simulate(model, worlds, keys, threads=default_threads(), precision="single")
+    pose, motion = [], []
+    for index, part in enumerate(found[:3]):
+        now, then = part[:, 0].astype(np.float64), part[:, 1].astype(np.float64)
+        change = then - now
+        if index == 2:
+            change = wrap_angle(change)
+        pose.append(now.reshape(shape))
+        motion.append((change / step).reshape(shape))
+    return pose, motion
+
+
+def _drawn(state: Sequence[Floats], weight: Floats, uniform: Floats) -> list[Floats]:
+    """Return the particles drawn by their weights, systematically."""
+    passages, particles = weight.shape
+    total = np.cumsum(weight, axis=1)
+    places = (np.arange(particles) + uniform) / particles
+    row = np.arange(passages)[:, None]
+    chosen = np.searchsorted((total / total[:, -1:] + row).ravel(), (places + row).ravel())
+    chosen = np.minimum(chosen, (row * particles + particles - 1).repeat(particles, 1).ravel())
+    return [part.ravel()[chosen].reshape(weight.shape) for part in state]
