@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.likelihood.departures import NUMBERS, STRENGTH_TERMS
+from driftwalk.likelihood.law.departures import NUMBERS, STRENGTH_TERMS, STRENGTHS
 from driftwalk.likelihood.spline import Floats, Spline
 
 Flags = npt.NDArray[np.bool_]
@@ -32,6 +32,8 @@ LARGEST_STEP_S = 0.05
 """Longest step of the filter's integrator."""
 LONGEST_GAP_S = 1.0
 """Longest gap that is predicted over; after a longer one the filter restarts."""
+SETTLING_SAMPLES = 3
+"""After the first one of a stretch, until the filter knows the velocity."""
 STEP = 1e-4
 """Relative change of a noise for the derivatives by it."""
 MOST_CHANGE = 100 * STEP
@@ -63,10 +65,25 @@ class Series:
     span: float = 0.0
     """Time of the recording's last sample, counted from its first [s]."""
 
-    def first(self, count: int) -> Series:
-        """Return the first samples of the series."""
+    @property
+    def settled(self) -> Flags:
+        """Which samples are not the first ones of a stretch, shape (n,).
+
+        Where the filter begins, and after a contact with the wall, it allows for any velocity. So
+        its next errors are far smaller than it expects, and places where it often begins, which are
+        those at the wall, would seem to have less noise.
+        """
+        begins = np.concatenate([[True], np.diff(self.time) > LONGEST_GAP_S])
+        begins |= self.excluded != 0
+        settled = ~begins
+        for later in range(1, SETTLING_SAMPLES + 1):
+            settled[later:] &= ~begins[:-later]
+        return settled
+
+    def part(self, first: int, end: int) -> Series:
+        """Return the samples from a first one on, before an end."""
         columns = ("time", "x", "y", "theta", "omega", "excluded", "angle")
-        return replace(self, **{name: getattr(self, name)[:count] for name in columns})
+        return replace(self, **{name: getattr(self, name)[first:end] for name in columns})
 
 
 @dataclass(frozen=True)
@@ -163,6 +180,8 @@ class Pair(NamedTuple):
     """By how much the parameter differs."""
     most_change: float = MOST_CHANGE
     """Of a variance; where it is more, the two cannot be compared."""
+    wave: Floats | None = None
+    """How much of the difference counts at each sample, shape (n,); all of it by default."""
 
     @property
     def comparable(self) -> Flags:
@@ -257,7 +276,7 @@ class Passes:
 
     def _sums_of(self, series: Series, point: Point, names: list[str]) -> Sums:
         base = self._run(series, point)
-        others = [self._beside_base(series, point, name, base) for name in names]
+        others = self._pairs(series, point, names, base)
         used = np.logical_and.reduce([_used(base), *(pair.comparable for pair in others)])
         white, changes, spreads = _noise_derivatives(base, others, used)
         right = np.zeros((used.size, white.shape[1], 1 + len(changes)))
@@ -281,6 +300,24 @@ class Passes:
                     spread * spreads[other]
                 ).sum()
         return Sums(deviance, score, information, int(used.sum()))
+
+    def _pairs(
+        self, series: Series, point: Point, names: Sequence[str], base: dict[str, Any]
+    ) -> list[Pair]:
+        """Return two passes for each parameter.
+
+        A closed cosine of the flow's strength changes so slowly that a change of the strength for
+        good does as well, times the cosine.
+        """
+        waves = [name for name in names if name in STRENGTHS and name not in point.opened]
+        steady = self._beside_base(series, point, "strength_0", base) if waves else None
+        found = []
+        for name in names:
+            if steady is not None and name in waves:
+                found.append(steady._replace(wave=_cosine(series, STRENGTHS.index(name) + 1)))
+            else:
+                found.append(self._beside_base(series, point, name, base))
+        return found
 
     def _beside_base(self, series: Series, point: Point, name: str, base: dict[str, Any]) -> Pair:
         """Return two passes that differ in one parameter alone."""
@@ -397,12 +434,16 @@ def _strength(series: Series, point: Point) -> Floats | None:
     waves = point.number("pulse_cosine"), point.number("pulse_sine")
     if not any(terms.values()) and not any(waves):
         return None
-    place = np.pi * series.time / max(series.span, 1e-300)
     strength = np.ones_like(series.time)
     for k, term in terms.items():
-        strength += term * np.cos(k * place)
+        strength += term * _cosine(series, k)
     phase = 2.0 * np.pi * point.number("pulse_frequency") * series.time
     return np.asarray(strength + waves[0] * np.cos(phase) + waves[1] * np.sin(phase))
+
+
+def _cosine(series: Series, number: int) -> Floats:
+    """Return one of the cosines over the recording, at the samples."""
+    return np.asarray(np.cos(number * np.pi * series.time / max(series.span, 1e-300)))
 
 
 def _whitened(found: dict[str, Any]) -> Floats:
@@ -447,10 +488,11 @@ def _noise_derivatives(
     root = factor(base["covariance"][used])
     white = forward(root, base["innovation"][used].T).T
     changes, spreads = [], []
-    for one, other, step, _ in others:
-        change = (one["innovation"][used] - other["innovation"][used]) / step
+    for one, other, step, _, wave in others:
+        per = 1.0 / step if wave is None else wave[used, None] / step
+        change = (one["innovation"][used] - other["innovation"][used]) * per
         changes.append(forward(root, change.T).T)
-        widening = unpacked((other["covariance"][used] - one["covariance"][used]) / step)
+        widening = unpacked((other["covariance"][used] - one["covariance"][used]) * per)
         half = forward(root, widening)
         spreads.append(forward(root, half.transpose(1, 0, 2)))
     return white, changes, spreads

@@ -7,12 +7,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from driftwalk.core.processors import one_blas_thread
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.agreement import angle_given_facts
-from driftwalk.likelihood.assumptions import assumptions_of
 from driftwalk.likelihood.filter_pass import Passes, Point
-from driftwalk.likelihood.law_facts import law_facts, side_slopes, stated_drag
-from driftwalk.likelihood.law_search import LawFound, LawSearch
+from driftwalk.likelihood.law.assumptions import Assumptions, assumptions_of
+from driftwalk.likelihood.law.facts import law_facts, side_slopes, stated_drag
+from driftwalk.likelihood.law.found import LawFound
+from driftwalk.likelihood.law.search import LawSearch
 from driftwalk.likelihood.mistakes.mirrored import spin_correlation
 from driftwalk.likelihood.newton import Prior, Tell, silent
 from driftwalk.likelihood.ready import (
@@ -37,6 +39,7 @@ from driftwalk.likelihood.result import (
 from driftwalk.likelihood.solution import BREAKDOWN, require_noise_below_motion, solved
 from driftwalk.likelihood.start import first_point, first_weights
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
+from driftwalk.likelihood.widening import with_mended_frames
 from driftwalk.schema import Track
 from driftwalk.schema.check import described
 from driftwalk.schema.facts import texts
@@ -47,6 +50,7 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 
+@one_blas_thread()
 def fit_motion(
     recordings: xr.Dataset | Sequence[xr.Dataset],
     study: Study | None = None,
@@ -110,11 +114,17 @@ def fit_motion(
     flows = len(intervals.labels)
     passes = Passes(series, body_of(chosen, used_angle), spline, flows)
     start = _start(passes, ready, chosen)
-    law, restricted = _search(passes, start, ready, chosen, tell or silent)
+    assumptions = assumptions_of(chosen, used_angle, recordings=len(ready.tracks), flows=flows)
+    law, restricted = _search(passes, start, ready, assumptions, chosen, tell or silent)
     mode = law.mode
     with solved():
         innovations = passes.innovations(restricted.point)
-    whiteness = whiteness_of(innovations)
+    whiteness = whiteness_of(
+        [
+            (white, used & one.settled)
+            for (white, used), one in zip(innovations, series, strict=True)
+        ]
+    )
     facts_given: dict[str, Any] = {}
     if used_angle == "state":
         given = series_of(ready.parts, chosen, outline, "given", ready.places)
@@ -122,7 +132,8 @@ def fit_motion(
             Passes(given, body_of(chosen, "given"), spline, flows), mode, restricted, chosen
         )
     duration = sum(float(one.time[-1] - one.time[0]) for one in series)
-    covariance = parameter_covariance(mode, restricted)
+    mended = ready.dropped_frames / max(ready.samples, 1)
+    covariance = with_mended_frames(parameter_covariance(mode, restricted), mended)
     facts: dict[str, Any] = {
         **parameter_facts(
             restricted.point,
@@ -132,7 +143,7 @@ def fit_motion(
         ),
         "maximum_likelihood_drag_coefficient": stated_drag(mode.point, chosen),
         **precision_facts(math.sqrt(covariance[0, 0]), duration, chosen),
-        **law_facts(law),
+        **law_facts(law, assumptions),
         **_turning(start, passes),
         "wetted_depth_m": chosen.wetted_depth_m,
         "wall_share": ready.wall_share,
@@ -234,14 +245,16 @@ def _start(passes: Passes, ready: Ready, study: Study) -> Point:
 
 
 def _search(
-    passes: Passes, start: Point, ready: Ready, study: Study, tell: Tell
+    passes: Passes,
+    start: Point,
+    ready: Ready,
+    assumptions: Assumptions,
+    study: Study,
+    tell: Tell,
 ) -> tuple[LawFound, Restricted]:
     """Return the law with the maximum of its likelihood, and that of the restricted one."""
     prior = Prior(passes)
     weights = first_weights(ready.tracks, passes.spline)
-    assumptions = assumptions_of(
-        study, passes.body.orientation, recordings=len(ready.tracks), flows=passes.flows
-    )
     with solved():
         law = LawSearch(passes, prior, assumptions, study.fit.iterations, tell).find(start, weights)
         tell(law.mode.iterations, law.mode.iterations, "drag")

@@ -12,20 +12,26 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
-from driftwalk.likelihood.departures import NUMBERS
 from driftwalk.likelihood.filter_pass import Passes, Point, Sums
+from driftwalk.likelihood.law.departures import NUMBERS
 from driftwalk.likelihood.solution import cholesky
 from driftwalk.likelihood.spline import Floats, penalties
 
 PRIOR_DRAG = 0.5
 """Centre of the weak prior of C_d, and where the search begins."""
 PRIOR_LOG_DRAG_STD = 0.7
-HELD = ((0, 2, 3, 4), (0,))
-"""Parameters, counted from C_d on, that the first steps leave as they are: flow and q have to
-settle before a step of C_d or of the other noises means anything."""
+Held = Sequence[Sequence[int]]
+"""Parameters, counted from C_d on, that the first steps leave as they are."""
+FROM_AFAR: Final[Held] = ((0, 2, 3, 4), (0,))
+"""Flow and q have to settle before a step of C_d or of the other noises means anything."""
+FROM_ANOTHER: Final[Held] = ((1, 2, 3, 4), (1, 2, 3, 4))
+"""Where the search begins at the mode of other samples, the flow has to follow the new ones before
+a step of the noises means anything."""
+FROM_NEAR: Final[Held] = ()
 PRIOR_LEVER = 0.01
 """Centre of the weak prior of the force's lever, in sides of the block, and its first value."""
 NOTABLE_LEVER = 0.005
@@ -43,9 +49,11 @@ MOST_LOG_STEP = 1.0
 MOST_LOG_DRAG_STEP = 0.5
 MOST_FACTOR = 10.0
 """By which q, r^2 or the weight of a penalty may change in a step."""
-CLOSE = 0.1
-"""Converged when the steps of C_d, q and r, and in the mean those of the coefficients, are below
-this part of their standard deviations."""
+CLOSE = 0.25
+"""Converged when the steps of C_d and the noises, and in the mean those of the coefficients, are
+below this part of their standard deviations: what is left is a tenth of such a step."""
+CLOSE_ENOUGH = 0.5
+"""The same where a search of many more samples begins: what is saved here costs more there."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +138,12 @@ class Mode:
     deviance: float
     """Negative log likelihood with the priors, at the last step."""
 
+    def value_of(self, name: str) -> tuple[float, float]:
+        """Return a noise or an opened number, and its standard deviation by theory."""
+        extras = self.point.extras
+        at = self.point.coefficients.size + 1 + list(extras).index(name)
+        return extras[name], math.sqrt(float(self.covariance[at, at]))
+
 
 def known_numbers_variance(mode: Mode) -> float:
     """Return the variance of ln C_d by theory, were the opened numbers known."""
@@ -157,7 +171,8 @@ def find_mode(
     *,
     iterations: int,
     tell: Tell = silent,
-    hold_first: bool = True,
+    held: Held = FROM_AFAR,
+    close: float = CLOSE,
 ) -> Mode:
     """Search the maximum of the penalised likelihood.
 
@@ -175,9 +190,11 @@ def find_mode(
         Most steps.
     tell : callable
         Called with the number of finished steps, the largest number, and the present task.
-    hold_first : bool
-        Whether the first steps leave C_d and some noises as they are: not where the search begins
-        near its end.
+    held : sequence of sequence of int
+        Parameters that the first steps leave as they are: `FROM_AFAR`, `FROM_ANOTHER` or
+        `FROM_NEAR`.
+    close : float
+        The search ends when its steps are below this part of the standard deviations.
     """
     point, used, converged = start, 0, False
     covariance = np.zeros((0, 0))
@@ -185,13 +202,15 @@ def find_mode(
     last = np.zeros(start.coefficients.size + 1 + len(start.extras))
     for index in range(iterations):
         tell(index, iterations, "likelihood")
-        sums = prior.add(passes.sums(point), point, weights)
-        used, deviance = sums.used, sums.deviance
         drag = point.coefficients.size
-        held = [drag + k for k in (HELD[index] if hold_first and index < len(HELD) else ())]
-        held = [one for one in held if one <= drag + len(point.noises)]
+        left = [drag + k for k in (held[index] if index < len(held) else ())]
+        left = [one for one in left if one <= drag + len(point.noises)]
+        others = range(drag + 1, drag + 1 + len(point.extras))
+        moving = "without" if set(others) <= set(left) else "with"
+        sums = _of_all(prior.add(passes.sums(point, noise=moving), point, weights), last.size)
+        used, deviance = sums.used, sums.deviance
         covariance = inverse(sums.information)
-        step = limited(newton_step(sums, covariance, held=held), drag, list(point.opened))
+        step = limited(newton_step(sums, covariance, held=left), drag, list(point.opened))
         step = last = damped(step, last, sums.information)
         point = point.moved(step)
         weights = prior.updated(weights, point, covariance)
@@ -200,10 +219,18 @@ def find_mode(
         if point.log_lever is not None:
             moves[drag + LEVER] = 0.0
         near = max(float(moves[drag:].max()), float(np.sqrt((moves[:drag] ** 2).mean())))
-        if len(held) == 0 and near < CLOSE:
+        if len(left) == 0 and near < close:
             converged = True
             break
     return Mode(point, weights, covariance, used, index + 1, converged, deviance)
+
+
+def _of_all(sums: Sums, count: int) -> Sums:
+    """Return the sums with rows of parameters that have no derivatives, and no step, behind."""
+    information, score = np.eye(count), np.zeros(count)
+    known = sums.score.size
+    information[:known, :known], score[:known] = sums.information, sums.score
+    return sums._replace(score=score, information=information)
 
 
 def newton_step(sums: Sums, covariance: Floats, *, held: Sequence[int] = ()) -> Floats:

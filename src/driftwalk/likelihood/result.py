@@ -23,13 +23,13 @@ from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.flow.grid import Grid, make_grid
 from driftwalk.likelihood.filter_pass import Point, Series
 from driftwalk.likelihood.intervals import Intervals, fitted_intervals, switched_frames
-from driftwalk.likelihood.law_facts import (
+from driftwalk.likelihood.law.facts import (
     inertia_facts,
     inertia_of,
     number_facts,
     number_variables,
 )
-from driftwalk.likelihood.law_search import LawFound
+from driftwalk.likelihood.law.found import LawFound
 from driftwalk.likelihood.newton import Mode, known_numbers_variance
 from driftwalk.likelihood.reml import Restricted
 from driftwalk.likelihood.spline import Floats, Spline
@@ -58,6 +58,12 @@ PARAMETERS: Final = (
     "ln_orientation_noise",
 )
 """The last two with the angle in the state only."""
+
+WORDS: Final = (
+    *("angle", "source", "simulated_recording"),
+    *("force_law", "force_law_stated", "drag_law", "drag_law_stated"),
+)
+"""Facts in words, which are attributes."""
 
 
 class Whiteness(NamedTuple):
@@ -249,7 +255,7 @@ def build_fit(
         "kind": "fit",
         "schema_version": KINDS["fit"].version,
         "arena": json.dumps(study.tank.to_arena()),
-        **{name: facts[name] for name in ("angle", "source", "simulated_recording", "force_law")},
+        **{name: facts[name] for name in WORDS},
         "study": study.to_toml(),
     }
     return xr.Dataset(data | numbers, coords | names_of, attrs)

@@ -73,7 +73,7 @@ def test_the_answer_has_units_and_verdicts(fit: xr.Dataset) -> None:
     assert bool(fit["converged"]) is True
     assert set(fit.attrs) == {
         *("kind", "schema_version", "arena", "angle", "source", "simulated_recording", "study"),
-        "force_law",
+        *("force_law", "force_law_stated", "drag_law", "drag_law_stated"),
     }
     with pytest.raises(InputError, match="the fit has no viscosity: it has drag_coefficient"):
         fitted_value(fit, "viscosity")

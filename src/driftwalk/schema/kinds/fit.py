@@ -21,7 +21,8 @@ _TURNING: Final = "the angle is in the state"
 _ASKED: Final = "a precision of C_d is asked for"
 _CHECKED: Final = "the model was checked"
 _LAWS: Final = "the fit was made by a version that looks for the force law"
-_WALL: Final = "the wall was estimated"
+_SAYS: Final = "the fit was made by a version that keeps it"
+_WALL: Final = "contacts with the wall were looked for"
 _WALL_FOUND: Final = "the wall was estimated, from eight passages or more"
 _COMPARED_LAWS: Final = "two laws were fitted"
 _NO_ADDED_MASS: Final = "no added mass was stated, and the paper's law was found"
@@ -297,10 +298,24 @@ FIT: Final = Kind(
     attributes=(
         Attribute("angle", "text", 'how the orientation was used: "state", "given" or "none"'),
         Attribute(
-            "force_law", "text", 'force law that was found: "paper" or "floating body"',
+            "force_law", "text", 'force law, found or stated: "paper" or "floating body"',
             _LAWS,
         ),
+        Attribute(
+            "force_law_stated", "text", '"yes" where the fit tried no other, else "no"', _SAYS
+        ),
+        Attribute(
+            "drag_law", "text", 'how the drag goes with the speed: "quadratic", "linear", "mixed" '
+            'of both, or "power"', _SAYS,
+        ),
+        Attribute(
+            "drag_law_stated", "text", '"yes" where the fit tried no other, else "no"', _SAYS
+        ),
         Attribute("check_left_out", "text", "reason why the model was not checked", "it was not"),
+        Attribute(
+            "wall_left_out", "text", "reason why the wall was not estimated",
+            "asked for, and it was not",
+        ),
         SIMULATED,
         ARENA,
         SOURCE,

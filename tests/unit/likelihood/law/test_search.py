@@ -17,7 +17,8 @@ from driftwalk.core.study_keys import FIT_KEYS, study_overrides
 from driftwalk.figures import write_laws_figure
 from driftwalk.likelihood import compare_laws
 from driftwalk.likelihood.filter_pass import Point
-from driftwalk.likelihood.held_out import LAWS
+from driftwalk.likelihood.law.assumptions import assumptions_of
+from driftwalk.likelihood.law.held_out import LAWS
 from driftwalk.likelihood.result import _log_drag_std
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema.check import check_dataset
@@ -196,3 +197,13 @@ def test_what_is_stated_goes_with_the_fit() -> None:
     assert fitted_value(fit, "linear_drag") == pytest.approx(
         estimated_study(fit).forces.linear_drag_kg_s
     )
+
+
+def test_a_study_file_with_every_key_states_no_law() -> None:
+    """As `driftwalk study new` writes it: keys that have their defaults leave the search open."""
+    whole = dw.Study(forces=dw.Study().forces.model_dump())
+    assert "drag_power" in whole.forces.model_fields_set
+    left = assumptions_of(whole, "state", recordings=1, flows=1)
+    assert left == assumptions_of(dw.Study(), "state", recordings=1, flows=1)
+    assert left.pressure_gradient == "auto"
+    assert "drag_power" in left.tried

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.assumptions import FLOATING
+from driftwalk.core.processors import one_blas_thread
 from driftwalk.likelihood.check.errors import Estimate, estimate_of
-from driftwalk.likelihood.departures import DRAG_SHAPES
 from driftwalk.likelihood.filter_pass import Passes, Point, Series, log_densities
-from driftwalk.likelihood.law_search import evidence_of
+from driftwalk.likelihood.law.assumptions import FLOATING
+from driftwalk.likelihood.law.departures import DRAG_SHAPES, DRAGS
+from driftwalk.likelihood.law.search import evidence_of
 from driftwalk.likelihood.newton import Prior, Tell, find_mode, silent
 from driftwalk.likelihood.solution import BREAKDOWN
 from driftwalk.schema.check import described
@@ -36,8 +37,6 @@ LAWS: Final[dict[str, tuple[bool, str]]] = {
     "floating body, a power of the speed": (True, "power"),
 }
 """Whether the water's acceleration pushes the body, and its drag."""
-FIRST_SHAPES: Final = (("mixed", "linear_share", 0.3), ("power", "drag_power", 1.8))
-"""Kinds of drag with a number of their own, and its first value."""
 
 
 class _Compared(NamedTuple):
@@ -47,6 +46,7 @@ class _Compared(NamedTuple):
     drag: float
 
 
+@one_blas_thread()
 def compare_laws(
     fit: xr.Dataset,
     recordings: Sequence[xr.Dataset],
@@ -106,7 +106,7 @@ def compare_laws(
 def _under(estimate: Estimate, floating: bool, drag: str) -> _Compared | None:
     """Fit a law to the first part and predict the rest; nothing where it has no solution."""
     passes, prior = estimate.passes, Prior(estimate.passes)
-    training = replace(passes, series=[one.first(_training(one)) for one in passes.series])
+    training = replace(passes, series=[one.part(0, _training(one)) for one in passes.series])
     start = _start(estimate.point, floating=floating, drag=drag)
     try:
         with np.errstate(all="ignore"):
@@ -116,7 +116,6 @@ def _under(estimate: Estimate, floating: bool, drag: str) -> _Compared | None:
                 estimate.weights,
                 prior,
                 iterations=estimate.study.fit.iterations,
-                hold_first=True,
             )
             scores = _scores(passes, mode.point)
             return _Compared(evidence_of(mode, prior), scores, math.exp(mode.point.log_drag))
@@ -129,11 +128,8 @@ def _start(point: Point, *, floating: bool, drag: str) -> Point:
     known = {**point.fixed, **point.opened}
     for name in (*FLOATING, *DRAG_SHAPES):
         known.pop(name, None)
-    known.update(FLOATING if floating else {})
-    opened = {name: value for kind, name, value in FIRST_SHAPES if kind == drag}
-    if drag == "linear":
-        known["linear_share"] = 1.0
-    return replace(point, opened=opened, fixed=known)
+    known.update({**(FLOATING if floating else {}), **DRAGS[drag].fixed})
+    return replace(point, opened=DRAGS[drag].opened, fixed=known)
 
 
 def _training(series: Series) -> int:

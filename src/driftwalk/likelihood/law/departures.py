@@ -43,6 +43,23 @@ DRAG_SHAPES: Final = ("linear_share", "drag_power")
 """How the drag may go with the speed otherwise: one of them at most is opened."""
 PULSES: Final = ("pulse_cosine", "pulse_sine")
 
+
+class Drag(NamedTuple):
+    """A way in which the drag goes with the speed."""
+
+    opened: Mapping[str, float] = {}
+    """Its own number with a first value."""
+    fixed: Mapping[str, float] = {}
+
+
+DRAGS: Final[Mapping[str, Drag]] = {
+    "quadratic": Drag(),
+    "linear": Drag(fixed={"linear_share": 1.0}),
+    "mixed": Drag(opened={"linear_share": 0.3}),
+    "power": Drag(opened={"drag_power": 1.7}),
+}
+"""By the word of a study for it."""
+
 NUMBERS: Final[Mapping[str, Number]] = {
     "water_acceleration": Number(0.0, 1e-4, 1.0, 0.5, -1.0, 3.0),
     "water_spin": Number(0.0, 1e-5, 1.0, 0.5, -1.0, 3.0),

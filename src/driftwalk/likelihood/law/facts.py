@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.assumptions import USUAL_ADDED_MASS, added_mass_of
-from driftwalk.likelihood.departures import STRENGTHS
 from driftwalk.likelihood.filter_pass import Passes, Point
+from driftwalk.likelihood.law.assumptions import USUAL_ADDED_MASS, added_mass_of, is_stated
+from driftwalk.likelihood.law.departures import DRAG_SHAPES, STRENGTHS
 from driftwalk.schema.facts import fitted_value
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.likelihood.law_search import LawFound
+    from driftwalk.likelihood.law.assumptions import Assumptions
+    from driftwalk.likelihood.law.found import LawFound
     from driftwalk.likelihood.reml import Restricted
     from driftwalk.likelihood.spline import Floats
     from driftwalk.model import Study
@@ -58,7 +59,7 @@ def inertia_of(study: Study, *, floating: bool) -> Inertia:
     stated = (
         study.fit.added_mass_share != "auto"
         or study.fit.law == "paper"
-        or "added_mass_share" in study.forces.model_fields_set
+        or is_stated(study, "added_mass_share")
     )
     return Inertia(added, std, stated, math.hypot(std / (1.0 + added), mass))
 
@@ -142,12 +143,27 @@ def _linear_drag(point: Point, study: Study) -> float:
     return drag * inertia_of(study, floating=floating).share
 
 
-def law_facts(law: LawFound) -> dict[str, Any]:
-    """Return the law, and by how much the recording supports it."""
-    facts: dict[str, Any] = {"force_law": "floating body" if law.floating else "paper"}
+def law_facts(law: LawFound, assumptions: Assumptions) -> dict[str, Any]:
+    """Return the law, whether it was stated, and by how much the recording supports it."""
+    searched = bool(set(DRAG_SHAPES) & set(assumptions.tried))
+    facts: dict[str, Any] = {
+        "force_law": "floating body" if law.floating else "paper",
+        "force_law_stated": "no" if assumptions.pressure_gradient == "auto" else "yes",
+        "drag_law": _drag_law(law.mode.point),
+        "drag_law_stated": "no" if searched else "yes",
+    }
     if math.isfinite(law.settled_by):
         facts["law_settled_by"] = law.settled_by
     return facts
+
+
+def _drag_law(point: Point) -> str:
+    """Return how the drag goes with the speed, in one word."""
+    if "drag_power" in point.opened or "drag_power" in point.fixed:
+        return "power"
+    if "linear_share" in point.opened:
+        return "mixed"
+    return "linear" if point.number("linear_share") == 1.0 else "quadratic"
 
 
 def number_variables(point: Point, law: LawFound) -> tuple[dict[str, Any], dict[str, Any]]:

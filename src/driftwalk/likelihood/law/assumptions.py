@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from driftwalk.likelihood.departures import DRAG_SHAPES, STRENGTHS
+from driftwalk.likelihood.law.departures import DRAG_SHAPES, DRAGS, STRENGTHS
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -38,7 +38,7 @@ class Assumptions:
 def assumptions_of(study: Study, angle: str, *, recordings: int, flows: int) -> Assumptions:
     """Return what a study leaves to the fit.
 
-    The section [forces] states the law where it sets its keys and [fit] says "auto".
+    Where [fit] says "auto", a key of [forces] states the law if it differs from its default.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def assumptions_of(study: Study, angle: str, *, recordings: int, flows: int) -> 
     """
     fit = study.fit
     opened, fixed, tried = _drag_of(study)
-    if fit.force_memory_s == "auto" and study.forces.force_memory_s > 0.0:
+    if fit.force_memory_s == "auto" and is_stated(study, "force_memory_s"):
         fixed["force_memory"] = study.forces.force_memory_s
     elif fit.force_memory_s == "auto":
         tried.append("force_memory")
@@ -66,29 +66,31 @@ def assumptions_of(study: Study, angle: str, *, recordings: int, flows: int) -> 
         tried += STRENGTHS
     pulses = fit.flow_strength != "constant" and alone
     gradient = "off" if fit.law == "paper" else fit.pressure_gradient
-    if gradient == "auto" and "pressure_gradient" in study.forces.model_fields_set:
-        gradient = "on" if study.forces.pressure_gradient else "off"
+    if gradient == "auto" and is_stated(study, "pressure_gradient"):
+        gradient = "on"
     return Assumptions(gradient, opened, fixed, tuple(tried), pulses)
 
 
 def _drag_of(study: Study) -> tuple[dict[str, float], dict[str, float], list[str]]:
     """Return the numbers of the drag that are opened, known and tried."""
     law = study.fit.law
-    if law == "linear":
-        return {}, {"linear_share": 1.0}, []
-    if law == "mixed":
-        return {"linear_share": 0.3}, {}, []
-    if law == "power":
-        return {"drag_power": 1.8}, {}, []
-    if law == "auto" and "drag_power" in study.forces.model_fields_set:
+    if law == "auto" and is_stated(study, "drag_power"):
         return {}, {"drag_power": study.forces.drag_power}, []
-    return {}, {}, [*DRAG_SHAPES] if law == "auto" else []
+    if law == "auto":
+        return {}, {}, [*DRAG_SHAPES]
+    drag = DRAGS["quadratic" if law == "paper" else law]
+    return dict(drag.opened), dict(drag.fixed), []
+
+
+def is_stated(study: Study, key: str) -> bool:
+    """Return whether [forces] states another law. A new study file holds every key as it is."""
+    return bool(getattr(study.forces, key) != type(study.forces).model_fields[key].default)
 
 
 def added_mass_of(study: Study, *, floating: bool) -> tuple[float, float]:
     """Return the added mass as a share of the block's mass, and its standard deviation."""
     stated = study.fit.added_mass_share
-    if stated == "auto" and "added_mass_share" in study.forces.model_fields_set:
+    if stated == "auto" and is_stated(study, "added_mass_share"):
         stated = study.forces.added_mass_share
     if stated != "auto":
         return stated, study.fit.added_mass_share_std

@@ -1,0 +1,90 @@
+"""Modes of the likelihood, as the search over laws asks for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from driftwalk.likelihood.excerpt import pieces
+from driftwalk.likelihood.filter_pass import Passes, Point, Series
+from driftwalk.likelihood.law.trial import Trial, try_numbers
+from driftwalk.likelihood.newton import (
+    CLOSE,
+    CLOSE_ENOUGH,
+    FROM_AFAR,
+    FROM_ANOTHER,
+    Held,
+    Mode,
+    Prior,
+    Tell,
+    Weights,
+    find_mode,
+)
+from driftwalk.likelihood.solution import BREAKDOWN
+
+TRIAL_ITERATIONS: Final = 12
+"""Most steps of such a search."""
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Finds modes for the recordings of one fit."""
+
+    passes: Passes
+    prior: Prior
+    iterations: int
+    """Most steps of a search."""
+    tell: Tell
+
+    def of(self, series: Sequence[Series]) -> Modes:
+        """Return the same for other series."""
+        return replace(self, passes=replace(self.passes, series=series))
+
+    def soon(self) -> Modes:
+        """Return the same with fewer steps, to see whether a search comes to an end."""
+        return replace(self, iterations=min(self.iterations, TRIAL_ITERATIONS))
+
+    def find(
+        self, start: Point, weights: Weights, *, held: Held = FROM_AFAR, close: float = CLOSE
+    ) -> Mode:
+        """Return the mode."""
+        return find_mode(
+            self.passes,
+            start,
+            weights,
+            self.prior,
+            iterations=self.iterations,
+            tell=self.tell,
+            held=held,
+            close=close,
+        )
+
+    def find_from_afar(self, start: Point, weights: Weights) -> Mode:
+        """Return the mode, of long recordings by way of that of pieces of them."""
+        few = pieces(self.passes)
+        if few is not None:
+            near = unless_broken(lambda: self.of(few).find(start, weights, close=CLOSE_ENOUGH))
+            if near is not None and near.converged:
+                mode = unless_broken(lambda: self.find(near.point, near.weights, held=FROM_ANOTHER))
+                if mode is not None and mode.converged:
+                    return mode
+        return self.find(start, weights)
+
+    def tested(self, mode: Mode, names: Sequence[str]) -> Trial | None:
+        """Return the score tests of numbers; nothing where they break down."""
+        try:
+            return try_numbers(self.passes, mode, self.prior, names)
+        except BREAKDOWN:
+            return None
+
+
+def unless_broken(search: Callable[[], Mode]) -> Mode | None:
+    """Return the mode; nothing where the search breaks down, as under a wrong law it may."""
+    try:
+        with np.errstate(all="ignore"):
+            return search()
+    except (*BREAKDOWN, ValueError):
+        return None

@@ -1,0 +1,187 @@
+"""The force law and the departures from the model that a recording supports.
+
+The search of the likelihood is made for the paper's law, and for that of a floating body where
+score tests under the first cast doubt on it. At the better one, such tests say which further
+numbers the recording asks for (`driftwalk.likelihood.law.trial`). Those are opened and fitted, and
+closed again where nothing comes of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Final
+
+import numpy as np
+
+from driftwalk.likelihood.excerpt import beginning
+from driftwalk.likelihood.filter_pass import Passes, Point
+from driftwalk.likelihood.law.assumptions import FLOATING, Assumptions
+from driftwalk.likelihood.law.departures import DRAG_SHAPES, DRAGS
+from driftwalk.likelihood.law.found import LawFound
+from driftwalk.likelihood.law.modes import Modes, unless_broken
+from driftwalk.likelihood.law.opening import OPENED_SIGMAS, Opening, is_kept
+from driftwalk.likelihood.law.trial import Trial
+from driftwalk.likelihood.newton import (
+    FROM_ANOTHER,
+    FROM_NEAR,
+    NOTABLE_LEVER,
+    Mode,
+    Prior,
+    Tell,
+    Weights,
+)
+from driftwalk.schema.law_words import LEAST_EVIDENCE
+
+DOUBTED_CHI_SQUARED: Final = 30.0
+"""The paper's law is in doubt when the numbers of a floating body are so far from its own,"""
+DOUBTED_LINEAR_SIGMAS: Final = 3.0
+"""when its drag seems to have a linear part, or when another number is to be opened."""
+LEVER_SIGMAS: Final = 1.64
+"""A lever of the force counts when it is so far above what is notable."""
+
+
+def evidence_of(mode: Mode, prior: Prior) -> float:
+    """Return the logarithm of the evidence by Laplace's approximation, without its constant."""
+    components = mode.point.coefficients.reshape(-1, len(prior.roughness)).shape[0]
+    precision = np.linalg.slogdet(prior.matrix(mode.weights))[1]
+    return float(
+        -mode.deviance
+        + 0.5 * np.linalg.slogdet(mode.covariance)[1]
+        + 0.5 * components * float(precision)
+    )
+
+
+class LawSearch:
+    """Searches over laws for the recordings of one fit."""
+
+    def __init__(
+        self, passes: Passes, prior: Prior, assumptions: Assumptions, iterations: int, tell: Tell
+    ) -> None:
+        self.assumptions = assumptions
+        self.modes = Modes(passes, prior, iterations, tell)
+        self.opening = Opening(self.modes, assumptions)
+
+    def find(self, start: Point, weights: Weights) -> LawFound:
+        """Return the law and the mode that the recording supports."""
+        start = replace(start, opened=self.assumptions.opened, fixed=self.assumptions.fixed)
+        found = self._base(start, weights)
+        if "drag_power" in self.assumptions.tried and self._turns_by_itself(found.mode):
+            found = self._with_power(found, start, weights)
+        return self.opening.departed(found)
+
+    def _base(self, start: Point, weights: Weights) -> LawFound:
+        floating = replace(start, fixed={**start.fixed, **FLOATING})
+        if self.assumptions.pressure_gradient == "on":
+            return self._alone(self.modes.find_from_afar(floating, weights), floating=True)
+        if self.assumptions.pressure_gradient == "off":
+            return self._alone(self.modes.find_from_afar(start, weights), floating=False)
+        paper = unless_broken(lambda: self.modes.find_from_afar(start, weights))
+        if paper is not None and paper.converged:
+            trial = self.modes.tested(paper, (*FLOATING, *self.assumptions.tried))
+            if trial is not None and not self._is_doubted(trial):
+                return self._undoubted(paper, trial)
+        return self._compared({"paper": start, "floating": floating}, weights, paper)
+
+    def _is_doubted(self, trial: Trial) -> bool:
+        """Return whether the law may be another, from the score tests under the paper's.
+
+        A body that floats seems, under the paper's law, to have a weak drag with a linear part.
+        """
+        sigmas = trial.sigmas
+        if trial.chi_squared(dict.fromkeys(self._floating_names, 0.0)) > DOUBTED_CHI_SQUARED:
+            return True
+        if sigmas.get("linear_share", 0.0) > DOUBTED_LINEAR_SIGMAS:
+            return True
+        if sigmas.get("drag_power", 0.0) < -DOUBTED_LINEAR_SIGMAS:
+            return True
+        numbers = set(sigmas) - set(FLOATING) - set(DRAG_SHAPES)
+        return any(abs(sigmas[name]) > OPENED_SIGMAS for name in numbers)
+
+    @property
+    def _floating_names(self) -> tuple[str, ...]:
+        """The numbers of a floating body that the recording can test."""
+        return (
+            tuple(FLOATING)
+            if self.modes.passes.body.orientation == "state"
+            else ("water_acceleration",)
+        )
+
+    def _undoubted(self, paper: Mode, trial: Trial) -> LawFound:
+        """Return the paper's law, and whether that of a floating body would do as well."""
+        names = self._floating_names
+        own = trial.chi_squared(dict.fromkeys(names, 0.0))
+        other = trial.chi_squared({name: FLOATING[name] for name in names})
+        apart = 0.5 * (other - own)
+        found = self._alone(paper, floating=False)
+        return replace(
+            found, settled_by=max(apart, 0.0) if apart < LEAST_EVIDENCE else math.inf, trial=trial
+        )
+
+    def _compared(
+        self, starts: Mapping[str, Point], weights: Weights, paper: Mode | None
+    ) -> LawFound:
+        """Return the law with the larger evidence in the beginning of the recordings."""
+        modes = self.modes
+        series = beginning(modes.passes)
+        begin = modes.of(series).soon()
+        tried = {
+            name: unless_broken(partial(begin.find, start, weights))
+            for name, start in starts.items()
+        }
+        found = {name: mode for name, mode in tried.items() if mode is not None}
+        if not found:
+            raise np.linalg.LinAlgError("no law has a solution")
+        evidence = {name: evidence_of(mode, modes.prior) for name, mode in found.items()}
+        # Infinite where one law alone has a solution.
+        ahead = evidence.get("floating", -math.inf) - evidence.get("paper", -math.inf)
+        whole = series is modes.passes.series
+        held = FROM_NEAR if whole else FROM_ANOTHER
+        if ahead >= LEAST_EVIDENCE:
+            near = found["floating"]
+            mode: Mode | None = near
+            if not (near.converged and whole):
+                mode = unless_broken(lambda: modes.find(near.point, near.weights, held=held))
+            if mode is not None:
+                return LawFound(mode, mode, True, evidence, ahead, None)
+        if paper is None:
+            near = found.get("paper", next(iter(found.values())))
+            start = replace(near.point, fixed=starts["paper"].fixed)
+            paper = modes.find(start, near.weights, held=held)
+        # Below zero where the other law has more evidence, but too little, or no solution on all.
+        return LawFound(paper, paper, False, evidence, -ahead, None)
+
+    def _alone(self, mode: Mode, *, floating: bool) -> LawFound:
+        name = "floating" if floating else "paper"
+        return LawFound(
+            mode, mode, floating, {name: evidence_of(mode, self.modes.prior)}, math.inf, None
+        )
+
+    def _turns_by_itself(self, mode: Mode) -> bool:
+        """Return whether the stochastic force seems to turn the block."""
+        if mode.point.log_lever is None:
+            return False
+        value, std = mode.value_of("log_lever")
+        lower = math.exp(value - LEVER_SIGMAS * std)
+        return lower > NOTABLE_LEVER * self.modes.passes.body.side
+
+    def _with_power(self, found: LawFound, start: Point, weights: Weights) -> LawFound:
+        """Return the law with another power of the drag, where it explains why the block turns.
+
+        A flow that was fitted under the power 2 can take up a drag of another one. Its score test
+        is then blind, no search from there finds it, and what is left is a block that turns
+        otherwise than its drag makes it. So the search begins again.
+        """
+        fixed = {**start.fixed, **(FLOATING if found.floating else {})}
+        point = replace(start, opened={**start.opened, **DRAGS["power"].opened}, fixed=fixed)
+        mode = unless_broken(lambda: self.modes.find_from_afar(point, weights))
+        if (
+            mode is None
+            or not mode.converged
+            or not is_kept(mode, "drag_power", self.opening.worth)
+        ):
+            return found
+        better = evidence_of(mode, self.modes.prior) - evidence_of(found.mode, self.modes.prior)
+        return replace(found, mode=mode, trial=None) if better > LEAST_EVIDENCE else found

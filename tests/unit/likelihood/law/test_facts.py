@@ -1,0 +1,55 @@
+"""A fit says which part of its law was stated, and not searched for."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from fit_worlds import fitted
+
+from driftwalk.likelihood.filter_pass import Point
+from driftwalk.likelihood.law.assumptions import FLOATING, assumptions_of
+from driftwalk.likelihood.law.facts import law_facts
+from driftwalk.likelihood.law.found import LawFound
+from driftwalk.model import Study, apply_overrides
+from driftwalk.schema.check import check_dataset
+
+
+def facts_of(stated: dict[str, Any]) -> dict[str, Any]:
+    """Return the facts of a law that is as stated, without a search."""
+    study = apply_overrides(Study(), stated)
+    assumptions = assumptions_of(study, "state", recordings=1, flows=1)
+    floating = assumptions.pressure_gradient == "on"
+    fixed = {**assumptions.fixed, **(FLOATING if floating else {})}
+    point = Point(np.zeros((2, 1, 1)), 0.0, 0.0, 0.0, opened=assumptions.opened, fixed=fixed)
+    law = SimpleNamespace(floating=floating, settled_by=np.inf, mode=SimpleNamespace(point=point))
+    return law_facts(cast(LawFound, law), assumptions)
+
+
+@pytest.mark.parametrize(
+    ("stated", "force", "drag", "kind"),
+    [
+        ({}, "no", "no", "quadratic"),
+        ({"fit.law": "paper"}, "yes", "yes", "quadratic"),
+        ({"fit.law": "quadratic"}, "no", "yes", "quadratic"),
+        ({"fit.law": "linear"}, "no", "yes", "linear"),
+        ({"fit.law": "mixed"}, "no", "yes", "mixed"),
+        ({"fit.law": "power"}, "no", "yes", "power"),
+        ({"fit.pressure_gradient": "on"}, "yes", "no", "quadratic"),
+        ({"fit.pressure_gradient": "off"}, "yes", "no", "quadratic"),
+        ({"forces.pressure_gradient": True}, "yes", "no", "quadratic"),
+        ({"forces.drag_power": 1.5}, "no", "yes", "power"),
+    ],
+)
+def test_stated_laws(stated: dict[str, Any], force: str, drag: str, kind: str) -> None:
+    facts = facts_of(stated)
+    assert (facts["force_law_stated"], facts["drag_law_stated"]) == (force, drag)
+    assert facts["drag_law"] == kind
+
+
+def test_a_fit_keeps_it() -> None:
+    fit = fitted(120.0)
+    assert {fit.attrs["force_law_stated"], fit.attrs["drag_law_stated"]} == {"yes"}
+    check_dataset(fit)

@@ -1,0 +1,72 @@
+"""Excerpts of recordings, on which a search comes near its end."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fit_worlds import coarse_study, driven
+
+from driftwalk.flow.arena import outline_of
+from driftwalk.likelihood.excerpt import NEAR_SAMPLES, PIECE_SAMPLES, WORTH_FACTOR, pieces
+from driftwalk.likelihood.filter_pass import Passes
+from driftwalk.likelihood.fit import fit_motion
+from driftwalk.likelihood.law import modes
+from driftwalk.likelihood.ready import body_of, series_of
+from driftwalk.likelihood.spline import lay_spline
+from driftwalk.schema import body_track
+
+
+def _passes(seconds: float) -> Passes:
+    study = coarse_study()
+    outline = outline_of(study.tank.to_arena())
+    track = body_track(driven(1, seconds, {}))
+    series = series_of([track], study, outline, "state")
+    return Passes(series, body_of(study, "state"), lay_spline(outline, side=0.03, spacing=0.03))
+
+
+def test_pieces_come_from_all_over_a_long_recording() -> None:
+    few = pieces(_passes(0.11 * WORTH_FACTOR * NEAR_SAMPLES))
+    assert few is not None
+    assert {one.time.size for one in few} == {PIECE_SAMPLES}
+    assert len(few) == NEAR_SAMPLES // PIECE_SAMPLES
+    whole = _passes(0.11 * WORTH_FACTOR * NEAR_SAMPLES).series[0]
+    first = [one.time[0] for one in few]
+    assert first[0] == whole.time[0]
+    assert few[-1].time[-1] == whole.time[-1]
+    assert np.ptp(np.diff(first)) < 0.2
+    assert np.min(np.diff(first)) > 0.1 * PIECE_SAMPLES
+
+
+def test_a_short_recording_is_searched_as_a_whole() -> None:
+    assert pieces(_passes(60.0)) is None
+
+
+def test_of_many_short_recordings_little_would_be_left_out() -> None:
+    passes = _passes(60.0)
+    assert pieces(replace(passes, series=40 * passes.series)) is None
+    long = _passes(600.0)
+    few = pieces(replace(long, series=5 * long.series))
+    assert few is not None
+    assert sum(one.time.size for one in few) == 5 * 2 * PIECE_SAMPLES
+
+
+@pytest.mark.slow
+def test_a_search_by_way_of_pieces_ends_where_one_of_the_whole_does(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each ends within a tenth of a standard deviation of the mode: 0.2 apart at most."""
+    study = coarse_study()
+    recording = driven(2, 1200.0, {})
+    found = fit_motion(recording, study)
+    # Two steps without the noises, and two with them: fewer than a search from afar takes.
+    assert int(found["iterations"]) <= 5
+    monkeypatch.setattr(modes, "pieces", lambda passes: None)
+    whole = fit_motion(recording, study)
+    assert int(whole["iterations"]) > 5
+    width = np.ptp(whole["interval"].values, axis=1) / 3.29
+    apart = np.abs(found["estimate"].values - whole["estimate"].values)
+    # The lever may be known from its prior alone, and the added mass is stated.
+    found_out = ~np.isin(whole["parameter"].values, ["force_lever", "added_mass_share"])
+    assert (apart < 0.2 * width)[found_out].all()
