@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.likelihood.filter_pass import Passes
-from driftwalk.likelihood.newton import Mode, Prior, find_mode
+from driftwalk.likelihood.newton import FROM_NEAR, Mode, Prior, find_mode
 from driftwalk.likelihood.reml import Restricted, restricted_drag
 from driftwalk.likelihood.result import parameter_covariance, parameter_facts
 from driftwalk.likelihood.solution import BREAKDOWN
@@ -20,6 +20,8 @@ from driftwalk.likelihood.solution import BREAKDOWN
 if TYPE_CHECKING:
     from driftwalk.model import Study
 
+CLOSE: Final = 2.0
+"""In standard deviations: a shorter step of the search leaves a fifth of one at most."""
 NOTABLE_DISAGREEMENT: Final = 3.0
 """Combined standard deviations beyond which the two estimates of C_d do not agree."""
 
@@ -51,7 +53,13 @@ def angle_given_facts(
     prior = Prior(passes)
     try:
         other = find_mode(
-            passes, start, mode.weights, prior, iterations=study.fit.iterations, hold_first=False
+            passes,
+            start,
+            mode.weights,
+            prior,
+            iterations=study.fit.iterations,
+            held=FROM_NEAR,
+            close=CLOSE,
         )
         again = restricted_drag(passes, other, prior, intensity=False)
     except BREAKDOWN:

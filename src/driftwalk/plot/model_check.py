@@ -172,6 +172,9 @@ def plot_residual_time(
     reach = 100.0 * BAND_STDS * check[f"{name}_std"].values
     ax.axhline(0.0, color=MUTED, lw=0.6)
     ax.errorbar(middle, value, xerr=half, yerr=reach, fmt="o", ms=3.0, lw=0.9, color=BLUE)
+    if show == "flow" and np.isnan(value).any():
+        words = "no point: absorbed by the fit"
+        ax.text(0.98, 0.03, words, ha="right", color=MUTED, fontsize=6.0, transform=ax.transAxes)
     for edge in start[1:][np.diff(check["part_recording"].values) > 0] / 60.0:
         ax.axvline(edge, color=MUTED, lw=0.6, ls=":")
     ax.set_xlabel("time (min)")

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.remember import remembered
 from driftwalk.record.raw import Array
 from driftwalk.schema import Track
 
@@ -78,9 +79,9 @@ def estimate_tracking_noise(track: Track) -> NoiseEstimate:
     >>> round(estimate_tracking_noise(track).position_noise_m, 4)
     0.0003
     """
-    position = _estimate(track.time, [track.x, track.y])
+    position = _estimate(track.time, (track.x, track.y))
     turned = np.isfinite(track.theta)
-    orientation = _estimate(track.time[turned], [np.unwrap(track.theta[turned])])
+    orientation = _estimate(track.time[turned], (np.unwrap(track.theta[turned]),))
     return NoiseEstimate(
         position_noise_m=position.noise,
         orientation_noise_rad=orientation.noise,
@@ -101,7 +102,8 @@ class _Estimate(NamedTuple):
 _NOTHING = _Estimate(math.nan, math.nan, math.nan, 0)
 
 
-def _estimate(time: Array, series: list[Array]) -> _Estimate:
+@remembered
+def _estimate(time: Array, series: tuple[Array, ...]) -> _Estimate:
     """Fit noise and intensity to the lag products of all blocks."""
     starts = _window_starts(time)
     if starts.size < MIN_WINDOWS:

@@ -117,4 +117,9 @@ def test_a_robot_that_drives_itself_is_not_explained(
     found = json.loads(done.out)
     assert found["explained"] is False
     assert any("excess kurtosis" in text for text in found["findings"])
-    assert found["ks_distance"] > 4.0 * found["ks_noise_floor"]
+    if found["ks_distance"] is None:
+        # Next to jitter of the stamps the noise of the tracker may not be known; nothing can then
+        # be simulated.
+        assert found["tracking_noise_m_interval"][1] is None
+    else:
+        assert found["ks_distance"] > 4.0 * found["ks_noise_floor"]

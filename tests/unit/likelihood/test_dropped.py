@@ -14,6 +14,7 @@ from hypothesis import given, settings, strategies as st
 
 import driftwalk as dw
 from driftwalk.likelihood.mistakes.dropped import ENOUGH, find_dropped_frames, places_of, with_gaps
+from driftwalk.likelihood.widening import with_mended_frames
 from driftwalk.schema import Track, body_track, build_trajectory
 from driftwalk.schema.facts import fit_facts
 
@@ -194,3 +195,12 @@ def test_one_frame_in_twenty_may_be_missing() -> None:
     assert missing == pytest.approx(np.sum(np.diff(frame) - 1), rel=0.1)
     assert any(f"{missing} frames are missing" in text for text in fit_facts(found)["warnings"])
     assert fit_facts(clean)["dropped_frames"] == 0
+
+
+def test_the_interval_of_the_force_knows_of_mended_frames() -> None:
+    """0.7 of their share, in squares; that of C_d stays as it is."""
+    covariance = np.diag([0.04, 0.09, 0.01])
+    wider = with_mended_frames(covariance, 0.1)
+    assert wider[1, 1] == pytest.approx(0.09 + (2.0 * 0.7 * 0.1) ** 2)
+    assert np.array_equal(np.delete(wider, 1, axis=0), np.delete(covariance, 1, axis=0))
+    assert np.array_equal(with_mended_frames(covariance, 0.0), covariance)

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from driftwalk.conditions.study import fitted_law
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.filter_pass import Passes, Place, Point, Series, Sums
-from driftwalk.likelihood.law_facts import effective_logs, stored_numbers
+from driftwalk.likelihood.law.facts import effective_logs, stored_numbers
 from driftwalk.likelihood.newton import Prior, Weights
 from driftwalk.likelihood.ready import body_of, prepare
 from driftwalk.likelihood.result import require_fit
@@ -101,6 +101,7 @@ class Errors:
     white: Floats
     """Shape (n, D); zero where not used."""
     used: Flags
+    """Samples whose errors count: not the first ones of a stretch."""
     outlier: Flags
     """Samples that the filter did not take, so far were they from where it had predicted them."""
     speed: Floats
@@ -118,12 +119,14 @@ def errors_of(estimate: Estimate) -> list[Errors]:
     whitened = estimate.passes.innovations(estimate.point)
     for series, (white, used) in zip(estimate.passes.series, whitened, strict=True):
         point = estimate.point.in_flow(series.flow)
-        states = estimate.passes._filter(series, point).run(series.time.size)["state"]
+        states = estimate.passes.states(series, point)
         speed = np.full(series.time.size, np.nan)
         # The state before the sample: to sort errors by what they caused would bias them.
         speed[1:] = _relative_speed(states[:-1], estimate.passes.spline, point)
         outlier = np.isfinite(white).all(axis=1) & ~used & (series.excluded == 0)
-        found.append(Errors(series, np.where(used[:, None], white, 0.0), used, outlier, speed))
+        counted = used & series.settled
+        white = np.where(counted[:, None], white, 0.0)
+        found.append(Errors(series, white, counted, outlier, speed))
     return found
 
 

@@ -29,6 +29,8 @@ SPEED_BINS = 6
 FEWEST_IN_CELL = 10
 FEWEST_FOR_SPREAD = 50
 """Samples that make the mean of their squares about normal."""
+LEAST_VISIBLE = 0.5
+"""Share of a group's change that must be left by the fit for its estimate to mean something."""
 LEAST_FREEDOM = 0.1
 """A direction in which fitting has left less than this share of the variance says nothing."""
 
@@ -226,6 +228,8 @@ class Trend(NamedTuple):
     """Its standard deviation."""
     chi_squared: float
     dof: int
+    visible: Flags
+    """Whether most of a change in a group could be seen: the fit may have absorbed it."""
 
 
 def trend_of(contrast: Contrast, covariance: Floats) -> Trend:
@@ -241,7 +245,7 @@ def trend_of(contrast: Contrast, covariance: Floats) -> Trend:
     seen = value > LEAST_FREEDOM * typical
     if not typical > 0.0 or not seen.any():
         nothing = np.full(contrast.size, np.nan)
-        return Trend(nothing, nothing, 0.0, 0)
+        return Trend(nothing, nothing, 0.0, 0, np.zeros(contrast.size, dtype=bool))
     inverse = (vector[:, seen] / value[seen]) @ vector[:, seen].T
     change = inverse @ contrast.score
     return Trend(
@@ -249,6 +253,7 @@ def trend_of(contrast: Contrast, covariance: Floats) -> Trend:
         np.sqrt(np.diag(inverse)),
         float(contrast.score @ change),
         int(seen.sum()),
+        (vector[:, seen] ** 2).sum(axis=1) > LEAST_VISIBLE,
     )
 
 

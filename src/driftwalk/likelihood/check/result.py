@@ -68,8 +68,8 @@ def place_variables(found: Residuals) -> Parts:
         "part_dof": ("part", place.mean.shape[1] * known.sum(axis=1)),
         "part_noise_ratio": ("part", found.noise_by_part.ratio),
         "part_noise_ratio_std": ("part", found.noise_by_part.std),
-        "flow_change": ("part", found.strength.change),
-        "flow_change_std": ("part", found.strength.std),
+        "flow_change": ("part", np.where(found.strength.visible, found.strength.change, np.nan)),
+        "flow_change_std": ("part", np.where(found.strength.visible, found.strength.std, np.nan)),
         "drag_change": ("speed_range", found.drag.change),
         "drag_change_std": ("speed_range", found.drag.std),
     }

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.errors import InputError
+from driftwalk.core.processors import one_blas_thread
 from driftwalk.likelihood.check.errors import Errors, errors_of, estimate_of
 from driftwalk.likelihood.check.motion import compare_motion
 from driftwalk.likelihood.check.residuals import residuals_of
@@ -39,6 +40,7 @@ model itself fail the test of their autocorrelation: 3 of 5 did with 200 samples
 300."""
 
 
+@one_blas_thread()
 def check_model(
     fit: xr.Dataset,
     recordings: xr.Dataset | Sequence[xr.Dataset],
@@ -51,7 +53,7 @@ def check_model(
 
     Ten criteria with a p value, for the errors of prediction and the motion of simulated
     recordings, and a largest share of outliers; the model explains the recording unless a p value
-    is below 0.002. A recording of the model itself fails once in 50 times by that count
+    is below 0.001. A recording of the model itself fails once in 100 times by that count
     (Bonferroni; measured: docs/explanation/likelihood.md). The check corrects for the errors that
     fitting hundreds of coefficients absorbs: their covariance at the estimate is ``I - J C J'``.
 
@@ -142,7 +144,14 @@ def check_model(
         # are white.
         motion, scan = None, None
         attrs |= {"ks_distance": np.nan, "ks_noise_floor": np.nan, "ks_left_out": str(error)}
-    criteria = criteria_of(errors, found, motion, scan, angle=fit.attrs["angle"])
+    criteria = criteria_of(
+        errors,
+        found,
+        motion,
+        scan,
+        angle=fit.attrs["angle"],
+        mistakes=int(fit["mistakes"]) if "mistakes" in fit else 0,
+    )
     parts.append(criterion_variables(criteria))
     for more, at in parts:
         data |= more

@@ -15,6 +15,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.remember import remembered
 from driftwalk.likelihood.mistakes.interval_windows import (
     AT_MIDDLE,
     CLASSES,
@@ -89,6 +90,7 @@ class DroppedFrames(NamedTuple):
         return int(self.missing.sum())
 
 
+@remembered
 def find_dropped_frames(track: Track, clock: Floats) -> DroppedFrames:
     """Find frames that are missing although the stamps say a constant rate.
 

@@ -84,12 +84,10 @@ def find_smoothing(track: Track) -> Smoothing | None:
     weight = np.full(seen.size, INDEPENDENT * segments)
     weight[-1] *= 0.5  # the highest frequency has no phase
     best = -float((weight * (np.log(seen) + 1.0)).sum())
-    plain = _likelihood(seen, _expected()[""], weight)
+    plain = _likelihood(seen, _plain(), weight)
     if best - plain < ENOUGH:
         return None
-    found = {
-        way: _likelihood(seen, parts, weight) - plain for way, parts in _expected().items() if way
-    }
+    found = {way: _likelihood(seen, parts, weight) - plain for way, parts in _expected().items()}
     way, *others = sorted(found, key=lambda name: -found[name])
     evidence = found[way]
     if evidence < ENOUGH or best - plain - evidence > MOST_LEFT * (best - plain):
@@ -146,18 +144,33 @@ def _band() -> slice:
     return slice(int(np.ceil(LOWEST * SEGMENT)), None)
 
 
-@cache
-def _expected() -> Mapping[str, Floats]:
-    """Return what spectra are made of, by the way of smoothing; "" is none. Shapes (f, parts)."""
-    turn = 2.0 * np.pi * np.arange(GRID) / GRID
+def _turn() -> Floats:
+    return 2.0 * np.pi * np.arange(GRID) / GRID
+
+
+def _parts() -> Floats:
+    """Return what spectra are made of without smoothing, shape (parts, GRID)."""
+    turn = _turn()
     difference = np.abs(1.0 - np.exp(1j * turn)) ** 2
     motion = (2.0 + np.cos(turn)) / 3.0
     forgetting = [
         motion * (1.0 - one) ** 2 / np.abs(1.0 - one * np.exp(1j * turn)) ** 2 for one in MEMORIES
     ]
     # Tracking noise, jumps of the position, of the velocity, and of an acceleration that lasts.
-    parts = np.stack([difference**2, difference, motion, *forgetting])
-    found = {"": _tapered(parts)}
+    return np.stack([difference**2, difference, motion, *forgetting])
+
+
+@cache
+def _plain() -> Floats:
+    """Return the same for a segment, shape (f, parts)."""
+    return _tapered(_parts())
+
+
+@cache
+def _expected() -> Mapping[str, Floats]:
+    """Return what spectra are made of, by the way of smoothing. Shapes (f, parts)."""
+    turn, parts = _turn(), _parts()
+    found = {}
     for way, weights in _ways().items():
         gain = np.abs(np.exp(-1j * np.outer(turn, np.arange(weights.size))) @ weights) ** 2
         # Rounding comes after the smoothing.
@@ -166,6 +179,7 @@ def _expected() -> Mapping[str, Floats]:
 
 
 def _ways() -> dict[str, Floats]:
+    # Slow to load, and asked for only where the plain spectrum does not fit.
     from scipy.signal import savgol_coeffs
 
     ways = {f"averages over {n} frames": np.full(n, 1.0 / n) for n in AVERAGED}

@@ -32,6 +32,8 @@ BAND_STDS: Final = 1.96
 LEAST_TOP: Final = 4.0
 """Least upper end of the colours of a residual map [sd], so that chance looks pale."""
 
+ABSORBED: Final = "A tenth without a point: the fitted flow has absorbed what would be seen there."
+
 
 def check_sections(check: xr.Dataset) -> list[Section]:
     """Return the sections on a model check.
@@ -131,20 +133,26 @@ def _field(
 
 
 def _flow_over_time(check: xr.Dataset) -> Section:
-    return _over_time(check, "flow_change", 0.0, "strength of the flow, relative to its mean")
+    words = "strength of the flow, relative to its mean"
+    return _over_time(check, "flow_change", 0.0, words, ABSORBED)
 
 
 def _noise_over_time(check: xr.Dataset) -> Section:
     return _over_time(check, "part_noise_ratio", 1.0, "squared errors, relative to their mean")
 
 
-def _over_time(check: xr.Dataset, name: str, shift: float, words: str) -> Section:
+def _over_time(
+    check: xr.Dataset, name: str, shift: float, words: str, absorbed: str = ""
+) -> Section:
     require(check, name, f"{name}_std", "part_start", "part_end", "part_recording")
     start, end = running_time(check)
     value = check[name].values - shift
     reach = BAND_STDS * check[f"{name}_std"].values
+    note = "Tenths of the recording, with 95 % bars; 0 if nothing changes."
+    if absorbed and np.isnan(value).any():
+        note += f" {absorbed}"
     return chart(
-        "", "", "Tenths of the recording, with 95 % bars; 0 if nothing changes.",
+        "", "", note,
         x=label("time", "s"), y=label(words),
         series=[_with_bars("tenths", 0.5 * (start + end), value, reach)],
         marks=[mark("no change", y=0.0)],

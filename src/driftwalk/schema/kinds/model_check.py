@@ -90,7 +90,10 @@ MODEL_CHECK: Final = Kind(
         Variable("part_dof", "part", "1", "their degrees of freedom", "int"),
         Variable("part_noise_ratio", "part", "1", "mean square against that of all"),
         Variable("part_noise_ratio_std", "part", "1", "its standard deviation"),
-        Variable("flow_change", "part", "1", "relative change of the flow's strength"),
+        Variable(
+            "flow_change", "part", "1", "relative change of the flow's strength",
+            note="NaN where the fit has absorbed most of it",
+        ),
         Variable("flow_change_std", "part", "1", "its standard deviation"),
         Variable("drag_change", "speed_range", "1", "relative change of C_d"),
         Variable("drag_change_std", "speed_range", "1", "its standard deviation"),

@@ -71,6 +71,18 @@ def test_sums_and_their_variance_by_dense_algebra() -> None:
     )
 
 
+def test_a_change_that_the_fit_has_absorbed_is_not_visible() -> None:
+    generator = np.random.default_rng(5)
+    white, weight = generator.normal(size=(2, ROWS))
+    group = np.arange(ROWS) % 3
+    jacobian = np.zeros((ROWS, PARAMETERS))
+    jacobian[group == 0, 0] = weight[group == 0]
+    covariance = np.linalg.inv(jacobian.T @ jacobian + 1e-6 * np.eye(PARAMETERS))
+    trend = trend_of(contrast_of(group, 3, weight, white, jacobian), covariance)
+    assert trend.visible.tolist() == [False, True, True]
+    assert trend.dof == 2
+
+
 def test_chi_squared_of_a_cell_by_dense_algebra() -> None:
     jacobian, _, covariance = linear_world(3)
     generator = np.random.default_rng(4)
