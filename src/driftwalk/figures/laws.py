@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,7 +11,8 @@ import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.figures.write import write_each
-from driftwalk.plot.parts.style import SINGLE_COLUMN_MM, new_figure
+from driftwalk.plot.parts.style import BLUE, MUTED, SINGLE_COLUMN_MM, new_figure
+from driftwalk.schema.compared_laws import compared_laws
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,7 +20,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LEAST_SHOWN = 1e-5
-"""Smallest loss on the axis [nats a sample]."""
+"""Smallest width of the even part of the axis [nats]."""
+MOST_EVEN = 20.0
+"""Largest loss, in standard errors, up to which the axis is even; beyond it is logarithmic."""
 
 
 def write_laws_figure(
@@ -81,17 +85,26 @@ def plot_laws(fit: xr.Dataset, ax: Axes) -> Axes:
     --------
     ``plot_laws(fit, ax)``
     """
-    known = fit.isel(compared_law=np.flatnonzero(np.isfinite(fit["compared_log_score"].values)))
-    order = np.argsort(known["compared_log_score"].values)
-    score = known["compared_log_score"].values[order]
-    std = known["compared_log_score_std"].values[order]
-    names = [str(name) for name in known["compared_law"].values[order]]
-    lost = np.maximum(score.max() - score, LEAST_SHOWN)
+    every = compared_laws(fit)
+    known = [law for law in reversed(every) if law.solved]
+    if not known:
+        ax.set_title("no law has a solution")
+        return ax
+    names = [law.name for law in known]
+    lost, std = (np.array(one) for one in zip(*((law.loss, law.std) for law in known), strict=True))
     place = np.arange(len(names))
-    ax.errorbar(lost, place, xerr=std, fmt="o", color="C0", capsize=2.0)
-    ax.set_xscale("symlog", linthresh=max(float(std.max()), LEAST_SHOWN))
-    ax.axvline(0.0, color="0.6", linewidth=0.8)
+    ax.errorbar(lost, place, xerr=std, fmt="o", ms=3.0, lw=0.9, capsize=2.0, color=BLUE)
+    even = max(float(std.max()), LEAST_SHOWN)
+    if float(lost.max()) > MOST_EVEN * even:
+        # From a power of ten on: no other label of the axis is then next to that of 0.
+        ax.set_xscale("symlog", linthresh=10.0 ** math.ceil(math.log10(even)))
+    else:
+        ax.locator_params(axis="x", nbins=5)
+    ax.axvline(0.0, color=MUTED, lw=0.6)
     ax.set_yticks(place, names)
     ax.set_ylim(-0.6, len(names) - 0.4)
-    ax.set_xlabel("held out samples: loss against the best law [nats a sample]")
+    ax.set_xlabel("loss per held out sample, against the best law (nats)")
+    unsolved = len(every) - len(known)
+    if unsolved:
+        ax.set_title(f"not shown, without a solution: {unsolved}")
     return ax

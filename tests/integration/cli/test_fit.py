@@ -91,11 +91,14 @@ def test_several_recordings(fitted: tuple[Path, Done], tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("no_figures")
 def test_people_read_the_answer(tmp_path: Path) -> None:
-    done = here(*FIT, "--to", "100", "-o", tmp_path / "run", "--angle", "none")
+    done = here(*FIT, "--to", "100", "-o", tmp_path / "run", "--angle", "none", "--wall")
     assert done.code == 0, done.err
     assert "drag coefficient C_d" in done.out
     assert "redrawn every 16 ms" in done.out
     assert "no orientation was used" in done.err
+    (wall,) = [line for line in done.out.splitlines() if line.startswith("wall ")]
+    assert "needs the orientation" in wall
+    assert wall.endswith("(--columns), and fit with --angle state")
 
 
 @pytest.mark.parametrize(

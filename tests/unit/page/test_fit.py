@@ -97,6 +97,17 @@ def test_the_check_of_a_fit(sections: list[dict[str, Any]]) -> None:
         assert values(real["y"]).tolist() == [1.0] * 6
 
 
+def test_a_tenth_that_the_fit_absorbed_has_no_point() -> None:
+    check = made_up_check()
+    assert "absorbed" not in str(
+        part_of(fit_sections(None, check=check), "check-flow-time")["note"]
+    )
+    check["flow_change"].values[1] = check["flow_change_std"].values[1] = np.nan
+    part = part_of(fit_sections(None, check=check), "check-flow-time")
+    assert "A tenth without a point" in part["note"]
+    assert np.isnan(values(part["series"][0]["y"])[1])
+
+
 def test_a_fit_that_was_not_checked_says_so() -> None:
     made = fit_sections(made_up_fit())
     assert part_of(made, "check")["kind"] == "empty"

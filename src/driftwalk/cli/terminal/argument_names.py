@@ -64,7 +64,7 @@ WHOLE: Final[dict[str, str]] = {
 }
 """From an argument with its value to an option, where the option does not take that value."""
 
-MESSAGES: Final = frozenset({"findings", "interrupted", "warning", "warnings"})
+MESSAGES: Final = frozenset({"findings", "interrupted", "wall_left_out", "warning", "warnings"})
 """Keys of JSON whose values are messages of the library."""
 
 # A command has one list of options: it need not say of which function the argument is.

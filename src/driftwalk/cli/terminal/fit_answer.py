@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import degrees, isfinite, isnan
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
 from driftwalk.cli.terminal.answer import (
+    label_of,
     print_estimates,
     print_intensity,
     print_origin,
@@ -17,33 +16,27 @@ from driftwalk.cli.terminal.answer import (
     print_row,
     print_warnings,
 )
+from driftwalk.cli.terminal.argument_names import to_options
+from driftwalk.schema.compared_laws import compared_laws
 from driftwalk.schema.facts import fit_facts, sentences
+from driftwalk.schema.law_words import (
+    LAW_KEYS,
+    LINEAR_DRAG_ALONE,
+    WALL_KEYS,
+    law_numbers,
+    law_words,
+    wall_numbers,
+    wall_words,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
 
-_LAW_ROWS: Final = {
-    "added_mass_share": ("added mass / mass", 1.0, ""),
-    "effective_drag_coefficient": ("C_d per effective mass", 1.0, ""),
-    "effective_force_std_N": ("σ_F per effective mass", 1e3, " mN"),
-    "linear_drag_kg_s": ("linear drag", 1e3, " g/s"),
-    "drag_power": ("power of the drag", 1.0, ""),
-    "force_memory_s": ("memory of the force", 1.0, " s"),
-    "time_stamp_noise_s": ("jitter of the stamps", 1e3, " ms"),
-    "orientation_offset_rad": ("orientation offset", degrees(1.0), "°"),
-    "marker_x_m": ("marker off by, x", 1e3, " mm"),
-    "marker_y_m": ("marker off by, y", 1e3, " mm"),
-    "flow_strength_change": ("change of the flow", 1e2, " %"),
-    "pulse_amplitude": ("pulses of the flow", 1e2, " %"),
-    "pulse_frequency_Hz": ("frequency of pulses", 1.0, " Hz"),
-}
-"""Name, factor and unit of the rows of estimates that stand in a fit where the recording or the
-user asks for them."""
 MOST_FINDINGS: Final = 2
 """Findings that are printed; all are in the file."""
 FAR_ABOVE_FLOOR: Final = 2.0
-LEAST_EVIDENCE: Final = 3.0
-"""Difference of the logarithms of the evidence for two laws, below which both may be right."""
+TELLING_SHARE: Final = 0.02
+"""Of the intervals at the wall, from which on there may be enough contacts to estimate it."""
 _KEYS: Final = (
     "drag_coefficient",
     "drag_coefficient_interval",
@@ -74,16 +67,11 @@ _KEYS: Final = (
     "needed_duration_s",
     "switching_times_s",
     "mistakes",
-    "force_law",
-    "law_settled_by",
-    *(f"{name}{end}" for name in _LAW_ROWS for end in ("", "_interval")),
-    "drag_coefficient_any_added_mass_interval",
-    "force_std_any_added_mass_interval_N",
+    *LAW_KEYS,
     "jumps_removed",
     "dropped_frames",
     "compared_laws",
-    "wall_contacts",
-    *(f"wall_{name}{end}" for name in ("restitution", "friction") for end in ("", "_interval")),
+    *WALL_KEYS,
 )
 """The last ones where they are in the fit."""
 
@@ -136,12 +124,18 @@ def print_answer(fit: xr.Dataset, check: xr.Dataset | None, folder: Path) -> Non
     """Print the answer for people: the fit, where the flow is, and the check."""
     facts = fit_facts(fit)
     print_origin(fit)
-    print_estimates(fit, "drag_coefficient", "force_std", "tracking_noise")
+    if facts.get("drag_law") == "linear":
+        print_row(label_of("drag_coefficient"), LINEAR_DRAG_ALONE)
+    else:
+        print_estimates(fit, "drag_coefficient")
+    print_estimates(fit, "force_std", "tracking_noise")
     print_intensity(facts["force_noise_intensity_N2_s"])
     print_law(facts)
-    if "compared_law" in fit.dims:
-        _print_laws(fit)
-    print_row("intervals at the wall", f"{facts['wall_share']:.1%}, left out")
+    _print_laws(fit)
+    left_out = f"{facts['wall_share']:.1%}, left out"
+    if _may_tell_the_wall(fit, facts):
+        left_out += "; --wall estimates restitution and friction from them"
+    print_row("intervals at the wall", left_out)
     _print_wall(facts)
     if "flow" in fit.dims:
         names = fit["flow"].values[fit["interval_flow"].values]
@@ -153,50 +147,39 @@ def print_answer(fit: xr.Dataset, check: xr.Dataset | None, folder: Path) -> Non
     print_page(folder)
 
 
+def _may_tell_the_wall(fit: xr.Dataset, facts: Mapping[str, Any]) -> bool:
+    """Return whether nobody has asked for the wall, and the recording may tell what it does."""
+    asked = "wall_contacts" in facts or "wall_left_out" in facts
+    return not asked and fit.attrs["angle"] == "state" and facts["wall_share"] > TELLING_SHARE
+
+
 def _print_wall(facts: Mapping[str, Any]) -> None:
     """Print restitution and friction of the wall, where they were estimated."""
-    if "wall_contacts" not in facts:
-        return
-    if "wall_friction" not in facts:
-        print_row("wall", f"{facts['wall_contacts']} contacts say too little of it")
-        return
-    for name in ("restitution", "friction"):
-        low, high = facts[f"wall_{name}_interval"]
-        print_row(f"{name} of the wall", f"{facts[f'wall_{name}']:.2g} ({low:.2g} to {high:.2g})")
-
-
-def _law_in_words(law: str, settled: float | None) -> str:
-    """Return the force law, and by how much the recording supports it."""
-    names = ["the paper's", "a floating body's"]
-    found, other = names if law == "paper" else reversed(names)
-    if settled is None:
-        return f"{found}, as far as this recording tells" if law == "paper" else found
-    if settled < LEAST_EVIDENCE:
-        return f"{found}; the recording cannot tell it from {other}"
-    return f"{found}; {other} is less likely by e^{settled:.0f}"
+    lacking = wall_words(facts)
+    if lacking is not None:
+        print_row("wall", to_options(lacking))
+    for number in wall_numbers(facts):
+        print_row(number.label, number.text(digits=2))
 
 
 def print_law(facts: Mapping[str, Any]) -> None:
     """Print the force law, by how much the recording supports it, and what was opened."""
-    if "force_law" in facts:
-        print_row("force law", _law_in_words(str(facts["force_law"]), facts.get("law_settled_by")))
-    for key, (name, scale, unit) in _LAW_ROWS.items():
-        if key in facts:
-            low, high = (scale * end for end in facts[f"{key}_interval"])
-            print_row(name, f"{scale * facts[key]:.3g}{unit} ({low:.3g} to {high:.3g})")
+    for label, words in law_words(facts).items():
+        print_row(label, words)
+    for number in law_numbers(facts):
+        print_row(number.label, number.text())
 
 
 def _print_laws(fit: xr.Dataset) -> None:
     """Print the table of compared laws, the best first."""
-    best = float(fit["compared_log_score"].max())
-    evidence = fit["compared_log_evidence"] - fit["compared_log_evidence"].max()
+    laws = compared_laws(fit)
+    if not laws:
+        return
+    width = 2 + max(len(law.name) for law in laws)
     print("force laws: held out prediction per sample, and evidence, below the best")
-    for name in fit["compared_law"].values[np.argsort(-fit["compared_log_score"].values)]:
-        law = fit.sel(compared_law=name)
-        lost, std = best - float(law["compared_log_score"]), float(law["compared_log_score_std"])
-        one = float(evidence.sel(compared_law=name))
-        words = "no solution" if isnan(lost) else f"{lost:8.4f} ± {std:.4f}   {abs(one):8.1f}"
-        print(f"  {name:<28}{words}")
+    for law in laws:
+        words = f"{law.loss:8.4f} ± {law.std:.4f}   {abs(law.evidence):8.1f}"
+        print(f"  {law.name:<{width}}{words if law.solved else 'no solution'}")
 
 
 def _print_verdict(check: xr.Dataset | None, fit: xr.Dataset) -> None:

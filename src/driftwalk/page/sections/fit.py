@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from driftwalk.page.parts import (
     SIMULATED,
     Section,
+    attempt,
     empty_head,
     empty_section,
     estimate,
@@ -21,10 +22,12 @@ from driftwalk.page.parts import (
 )
 from driftwalk.page.sections.check import check_sections
 from driftwalk.page.sections.flow import flow_sections
+from driftwalk.page.sections.law import law_sections
 from driftwalk.page.sections.recording import Noise, recording_sections
 from driftwalk.page.words import count, percent, quantity, with_interval
 from driftwalk.plot.parts.labels import interval_of
 from driftwalk.schema.facts import sentences
+from driftwalk.schema.law_words import LINEAR_DRAG_ALONE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -65,6 +68,7 @@ def fit_sections(
         made = empty_head("There is no fit yet.")
     else:
         made = head_sections(lambda: fit_summary(fit, check), lambda: _warnings(fit, check))
+        made += attempt("law", "The force law", lambda: law_sections(fit))
         noise = _noise(fit)
     for number_of, recording in enumerate(recordings, start=1):
         parts = recording_sections(recording, body=body, noise=noise)
@@ -92,7 +96,7 @@ def fit_summary(fit: xr.Dataset, check: xr.Dataset | None = None) -> Section:
     judge = _judge(fit, check)
     paragraphs += [] if judge is None else [_verdict(judge)]
     shown = [
-        estimate(fit, "drag_coefficient", label="drag coefficient", symbol="C_d", unit="1"),
+        *_drag(fit),
         estimate(
             fit, "force_std_N", label="stochastic force", symbol="σ_F", unit="N",
             note=f"redrawn every {every}",
@@ -106,6 +110,13 @@ def fit_summary(fit: xr.Dataset, check: xr.Dataset | None = None) -> Section:
                note="1 if the model is right"),
     ]  # fmt: skip
     return section("summary", "summary", "Method and results", paragraphs=paragraphs, numbers=shown)
+
+
+def _drag(fit: xr.Dataset) -> list[dict[str, Any]]:
+    """Return C_d; nothing where a linear law has none."""
+    if fit.attrs.get("drag_law") == "linear":
+        return []
+    return [estimate(fit, "drag_coefficient", label="drag coefficient", symbol="C_d", unit="1")]
 
 
 def _what_was_done(fit: xr.Dataset) -> str:
@@ -122,6 +133,11 @@ def _what_was_done(fit: xr.Dataset) -> str:
         parts.append(quantity(duration, "s"))
     if samples is not None and used is not None:
         parts.append(f"{int(used)} of {int(samples)} samples used")
+    left_out, put_in = (value_of(fit, name) for name in ("mistakes", "dropped_frames"))
+    if left_out:
+        parts.append(f"{int(left_out)} left out as mistakes of the tracker")
+    if put_in:
+        parts.append(f"the time of {count(int(put_in), 'dropped frame')} put in")
     wall = value_of(fit, "wall_share")
     if wall is not None:
         parts.append(f"{percent(wall)} of the intervals at the wall, left out")
@@ -145,9 +161,11 @@ def _what_was_found(fit: xr.Dataset) -> str:
         )
     )
     every = quantity(required(fit, "force_interval_s"), "s")
+    linear = fit.attrs.get("drag_law") == "linear"
+    of_drag = f": {LINEAR_DRAG_ALONE}" if linear else f" is C_d = {drag}"
     return (
-        f"The drag coefficient is C_d = {drag}, the stochastic force σ_F = {force}, redrawn "
-        f"every {every}, the tracking noise {noise}. The intervals hold if the drag law is right."
+        f"The drag coefficient{of_drag}. The stochastic force is σ_F = {force}, redrawn every "
+        f"{every}, the tracking noise {noise}. The intervals hold if the force law is right."
     )
 
 

@@ -1,0 +1,126 @@
+"""The force law of a fit on its page: what was found or stated, and what was tested."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from driftwalk.page.parts import Section, figure, section, value_of
+from driftwalk.page.words import percent
+from driftwalk.schema.compared_laws import compared_laws
+from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.law_words import (
+    LawNumber,
+    law_limits,
+    law_numbers,
+    law_words,
+    wall_numbers,
+    wall_words,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+TESTED: Final = {
+    "water_acceleration": "push of the water's acceleration",
+    "water_spin": "torque of the water's acceleration",
+    "linear_share": "linear part of the drag",
+    "drag_power": "power of the drag",
+    "force_memory": "memory of the force",
+    "time_variance": "jitter of the stamps",
+    "angle_offset": "orientation offset",
+    "marker_x": "marker off by, x",
+    "marker_y": "marker off by, y",
+    **{f"strength_{k}": f"strength of the flow, cosine {k}" for k in range(1, 7)},
+}
+"""Words for the numbers that score tests look at."""
+
+
+def law_sections(fit: xr.Dataset) -> list[Section]:
+    """Return the sections on the force law, its rivals, and the wall; nothing for an old fit."""
+    facts = fit_facts(fit)
+    confidence = value_of(fit, "confidence")
+    made = []
+    rows = law_words(facts)
+    if rows:
+        said = [f"{_first_upper(label)}: {words}." for label, words in rows.items()]
+        shown = [_card(number, confidence) for number in law_numbers(facts)]
+        if "law_settled_by" in facts:
+            shown.insert(0, _settled(facts["law_settled_by"]))
+        made.append(
+            section(
+                "law", "summary", "The force law",
+                paragraphs=[*said, *law_limits(facts)], numbers=shown,
+            )
+        )  # fmt: skip
+    made += [part for part in (_compared(fit), _tested(fit)) if part is not None]
+    lacking, walls = wall_words(facts), wall_numbers(facts)
+    if lacking is not None or walls:
+        words = f"The block touched the wall in {facts['wall_contacts']} passages."
+        paragraphs = [words if lacking is None else f"The wall: {lacking}."]
+        numbers = [_card(number, confidence) for number in walls]
+        made.append(section("wall", "summary", "The wall", paragraphs=paragraphs, numbers=numbers))
+    return made
+
+
+def _settled(apart: float) -> dict[str, Any]:
+    note = "difference of the logarithms of the evidence; below 3 the recording cannot tell"
+    return figure("evidence for this law over the other", apart, note=note)
+
+
+def _card(number: LawNumber, confidence: float | None) -> dict[str, Any]:
+    """Return a number for a summary, in the units of the command line."""
+    card = figure(number.label, number.value, number.unit or "1", note=number.note)
+    if number.stated:
+        return card | {"note": f"stated; {number.note}"}
+    if not isfinite(number.high):
+        share = "" if confidence is None else f"{percent(confidence)}: "
+        return card | {"note": f"{share}{number.low:.2g} or more; {number.note}"}
+    return card | {"low": number.low, "high": number.high, "confidence": confidence}
+
+
+def _compared(fit: xr.Dataset) -> Section | None:
+    """Return the table of compared laws, where they were compared."""
+    laws = compared_laws(fit)
+    if not laws:
+        return None
+    rows: list[list[Any]] = [
+        [law.name, *([law.loss, law.std, law.evidence] if law.solved else [None, None, None])]
+        for law in laws
+    ]
+    columns = ["force law", "loss per held out sample", "its standard error", "evidence"]
+    note = (
+        "Each law was fitted to the first 70 % of the recording and predicted the rest. Loss and "
+        "evidence are logarithms, against the best law. A dash: the law has no solution."
+    )
+    return section("laws", "table", "Force laws compared", note, columns=columns, rows=rows)
+
+
+def _tested(fit: xr.Dataset) -> Section | None:
+    """Return the table of what was tested and stayed closed."""
+    if "departure" not in fit.coords or fit.sizes["departure"] == 0:
+        return None
+    names = [str(name) for name in fit["departure"].values]
+    std = fit["departure_std"].values
+    sigmas = np.divide(
+        fit["departure_estimate"].values, std, out=np.full(std.shape, np.nan), where=std > 0.0
+    )
+    rows: list[list[Any]] = [
+        [TESTED.get(name, name), round(float(value), 2) if isfinite(value) else None]
+        for name, value in zip(names, sigmas, strict=True)
+    ]
+    note = (
+        "The last score tests of the search: estimates of numbers that are not in the fit, in "
+        "their standard deviations; 0 is the model. The fit takes up a number that is far from 0 "
+        "and large enough to matter."
+    )
+    columns = ["what was tested", "standard deviations from the model"]
+    return section(
+        "tested", "table", "Tested, and not in the fit", note, columns=columns, rows=rows
+    )
+
+
+def _first_upper(text: str) -> str:
+    return text[:1].upper() + text[1:]
