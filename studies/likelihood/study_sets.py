@@ -17,8 +17,15 @@ if TYPE_CHECKING:
     import xarray as xr
 
 CAMERA = Camera()
-FIRST_SEED = {"synthetic": 0, "coverage": 10_000, "ode": 20_000, "lengths": 30_000}
-"""Seed of the first world of a set; the others follow."""
+FIRST_SEED = {
+    "synthetic": 0,
+    "coverage": 10_000,
+    "ode": 20_000,
+    "lengths": 30_000,
+    "right": 50_000,
+}
+"""Seed of the first world of a set; the others follow. The set "right" is one of studies/misfit,
+whose other worlds begin at 40,000."""
 WORLDS = {"synthetic": 48, "coverage": 200, "ode": 16, "lengths": 6}
 TRIAL_S = 1800.0
 TRIAL_STEP_S = 0.01

@@ -44,6 +44,8 @@ class Case:
     stated: Mapping[str, float] = field(default_factory=dict)
     """Keys of the study that the user knows, and states."""
     angle: str = "state"
+    growth: float = 0.0
+    """Of the flow's strength, from a minute before the first sample to the last, as a share."""
     carried: bool = False
     """Whether the water carries the block along. In a sink, or in a small vortex, such a block
     stays in one place, and nothing is learned: its flow is a swirl with jets, without a sink."""

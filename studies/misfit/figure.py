@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from cases import CASES
 from matplotlib.figure import Figure
-from run import read_lines, version
+from run import current, read_lines
 
 from driftwalk.plot.parts.style import DOUBLE_COLUMN_MM, new_figure, print_style
 
@@ -29,9 +29,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("out", type=Path)
     parser.add_argument("file", type=Path)
+    parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--before", type=Path, default=None)
     options = parser.parse_args()
-    after = [one for one in read_lines(options.out / "results.jsonl") if one["fit"] == version()]
+    after = current(options.out / "results.jsonl", options.minutes)
     before = [] if options.before is None else read_lines(options.before)
     with print_style():
         figure = drawn(after, before)

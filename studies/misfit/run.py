@@ -1,10 +1,13 @@
 """Fit recordings of worlds that are not as the model says, a line of JSON for each.
 
-    python studies/misfit/run.py OUT [--worlds 8] [--minutes 10] [--workers 2] [--case NAME ...]
+    python studies/misfit/run.py OUT [--set misfits] [--worlds 8] [--minutes 10] [--workers 2]
+                                     [--case NAME ...]
 
-OUT keeps the motions (`motions/`) and `results.jsonl`. What is in there is not done again, so a
-study that was stopped goes on where it was; a line names the version of the fit's source, and
-results of other versions are computed again. The motions come from the Open Dynamics Engine.
+The sets: `misfits`, of large ones (`cases.py`); `sizes`, of what can just be found (`sizes.py`);
+`right`, of worlds that are as the model says (`right.py`). OUT keeps the motions (`motions/`) and a
+file of results for each set. What is in there is not done again, so a study that was stopped goes
+on where it was; a line names the version of the fit's source, and results of other versions are
+computed again. The motions come from the Open Dynamics Engine, those of `right` from driftwalk.
 """
 
 from __future__ import annotations
@@ -22,7 +25,9 @@ from typing import Any, Final
 
 import numpy as np
 from cases import CASES, Case, Seen
+from right import right_motion
 from scipy.interpolate import RegularGridInterpolator
+from sizes import SIZES
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "studies" / "likelihood"))
@@ -48,6 +53,8 @@ REFERENCE_M_S: Final = 0.03
 SOURCES: Final = ("src/driftwalk/likelihood/**/*.py", "cpp/include/driftwalk/infer/*.hpp")
 ODE: Final = ROOT / "benchmarks" / "ode"
 SKIPPED: Final = 77
+RIGHT: Final = {"the model itself": Case()}
+SETS: Final = {"misfits": CASES, "sizes": SIZES, "right": RIGHT}
 
 
 def main() -> None:
@@ -57,23 +64,35 @@ def main() -> None:
     parser.add_argument("--worlds", type=int, default=8)
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--case", dest="names", action="append", choices=CASES)
+    parser.add_argument("--set", dest="kind", choices=SETS, default="misfits")
+    parser.add_argument("--case", dest="names", action="append")
     options = parser.parse_args()
-    motions, results = options.out / "motions", options.out / "results.jsonl"
+    cases = SETS[options.kind]
+    unknown = set(options.names or ()) - set(cases)
+    if unknown:
+        parser.error(f"no case {unknown.pop()!r}; there are: {', '.join(cases)}")
+    motions, results = options.out / "motions", options.out / file_of(options.kind)
     motions.mkdir(parents=True, exist_ok=True)
-    try:
-        build_ode(motions)
-    except peer().PeerMissing as reason:
-        print(f"skipped: {reason}")
-        sys.exit(SKIPPED)
-    done = {(one["case"], one["world"]) for one in read_lines(results) if one["fit"] == version()}
-    wanted = [(name, k) for k in range(options.worlds) for name in options.names or CASES]
+    if options.kind != "right":
+        try:
+            build_ode(motions)
+        except peer().PeerMissing as reason:
+            print(f"skipped: {reason}")
+            sys.exit(SKIPPED)
+    done = {
+        (one["case"], one["world"], one["minutes"])
+        for one in read_lines(results)
+        if one["fit"] == version()
+    }
+    wanted = [
+        (name, k, options.minutes) for k in range(options.worlds) for name in options.names or cases
+    ]
     missing = [one for one in wanted if one not in done]
     # The workers begin afresh and read this before they load numpy.
     os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
     fresh = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(options.workers, mp_context=fresh) as pool:
-        jobs = [pool.submit(fit_one, *one, motions, options.minutes) for one in missing]
+        jobs = [pool.submit(fit_one, options.kind, *one, motions) for one in missing]
         for job in as_completed(jobs):
             line = job.result()
             with results.open("a", encoding="utf-8") as file:
@@ -81,10 +100,18 @@ def main() -> None:
             print(in_words(line), flush=True)
 
 
-def fit_one(name: str, number: int, motions: Path, minutes: float) -> dict[str, Any]:
+def file_of(kind: str) -> str:
+    """Return the name of the file that holds the results of a set."""
+    return "results.jsonl" if kind == "misfits" else f"{kind}.jsonl"
+
+
+def fit_one(kind: str, name: str, number: int, minutes: float, motions: Path) -> dict[str, Any]:
     """Fit one recording, check the model, and hold both beside the truth."""
-    case = CASES[name]
-    world, poses = motion(case, number, motions, minutes)
+    case = SETS[kind][name]
+    if kind == "right":
+        world, poses = right_motion(number, motions, minutes)
+    else:
+        world, poses = motion(case, number, motions, minutes)
     recording = record(case, poses, number)
     study = dw.Study()
     wrong = {key: factor * _number_at(study, key) for key, factor in case.told.items()}
@@ -124,6 +151,11 @@ def fit_one(name: str, number: int, motions: Path, minutes: float) -> dict[str, 
         ]
         for name in fit["parameter"].values[6 if "force_lever" in fit["parameter"] else 4 :]
     }
+    if "departure" in fit.coords:
+        names, std = fit["departure"].values, fit["departure_std"].values
+        facts["departure_std"] = {
+            str(name): float(one) for name, one in zip(names, std, strict=True)
+        }
     if "drag_coefficient_any_added_mass_interval" in fit:
         for parameter in ("drag_coefficient", "force_std"):
             low, high = fit[f"{parameter}_any_added_mass_interval"].values
@@ -132,6 +164,7 @@ def fit_one(name: str, number: int, motions: Path, minutes: float) -> dict[str, 
         check = check_model(fit, recording)
         facts["explained"] = bool(check["explained"])
         facts["findings"] = [str(text) for text in check["finding"].values]
+        facts["least_p_value"] = float(check["p_value"].min())
     except DriftwalkError as error:
         facts["explained"], facts["findings"] = None, [str(error)]
     facts["warnings"] = [str(text) for text in fit["warning"].values]
@@ -177,6 +210,9 @@ def motion(case: Case, number: int, folder: Path, minutes: float) -> tuple[World
     """Return a world and the block's motion in it; both are kept."""
     world = world_of(number, case)
     words = [f"{name}={value:.9g}" for name, value in case.law.items()]
+    if case.growth:
+        # The engine begins a minute before the first sample.
+        words.append(f"flow_growth={case.growth / (60.0 * minutes + 60.0):.9g}")
     program = "".join(path.read_text() for path in sorted(ODE.glob("*.?pp")))
     label = hashlib.sha256(
         " ".join([*words, f"{minutes:g}", str(case.carried), program]).encode()
@@ -226,6 +262,12 @@ def version() -> str:
     """Return a number that is another one for another version of the fit's source."""
     files = sorted(file for pattern in SOURCES for file in ROOT.glob(pattern))
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:12]
+
+
+def current(path: Path, minutes: float | None = None) -> list[dict[str, Any]]:
+    """Return the results of this version of the fit, of one length where it is given."""
+    lines = [one for one in read_lines(path) if one["fit"] == version()]
+    return [one for one in lines if minutes is None or one["minutes"] == minutes]
 
 
 def in_words(line: dict[str, Any]) -> str:

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 from cases import CASES
-from run import FIRST_SEED, read_lines, version
+from run import FIRST_SEED, current, read_lines
 
 import driftwalk as dw
 from driftwalk.core.atomic import write_atomic
@@ -31,10 +31,11 @@ def main() -> None:
     """Print the table, and store it when asked to."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("out", type=Path)
+    parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--before", type=Path, default=None)
     parser.add_argument("--store", type=Path, default=None)
     options = parser.parse_args()
-    lines = [one for one in read_lines(options.out / "results.jsonl") if one["fit"] == version()]
+    lines = current(options.out / "results.jsonl", options.minutes)
     before = None if options.before is None else read_lines(options.before)
     text = markdown(lines, before)
     print(text)
