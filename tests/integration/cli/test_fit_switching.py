@@ -52,9 +52,8 @@ def test_the_model_with_the_switch_explains_the_recording(finished: tuple[Path, 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
-def test_without_the_switch_it_does_not(
-    recording: Path, finished: tuple[Path, Done], tmp_path: Path
-) -> None:
+def test_without_the_switch_it_does_not(recording: Path, tmp_path: Path) -> None:
+    """The steps alone do not show it: under the law of a floating body they come out right."""
     found = answer(
         here(
             "fit", recording, *COARSE, "--flow-strength", "constant", "-o", tmp_path / "s", "--json"
@@ -62,7 +61,6 @@ def test_without_the_switch_it_does_not(
     )
     assert not found["explained"]
     assert any("the motion changes" in finding for finding in found["findings"])
-    assert found["ks_distance"] > 2.0 * answer(finished[1])["ks_distance"]
 
 
 @pytest.mark.slow
