@@ -7,6 +7,7 @@ how numbers compare.
 
 from __future__ import annotations
 
+import math
 import re
 from enum import Enum
 
@@ -15,6 +16,10 @@ CLOSE = 0.05
 """Largest relative difference of numbers that are close."""
 SMALL = 0.01
 """Largest difference of close numbers next to 0."""
+RUNS = 1000
+"""Runs of an assembly that a page shows."""
+SHARE_SIGMAS = 4.0
+"""Of the scatter of two shares of so many runs: right numbers fail once in 16,000."""
 SPAN = re.compile(r"#(?: (?:h|min|s))(?: # (?:min|s))?(?![\w/])")
 LIST = re.compile(r"(<span>|#)(?:, \1)+")
 
@@ -26,6 +31,8 @@ class Numbers(Enum):
     """The command ran as shown on the files of the page."""
     CLOSE = "close"
     """So it did, but on an earlier result, whose last bits depend on the machine."""
+    RUNS = "runs"
+    """So it did, and the runs are chaotic: other last bits make them other runs of the same law."""
     ANY = "any"
     """It ran on less, so that only the words and the places of numbers are compared."""
 
@@ -57,7 +64,15 @@ def _agree(shown: str, printed: str, numbers: Numbers) -> bool:
     if NUMBER.sub("#", shown) != NUMBER.sub("#", printed):
         return False
     pairs = zip(NUMBER.findall(shown), NUMBER.findall(printed), strict=True)
-    return all(abs(float(a) - float(b)) <= max(CLOSE * abs(float(a)), SMALL) for a, b in pairs)
+    return all(abs(float(a) - float(b)) <= _tolerance(float(a), numbers) for a, b in pairs)
+
+
+def _tolerance(shown: float, numbers: Numbers) -> float:
+    """Return by how much a printed number may differ from the shown one."""
+    close = max(CLOSE * abs(shown), SMALL)
+    if numbers is not Numbers.RUNS or not 0.0 <= shown <= 1.0:
+        return close
+    return max(close, SHARE_SIGMAS * math.sqrt(2.0 * shown * (1.0 - shown) / RUNS))
 
 
 def _form(line: str) -> str:

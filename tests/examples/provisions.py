@@ -239,7 +239,7 @@ PAGES: dict[str, Page] = {
         numbers=Numbers.SAME,
         # Thousand runs in a fitted flow; the size of a compressed file.
         numbers_of={
-            "driftwalk assemble *": Numbers.CLOSE,
+            "driftwalk assemble *": Numbers.RUNS,
             "driftwalk report *": Numbers.CLOSE,
         },
         slow=True,

@@ -60,6 +60,8 @@ PRINTED = "drag   0.39\nforce  0.61 mN\nrecord 12 min 3 s (2 h 1 min to 1 h)\nof
         (["drag 0.40"], Numbers.CLOSE, []),
         (["drag 0.45"], Numbers.CLOSE, ["drag 0.45"]),
         (["drags 0.39"], Numbers.CLOSE, ["drags 0.39"]),
+        (["drag 0.32"], Numbers.RUNS, []),
+        (["drag 0.30"], Numbers.RUNS, ["drag 0.30"]),
         (["drag 7", "force 1e-3 mN"], Numbers.ANY, []),
         (["record 3 min (1 min to 4 h 2 min)", "of 5 min, 1 h, 2 h"], Numbers.ANY, []),
         (["force 0.61 N"], Numbers.ANY, ["force 0.61 N"]),

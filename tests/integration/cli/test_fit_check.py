@@ -112,14 +112,10 @@ def test_a_robot_that_drives_itself_is_not_explained(
     name = "destab_driveA_100pc_0_noisevar_10_randdur_600.csv"
     recording = shared_data("smarticles-rattling") / name
     study = STUDIES / "smarticles.toml"
-    done = here("fit", recording, "--study", study, "-o", tmp_path / "run", "--json")
+    words = ("--study", study, "--to", "120", "-o", tmp_path / "run", "--json")
+    done = here("fit", recording, *words)
     assert done.code == 0, done.err
     found = json.loads(done.out)
     assert found["explained"] is False
     assert any("excess kurtosis" in text for text in found["findings"])
-    if found["ks_distance"] is None:
-        # Next to jitter of the stamps the noise of the tracker may not be known; nothing can then
-        # be simulated.
-        assert found["tracking_noise_m_interval"][1] is None
-    else:
-        assert found["ks_distance"] > 4.0 * found["ks_noise_floor"]
+    assert found["ks_distance"] > 3.0 * found["ks_noise_floor"]
