@@ -14,7 +14,7 @@ import driftwalk as dw
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "tutorials" / "notebook.md"
 RECORDING = Path(str(files("driftwalk.datasets") / "tank30_ode_a" / "recording.csv"))
-SECONDS = 120.0
+SECONDS = 60.0
 # The page is for a real recording and takes minutes; these sizes take seconds.
 SMALLER = {
     'rec, model, folder="run/"': 'rec, model, study=SMALL, folder="run/"',
@@ -32,7 +32,7 @@ def blocks() -> list[str]:
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with the first two minutes of the bundled recording as track.csv."""
+    """Return a folder with the first minute of the bundled recording as track.csv."""
     folder = tmp_path_factory.mktemp("notebook")
     lines = RECORDING.read_text(encoding="utf-8").splitlines()
     kept = [line for line in lines[1:] if float(line.split(",")[0]) <= SECONDS]

@@ -161,13 +161,13 @@ def test_four_blocks_with_heavy_noise(
 def test_a_fit_of_tracked_poses_is_that_of_the_true_ones(
     scenes: ModuleType, scores: ModuleType, tmp_path: Path
 ) -> None:
-    out, motion, truth = filmed(scenes, tmp_path, "closed-loop", 301, 900)
+    out, motion, truth = filmed(scenes, tmp_path, "closed-loop", 301, 600)
     errors = scores.score(xr.load_dataset(out), truth)
     sizes = 1e-3 * errors["position_sd_per_axis_mm"], np.radians(errors["angle_sd_deg"])
     loop = import_module("closed_loop")
     true = save_trajectory(loop.with_noise(motion, *sizes, seed=1), tmp_path / "true.nc")
     tracked_fit, true_fit = (
-        run_driftwalk("fit", file, *TANK, "--no-check", "-o", tmp_path / file.stem)
+        run_driftwalk("fit", file, *TANK, "--law", "paper", "--no-check", "-o", tmp_path / file.stem)
         for file in (out, true)
     )
     for name in ("drag_coefficient", "force_std_N"):
