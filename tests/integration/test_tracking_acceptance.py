@@ -167,7 +167,9 @@ def test_a_fit_of_tracked_poses_is_that_of_the_true_ones(
     loop = import_module("closed_loop")
     true = save_trajectory(loop.with_noise(motion, *sizes, seed=1), tmp_path / "true.nc")
     tracked_fit, true_fit = (
-        run_driftwalk("fit", file, *TANK, "--law", "paper", "--no-check", "-o", tmp_path / file.stem)
+        run_driftwalk(
+            "fit", file, *TANK, "--law", "paper", "--no-check", "-o", tmp_path / file.stem
+        )
         for file in (out, true)
     )
     for name in ("drag_coefficient", "force_std_N"):

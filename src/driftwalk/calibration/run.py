@@ -41,6 +41,7 @@ from driftwalk.calibration.search import (
     window_smoother,
 )
 from driftwalk.calibration.surface import Optimum
+from driftwalk.calibration.wall import wall_warning
 from driftwalk.comparison import Statistic
 from driftwalk.conditions import recorded_camera
 from driftwalk.core.errors import InputError
@@ -156,6 +157,8 @@ def calibrate(
     keep = stores if stores is not None else _in_memory
     say = tell if tell is not None else _silent
     result = _Calibration(problem, keep, say).run()
+    of_wall = wall_warning(track, chosen) if isinstance(searched, BlockModel) else None
+    result.warnings += [of_wall] if of_wall is not None else []
     halves = _halves(track, problem, flow_of, say)
     return _finish(result, halves, recording, problem)
 

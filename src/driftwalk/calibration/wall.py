@@ -1,0 +1,60 @@
+"""Whether the wall, of which nobody said how it is, moves the answer of a calibration."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from driftwalk.flow.arena import outline_of
+from driftwalk.schema import Track
+
+if TYPE_CHECKING:
+    from driftwalk.model import Study
+
+NOTABLE_SHARE: Final = 0.05
+"""Share of the samples near the wall from which on its friction counts."""
+REACH_M: Final = 0.002
+"""A block may move so far from one sample to the next."""
+
+
+def wall_warning(track: Track, study: Study) -> str | None:
+    """Return a warning where the block is often at a wall whose properties nobody stated.
+
+    A calibration by steps simulates the contacts with the wall. Where the friction of the wall is 1
+    and the study says 0, C_d comes out a third too small.
+
+    Parameters
+    ----------
+    track : Track
+        The recording.
+    study : Study
+        Tank and block. A wall with the default restitution and friction is one of which nobody said
+        anything.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> time, zero = np.arange(5.0), np.zeros(5)
+    >>> wall_warning(Track(time, zero, zero, zero), dw.Study()) is None
+    True
+    """
+    tank = study.tank
+    fields = type(tank).model_fields
+    if any(
+        getattr(tank, name) != fields[name].default
+        for name in ("wall_restitution", "wall_friction")
+    ):
+        return None
+    reach = study.block.side_m / math.sqrt(2.0) + REACH_M
+    near = outline_of(tank.to_arena()).depth(track.x, track.y) < reach
+    share = float(np.mean(near))
+    if share <= NOTABLE_SHARE:
+        return None
+    return (
+        f"the block may touch the wall in {share:.0%} of the samples, and the study takes the "
+        f"default wall (restitution {tank.wall_restitution:g}, friction {tank.wall_friction:g}): a "
+        "wrong friction can move C_d by a third; the likelihood fit estimates both from the "
+        "contacts (`estimate_wall`): state them (`tank.wall_restitution`, `tank.wall_friction`)"
+    )
