@@ -314,6 +314,7 @@ PAGES: dict[str, Page] = {
             "fit first.csv": "fit --no-check first.csv",
             "fit recording.csv --mass": "fit --no-check first.csv --mass",
             "fit recording.csv --law": "fit --no-check first.csv --law",
+            "fit recording.csv --wall": "fit --no-check first.csv --wall",
             "fit recording.csv --compare": "fit --no-check first.csv --compare",
             "fit recording.csv --switching-times 10min,20min": "fit --no-check recording.csv "
             "--switching-times 40s,80s",

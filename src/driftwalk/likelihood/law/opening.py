@@ -82,7 +82,12 @@ class Opening:
         else:
             names = self._closed_names(mode, closed)
             trial = self.modes.tested(mode, names) if names else None
-        return replace(found, mode=mode, trial=trial)
+        return replace(found, mode=self._pruned(mode), trial=trial)
+
+    def _pruned(self, mode: Mode) -> Mode:
+        """Return the mode without numbers that are idle since others were opened."""
+        names = set(mode.point.opened) - set(self.assumptions.opened)
+        return (self._without(mode, self._idle(mode, names)) or mode) if names else mode
 
     def _closed_names(self, mode: Mode, closed: Set[str]) -> list[str]:
         """Return the numbers that may still be opened."""
@@ -97,20 +102,21 @@ class Opening:
     def _opened_or_strongest(
         self, mode: Mode, asked: Mapping[str, float], trial: Trial | None
     ) -> tuple[Mode, set[str]]:
-        """Return the mode with numbers opened, or where nothing comes of all together, with one.
+        """Return the mode with numbers opened, or where nothing comes of all together, with some.
 
         One large mistake makes others seem to be there, and no search finds them all. The numbers
         that were not opened alone are not counted as closed: without the mistake they are tested
         again.
         """
         found, dropped = self._opened(mode, asked)
-        names = [] if trial is None else [name for name in asked if name in trial.names]
-        single = [name for name in names if name not in STRENGTHS]
-        if found is not mode or trial is None or not single or len(asked) == 1:
+        parts = [] if trial is None else _parts(asked, trial)
+        if found is not mode or len(parts) < 2:
             return found, dropped
-        strongest = max(single, key=lambda name: abs(trial.sigmas[name]))
-        alone, of_alone = self._opened(mode, {strongest: asked[strongest]})
-        return (found, dropped) if alone is mode else (alone, of_alone)
+        for names in parts:
+            alone, of_alone = self._opened(mode, {name: asked[name] for name in names})
+            if alone is not mode:
+                return alone, of_alone
+        return found, dropped
 
     def _asked(self, mode: Mode, trial: Trial | None, closed: Set[str]) -> dict[str, float]:
         """Return the numbers to open, with the values to begin with.
@@ -170,22 +176,34 @@ class Opening:
         if found is None:
             return before, set(asked)
         mode = found
-        dropped = {name for name in asked if not is_kept(mode, name, self.worth)}
+        dropped = self._idle(mode, set(asked))
+        if dropped >= set(asked):
+            return before, dropped
+        return self._without(mode, dropped) or before, dropped
+
+    def _idle(self, mode: Mode, names: Set[str]) -> set[str]:
+        """Return those of some opened numbers that are too near the model to stay open."""
+        idle = {
+            name
+            for name in names
+            if name != "pulse_frequency" and not is_kept(mode, name, self.worth)
+        }
+        # The cosines of the strength, and the two parts of a pulse, stay or go together.
         strengths = set(STRENGTHS) & set(mode.point.opened)
-        if strengths - dropped:
-            dropped -= strengths
-        if set(PULSES) & set(asked) and not set(PULSES) <= dropped:
-            dropped -= set(PULSES)
-        if dropped:
-            if dropped >= set(asked):
-                return before, dropped
-            if set(PULSES) <= dropped:
-                # Without pulses their frequency is the frequency of nothing.
-                dropped.add("pulse_frequency")
-            kept = {name: value for name, value in mode.point.opened.items() if name not in dropped}
-            found = self._short(replace(mode.point, opened=kept), mode.weights)
-            mode = before if found is None else found
-        return mode, dropped
+        if strengths - idle:
+            idle -= strengths
+        if set(PULSES) & set(names) and not set(PULSES) <= idle:
+            idle -= set(PULSES)
+        return idle
+
+    def _without(self, mode: Mode, idle: Set[str]) -> Mode | None:
+        """Return the mode without some opened numbers; nothing where the search breaks down."""
+        if not idle:
+            return mode
+        # Without pulses their frequency is the frequency of nothing.
+        gone = {*idle, "pulse_frequency"} if set(PULSES) <= idle else idle
+        kept = {name: value for name, value in mode.point.opened.items() if name not in gone}
+        return self._short(replace(mode.point, opened=kept), mode.weights)
 
     def _short(self, point: Point, weights: Weights) -> Mode | None:
         """Return the mode near a point; nothing where the search does not soon come to its end.
@@ -194,6 +212,21 @@ class Opening:
         """
         mode = unless_broken(lambda: self.modes.soon().find(point, weights, held=FROM_NEAR))
         return mode if mode is not None and mode.converged else None
+
+
+def _parts(asked: Mapping[str, float], trial: Trial) -> list[tuple[str, ...]]:
+    """Return the numbers that are opened together, what the recording asks for most first."""
+    gains: dict[tuple[str, ...], float] = {}
+    strengths = tuple(name for name in STRENGTHS if name in asked)
+    if strengths:
+        gains[strengths] = trial.chi_squared(dict.fromkeys(strengths, 0.0)) - len(strengths)
+    pulses = tuple(name for name in asked if name.startswith("pulse_"))
+    if pulses:
+        # Those have no score test, and may be what another departure leaves in the spectrum.
+        gains[pulses] = 0.0
+    for name in set(asked) - {*strengths, *pulses}:
+        gains[(name,)] = trial.sigmas[name] ** 2 - 1.0
+    return sorted(gains, key=lambda names: (-gains[names], names))
 
 
 def _within(name: str, value: float) -> float:
