@@ -19,6 +19,7 @@ import multiprocessing
 import os
 import sys
 import time
+import zlib
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any, Final
@@ -47,7 +48,7 @@ INTERVAL_S: Final = 0.1
 NOISE: Final = (0.3e-3, 0.3e-3, np.deg2rad(0.5))
 """Of x, y [m] and theta [rad]."""
 FIRST_SEED: Final = 40_000
-"""Of the first world; no other study uses it."""
+"""Of the worlds, with the case and the number of each; no other study uses it."""
 REFERENCE_M_S: Final = 0.03
 """Speed at which a drag of another power is that of C_d (benchmarks/ode/tank.hpp)."""
 SOURCES: Final = ("src/driftwalk/likelihood/**/*.py", "cpp/include/driftwalk/infer/*.hpp")
@@ -111,8 +112,8 @@ def fit_one(kind: str, name: str, number: int, minutes: float, motions: Path) ->
     if kind == "right":
         world, poses = right_motion(number, motions, minutes)
     else:
-        world, poses = motion(case, number, motions, minutes)
-    recording = record(case, poses, number)
+        world, poses = motion(case, draws(kind, name, number), number, motions, minutes)
+    recording = record(case, poses, draws(kind, name, number, "camera"))
     study = dw.Study()
     wrong = {key: factor * _number_at(study, key) for key, factor in case.told.items()}
     facts: dict[str, Any] = {
@@ -206,22 +207,32 @@ def _force(drag_coefficient: float, power: float, linear: float, slip: float) ->
     return 4.0 / np.pi * faced + linear * slip
 
 
-def motion(case: Case, number: int, folder: Path, minutes: float) -> tuple[World, Poses]:
+def draws(kind: str, name: str, number: int, what: str = "world") -> np.random.Generator:
+    """Return the random numbers of a recording, for its world or its camera.
+
+    Each misfit has worlds of its own, so that those of one table are independent of each other.
+    The sizes of misfits share theirs: what differs between two sizes is then their size.
+    """
+    of_case = zlib.crc32(name.encode()) if kind == "misfits" else 0
+    return np.random.default_rng([FIRST_SEED, of_case, number, zlib.crc32(what.encode())])
+
+
+def motion(
+    case: Case, rng: np.random.Generator, number: int, folder: Path, minutes: float
+) -> tuple[World, Poses]:
     """Return a world and the block's motion in it; both are kept."""
-    world = world_of(number, case)
+    world, seed = world_of(case, number, rng), int(rng.integers(2**31))
     words = [f"{name}={value:.9g}" for name, value in case.law.items()]
     if case.growth:
         # The engine begins a minute before the first sample.
         words.append(f"flow_growth={case.growth / (60.0 * minutes + 60.0):.9g}")
     program = "".join(path.read_text() for path in sorted(ODE.glob("*.?pp")))
     label = hashlib.sha256(
-        " ".join([*words, f"{minutes:g}", str(case.carried), program]).encode()
+        " ".join([*words, f"{minutes:g}", str(seed), str(case.carried), program]).encode()
     ).hexdigest()[:12]
     path = folder / f"{number:03d}-{label}.npz"
     if not path.exists():
-        poses = ode_poses(
-            folder / PROGRAM, world, duration=60.0 * minutes, seed=FIRST_SEED + number, law=words
-        )
+        poses = ode_poses(folder / PROGRAM, world, duration=60.0 * minutes, seed=seed, law=words)
         partial = path.with_suffix(f".{os.getpid()}.npz")
         np.savez(partial, **poses._asdict())
         partial.replace(path)
@@ -229,18 +240,16 @@ def motion(case: Case, number: int, folder: Path, minutes: float) -> tuple[World
         return world, Poses(*(stored[name] for name in Poses._fields))
 
 
-def world_of(number: int, case: Case) -> World:
+def world_of(case: Case, number: int, rng: np.random.Generator) -> World:
     """Draw a world: C_d 0.4 to 0.5, sigma_F 0.5 to 0.7 mN, a flow of one of the two families."""
-    rng = np.random.default_rng(FIRST_SEED + number)
     drag, force = float(rng.uniform(0.4, 0.5)), float(rng.uniform(0.5e-3, 0.7e-3))
     if case.carried:
         return World(drag, force, *draw_flow(rng, "regular", sink_share=0.0))
     return World(drag, force, *draw_flow(rng, FAMILIES[number % len(FAMILIES)]))
 
 
-def record(case: Case, poses: Poses, number: int) -> Any:
+def record(case: Case, poses: Poses, rng: np.random.Generator) -> Any:
     """Return the `trajectory` that the camera of a case makes of the motion."""
-    rng = np.random.default_rng([FIRST_SEED, number])
     time = INTERVAL_S * np.arange(poses.x.size)
     noisy = [
         part + std * rng.normal(size=time.size) for part, std in zip(poses, NOISE, strict=True)
