@@ -26,6 +26,7 @@ def one_blas_thread() -> Iterator[None]:
 
     Examples
     --------
+    >>> import numpy as np
     >>> with one_blas_thread():
     ...     solved = np.linalg.solve(2.0 * np.eye(2), np.ones(2))
     >>> solved
