@@ -137,7 +137,7 @@ def test_four_blocks_with_moderate_noise(
     scenes: ModuleType, scores: ModuleType, tmp_path: Path, seed: int
 ) -> None:
     """Measured: 0.018 mm, 0.10 degrees, all samples."""
-    out, _, truth = filmed(scenes, tmp_path, "moderate", seed, 150)
+    out, _, truth = filmed(scenes, tmp_path, "moderate", seed, 100)
     found = scores.score(xr.load_dataset(out), truth)
     assert found["position_rms_mm"] <= 0.15
     assert found["angle_rms_deg"] <= 0.5
@@ -151,7 +151,7 @@ def test_four_blocks_with_moderate_noise(
 def test_four_blocks_with_heavy_noise(
     scenes: ModuleType, scores: ModuleType, tmp_path: Path, seed: int
 ) -> None:
-    out, _, truth = filmed(scenes, tmp_path, "heavy", seed, 120)
+    out, _, truth = filmed(scenes, tmp_path, "heavy", seed, 80)
     found = scores.score(xr.load_dataset(out), truth)
     assert found["recall_visible"] >= 0.95
     assert found["unmarked"] == 0

@@ -223,25 +223,25 @@ def random_case(seed: int) -> tuple[dw.Study, xr.Dataset, dict[str, Any]]:
 @pytest.mark.slow
 def test_random_worlds_agree_for_a_second_and_a_half() -> None:
     met = latched = 0
-    for seed in range(40):
+    for seed in range(25):
         model, flow, arguments = random_case(seed)
         run = compare(model, flow, steps=150, **arguments)
         met += run["first_contact_step"] > 0
         latched += int(run["event_count"])
-    assert met > 20
-    assert latched > 20
+    assert met > 12
+    assert latched > 12
 
 
 @pytest.mark.slow
 def test_most_worlds_agree_for_six_seconds() -> None:
     # Crowded worlds part by chaos, from 1e-16 m on: the events of most are still the same.
     same, distance = 0, []
-    for seed in range(1000, 1010):
+    for seed in range(1000, 1007):
         model, flow, arguments = random_case(seed)
         settings = {**RULES, **arguments, "steps": 600}
         native = native_row(model, flow, **settings)
         twin = assemble_reference(model, flow, **settings)
         same += all(np.array_equal(native[name], twin[name]) for name in EXACT)
         distance.append(apart(native, twin))
-    assert same >= 9
+    assert same >= 6
     assert np.quantile(distance, 0.75) < TOLERANCE
