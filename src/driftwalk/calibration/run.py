@@ -40,6 +40,7 @@ from driftwalk.calibration.search import (
     run_map,
     window_smoother,
 )
+from driftwalk.calibration.steadiness import Steadiness, steadiness_of
 from driftwalk.calibration.surface import Optimum
 from driftwalk.calibration.wall import wall_warning
 from driftwalk.comparison import Statistic
@@ -158,9 +159,11 @@ def calibrate(
     say = tell if tell is not None else _silent
     result = _Calibration(problem, keep, say).run()
     of_wall = wall_warning(track, chosen) if isinstance(searched, BlockModel) else None
-    result.warnings += [of_wall] if of_wall is not None else []
+    steadiness = steadiness_of(problem)
+    of_time = None if steadiness is None else steadiness.warning
+    result.warnings += [text for text in (of_wall, of_time) if text is not None]
     halves = _halves(track, problem, flow_of, say)
-    return _finish(result, halves, recording, problem)
+    return _finish(result, halves, steadiness, recording, problem)
 
 
 def _study_and_model(
@@ -377,7 +380,11 @@ def _halves(track: Track, problem: Problem, flow_of: FlowSource, say: Tell) -> H
 
 
 def _finish(
-    found: _Calibration, halves: Halves | None, recording: xr.Dataset, problem: Problem
+    found: _Calibration,
+    halves: Halves | None,
+    steadiness: Steadiness | None,
+    recording: xr.Dataset,
+    problem: Problem,
 ) -> xr.Dataset:
     """Put the pieces into one dataset and state the answer."""
     lowest = found.coarse.point(found.coarse.cell_of_minimum())
@@ -397,6 +404,10 @@ def _finish(
         facts |= estimate_facts(problem, halves.point, "first_half_")
         facts["second_half_ks_distance"] = halves.distance
         facts["second_half_noise_floor"] = halves.floor
+    if steadiness is not None:
+        facts["halves_ks_distance"] = steadiness.distance
+        facts["halves_ks_distance_expected"] = steadiness.expected
+        facts["halves_p_value"] = steadiness.p_value
     surface = None if found.surface is None else at_settings(found.surface)
     pieces = Found(found.coarse, found.refined, surface, found.bootstrap, found.region)
     return build_calibration(problem, pieces, facts)

@@ -34,6 +34,9 @@ _KEYS: Final = (
     "interval_stretch",
     "second_half_ks_distance",
     "second_half_noise_floor",
+    "halves_ks_distance",
+    "halves_ks_distance_expected",
+    "halves_p_value",
     "first_half_drag_coefficient",
     "first_half_force_std_N",
     "coarse_drag_coefficient",
@@ -73,6 +76,12 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
             "second half",
             f"{facts['second_half_ks_distance']:.4f} for a calibration on the first, noise floor "
             f"{facts['second_half_noise_floor']:.4f}",
+        )
+    if "halves_ks_distance" in facts:
+        print_row(
+            "its own halves",
+            f"{facts['halves_ks_distance']:.4f} apart, halves of parts drawn at random "
+            f"{facts['halves_ks_distance_expected']:.4f}",
         )
     print_warnings(facts["warnings"])
     print_figures(folder)

@@ -222,6 +222,8 @@ def validation_section(calibration: xr.Dataset) -> Section:
     keys += [
         ("KS distance to the second half", "second_half_ks_distance", 1.0),
         ("noise floor there", "second_half_noise_floor", 1.0),
+        ("KS distance between the two halves", "halves_ks_distance", 1.0),
+        ("the same of parts drawn at random", "halves_ks_distance_expected", 1.0),
     ]
     rows = [
         [label, None if (value := value_of(calibration, key)) is None else scale * value]

@@ -40,6 +40,7 @@ OPTIMUM: Final = "optimum_"
 _BINS: Final = "density_step_length density_turning_angle"
 _REFINED: Final = "refined"
 _BOOTSTRAPPED: Final = "with a bootstrap"
+_LONG: Final = "200 pairs of steps or more"
 
 
 def _map(prefix: str, dims: str, replicate: str, when: str) -> tuple[Variable, ...]:
@@ -160,6 +161,18 @@ _ANSWER: Final = (
         "KS distance of the estimates from the first half to the second", when=_REFINED,
     ),
     Variable("second_half_noise_floor", "", "1", "noise floor of the second half", when=_REFINED),
+    Variable(
+        "halves_ks_distance", "", "1", "KS distance between the recording's own two halves",
+        when=_LONG,
+    ),
+    Variable(
+        "halves_ks_distance_expected", "", "1",
+        "the same between halves of parts drawn at random, the median", when=_LONG,
+    ),
+    Variable(
+        "halves_p_value", "", "1", "share of the drawn halves that differ as much", when=_LONG,
+        note="at 0.005 the motion is not steady",
+    ),
     Variable(
         "region_level", "", "1", "KS distance at the border of the joint region",
         when=_BOOTSTRAPPED,

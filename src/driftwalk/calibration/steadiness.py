@@ -1,0 +1,81 @@
+"""Whether a recording moves in its second half as in its first, before a model is blamed for it."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.calibration.problem import Problem
+from driftwalk.comparison.statistic import StepTable
+
+PARTS: Final = 20
+"""Parts of which halves are drawn at random."""
+FEWEST_PAIRS: Final = 200
+DRAWS: Final = 199
+LEVEL: Final = 0.005
+"""A recording is not steady when no half drawn at random differs as much as those in time."""
+SEED: Final = 20
+
+
+class Steadiness(NamedTuple):
+    """How far the two halves of a recording are from each other."""
+
+    distance: float
+    """KS distance between the steps of the first half and those of the second."""
+    expected: float
+    """Median KS distance between halves that are made of parts drawn at random."""
+    p_value: float
+    """Share of such halves that differ as much."""
+
+    @property
+    def warning(self) -> str | None:
+        """Return a warning where the motion is not steady."""
+        if self.p_value > LEVEL:
+            return None
+        return (
+            f"the motion is not steady: D = {self.distance:.3f} between the recording's own two "
+            f"halves, {self.expected:.3f} between halves of parts drawn at random; no steady model "
+            "can predict one half from the other, whatever its parameters"
+        )
+
+
+def steadiness_of(problem: Problem) -> Steadiness | None:
+    """Compare the halves of a recording with each other.
+
+    The steps, in their order in time, are cut into 20 parts of equal numbers. Ten of them drawn at
+    random, and the other ten, differ by chance and by what lasts less than a part. The first ten
+    and the last ten differ by more where the motion changes with time.
+
+    Parameters
+    ----------
+    problem : Problem
+        The recording with its steps and the statistic.
+
+    Returns
+    -------
+    Steadiness or None
+        Nothing where the recording has fewer than 200 pairs of steps.
+    """
+    count = len(problem.steps)
+    if count < FEWEST_PAIRS:
+        return None
+    part = PARTS * np.arange(count) // count
+    own = _distance(problem, part < PARTS // 2)
+    random = np.random.default_rng(SEED)
+    drawn = [
+        _distance(problem, np.isin(part, random.permutation(PARTS)[: PARTS // 2]))
+        for _ in range(DRAWS)
+    ]
+    as_far = sum(one >= own for one in drawn)
+    return Steadiness(own, float(np.median(drawn)), (1 + as_far) / (1 + DRAWS))
+
+
+def _distance(problem: Problem, chosen: npt.NDArray[np.bool_]) -> float:
+    """Return the distance between the chosen steps and the others."""
+    tables = []
+    for kept in (chosen, ~chosen):
+        length, angle = (np.ascontiguousarray(one[None]) for one in problem.steps[kept].T)
+        tables.append(StepTable(length, angle, np.array([kept.sum()], dtype=np.int64)))
+    return float(problem.statistic.matrix(*tables)[0, 0])
