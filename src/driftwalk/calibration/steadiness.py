@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final, NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
 from driftwalk.calibration.problem import Problem
-from driftwalk.comparison.statistic import StepTable
+from driftwalk.comparison import block_permutation_test
 
 PARTS: Final = 20
 """Parts of which halves are drawn at random."""
@@ -58,24 +56,15 @@ def steadiness_of(problem: Problem) -> Steadiness | None:
     Steadiness or None
         Nothing where the recording has fewer than 200 pairs of steps.
     """
-    count = len(problem.steps)
+    steps = problem.steps
+    count = len(steps)
     if count < FEWEST_PAIRS:
         return None
-    part = PARTS * np.arange(count) // count
-    own = _distance(problem, part < PARTS // 2)
-    random = np.random.default_rng(SEED)
-    drawn = [
-        _distance(problem, np.isin(part, random.permutation(PARTS)[: PARTS // 2]))
-        for _ in range(DRAWS)
-    ]
-    as_far = sum(one >= own for one in drawn)
-    return Steadiness(own, float(np.median(drawn)), (1 + as_far) / (1 + DRAWS))
-
-
-def _distance(problem: Problem, chosen: npt.NDArray[np.bool_]) -> float:
-    """Return the distance between the chosen steps and the others."""
-    tables = []
-    for kept in (chosen, ~chosen):
-        length, angle = (np.ascontiguousarray(one[None]) for one in problem.steps[kept].T)
-        tables.append(StepTable(length, angle, np.array([kept.sum()], dtype=np.int64)))
-    return float(problem.statistic.matrix(*tables)[0, 0])
+    middle = (count + 1) // 2
+    first, second = steps[:middle], steps[middle:]
+    drawn = block_permutation_test(
+        first, second, block_length=count // PARTS, permutations=DRAWS, seed=SEED
+    )
+    tables = [replace(problem.reference, steps=half).table for half in (first, second)]
+    distance = float(problem.statistic.matrix(*tables)[0, 0])
+    return Steadiness(distance, drawn.noise_floor, drawn.p_value)
