@@ -41,11 +41,7 @@ def wall_warning(track: Track, study: Study) -> str | None:
     True
     """
     tank = study.tank
-    fields = type(tank).model_fields
-    if any(
-        getattr(tank, name) != fields[name].default
-        for name in ("wall_restitution", "wall_friction")
-    ):
+    if not (tank.is_default("wall_restitution") and tank.is_default("wall_friction")):
         return None
     reach = study.block.side_m / math.sqrt(2.0) + REACH_M
     near = outline_of(tank.to_arena()).depth(track.x, track.y) < reach

@@ -141,6 +141,10 @@ class Section(_WithSignature, BaseModel):
         except ValidationError as error:
             raise _SectionError(_describe(type(self), error)) from None
 
+    def is_default(self, key: str) -> bool:
+        """Return whether a key has its default value: a study file may hold it all the same."""
+        return bool(getattr(self, key) == type(self).model_fields[key].default)
+
     @classmethod
     def replaced_by(cls, keys: set[str]) -> set[str]:  # noqa: ARG003
         """Return the keys that lose their meaning when the keys given are set."""

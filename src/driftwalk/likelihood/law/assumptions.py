@@ -84,7 +84,7 @@ def _drag_of(study: Study) -> tuple[dict[str, float], dict[str, float], list[str
 
 def is_stated(study: Study, key: str) -> bool:
     """Return whether [forces] states another law. A new study file holds every key as it is."""
-    return bool(getattr(study.forces, key) != type(study.forces).model_fields[key].default)
+    return not study.forces.is_default(key)
 
 
 def added_mass_of(study: Study, *, floating: bool) -> tuple[float, float]:
