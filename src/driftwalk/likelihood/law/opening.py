@@ -87,7 +87,7 @@ class Opening:
     def _pruned(self, mode: Mode) -> Mode:
         """Return the mode without numbers that are idle since others were opened."""
         names = set(mode.point.opened) - set(self.assumptions.opened)
-        return (self._without(mode, self._idle(mode, names)) or mode) if names else mode
+        return self._without(mode, self._idle(mode, names)) or mode
 
     def _closed_names(self, mode: Mode, closed: Set[str]) -> list[str]:
         """Return the numbers that may still be opened."""
