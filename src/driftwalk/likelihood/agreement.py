@@ -59,7 +59,6 @@ def angle_given_facts(
             prior,
             iterations=study.fit.iterations,
             held=FROM_NEAR,
-            close=CLOSE,
         )
         again = restricted_drag(passes, other, prior, intensity=False)
     except BREAKDOWN:

@@ -54,6 +54,10 @@ CLOSE = 0.25
 below this part of their standard deviations: what is left is a tenth of such a step."""
 CLOSE_ENOUGH = 0.5
 """The same where a search of many more samples begins: what is saved here costs more there."""
+CLOSE_NATS: Final = 1.0
+"""Converged when a whole step would also raise the log likelihood by less than this. Hundreds of
+coefficients may each move by a small part of their standard deviations and gain 100 nats together:
+on the plateau at the edge of a narrow jet a search ended 170 nats above its minimum."""
 
 
 @dataclass(frozen=True)
@@ -173,6 +177,7 @@ def find_mode(
     tell: Tell = silent,
     held: Held = FROM_AFAR,
     close: float = CLOSE,
+    close_nats: float = CLOSE_NATS,
 ) -> Mode:
     """Search the maximum of the penalised likelihood.
 
@@ -194,7 +199,9 @@ def find_mode(
         Parameters that the first steps leave as they are: `FROM_AFAR`, `FROM_ANOTHER` or
         `FROM_NEAR`.
     close : float
-        The search ends when its steps are below this part of the standard deviations.
+        The search ends when its steps are below this part of the standard deviations,
+    close_nats : float
+        and when a whole step would gain less than this [nat].
     """
     point, used, converged = start, 0, False
     covariance = np.zeros((0, 0))
@@ -219,7 +226,8 @@ def find_mode(
         if point.log_lever is not None:
             moves[drag + LEVER] = 0.0
         near = max(float(moves[drag:].max()), float(np.sqrt((moves[:drag] ** 2).mean())))
-        if len(left) == 0 and near < close:
+        gain = 0.5 * float(sums.score @ covariance @ sums.score)
+        if len(left) == 0 and near < close and gain < close_nats:
             converged = True
             break
     return Mode(point, weights, covariance, used, index + 1, converged, deviance)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -14,6 +15,7 @@ from driftwalk.likelihood.law.trial import Trial, try_numbers
 from driftwalk.likelihood.newton import (
     CLOSE,
     CLOSE_ENOUGH,
+    CLOSE_NATS,
     FROM_AFAR,
     FROM_ANOTHER,
     Held,
@@ -38,6 +40,10 @@ class Modes:
     iterations: int
     """Most steps of a search."""
     tell: Tell
+    close: float = CLOSE
+    """A search ends when its steps are below this part of the standard deviations,"""
+    close_nats: float = CLOSE_NATS
+    """and when a whole step would gain less than this [nat]."""
 
     def of(self, series: Sequence[Series]) -> Modes:
         """Return the same for other series."""
@@ -45,11 +51,14 @@ class Modes:
 
     def soon(self) -> Modes:
         """Return the same with fewer steps, to see whether a search comes to an end."""
-        return replace(self, iterations=min(self.iterations, TRIAL_ITERATIONS))
+        few = min(self.iterations, TRIAL_ITERATIONS)
+        return replace(self, iterations=few, close_nats=math.inf)
 
-    def find(
-        self, start: Point, weights: Weights, *, held: Held = FROM_AFAR, close: float = CLOSE
-    ) -> Mode:
+    def roughly(self) -> Modes:
+        """Return the same with searches that end a little earlier, where another one follows."""
+        return replace(self, close=CLOSE_ENOUGH, close_nats=math.inf)
+
+    def find(self, start: Point, weights: Weights, *, held: Held = FROM_AFAR) -> Mode:
         """Return the mode."""
         return find_mode(
             self.passes,
@@ -59,14 +68,16 @@ class Modes:
             iterations=self.iterations,
             tell=self.tell,
             held=held,
-            close=close,
+            close=self.close,
+            close_nats=self.close_nats,
         )
 
     def find_from_afar(self, start: Point, weights: Weights) -> Mode:
         """Return the mode, of long recordings by way of that of pieces of them."""
         few = pieces(self.passes)
         if few is not None:
-            near = unless_broken(lambda: self.of(few).find(start, weights, close=CLOSE_ENOUGH))
+            rough = self.of(few).roughly()
+            near = unless_broken(lambda: rough.find(start, weights))
             if near is not None and near.converged:
                 mode = unless_broken(lambda: self.find(near.point, near.weights, held=FROM_ANOTHER))
                 if mode is not None and mode.converged:
