@@ -53,7 +53,7 @@ def check_model(
 
     Ten criteria with a p value, for the errors of prediction and the motion of simulated
     recordings, and a largest share of outliers; the model explains the recording unless a p value
-    is below 0.001. A recording of the model itself fails once in 100 times by that count
+    is below 0.0005. A recording of the model itself fails once in 200 times by that count
     (Bonferroni; measured: docs/explanation/likelihood.md). The check corrects for the errors that
     fitting hundreds of coefficients absorbs: their covariance at the estimate is ``I - J C J'``.
 

@@ -16,10 +16,10 @@ from driftwalk.likelihood.check.scan import Scan
 from driftwalk.likelihood.check.white import White
 from driftwalk.likelihood.spline import Floats
 
-LEVEL = 0.001
+LEVEL = 0.0005
 """A recording of the model itself fails one criterion this often; ten of them, that is one
-recording in 100. At 0.002 three of 68 failed, where one in 50 is allowed: tails of distributions
-are known only about, so the level has a margin (docs/explanation/likelihood.md)."""
+recording in 200. One in 50 is allowed: tails of distributions are known only about, so the level
+has a margin. At 0.001 five of 276 failed (docs/explanation/likelihood.md)."""
 MOST_OUTLIERS = 1e-3
 """Share of samples. One in 5e8 is expected, but a tracker may slip now and then."""
 MISSED_MISTAKES = 0.25
