@@ -20,17 +20,53 @@ using namespace nb::literals;
 
 namespace {
 
-// Worlds as the columns of one array (worlds, 8): x, y, theta, vx, vy, omega, drag coefficient,
-// force std; and their random keys.
+// A self-propelled particle instead of the block: what all worlds of a batch have in common.
+driftwalk::ParticleModel particle(const std::string& kind, int states, const std::string& contact,
+                                  bool carried) {
+  using driftwalk::ParticleKind;
+  using driftwalk::WallContact;
+  driftwalk::ParticleModel model;
+  model.kind = kind == "inertial"    ? ParticleKind::inertial
+               : kind == "switching" ? ParticleKind::switching
+                                     : ParticleKind::none;
+  model.contact = contact == "reflect" ? WallContact::reflect : WallContact::slide;
+  model.states = states;
+  model.carried = carried;
+  const bool switching = model.kind == ParticleKind::switching;
+  if (model.kind == ParticleKind::none || (contact != "reflect" && contact != "slide") ||
+      states < (switching ? 1 : 0) || states > (switching ? driftwalk::most_particle_states : 0)) {
+    throw std::invalid_argument("no such particle");
+  }
+  return model;
+}
+
+int columns_of(const driftwalk::ParticleModel& model) {
+  switch (model.kind) {
+  case driftwalk::ParticleKind::switching:
+    return driftwalk::particle_columns(model.states);
+  case driftwalk::ParticleKind::inertial:
+    return driftwalk::inertial_columns;
+  case driftwalk::ParticleKind::none:
+    break;
+  }
+  return 2;
+}
+
+// Worlds as the columns of one array: x, y, theta, vx, vy, omega; then drag coefficient and
+// force std, or a particle's numbers; and their random keys.
 class Worlds {
 public:
-  Worlds(const In<double, 2>& table, const In<std::uint64_t, 1>& key)
-      : count_(table.shape(0)), columns_(table.size()) {
-    if (table.shape(1) != 8 || key.size() != count_) {
-      throw std::invalid_argument("worlds must have shape (n, 8) and key shape (n,)");
+  Worlds(const In<double, 2>& table, const In<std::uint64_t, 1>& key,
+         const std::optional<driftwalk::ParticleModel>& model)
+      : count_(table.shape(0)), columns_(table.size()),
+        particle_(model.value_or(driftwalk::ParticleModel())) {
+    const std::size_t width = 6 + static_cast<std::size_t>(columns_of(particle_));
+    if (table.shape(1) != width || key.size() != count_) {
+      throw std::invalid_argument("worlds must have shape (n, " + std::to_string(width) +
+                                  ") and key shape (n,)");
     }
     for (std::size_t row = 0; row < count_; ++row) {
-      for (std::size_t column = 0; column < 8; ++column) {
+      for (std::size_t column = 0; column < width; ++column) {
         columns_[column * count_ + row] = table(row, column);
       }
     }
@@ -48,8 +84,13 @@ public:
     view.vx = column(3);
     view.vy = column(4);
     view.omega = column(5);
-    view.drag_coefficient = column(6);
-    view.force_std = column(7);
+    view.particle = particle_;
+    if (particle_.kind == driftwalk::ParticleKind::none) {
+      view.drag_coefficient = column(6);
+      view.force_std = column(7);
+    } else {
+      view.particle.values = column(6);
+    }
     view.key = key_.data();
     return view;
   }
@@ -58,6 +99,7 @@ private:
   std::size_t count_;
   std::vector<double> columns_;
   std::vector<std::uint64_t> key_;
+  driftwalk::ParticleModel particle_;
 };
 
 template <class T>
@@ -77,8 +119,8 @@ nb::tuple simulate_as(const driftwalk::PreparedRun<T>& run, const Worlds& worlds
 }
 
 nb::tuple simulate(const Model& model, In<double, 2> table, In<std::uint64_t, 1> key, int threads,
-                   const std::string& precision) {
-  const Worlds worlds(table, key);
+                   const std::string& precision, std::optional<driftwalk::ParticleModel> particle) {
+  const Worlds worlds(table, key, particle);
   if (precision == "double") {
     return simulate_as(model.twice(), worlds, model.samples(), threads);
   }
@@ -88,8 +130,9 @@ nb::tuple simulate(const Model& model, In<double, 2> table, In<std::uint64_t, 1>
 nb::dict score(const Model& model, In<double, 2> table, In<std::uint64_t, 1> key,
                In<std::int32_t, 1> left, In<double, 1> weight, In<std::int32_t, 1> triple,
                std::optional<In<double, 2>> reference, int bins, double length_limit,
-               double angle_limit, std::int64_t excerpt, bool keep_steps, int threads) {
-  const Worlds worlds(table, key);
+               double angle_limit, std::int64_t excerpt, bool keep_steps, int threads,
+               std::optional<driftwalk::ParticleModel> particle) {
+  const Worlds worlds(table, key, particle);
   const std::size_t count = worlds.count();
   driftwalk::Scoring scoring;
   scoring.plan = {left.data(), weight.data(), triple.data(), static_cast<std::int64_t>(left.size()),
@@ -224,11 +267,20 @@ void register_simulate(nb::module_& module) {
   driftwalk::each_model_number([&](const char* name, const char*, driftwalk::Range, auto field) {
     model.def_prop_ro(name, [field](const Model& self) { return self.numbers().*field; });
   });
+  nb::class_<driftwalk::ParticleModel>(module, "Particle")
+      .def(
+          "__init__",
+          [](driftwalk::ParticleModel* self, const std::string& kind, int states,
+             const std::string& contact, bool carried) {
+            new (self) driftwalk::ParticleModel(particle(kind, states, contact, carried));
+          },
+          nb::kw_only(), "kind"_a, "states"_a, "contact"_a, "carried"_a)
+      .def_prop_ro("columns", &columns_of);
   module.def("simulate", &simulate, "model"_a, "worlds"_a, "key"_a, nb::kw_only(), "threads"_a,
-             "precision"_a);
+             "precision"_a, "particle"_a = nb::none());
   module.def("score", &score, "model"_a, "worlds"_a, "key"_a, nb::kw_only(), "left"_a, "weight"_a,
              "triple"_a, "reference"_a.none(), "bins"_a, "length_limit"_a, "angle_limit"_a,
-             "excerpt"_a, "keep_steps"_a, "threads"_a);
+             "excerpt"_a, "keep_steps"_a, "threads"_a, "particle"_a = nb::none());
   module.def("ks_matrix", &ks_matrix, "a_length"_a, "a_angle"_a, "a_count"_a, "b_length"_a,
              "b_angle"_a, "b_count"_a, nb::kw_only(), "threads"_a);
   module.def("drag", &drag, "model"_a, nb::kw_only(), "drag_coefficient"_a, "x"_a, "y"_a, "theta"_a,

@@ -59,9 +59,21 @@ class Model:
     @property
     def samples(self) -> int: ...
 
+# A self-propelled particle instead of the block; `columns` are those of a world after its start.
+class Particle:
+    def __init__(self, *, kind: str, states: int, contact: str, carried: bool) -> None: ...
+    @property
+    def columns(self) -> int: ...
+
 # x, y, theta of shape (worlds, samples), float32 or float64 by precision, and status (worlds,)
 def simulate(
-    model: Model, worlds: _Floats, key: _Keys, *, threads: int, precision: str
+    model: Model,
+    worlds: _Floats,
+    key: _Keys,
+    *,
+    threads: int,
+    precision: str,
+    particle: Particle | None = None,
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[np.uint32]]: ...
 def score(
     model: Model,
@@ -78,6 +90,7 @@ def score(
     excerpt: int,
     keep_steps: bool,
     threads: int,
+    particle: Particle | None = None,
 ) -> dict[str, npt.NDArray[Any]]: ...
 def ks_matrix(
     a_length: _Floats,

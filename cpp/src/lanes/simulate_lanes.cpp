@@ -1,4 +1,5 @@
 // The simulation kernel, compiled once per instruction set.
+#include "driftwalk/particle/run.hpp"
 #include "driftwalk/physics/laws/mixed.hpp"
 #include "driftwalk/simulate/lanes.hpp"
 #include "driftwalk/simulate/run.hpp"
@@ -17,7 +18,9 @@ constexpr int float_lanes = 4;
 void simulate(const Prepared<float>& run, const BatchWorlds& worlds, std::int64_t first, int count,
               const SampleSink<float>& sink, std::uint32_t* status) {
   using Real = FloatPack<float_lanes>;
-  if (!run.drag.is_quadratic) {
+  if (worlds.particle.kind != ParticleKind::none) {
+    run_particle_kind<Real>(run, worlds, first, count, sink, status);
+  } else if (!run.drag.is_quadratic) {
     run_worlds<Real, float, MixedDrag<Real>>(run, worlds, first, count, sink, status);
   } else {
     run_worlds<Real, float, QuadraticDrag>(run, worlds, first, count, sink, status);

@@ -23,6 +23,8 @@ class Purpose(IntEnum):
     FORCE = 1
     OBSERVATION = 2
     START = 3
+    MOTION = 4
+    BOUT = 5
 
 
 WORK: Final[dict[str, int]] = {

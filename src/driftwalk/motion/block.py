@@ -11,8 +11,8 @@ from driftwalk import _core
 from driftwalk.comparison import StepReference
 from driftwalk.conditions.recorded import Conditions
 from driftwalk.core.errors import InputError
+from driftwalk.motion.native import scored
 from driftwalk.motion.protocol import Details, Floats, Keys, Scores, Values, Worlds
-from driftwalk.motion.score import DENSITY_BINS, excerpt_samples
 from driftwalk.schema import Parameter
 from driftwalk.simulation.backend import native_model, world_table
 from driftwalk.simulation.initial import world_orientations
@@ -91,24 +91,8 @@ class BlockModel:
         InputError
             When the conditions have no flow.
         """
-        full = details == "all"
-        return dict(
-            _core.score(
-                self.native(like),
-                _table(values, like, keys),
-                keys,
-                left=reference.plan.left,
-                weight=reference.plan.weight,
-                triple=reference.plan.triple,
-                reference=reference.steps,
-                bins=DENSITY_BINS if full else 0,
-                length_limit=reference.length_limit,
-                angle_limit=reference.angle_limit,
-                excerpt=excerpt_samples(like) if full else 0,
-                keep_steps=details == "steps",
-                threads=like.threads,
-            )
-        )
+        table = _table(values, like, keys)
+        return scored(self.native(like), table, like, keys, reference, details=details)
 
     def describe(self) -> dict[str, Any]:
         """Return the study that it was made from."""

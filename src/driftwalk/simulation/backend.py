@@ -16,7 +16,7 @@ from driftwalk.schema.kinds.motion import WORLD_STATUS
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.model import Study
+    from driftwalk.model import FieldOfView, Study, Tank
     from driftwalk.model.tank import Outline
 
 Floats = npt.NDArray[np.float64]
@@ -62,12 +62,7 @@ def native_model(
         When there is no sample, times are not finite or do not increase, or the dataset is no flow
         field.
     """
-    check_flow_field(flow)
-    _check_sample_time(sample_time)
-    tank, forces = study.tank, study.forces
-    x, y = flow["x"].values, flow["y"].values
-    _require_table(flow, tank, accelerating=forces.pressure_gradient)
-    step = study.time_step_s
+    forces, step = study.forces, study.time_step_s
     return _core.Model(
         side=study.block.side_m,
         mass=study.block.mass_kg,
@@ -80,27 +75,95 @@ def native_model(
         drag_power=forces.drag_power,
         drag_speed=forces.drag_speed_m_s,
         displaced_mass=study.displaced_mass_kg if forces.pressure_gradient else 0.0,
-        radius=tank.radius_m or 0.0,
-        edges=wall_edges(tank),
-        restitution=tank.wall_restitution,
-        friction=tank.wall_friction,
-        bounce_speed=tank.bounce_speed_m_s,
-        u=_frames(flow, "u"),
-        v=_frames(flow, "v"),
-        frame_time=_frame_times(flow),
-        origin_x=float(x[0]),
-        origin_y=float(y[0]),
-        spacing_x=float((x[-1] - x[0]) / (x.size - 1)),
-        spacing_y=float((y[-1] - y[0]) / (y.size - 1)),
         time_step=step,
         steps_per_interval=round(forces.force_interval_s / step),
         force_memory=forces.force_memory_s,
-        sample_time=np.ascontiguousarray(sample_time, dtype=np.float64),
-        position_noise=camera.position_noise,
-        orientation_noise=camera.orientation_noise,
-        position_quantum=camera.position_quantum,
-        **_field_of_view(study),
+        **_surroundings(
+            study.tank, study.observation.field_of_view, flow, sample_time, camera,
+            accelerating=forces.pressure_gradient,
+        ),
+    )  # fmt: skip
+
+
+POINT: Final[dict[str, Any]] = {
+    "side": 1e-6, "mass": 1.0, "inertia": 1.0, "depth": 1.0, "strips": 1, "added_mass_share": 0.0,
+    "water_density": 1.0, "linear_drag": 0.0, "drag_power": 2.0, "drag_speed": 1.0,
+    "displaced_mass": 0.0, "steps_per_interval": 1, "force_memory": 0.0,
+}  # fmt: skip
+"""Numbers of a block where there is none: a self-propelled particle reads nothing of them."""
+
+
+def native_scene(
+    tank: Tank,
+    view: FieldOfView | None,
+    flow: xr.Dataset,
+    sample_time: Floats,
+    camera: Camera,
+    *,
+    time_step: float,
+) -> _core.Model:
+    """Return the native core's form of what surrounds a self-propelled particle.
+
+    Parameters
+    ----------
+    tank : Tank
+        The arena and its wall.
+    view : FieldOfView or None
+        What the camera sees, when that is less.
+    flow : xarray.Dataset
+        A `flow_field`; read where the particle is carried.
+    sample_time : ndarray, shape (n,)
+        Times of the samples from the start of the run [s], increasing, >= 0.
+    camera : Camera
+        Noise and resolution of the samples.
+    time_step : float
+        Time step [s].
+
+    Raises
+    ------
+    InputError
+        As `native_model`.
+    """
+    return _core.Model(
+        time_step=time_step,
+        **POINT,
+        **_surroundings(tank, view, flow, sample_time, camera, accelerating=False),
     )
+
+
+def _surroundings(
+    tank: Tank,
+    view: FieldOfView | None,
+    flow: xr.Dataset,
+    sample_time: Floats,
+    camera: Camera,
+    *,
+    accelerating: bool,
+) -> dict[str, Any]:
+    """Return wall, flow, samples and camera in the words of the native core."""
+    check_flow_field(flow)
+    _check_sample_time(sample_time)
+    _require_table(flow, tank, accelerating=accelerating)
+    x, y = flow["x"].values, flow["y"].values
+    return {
+        "radius": tank.radius_m or 0.0,
+        "edges": wall_edges(tank),
+        "restitution": tank.wall_restitution,
+        "friction": tank.wall_friction,
+        "bounce_speed": tank.bounce_speed_m_s,
+        "u": _frames(flow, "u"),
+        "v": _frames(flow, "v"),
+        "frame_time": _frame_times(flow),
+        "origin_x": float(x[0]),
+        "origin_y": float(y[0]),
+        "spacing_x": float((x[-1] - x[0]) / (x.size - 1)),
+        "spacing_y": float((y[-1] - y[0]) / (y.size - 1)),
+        "sample_time": np.ascontiguousarray(sample_time, dtype=np.float64),
+        "position_noise": camera.position_noise,
+        "orientation_noise": camera.orientation_noise,
+        "position_quantum": camera.position_quantum,
+        **_field_of_view(view),
+    }
 
 
 def _check_sample_time(time: Floats) -> None:
@@ -135,9 +198,8 @@ def _require_table(flow: xr.Dataset, tank: Outline, *, accelerating: bool) -> No
         )
 
 
-def _field_of_view(study: Study) -> dict[str, Any]:
+def _field_of_view(view: FieldOfView | None) -> dict[str, Any]:
     """Return what the camera sees, in the words of the native core."""
-    view = study.observation.field_of_view
     if view is None:
         return {"view_radius": 0.0, "view_x": 0.0, "view_y": 0.0, "view_edges": np.zeros((0, 3))}
     x, y = view.center_m

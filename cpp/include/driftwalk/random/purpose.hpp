@@ -10,6 +10,8 @@ enum class Purpose : std::uint32_t {
   force = 1,       // stochastic force, one draw per force interval
   observation = 2, // camera noise, one draw per sample
   start = 3,       // start pose
+  motion = 4,      // noise of a self-propelled particle, one draw per step
+  bout = 5,        // its bouts, at the step in which one begins
 };
 
 } // namespace driftwalk

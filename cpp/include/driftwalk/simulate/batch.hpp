@@ -1,6 +1,7 @@
-// What a batch of one-block worlds is: plain data that Python's side fills in, no logic.
+// What a batch of worlds with one body each is: plain data that Python's side fills in, no logic.
 #pragma once
 
+#include "driftwalk/particle/columns.hpp"
 #include "driftwalk/simulate/model_numbers.hpp"
 
 #include <cstdint>
@@ -37,6 +38,7 @@ struct BatchModel : ModelNumbers {
 // One entry per world.
 struct BatchWorlds {
   std::int64_t count = 0;
+  ParticleModel particle; // of no kind: the body is a block, with the next two numbers
   const double* drag_coefficient = nullptr;
   const double* force_std = nullptr;  // [N]
   const std::uint64_t* key = nullptr; // hash of (seed, trial, replicate)
