@@ -51,6 +51,8 @@ class Parameter:
         What formulas call it; default: the label.
     refined_step : float
         Largest step of the refined grid; 0 takes a fifth of `step`.
+    meaning : str
+        What it is, in a sentence.
 
     Raises
     ------
@@ -75,6 +77,7 @@ class Parameter:
     label: str = ""
     symbol: str = ""
     refined_step: float = 0.0
+    meaning: str = ""
 
     def __post_init__(self) -> None:
         if not self.name.isidentifier() or keyword.iskeyword(self.name):

@@ -1,0 +1,258 @@
+"""A member of the family as a motion model: its worlds come from the native core."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from driftwalk import _core
+from driftwalk.comparison import StepReference
+from driftwalk.conditions.recorded import Conditions
+from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.motion.family.columns import (
+    INERTIAL,
+    SHARED,
+    Numbers,
+    ParticleTable,
+    inertial_table,
+    switching_table,
+)
+from driftwalk.motion.family.members import MEMBERS, Member
+from driftwalk.motion.family.parts import PARTS, Part
+from driftwalk.motion.native import scored
+from driftwalk.motion.protocol import Details, Floats, Keys, Scores, Values, Worlds
+from driftwalk.schema import Parameter
+from driftwalk.simulation.backend import native_scene
+from driftwalk.simulation.initial import Start, world_orientations
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Tank
+
+LONGEST_STEP_S: Final = 0.02
+"""Time step, unless samples are so dense that half their interval is shorter."""
+
+
+class ParticleModel:
+    """A self-propelled body: a member of the family, with parts.
+
+    Parameters
+    ----------
+    member : Member
+        What it is.
+    parts : tuple of Part
+        What is added to it.
+    clearance : float
+        Distance of the recorded point from the wall at contact [m].
+
+    Examples
+    --------
+    >>> [parameter.key for parameter in family_model("active").parameters]
+    ['speed_m_s', 'rotational_diffusion_rad2_s', 'turn_rate_rad_s']
+    """
+
+    def __init__(
+        self, member: Member, parts: tuple[Part, ...] = (), *, clearance: float = 0.0
+    ) -> None:
+        self.member, self.parts, self.clearance = member, parts, clearance
+        named = [part.name for part in parts]
+        self.name = "+".join([member.name, *named])
+        self.needs_flow = "flow" in named
+        self.contact = "reflect" if "reflect" in named else "slide"
+        given = [member.parameters, *(part.parameters for part in parts)]
+        # Two parts that feel the wall have one range.
+        own = {one.name: one for some in given for one in some}
+        self.parameters: tuple[Parameter, ...] = tuple(own.values())
+        # Of the latest conditions: made once for all work units of a search.
+        self._ready: tuple[Conditions, _core.Model] | None = None
+
+    def simulate(self, values: Values, like: Conditions, keys: Keys) -> Worlds:
+        """Return one world per key; see `MotionModel.simulate`.
+
+        Raises
+        ------
+        InputError
+            When the water is to carry it and the conditions have no flow.
+        """
+        table = self.table(values, keys.size)
+        x, y, theta, status = _core.simulate(
+            self.native(like),
+            _rows(table, like.start, keys),
+            keys,
+            threads=like.threads,
+            precision="single",
+            particle=self.particle(table),
+        )
+        return Worlds(x, y, theta, status)
+
+    def score(
+        self,
+        values: Values,
+        like: Conditions,
+        keys: Keys,
+        reference: StepReference,
+        *,
+        details: Details = "none",
+    ) -> Scores:
+        """Return how far every world is from the recording; see `score_worlds`.
+
+        Raises
+        ------
+        InputError
+            As `simulate`.
+        """
+        table = self.table(values, keys.size)
+        return scored(
+            self.native(like),
+            _rows(table, like.start, keys),
+            like,
+            keys,
+            reference,
+            details=details,
+            particle=self.particle(table),
+        )
+
+    def table(self, values: Values, worlds: int) -> ParticleTable:
+        """Return the numbers of worlds as the native core takes them."""
+        shared: Numbers = {"clearance": self.clearance, **values}
+        if self.member.kind == "inertial":
+            return inertial_table({name: shared.get(name, 0.0) for name in INERTIAL}, worlds=worlds)
+        columns = {name: shared.get(name, 0.0) for name in SHARED}
+        return switching_table(self.member.states(values), columns, worlds=worlds)
+
+    def particle(self, table: ParticleTable) -> _core.Particle:
+        """Return the core's form of what all worlds have in common."""
+        return _core.Particle(
+            kind=table.kind, states=table.states, contact=self.contact, carried=self.needs_flow
+        )
+
+    def describe(self) -> dict[str, Any]:
+        """Return its name, its parameters and the clearance."""
+        return {
+            "name": self.name,
+            "parameters": [parameter.describe() for parameter in self.parameters],
+            "clearance_m": self.clearance,
+        }
+
+    def facts(self, estimate: Mapping[str, float]) -> dict[str, Any]:  # noqa: ARG002
+        """Return which model it was."""
+        return {"model": self.name}
+
+    def native(self, like: Conditions) -> _core.Model:
+        """Return the core's form of the conditions of a recording.
+
+        Raises
+        ------
+        InputError
+            As `simulate`.
+        """
+        ready = self._ready
+        if ready is None or ready[0] is not like:
+            if self.needs_flow and like.flow is None:
+                raise InputError(
+                    f"the water carries a body of the model {self.name}: its conditions need a "
+                    "flow field"
+                )
+            flow = like.flow if self.needs_flow else _still_water(like.tank)
+            assert flow is not None
+            ready = (
+                like,
+                native_scene(
+                    like.tank, like.view, flow, like.sample_time, like.camera,
+                    time_step=time_step_of(like.sample_time),
+                ),
+            )  # fmt: skip
+            self._ready = ready
+        return ready[1]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out what is made again where the model is used, and what has no pickle."""
+        return {"name": self.name, "clearance": self.clearance}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Make it again from its name."""
+        self.__dict__.update(family_model(state["name"], clearance=state["clearance"]).__dict__)
+
+
+def family_model(name: str, *, clearance: float = 0.0) -> ParticleModel:
+    """Return a member of the family of self-propelled bodies, with parts.
+
+    Parameters
+    ----------
+    name : str
+        A member, then parts: "active", "run_rest+wall", "burst_coast+wall+follow". A hyphen counts
+        as an underscore.
+    clearance : float
+        Distance of the recorded point from the wall at contact [m]: half the body's width.
+
+    Raises
+    ------
+    ConfigurationError
+        When there is no such member or part, a part is named twice, or does not go with the member.
+
+    Examples
+    --------
+    >>> model = family_model("run-tumble+wall")
+    >>> model.name, len(model.parameters)
+    ('run_tumble+wall', 9)
+    """
+    first, *rest = name.strip().replace("-", "_").split("+")
+    if first not in MEMBERS:
+        raise ConfigurationError(
+            f"there is no motion model {first!r}; there are {', '.join(MEMBERS)}"
+        )
+    for part in rest:
+        if part not in PARTS:
+            raise ConfigurationError(
+                f"a motion model has no part {part!r}; there are {', '.join(PARTS)}"
+            )
+    if len(set(rest)) < len(rest):
+        raise ConfigurationError(f"a part of {name} is named twice")
+    member = MEMBERS[first]
+    unfit = [part for part in rest if member.kind == "inertial" and PARTS[part].parameters]
+    if unfit:
+        raise ConfigurationError(
+            f"{first} has no heading: it takes the parts flow and reflect, not {', '.join(unfit)}"
+        )
+    if not (np.isfinite(clearance) and clearance >= 0.0):
+        raise ConfigurationError(f"clearance is {clearance}, expected a length from 0 m on")
+    return ParticleModel(member, tuple(PARTS[part] for part in rest), clearance=clearance)
+
+
+def time_step_of(sample_time: Floats) -> float:
+    """Return the time step for samples at these times [s]: a whole part of their interval.
+
+    Examples
+    --------
+    >>> time_step_of(np.arange(5) * 0.1)
+    0.02
+    """
+    if sample_time.size < 2:
+        return LONGEST_STEP_S
+    interval = float(np.median(np.diff(sample_time)))
+    return interval / max(int(np.ceil(interval / LONGEST_STEP_S - 1e-9)), 2)
+
+
+def _rows(table: ParticleTable, start: Start, keys: Keys) -> Floats:
+    """Return starts and numbers of worlds, one row each.
+
+    A body sets out in the direction that it moves in; where it does not move, in that of its
+    recorded orientation, or a random one.
+    """
+    moves = np.hypot(start.vx, start.vy) > 0.0
+    heading = np.where(moves, np.arctan2(start.vy, start.vx), np.asarray(start.theta, dtype=float))
+    columns = np.broadcast_arrays(
+        *(np.asarray(value, dtype=np.float64) for value in (start.x, start.y)),
+        world_orientations(heading, keys),
+        *(np.asarray(value, dtype=np.float64) for value in (start.vx, start.vy, start.omega)),
+    )
+    return np.ascontiguousarray(np.column_stack([*columns, table.columns]))
+
+
+def _still_water(tank: Tank) -> xr.Dataset:
+    from driftwalk.flow import uniform_flow
+
+    return uniform_flow(0.0, 0.0, arena=tank.to_arena())

@@ -1,0 +1,190 @@
+"""The family of self-propelled bodies: names, parts, tables, and the contract of a motion model."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import weibull_min
+
+import driftwalk as dw
+from driftwalk import _core
+from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.seeds import world_keys
+from driftwalk.motion.family import MEMBERS, PARTS, family_model
+from driftwalk.motion.family.columns import INERTIAL, SHARED, STATE, State, switching_table
+from driftwalk.motion.family.dwell import dwell_law
+from driftwalk.motion.family.particle import time_step_of
+from driftwalk.testing import MotionModelContract
+
+
+class FamilyContract(MotionModelContract):
+    name = ""
+
+    def model(self):
+        return family_model(self.name, clearance=0.01)
+
+
+class TestInertial(FamilyContract):
+    name = "inertial"
+
+
+class TestInertialInTheFlow(FamilyContract):
+    name = "inertial+flow+reflect"
+
+
+class TestActive(FamilyContract):
+    name = "active"
+
+
+class TestRunTumble(FamilyContract):
+    name = "run_tumble"
+
+
+class TestRunRest(FamilyContract):
+    name = "run_rest"
+
+
+class TestBurstCoast(FamilyContract):
+    name = "burst_coast"
+
+
+class TestTwoState(FamilyContract):
+    name = "two_state"
+
+
+class TestActiveWithAllParts(FamilyContract):
+    name = "active+wall+follow+slow+stroke+diffusion+flow+reflect"
+
+
+def test_every_member_is_held_to_the_contract():
+    tested = {one.name.split("+")[0] for one in FamilyContract.__subclasses__()}
+    parts = {part for one in FamilyContract.__subclasses__() for part in one.name.split("+")[1:]}
+    assert tested == set(MEMBERS)
+    assert parts == set(PARTS)
+
+
+@pytest.mark.parametrize("name", MEMBERS)
+def test_every_member_says_what_it_is(name):
+    member = MEMBERS[name]
+    assert member.sentence.endswith((".",))
+    assert member.formula
+    assert member.source
+    for parameter in family_model(name).parameters:
+        assert parameter.meaning.endswith("."), parameter.name
+        assert parameter.unit
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("fish", "there is no motion model 'fish'; there are inertial, active"),
+        ("active+gills", "has no part 'gills'; there are wall, follow"),
+        ("active+wall+wall", "is named twice"),
+        ("inertial+wall", "inertial has no heading"),
+    ],
+)
+def test_a_wrong_name_says_which_there_are(name, words):
+    with pytest.raises(ConfigurationError, match=words):
+        family_model(name)
+
+
+@pytest.mark.parametrize("clearance", [-0.1, np.nan, np.inf])
+def test_a_clearance_is_a_length(clearance):
+    with pytest.raises(ConfigurationError, match="clearance"):
+        family_model("active", clearance=clearance)
+
+
+def test_parts_that_feel_the_wall_share_its_range():
+    names = [one.name for one in family_model("active+wall+follow").parameters]
+    assert names.count("wall_range") == 1
+
+
+def test_a_hyphen_counts_as_an_underscore():
+    assert family_model("run-rest").name == "run_rest"
+
+
+def test_a_pickle_gives_the_same_bits():
+    contract = TestRunRest()
+    like, model = contract.conditions(), contract.model()
+    values = {one.name: np.full(3, one.low) for one in model.parameters}
+    keys = world_keys(5, trial=np.arange(3), replicate=0)
+    first = model.simulate(values, like, keys)
+    again = pickle.loads(pickle.dumps(model)).simulate(values, like, keys)
+    for a, b in zip(first, again, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_water_that_carries_has_to_be_there():
+    like = replace(TestInertialInTheFlow().conditions(), flow=None)
+    model = family_model("active+flow")
+    values = {one.name: np.full(1, one.low) for one in model.parameters}
+    with pytest.raises(InputError, match="need a flow field"):
+        model.simulate(values, like, world_keys(1, trial=0, replicate=np.arange(1)))
+
+
+@pytest.mark.parametrize("cv", [0.0, 1e-3, 0.05, 0.5, 1.0, 2.0, 5.0])
+def test_a_dwell_law_has_its_mean_and_spread(cv):
+    scale, power = (float(one) for one in dwell_law(2.0, cv))
+    if cv == 0.0:
+        assert (scale, power) == (2.0, 0.0)
+        return
+    law = weibull_min(1.0 / power, scale=scale)
+    assert law.mean() == pytest.approx(2.0, rel=1e-9)
+    assert law.std() == pytest.approx(2.0 * cv, rel=1e-6)
+
+
+def test_the_table_has_the_columns_of_the_core():
+    for count in (1, 2, 4):
+        states = [State(speed=0.1, dwell=1.0)] * count
+        table = switching_table(states, {}, worlds=2)
+        particle = _core.Particle(kind="switching", states=count, contact="slide", carried=False)
+        assert table.columns.shape == (2, particle.columns)
+        assert particle.columns == len(SHARED) + count * (len(STATE) + count)
+    inertial = _core.Particle(kind="inertial", states=0, contact="slide", carried=False)
+    assert inertial.columns == len(INERTIAL)
+
+
+def test_a_world_begins_in_a_state_as_often_as_it_is_there():
+    # Two of three bouts after A are B; the share of the time is entries times mean times.
+    a = State(speed=0.1, dwell=2.0, next=(0.0, 2 / 3, 1 / 3))
+    b = State(speed=0.1, dwell=4.0, next=(1.0, 0.0, 0.0))
+    c = State(speed=0.1, dwell=8.0, next=(1.0, 0.0, 0.0))
+    columns = switching_table([a, b, c], {}, worlds=1).columns[0]
+    at = STATE.index("start_share")
+    shares = [columns[len(SHARED) + k * (len(STATE) + 3) + at] for k in range(3)]
+    time = np.array([3 * 2.0, 2 * 4.0, 1 * 8.0])
+    np.testing.assert_allclose(shares, time / time.sum(), rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"kind": "block"}, {"states": 0}, {"states": 5}, {"contact": "stick"}]
+)
+def test_the_core_refuses_other_particles(wrong):
+    given = {"kind": "switching", "states": 1, "contact": "slide", "carried": False} | wrong
+    with pytest.raises(ValueError, match="no such particle"):
+        _core.Particle(**given)
+
+
+@pytest.mark.parametrize(
+    ("interval", "step"), [(0.1, 0.02), (1.0, 0.02), (1 / 30, 1 / 60), (0.001, 0.0005)]
+)
+def test_a_time_step_is_a_part_of_the_sampling_interval(interval, step):
+    assert time_step_of(np.arange(10) * interval) == pytest.approx(step)
+    assert time_step_of(np.zeros(1)) == 0.02
+
+
+def test_a_body_sets_out_in_the_direction_that_it_moves_in():
+    like = TestActive().conditions()
+    model = family_model("active")
+    values = {"speed": [0.01], "rotational_diffusion": [1e-4], "turn_rate": [0.0]}
+    worlds = model.simulate(
+        {name: np.asarray(value) for name, value in values.items()},
+        replace(like, camera=dw.simulation.backend.Camera()),
+        world_keys(1, trial=0, replicate=np.arange(1)),
+    )
+    # The conditions of the contract: v = (0.01, 0.02) m/s.
+    moved = np.array([worlds.x[0, 5] - worlds.x[0, 0], worlds.y[0, 5] - worlds.y[0, 0]])
+    assert np.arctan2(moved[1], moved[0]) == pytest.approx(np.arctan2(2, 1), abs=0.1)
