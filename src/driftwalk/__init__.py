@@ -94,7 +94,7 @@ _NAMES = {
         "apply_overrides",
         "load_study",
     ),
-    "driftwalk.motion": ("motion_model",),
+    "driftwalk.motion": ("models", "motion_model"),
     "driftwalk.notebook": (
         "assemble",
         "calibrate",

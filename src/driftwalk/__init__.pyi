@@ -81,6 +81,7 @@ from driftwalk.model import (
     load_study as load_study,
 )
 from driftwalk.motion import (
+    models as models,
     motion_model as motion_model,
 )
 from driftwalk.notebook import (

@@ -1,8 +1,10 @@
-"""What can be calibrated? Motion models: the block in a stirred tank, and any Python function."""
+"""What can be calibrated? Motion models: block, self-propelled bodies, any Python function."""
 
 from driftwalk.motion.block import BlockModel
 from driftwalk.motion.camera import observe_worlds
-from driftwalk.motion.function import FunctionModel, Scene, motion_model
+from driftwalk.motion.choose import motion_model
+from driftwalk.motion.family import ParticleModel, models
+from driftwalk.motion.function import FunctionModel, Scene
 from driftwalk.motion.protocol import Details, MotionModel, Scores, ScoresItself, Worlds
 from driftwalk.motion.random import WorldRandom
 from driftwalk.motion.score import score_worlds
@@ -14,11 +16,13 @@ __all__ = [
     "FunctionModel",
     "MotionModel",
     "Parameter",
+    "ParticleModel",
     "Scene",
     "Scores",
     "ScoresItself",
     "WorldRandom",
     "Worlds",
+    "models",
     "motion_model",
     "observe_worlds",
     "score_worlds",

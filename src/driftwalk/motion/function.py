@@ -169,66 +169,20 @@ class FunctionModel:
         return arrays[0], arrays[1], arrays[2] if len(arrays) == 3 else None
 
 
-def motion_model(
+def function_model(
     function: MotionFunction,
-    /,
-    *parameters: Parameter,
-    settings: Settings = "one",
-    **ranges: Range,
+    parameters: tuple[Parameter, ...],
+    ranges: Mapping[str, Range],
+    *,
+    settings: Settings,
 ) -> FunctionModel:
-    """Return a motion model made of a Python function.
-
-    The function is called as ``function(scene, speed=0.05, tumble_rate=1.2)``. `Scene` holds the
-    times at which positions are wanted, the start, the number of worlds, and random numbers with
-    one stream per world. The function returns the true positions ``x, y`` [m], or ``x, y, theta``
-    [rad], as arrays of shape ``(scene.worlds, scene.times.size)``; driftwalk adds the noise, the
-    resolution and the gaps of the recording, forms steps and compares. A row with NaN is a world
-    that failed; the others count.
-
-    All worlds of a call have the same parameters, which arrive as floats. With ``settings="many"``
-    they arrive as columns of shape (worlds, 1), and one call simulates many settings: worth it for
-    a function that steps through time in a loop.
-
-    Parameters
-    ----------
-    function : callable
-        The motion.
-    *parameters : Parameter
-        Parameters with a step, a scale or a label of their own.
-    settings : {"one", "many"}
-        Whether the worlds of a call share one setting of the parameters.
-    **ranges : tuple
-        The other parameters by name: ``(low, high)`` or ``(low, high, unit)``.
-
-    Returns
-    -------
-    FunctionModel
-        What `calibrate` takes.
+    """Return a motion model made of a Python function; see `driftwalk.motion.motion_model`.
 
     Raises
     ------
     ConfigurationError
         When there is no parameter, a range is none, or the function does not take them.
-
-    Notes
-    -----
-    Random numbers are to come from ``scene.random`` alone. `driftwalk.testing.MotionModelContract`
-    tells whether a model keeps to it.
-
-    Examples
-    --------
-    >>> import driftwalk as dw
-    >>> def diffuse(scene, *, diffusivity):
-    ...     spread = np.sqrt(2 * diffusivity * np.diff(scene.times, prepend=0.0))
-    ...     x, y = (np.cumsum(spread * scene.random.normal(spread.size), axis=1) for _ in "xy")
-    ...     return scene.start.x[:, None] + x, scene.start.y[:, None] + y
-    >>> dw.motion_model(diffuse, diffusivity=(1e-6, 1e-4, "m2/s")).parameters[0].key
-    'diffusivity_m2_s'
     """
-    if not callable(function):
-        raise ConfigurationError(
-            f"a motion model is made of a function, got {type(function).__name__}"
-        )
     if settings not in get_args(Settings):
         raise ConfigurationError(
             f"settings must be one of {', '.join(get_args(Settings))}, got {settings!r}"

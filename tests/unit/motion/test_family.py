@@ -17,6 +17,7 @@ from driftwalk.motion.family import MEMBERS, PARTS, family_model
 from driftwalk.motion.family.columns import INERTIAL, SHARED, STATE, State, switching_table
 from driftwalk.motion.family.dwell import dwell_law
 from driftwalk.motion.family.particle import time_step_of
+from driftwalk.schema import Parameter
 from driftwalk.testing import MotionModelContract
 
 
@@ -188,3 +189,61 @@ def test_a_body_sets_out_in_the_direction_that_it_moves_in():
     # The conditions of the contract: v = (0.01, 0.02) m/s.
     moved = np.array([worlds.x[0, 5] - worlds.x[0, 0], worlds.y[0, 5] - worlds.y[0, 0]])
     assert np.arctan2(moved[1], moved[0]) == pytest.approx(np.arctan2(2, 1), abs=0.1)
+
+
+def test_a_known_value_is_not_searched():
+    model = family_model("run_tumble", turn_rate=0.0, speed_cv=0.0, speed=(0.01, 0.1, "m/s"))
+    assert [one.name for one in model.parameters] == [
+        "speed",
+        "run_time",
+        "turn_std",
+        "rotational_diffusion",
+    ]
+    assert (model.parameters[0].low, model.parameters[0].high) == (0.01, 0.1)
+    assert model.parameters[0].scale == "log"
+    assert model.describe()["fixed"] == {"turn_rate": 0.0, "speed_cv": 0.0}
+
+
+def test_a_known_value_gives_the_bits_of_the_same_value():
+    like = TestActive().conditions()
+    keys = world_keys(5, trial=np.arange(2), replicate=0)
+    values = {"speed": np.full(2, 0.02), "rotational_diffusion": np.full(2, 0.3)}
+    known = family_model("active", turn_rate=0.5).simulate(values, like, keys)
+    free = family_model("active").simulate({**values, "turn_rate": np.full(2, 0.5)}, like, keys)
+    np.testing.assert_array_equal(known.x, free.x)
+
+
+@pytest.mark.parametrize(
+    ("choices", "words"),
+    [
+        ({"sped": 1.0}, "has no parameter 'sped'; it has speed, rotational_diffusion"),
+        ({"speed": "fast"}, "expected a value or a range"),
+        ({"speed": -1.0}, "speed is -1"),
+        ({"speed": np.nan}, "speed is nan"),
+        ({"speed": (0.1,)}, "expected a range"),
+        ({"speed": (0.1, 0.2, "cm/s")}, "speed is in m/s, and its range in cm/s"),
+        ({"speed": (0.2, 0.1)}, "below its beginning"),
+        ({"wall_slowing": 1.5}, "wall_slowing is 1.5, expected a number from 0 to 1"),
+        ({"wall_slowing": (-0.5, 0.5)}, "below 0"),
+    ],
+)
+def test_a_wrong_choice_is_refused(choices, words):
+    with pytest.raises(ConfigurationError, match=words):
+        family_model("active+wall", **choices)
+
+
+def test_a_parameter_is_given_once():
+    speed = Parameter("speed", "m/s", 0.01, 0.1, step=0.01)
+    with pytest.raises(ConfigurationError, match="given twice"):
+        family_model("active", speed, speed=0.1)
+    assert family_model("active", speed).parameters[0].step == 0.01
+
+
+def test_a_motion_model_is_a_name_or_a_function():
+    assert dw.motion_model("active").name == "active"
+    with pytest.raises(ConfigurationError, match="a name or a function, got int"):
+        dw.motion_model(3)
+    with pytest.raises(ConfigurationError, match="leave out `settings`"):
+        dw.motion_model("active", settings="many")
+    with pytest.raises(ConfigurationError, match="no `clearance`"):
+        dw.motion_model(lambda scene, speed: None, clearance=0.1, speed=(0, 1))

@@ -137,7 +137,7 @@ def test_a_function_that_gives_no_positions_is_named(returned, message):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: motion_model("line", speed=(0, 1)), "made of a function, got str"),
+        (lambda: motion_model("line", speed=(0, 1)), "there is no motion model 'line'"),
         (lambda: motion_model(line), "needs a parameter"),
         (lambda: motion_model(line, speed=0.1), "expected a range such as"),
         (lambda: motion_model(line, speed=("a", "b")), "no two numbers"),

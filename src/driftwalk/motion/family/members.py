@@ -82,6 +82,10 @@ def _named(parameter: Parameter, name: str, meaning: str) -> Parameter:
     return replace(parameter, name=name, label=label, symbol=label, meaning=meaning)
 
 
+def _none(_: Numbers) -> Sequence[State]:
+    return ()
+
+
 def _active(given: Numbers) -> Sequence[State]:
     return [
         State(
@@ -165,7 +169,7 @@ MEMBERS: Final[Mapping[str, Member]] = {
                 ),
                 replace(_TURN_RATE, meaning="Rate at which the velocity turns."),
             ),
-            lambda _: (),
+            _none,
             "inertial",
         ),
         Member(

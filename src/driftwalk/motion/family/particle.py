@@ -10,17 +10,15 @@ import numpy as np
 from driftwalk import _core
 from driftwalk.comparison import StepReference
 from driftwalk.conditions.recorded import Conditions
-from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.errors import InputError
 from driftwalk.motion.family.columns import (
-    INERTIAL,
-    SHARED,
     Numbers,
     ParticleTable,
     inertial_table,
     switching_table,
 )
-from driftwalk.motion.family.members import MEMBERS, Member
-from driftwalk.motion.family.parts import PARTS, Part
+from driftwalk.motion.family.members import Member
+from driftwalk.motion.family.parts import Part
 from driftwalk.motion.native import scored
 from driftwalk.motion.protocol import Details, Floats, Keys, Scores, Values, Worlds
 from driftwalk.schema import Parameter
@@ -45,27 +43,35 @@ class ParticleModel:
         What it is.
     parts : tuple of Part
         What is added to it.
+    parameters : tuple of Parameter
+        What is searched.
+    fixed : mapping of str to float
+        Values of its other parameters.
     clearance : float
         Distance of the recorded point from the wall at contact [m].
 
     Examples
     --------
+    >>> from driftwalk.motion.family import family_model
     >>> [parameter.key for parameter in family_model("active").parameters]
     ['speed_m_s', 'rotational_diffusion_rad2_s', 'turn_rate_rad_s']
     """
 
     def __init__(
-        self, member: Member, parts: tuple[Part, ...] = (), *, clearance: float = 0.0
+        self,
+        member: Member,
+        parts: tuple[Part, ...],
+        parameters: tuple[Parameter, ...],
+        *,
+        fixed: Mapping[str, float],
+        clearance: float,
     ) -> None:
-        self.member, self.parts, self.clearance = member, parts, clearance
+        self.member, self.parts, self.parameters = member, parts, parameters
+        self.fixed, self.clearance = dict(fixed), clearance
         named = [part.name for part in parts]
         self.name = "+".join([member.name, *named])
         self.needs_flow = "flow" in named
         self.contact = "reflect" if "reflect" in named else "slide"
-        given = [member.parameters, *(part.parameters for part in parts)]
-        # Two parts that feel the wall have one range.
-        own = {one.name: one for some in given for one in some}
-        self.parameters: tuple[Parameter, ...] = tuple(own.values())
         # Of the latest conditions: made once for all work units of a search.
         self._ready: tuple[Conditions, _core.Model] | None = None
 
@@ -117,11 +123,10 @@ class ParticleModel:
 
     def table(self, values: Values, worlds: int) -> ParticleTable:
         """Return the numbers of worlds as the native core takes them."""
-        shared: Numbers = {"clearance": self.clearance, **values}
+        given: Numbers = {"clearance": self.clearance, **self.fixed, **values}
         if self.member.kind == "inertial":
-            return inertial_table({name: shared.get(name, 0.0) for name in INERTIAL}, worlds=worlds)
-        columns = {name: shared.get(name, 0.0) for name in SHARED}
-        return switching_table(self.member.states(values), columns, worlds=worlds)
+            return inertial_table(given, worlds=worlds)
+        return switching_table(self.member.states(given), given, worlds=worlds)
 
     def particle(self, table: ParticleTable) -> _core.Particle:
         """Return the core's form of what all worlds have in common."""
@@ -130,10 +135,11 @@ class ParticleModel:
         )
 
     def describe(self) -> dict[str, Any]:
-        """Return its name, its parameters and the clearance."""
+        """Return its name, its parameters with their values or ranges, and the clearance."""
         return {
             "name": self.name,
             "parameters": [parameter.describe() for parameter in self.parameters],
+            "fixed": dict(self.fixed),
             "clearance_m": self.clearance,
         }
 
@@ -169,57 +175,8 @@ class ParticleModel:
         return ready[1]
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave out what is made again where the model is used, and what has no pickle."""
-        return {"name": self.name, "clearance": self.clearance}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Make it again from its name."""
-        self.__dict__.update(family_model(state["name"], clearance=state["clearance"]).__dict__)
-
-
-def family_model(name: str, *, clearance: float = 0.0) -> ParticleModel:
-    """Return a member of the family of self-propelled bodies, with parts.
-
-    Parameters
-    ----------
-    name : str
-        A member, then parts: "active", "run_rest+wall", "burst_coast+wall+follow". A hyphen counts
-        as an underscore.
-    clearance : float
-        Distance of the recorded point from the wall at contact [m]: half the body's width.
-
-    Raises
-    ------
-    ConfigurationError
-        When there is no such member or part, a part is named twice, or does not go with the member.
-
-    Examples
-    --------
-    >>> model = family_model("run-tumble+wall")
-    >>> model.name, len(model.parameters)
-    ('run_tumble+wall', 9)
-    """
-    first, *rest = name.strip().replace("-", "_").split("+")
-    if first not in MEMBERS:
-        raise ConfigurationError(
-            f"there is no motion model {first!r}; there are {', '.join(MEMBERS)}"
-        )
-    for part in rest:
-        if part not in PARTS:
-            raise ConfigurationError(
-                f"a motion model has no part {part!r}; there are {', '.join(PARTS)}"
-            )
-    if len(set(rest)) < len(rest):
-        raise ConfigurationError(f"a part of {name} is named twice")
-    member = MEMBERS[first]
-    unfit = [part for part in rest if member.kind == "inertial" and PARTS[part].parameters]
-    if unfit:
-        raise ConfigurationError(
-            f"{first} has no heading: it takes the parts flow and reflect, not {', '.join(unfit)}"
-        )
-    if not (np.isfinite(clearance) and clearance >= 0.0):
-        raise ConfigurationError(f"clearance is {clearance}, expected a length from 0 m on")
-    return ParticleModel(member, tuple(PARTS[part] for part in rest), clearance=clearance)
+        """Leave the core's form out: it is made again where the model is used."""
+        return {**self.__dict__, "_ready": None}
 
 
 def time_step_of(sample_time: Floats) -> float:
