@@ -38,6 +38,7 @@ COMMANDS: Final[dict[str, Command]] = {
     "info": Command("info", "info", "Say what a recording holds and how driftwalk reads it."),
     "convert": Command("convert", "convert", "Turn a recording into a trajectory file."),
     "flow": Command("flow", "flow", "Take the flow field from a recording."),
+    "models": Command("models", "models", "List the models of bodies that move by themselves."),
     "simulate": Command("simulate", "simulate", "Simulate the motion of the block."),
     "compare": Command("compare", "compare", "Measure how far apart two motions are."),
     "calibrate": Command(

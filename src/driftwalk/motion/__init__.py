@@ -3,7 +3,7 @@
 from driftwalk.motion.block import BlockModel
 from driftwalk.motion.camera import observe_worlds
 from driftwalk.motion.choose import motion_model
-from driftwalk.motion.family import ParticleModel, models
+from driftwalk.motion.family import MEMBERS, PARTS, Member, Part, ParticleModel, models
 from driftwalk.motion.function import FunctionModel, Scene
 from driftwalk.motion.protocol import Details, MotionModel, Scores, ScoresItself, Worlds
 from driftwalk.motion.random import WorldRandom
@@ -11,11 +11,15 @@ from driftwalk.motion.score import score_worlds
 from driftwalk.schema import Parameter
 
 __all__ = [
+    "MEMBERS",
+    "PARTS",
     "BlockModel",
     "Details",
     "FunctionModel",
+    "Member",
     "MotionModel",
     "Parameter",
+    "Part",
     "ParticleModel",
     "Scene",
     "Scores",

@@ -96,7 +96,7 @@ POINT: Final[dict[str, Any]] = {
 def native_scene(
     tank: Tank,
     view: FieldOfView | None,
-    flow: xr.Dataset,
+    flow: xr.Dataset | None,
     sample_time: Floats,
     camera: Camera,
     *,
@@ -110,8 +110,8 @@ def native_scene(
         The arena and its wall.
     view : FieldOfView or None
         What the camera sees, when that is less.
-    flow : xarray.Dataset
-        A `flow_field`; read where the particle is carried.
+    flow : xarray.Dataset or None
+        A `flow_field` that carries the particle; None: still water.
     sample_time : ndarray, shape (n,)
         Times of the samples from the start of the run [s], increasing, >= 0.
     camera : Camera
@@ -134,23 +134,34 @@ def native_scene(
 def _surroundings(
     tank: Tank,
     view: FieldOfView | None,
-    flow: xr.Dataset,
+    flow: xr.Dataset | None,
     sample_time: Floats,
     camera: Camera,
     *,
     accelerating: bool,
 ) -> dict[str, Any]:
     """Return wall, flow, samples and camera in the words of the native core."""
-    check_flow_field(flow)
     _check_sample_time(sample_time)
-    _require_table(flow, tank, accelerating=accelerating)
-    x, y = flow["x"].values, flow["y"].values
     return {
+        **(_still_water(tank) if flow is None else _water(flow, tank, accelerating=accelerating)),
         "radius": tank.radius_m or 0.0,
         "edges": wall_edges(tank),
         "restitution": tank.wall_restitution,
         "friction": tank.wall_friction,
         "bounce_speed": tank.bounce_speed_m_s,
+        "sample_time": np.ascontiguousarray(sample_time, dtype=np.float64),
+        "position_noise": camera.position_noise,
+        "orientation_noise": camera.orientation_noise,
+        "position_quantum": camera.position_quantum,
+        **_field_of_view(view),
+    }
+
+
+def _water(flow: xr.Dataset, tank: Tank, *, accelerating: bool) -> dict[str, Any]:
+    check_flow_field(flow)
+    _require_table(flow, tank, accelerating=accelerating)
+    x, y = flow["x"].values, flow["y"].values
+    return {
         "u": _frames(flow, "u"),
         "v": _frames(flow, "v"),
         "frame_time": _frame_times(flow),
@@ -158,11 +169,21 @@ def _surroundings(
         "origin_y": float(y[0]),
         "spacing_x": float((x[-1] - x[0]) / (x.size - 1)),
         "spacing_y": float((y[-1] - y[0]) / (y.size - 1)),
-        "sample_time": np.ascontiguousarray(sample_time, dtype=np.float64),
-        "position_noise": camera.position_noise,
-        "orientation_noise": camera.orientation_noise,
-        "position_quantum": camera.position_quantum,
-        **_field_of_view(view),
+    }
+
+
+def _still_water(tank: Tank) -> dict[str, Any]:
+    """Return a flow of four nodes at the corners of the tank's box: zero everywhere."""
+    width, height = tank.extent_m
+    none = np.zeros((1, 2, 2))
+    return {
+        "u": none,
+        "v": none,
+        "frame_time": np.zeros(1),
+        "origin_x": -width / 2.0,
+        "origin_y": -height / 2.0,
+        "spacing_x": width,
+        "spacing_y": height,
     }
 
 

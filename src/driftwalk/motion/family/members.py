@@ -157,7 +157,7 @@ MEMBERS: Final[Mapping[str, Member]] = {
             "A velocity that relaxes and is stirred: a drifting body, or a smooth swimmer.",
             "dw = -w / memory_time dt + turn_rate x w dt + speed_std sqrt(2 / memory_time) dW;"
             " dx = (w + u) dt",
-            "Gurarie et al., Methods Ecol. Evol. 8 (2017) 1317",
+            "Gurarie et al., Movement Ecology 5 (2017) 13",
             (
                 Parameter(
                     "speed_std", "m/s", 1e-6, 10.0, scale="log",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -24,11 +24,6 @@ from driftwalk.motion.protocol import Details, Floats, Keys, Scores, Values, Wor
 from driftwalk.schema import Parameter
 from driftwalk.simulation.backend import native_scene
 from driftwalk.simulation.initial import Start, world_orientations
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from driftwalk.model import Tank
 
 LONGEST_STEP_S: Final = 0.02
 """Time step, unless samples are so dense that half their interval is shorter."""
@@ -162,8 +157,7 @@ class ParticleModel:
                     f"the water carries a body of the model {self.name}: its conditions need a "
                     "flow field"
                 )
-            flow = like.flow if self.needs_flow else _still_water(like.tank)
-            assert flow is not None
+            flow = like.flow if self.needs_flow else None
             ready = (
                 like,
                 native_scene(
@@ -207,9 +201,3 @@ def _rows(table: ParticleTable, start: Start, keys: Keys) -> Floats:
         *(np.asarray(value, dtype=np.float64) for value in (start.vx, start.vy, start.omega)),
     )
     return np.ascontiguousarray(np.column_stack([*columns, table.columns]))
-
-
-def _still_water(tank: Tank) -> xr.Dataset:
-    from driftwalk.flow import uniform_flow
-
-    return uniform_flow(0.0, 0.0, arena=tank.to_arena())

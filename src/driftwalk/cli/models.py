@@ -1,0 +1,91 @@
+"""`driftwalk models`: the family of self-propelled motion models."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from driftwalk.cli.options.shared import Json
+from driftwalk.cli.terminal.output import print_json, print_table
+
+if TYPE_CHECKING:
+    from driftwalk.motion import Member, Part, ParticleModel
+
+
+def models(
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[NAME]",
+            help="A model with its parts, such as run_rest+wall.",
+            show_default=False,
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """List the motion models of bodies that move by themselves.
+
+    Without a name: all of them, and the parts that can be added. With one: its equation, its
+    source and its parameters.
+    """
+    from driftwalk.motion import MEMBERS, PARTS, ParticleModel, motion_model
+
+    if name is not None:
+        model = motion_model(name)
+        assert isinstance(model, ParticleModel)
+        _show(model, json=json)
+    elif json:
+        print_json(
+            {
+                "models": [_described(one) for one in MEMBERS.values()],
+                "parts": [_described(one) for one in PARTS.values()],
+            }
+        )
+    else:
+        for title, some in (("models", MEMBERS), ("parts", PARTS)):
+            rows = [(one.name, len(one.parameters), one.sentence) for one in some.values()]
+            print_table(rows, columns=("name", "parameters", "what"), title=title)
+
+
+def _show(model: ParticleModel, *, json: bool) -> None:
+    if json:
+        print_json(
+            {
+                **_described(model.member),
+                "name": model.name,
+                "parts": [_described(one) for one in model.parts],
+                "parameters": [one.describe() for one in model.parameters],
+            }
+        )
+        return
+    print_table(_rows(model), title=model.name)
+    rows = [
+        (one.name, one.unit, f"{one.low:g}", f"{one.high:g}", one.scale, one.meaning)
+        for one in model.parameters
+    ]
+    print_table(
+        rows, columns=("parameter", "unit", "from", "to", "scale", "what"), title="parameters"
+    )
+
+
+def _rows(model: ParticleModel) -> list[tuple[str, str]]:
+    rows = [
+        ("what", model.member.sentence),
+        ("equation", model.member.formula),
+        ("source", model.member.source),
+    ]
+    for part in model.parts:
+        rows.append((f"+{part.name}", " ".join(filter(None, (part.sentence, part.formula)))))
+    return rows
+
+
+def _described(one: Member | Part) -> dict[str, Any]:
+    found: dict[str, Any] = {
+        "name": one.name,
+        "sentence": one.sentence,
+        "formula": one.formula,
+        "parameters": [parameter.describe() for parameter in one.parameters],
+    }
+    source = getattr(one, "source", None)
+    return found if source is None else {**found, "source": source}
