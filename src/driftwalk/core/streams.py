@@ -38,6 +38,9 @@ WORK: Final[dict[str, int]] = {
     "first_half_refined": 7,
     "second_half": 8,
     "coverage": 9,
+    # the search over several parameters: its settings, and worlds to judge its answer by
+    "evolution": 10,
+    "judged": 11,
     # self-assembly: its runs, the parameters drawn for them, the flows drawn for them
     "run": 32,
     "parameters": 33,

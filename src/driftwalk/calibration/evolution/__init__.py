@@ -1,0 +1,16 @@
+"""Which values of several parameters fit? A search with random numbers of its own."""
+
+from driftwalk.calibration.evolution.objective import AspectObjective, wall_distance
+from driftwalk.calibration.evolution.ranges import Scales, recorded_ranges, scales_of
+from driftwalk.calibration.evolution.search import Budget, Found, search_minimum
+
+__all__ = [
+    "AspectObjective",
+    "Budget",
+    "Found",
+    "Scales",
+    "recorded_ranges",
+    "scales_of",
+    "search_minimum",
+    "wall_distance",
+]

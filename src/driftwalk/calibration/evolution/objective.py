@@ -1,0 +1,107 @@
+"""How far settings of a motion model are from a recording, in all aspects of its motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.comparison.aspects import (
+    Aspect,
+    AspectPlan,
+    AspectReference,
+    form_aspects,
+)
+from driftwalk.comparison.aspects.form import WallDistance
+from driftwalk.conditions import Conditions
+from driftwalk.core.seeds import world_keys
+from driftwalk.core.streams import trial_in
+from driftwalk.motion import MotionModel
+from driftwalk.motion.score import broken_worlds
+from driftwalk.schema import Parameter
+from driftwalk.simulation.backend import wall_edges
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class AspectObjective:
+    """The mean of distance over floor, as `search_minimum` wants it.
+
+    Attributes
+    ----------
+    model : MotionModel
+        What is simulated.
+    ranges : tuple of Parameter
+        Its parameters with the ranges of the search; the unit cube is their coordinates.
+    like : Conditions
+        The conditions of the recording.
+    plan : AspectPlan
+        How a world shows its aspects.
+    reference : AspectReference
+        The recording's.
+    seed : int
+        Seed of the worlds.
+    """
+
+    model: MotionModel
+    ranges: tuple[Parameter, ...]
+    like: Conditions
+    plan: AspectPlan
+    reference: AspectReference
+    seed: int
+
+    def __call__(self, settings: Floats, first: int, replicates: int) -> Floats:
+        """Return the mean score of each setting, shape (settings,)."""
+        distances = self.distances(settings, replicates, stage="evolution", first=first)
+        return np.asarray(self.reference.overall(distances).mean(axis=1))
+
+    def distances(self, settings: Floats, replicates: int, *, stage: str, first: int = 0) -> Floats:
+        """Return the distance of every world, shape (settings, replicates, aspects).
+
+        A world that lost its numbers is as far as can be, 1.
+        """
+        worlds, broken = self.worlds(settings, replicates, stage=stage, first=first)
+        found = self.reference.distances(worlds, threads=self.like.threads)
+        found[broken] = 1.0
+        return found.reshape(len(settings), replicates, -1)
+
+    def worlds(
+        self, settings: Floats, replicates: int, *, stage: str, first: int = 0
+    ) -> tuple[list[Sequence[Aspect]], npt.NDArray[np.bool_]]:
+        """Return the aspects of simulated worlds, replicates fastest, and which are broken."""
+        trial = trial_in(stage, np.arange(first, first + len(settings)))
+        keys = world_keys(
+            self.seed, trial=trial[:, None], replicate=np.arange(replicates)[None, :]
+        ).ravel()
+        values = {
+            name: np.repeat(column, replicates) for name, column in self.values(settings).items()
+        }
+        seen = self.model.simulate(values, self.like, keys)
+        wall = wall_distance(self.like)
+        aspects = [form_aspects(self.plan, x, y, wall=wall) for x, y in zip(*seen[:2], strict=True)]
+        return list(aspects), broken_worlds(seen.status)
+
+    def values(self, settings: Floats) -> dict[str, Floats]:
+        """Return the values of the parameters at points of the unit cube."""
+        settings = np.atleast_2d(settings)
+        found = {}
+        for column, one in zip(settings.T, self.ranges, strict=True):
+            low, high = (float(one.to_coordinate(end)) for end in (one.low, one.high))
+            found[one.name] = one.to_value(low + (high - low) * column)
+        return found
+
+
+def wall_distance(like: Conditions) -> WallDistance:
+    """Return the function that gives a point's distance from the wall of a recording [m]."""
+    radius = like.tank.radius_m
+    if radius is not None:
+        return lambda x, y: np.asarray(radius - np.hypot(x, y))
+    edges = wall_edges(like.tank)
+
+    def nearest(x: Floats, y: Floats) -> Floats:
+        return np.asarray(np.min([far - nx * x - ny * y for nx, ny, far in edges], axis=0))
+
+    return nearest
