@@ -42,7 +42,7 @@ def test_a_diffusing_particle_fills_a_circle_evenly(fresh_seed: Seed) -> None:
     )
     time = np.append(np.arange(0.0, 17.0, 0.25), 17.25)
     z, _ = paths(table, time, seed=fresh_seed(15), tank=BASIN, contact="reflect", time_step=0.01)
-    assert np.abs(z).max() <= reach + 1e-7, "a particle was within its clearance of the wall"
+    assert np.abs(z).max() <= reach + 1e-6 * 0.3, "a particle was within its clearance of the wall"
     evenly = (np.abs(z[:, -1]) / reach) ** 2
     assert errors_off(evenly, 0.5) < SIGMAS
     assert stats.kstest(evenly, "uniform").pvalue > FALSE_ALARM

@@ -130,6 +130,7 @@ def scene_of(case: Case) -> Scene:
     grid = {} if flow is None else {f"flow_{name}": flow[name].values for name in "xyuv"}
     return Scene(
         STEP,
+        case.tank.extent_m[0],
         radius=case.tank.radius_m or 0.0,
         edges=wall_edges(case.tank),
         reflects=case.reflects,
@@ -176,7 +177,7 @@ def agree(case: Case, seed: int = 5) -> Path:
     path = twin(case, steps, keys=keys, rows=starts())
     assert not (status & ~np.uint32(4)).any()
     assert np.abs(x + 1j * y - path.z.T).max() < 1e-9
-    # Not at time 0: there the core reports the heading after the first step.
+    # Not at time 0: a bout that ends in the first step has turned the core's heading already.
     apart = np.exp(1j * theta) - np.exp(1j * path.heading.T)
     assert np.abs(apart[:, 1:]).max() < 1e-7
     return path
@@ -186,6 +187,33 @@ def agree(case: Case, seed: int = 5) -> Path:
 def test_a_switching_particle_moves_as_its_twin(name: str) -> None:
     path = agree(SWITCHING[name])
     assert np.abs(path.z[-1] - path.z[0]).max() > 0.02, "no world moved"
+
+
+def test_a_heading_is_that_of_the_sample() -> None:
+    # Turning at 5 rad/s, seen at the ends of steps and between them.
+    case = Case((State(0.02, turn_rate=5.0),))
+    keys = world_keys(5, trial=0, replicate=np.arange(COUNT))
+    times = np.array([0.0, 0.5, 1.0, 1.25, 3.0]) * STEP
+    *_, theta, _ = native(case, times, keys=keys, rows=starts())
+    turned = np.angle(np.exp(1j * (theta - starts()[:, 2:3])))
+    np.testing.assert_allclose(turned, np.tile(5.0 * times, (COUNT, 1)), atol=1e-4)
+
+
+@pytest.mark.parametrize("angle", [10.0, 20.0, 40.0, 60.0])
+@pytest.mark.parametrize("reflects", [False, True])
+def test_a_particle_stays_in_a_sharp_corner(angle: float, reflects: bool) -> None:
+    # Straight on into the tip of a triangle that is as long as it is high.
+    half = np.tan(np.deg2rad(angle / 2))
+    tip = Tank(shape="polygon", vertices_m=((0.1, 0.0), (-0.1, 0.2 * half), (-0.1, -0.2 * half)))
+    case = Case((State(0.05, rotational_diffusion=0.01),), {}, tip, reflects)
+    rows = np.zeros((COUNT, 6))
+    rows[:, 0] = -0.05
+    keys = world_keys(5, trial=0, replicate=np.arange(COUNT))
+    x, y, _, status = native(case, np.arange(601) * STEP, keys=keys, rows=rows)
+    assert not (status & ~np.uint32(4)).any()
+    outside = [(x * nx + y * ny - far).max() for nx, ny, far in wall_edges(tip)]
+    assert max(outside) < 1e-6 * tip.extent_m[0]
+    assert x.max() > 0.09, "no particle came to the tip"
 
 
 @pytest.mark.parametrize("reflects", [False, True])

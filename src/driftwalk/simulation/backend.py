@@ -86,7 +86,7 @@ def native_model(
 
 
 POINT: Final[dict[str, Any]] = {
-    "side": 1e-6, "mass": 1.0, "inertia": 1.0, "depth": 1.0, "strips": 1, "added_mass_share": 0.0,
+    "mass": 1.0, "inertia": 1.0, "depth": 1.0, "strips": 1, "added_mass_share": 0.0,
     "water_density": 1.0, "linear_drag": 0.0, "drag_power": 2.0, "drag_speed": 1.0,
     "displaced_mass": 0.0, "steps_per_interval": 1, "force_memory": 0.0,
 }  # fmt: skip
@@ -125,6 +125,8 @@ def native_scene(
         As `native_model`.
     """
     return _core.Model(
+        # A contact is rounded, by less than this share of the arena.
+        side=4e-6 * max(tank.extent_m),
         time_step=time_step,
         **POINT,
         **_surroundings(tank, view, flow, sample_time, camera, accelerating=False),

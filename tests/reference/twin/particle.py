@@ -45,6 +45,8 @@ class Scene:
     """
 
     time_step: float
+    width: float
+    """Of the arena; contact is rounded by a millionth of it."""
     radius: float = 0.0
     edges: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     reflects: bool = False
@@ -116,21 +118,24 @@ def _uniforms(key: Keys, purpose: Purpose, index: npt.NDArray[np.int64]) -> Floa
 # --- the wall -------------------------------------------------------------------------------------
 
 
-def stay_inside(scene: Scene, clearance: Floats, z: Points, touched: Touched) -> Points:
+def stay_inside(
+    scene: Scene, clearance: Floats, came_from: Points, z: Points, touched: Touched
+) -> Points:
     """Return the points, those beyond the wall brought back; `touched` hears of each contact.
 
     Reflected points come in as far as they were out. Where that leads beyond another edge, and
-    where they do not bounce, they come to the contact with the nearest edge until all are clear.
+    where they do not bounce, they come to the contact with the nearest edge until all are clear;
+    those that never are go back to where they came from.
     """
     for turn in range(MOST_ROUNDS):
         distance, normal = scene.wall(z, clearance)
-        beyond = distance < 0
+        beyond = distance < -1e-6 * scene.width
         if not beyond.any():
             break
         back = 2 if scene.reflects and turn == 0 else 1
         z = z + np.where(beyond, back * distance, 0.0) * normal
         touched(normal, beyond)
-    return z
+    return np.where(scene.wall(z, clearance)[0] < -1e-6 * scene.width, came_from, z)
 
 
 def outward(velocity: Points, normal: Points) -> Floats:
@@ -150,13 +155,15 @@ def simulate_inertial(
     dt = scene.time_step
     kept = np.exp(-dt / memory)
     contact = 2.0 if scene.reflects else 1.0
+    # Means of both ends diffuse too far over long times: s^2 dt / 2 coth(dt / 2 tau) for s^2 tau.
+    way = np.sqrt(np.tanh(dt / (2 * memory)) / (dt / (2 * memory)))
     numbers = Numbers(key, steps)
     path = [(z, np.angle(velocity))]
     for step in range(steps):
         first, second, *_ = numbers.motion[step]
         stirred = std * np.sqrt(1 - kept**2) * (first + 1j * second)
         after = velocity * kept * np.exp(1j * rate * dt) + stirred
-        z = z + ((velocity + after) / 2 + scene.water(z)) * dt
+        came_from, z = z, z + (way * (velocity + after) / 2 + scene.water(z)) * dt
         velocity = after
 
         def touched(normal: Points, beyond: Mask) -> None:
@@ -164,7 +171,7 @@ def simulate_inertial(
             lost = np.where(beyond, contact * outward(velocity, normal), 0.0)
             velocity = velocity - lost * normal
 
-        z = stay_inside(scene, clearance, z, touched)
+        z = stay_inside(scene, clearance, came_from, z, touched)
         path.append((z, np.angle(velocity)))
     return Path(*(np.stack(column) for column in zip(*path, strict=True)))
 
@@ -306,20 +313,22 @@ def _step(scene: Scene, columns: Columns, one: Swimmer, numbers: Numbers, step: 
     for_turn, for_slow, *for_place = numbers.motion[step]
     one.left = one.left - dt
     change_bout(columns, one, numbers, step)
-    one.speed = one.target + (one.speed - one.target) * kept_over(
-        dt, columns.of("relaxation_time", one.state)
-    )
+    diffusion = columns.of("rotational_diffusion", one.state)
+    relaxation = columns.of("relaxation_time", one.state)
+    off = one.speed - one.target
+    # The mean within the step, at a heading that wavers on its way: a factor 1 - D dt / 4.
+    mean = (one.target + off * mean_over(dt, relaxation)) * np.exp(-diffusion * dt / 4)
+    one.speed = one.target + off * kept_over(dt, relaxation)
     kept = kept_over(dt, shared["slow_time"])
     one.slow = kept * one.slow + np.sqrt(1 - kept**2) * for_slow
     one.phase = one.phase + shared["stroke_frequency"] * dt
     wall_rate, wall_factor = felt_wall(scene, columns, one)
     speed = (
-        one.speed
+        mean
         * np.exp(shared["slow_std"] * one.slow - shared["slow_std"] ** 2 / 2)
         * (1 + shared["stroke"] * np.cos(2 * np.pi * one.phase))
         * wall_factor
     )
-    diffusion = columns.of("rotational_diffusion", one.state)
     turn = (one.turn_rate + wall_rate) * dt + np.sqrt(2 * diffusion * dt) * for_turn
     jitter = np.sqrt(2 * shared["diffusion"] * dt) * (for_place[0] + 1j * for_place[1])
     moved = (speed * np.exp(1j * (one.heading + turn / 2)) + scene.water(one.z)) * dt + jitter
@@ -332,7 +341,7 @@ def _step(scene: Scene, columns: Columns, one: Swimmer, numbers: Numbers, step: 
             thrown = ahead - 2 * outward(ahead, normal) * normal
             one.heading = np.where(beyond, np.angle(thrown), one.heading)
 
-    one.z = stay_inside(scene, shared["clearance"], one.z + moved, touched)
+    one.z = stay_inside(scene, shared["clearance"], one.z, one.z + moved, touched)
 
 
 def kept_over(dt: float, time: Floats) -> Floats:
@@ -341,3 +350,9 @@ def kept_over(dt: float, time: Floats) -> Floats:
     A time of 0 leaves nothing.
     """
     return np.where(time > 0, np.exp(-dt / np.where(time > 0, time, 1.0)), 0.0)
+
+
+def mean_over(dt: float, time: Floats) -> Floats:
+    """Return the mean within a step of what begins at 1 and relaxes to 0; 0 for a time of 0."""
+    z = dt / np.where(time > 0, time, 1.0)
+    return np.where(time > 0, -np.expm1(-z) / z, 0.0)

@@ -247,3 +247,21 @@ def test_a_motion_model_is_a_name_or_a_function():
         dw.motion_model("active", settings="many")
     with pytest.raises(ConfigurationError, match="no `clearance`"):
         dw.motion_model(lambda scene, speed: None, clearance=0.1, speed=(0, 1))
+
+
+def test_a_body_that_drifts_with_the_water_starts_at_rest_in_it():
+    """The start of a recording is seen from the ground."""
+    contract = TestInertialInTheFlow()
+    flow = dw.uniform_flow(0.02, 0.0, arena=dw.Study().tank.to_arena())
+    like = replace(
+        contract.conditions(),
+        flow=flow,
+        camera=dw.simulation.backend.Camera(),
+        start=dw.simulation.Start(-0.1, 0.0, 0.0, 0.02, 0.0, 0.0),
+    )
+    model = family_model("inertial+flow", speed_std=0.0, turn_rate=0.0)
+    worlds = model.simulate(
+        {"memory_time": np.array([1.0])}, like, world_keys(1, trial=0, replicate=np.arange(1))
+    )
+    time = like.sample_time
+    np.testing.assert_allclose(worlds.x[0][time < 8], -0.1 + 0.02 * time[time < 8], atol=1e-5)

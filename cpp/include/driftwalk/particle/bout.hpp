@@ -12,7 +12,7 @@ DRIFTWALK_LANES_BEGIN
 template <class Real>
 struct State {
   Real dwell_scale, dwell_power, start_share;
-  Real speed, speed_log_std, speed_kept, coasting;
+  Real speed, speed_log_std, speed_kept, speed_mean, coasting;
   Real turn_noise; // of the heading in a step [rad]
   Real turn_rate, turn_rate_std, turn_std, reversal_share;
   Real next[most_particle_states];
@@ -31,8 +31,10 @@ struct Bout {
   Real left;       // [s]
   Real target;     // the speed that it relaxes to [m/s]
   Real kept;       // of the difference to it, over a step
+  Real mean;       // of the difference within a step, over that at its beginning
   Real turn_rate;  // [rad/s]
   Real turn_noise; // [rad]
+  Real straight;   // way of a step over its length, for the heading wavers within it
 };
 
 // What the beginning of a bout does to the particle.
@@ -58,7 +60,9 @@ inline States<Real> read_states(const ColumnReader<Real>& columns, int count, do
     state.start_share = number(column_start_share);
     state.speed = number(column_speed);
     state.speed_log_std = log_std_of(number(column_speed_cv));
-    state.speed_kept = kept_over(dt, number(column_relaxation_time));
+    const Real relaxation = number(column_relaxation_time);
+    state.speed_kept = kept_over(dt, relaxation);
+    state.speed_mean = mean_over(dt, relaxation, state.speed_kept);
     state.coasting = number(column_coasting);
     state.turn_noise = sqrt(number(column_rotational_diffusion) * (T(2) * dt));
     state.turn_rate = number(column_turn_rate);
@@ -112,6 +116,7 @@ inline State<Real> current(const States<Real>& states, Real number) {
     take(&State<Real>::speed);
     take(&State<Real>::speed_log_std);
     take(&State<Real>::speed_kept);
+    take(&State<Real>::speed_mean);
     take(&State<Real>::coasting);
     take(&State<Real>::turn_noise);
     take(&State<Real>::turn_rate);
@@ -144,9 +149,14 @@ inline Entry<Real> begin_bout(const States<Real>& states,
   bout.left = select(where, bout.left + dwell, bout.left);
   bout.target = select(where, select(coasts, zero, speed), bout.target);
   bout.kept = select(where, state.speed_kept, bout.kept);
+  bout.mean = select(where, state.speed_mean, bout.mean);
   bout.turn_rate = select(where, state.turn_rate + state.turn_rate_std * normal[2], bout.turn_rate);
   bout.turn_noise = select(where, state.turn_noise, bout.turn_noise);
-  return {select(where, bounded_angle(state.turn_std * normal[1]), zero), speed,
+  // The mean over a step of e(phi), given phi at both ends, is shorter than 1: half a third of the
+  // noise's variance by the way in between, a twelfth by the chord. To first order, D dt / 4.
+  const Real straight = bounded_exp(state.turn_noise * state.turn_noise * T(-0.125));
+  bout.straight = select(where, straight, bout.straight);
+  return {select(where, without_turns(state.turn_std * normal[1]), zero), speed,
           where & (uniform[2] <= state.reversal_share), where & coasts};
 }
 

@@ -43,17 +43,21 @@ inline void mirror(const NearestWall<Real>& wall, typename Numbers<Real>::Bool w
   vy = vy - wall.ny * twice;
 }
 
+// A point is beyond the wall when it is so by this share of the arena's width: contact is rounded.
+inline constexpr double contact_slack = 1e-6;
+
 // Brings a point back that is beyond the wall, and calls `touched` with the wall and where that
 // was. Between edges that meet at an angle, leaving one can mean entering the next: go round until
-// all are clear. A point that is thrown back comes in as far as it was out.
+// all are clear; in the tip of a sharp corner it goes back to where it came from. A point that is
+// thrown back comes in as far as it was out.
 template <class Real, class T, class Touched>
-inline void stay_inside(const WallView<T>& view, Real clearance, WallContact contact, Real& x,
-                        Real& y, const Touched& touched) {
+inline void stay_inside(const WallView<T>& view, T slack, Real clearance, WallContact contact,
+                        Real from_x, Real from_y, Real& x, Real& y, const Touched& touched) {
   constexpr int most_rounds = 16;
-  const Real zero{T(0)};
+  const Real zero{T(0)}, outside{-slack};
   for (int round = 0; round < most_rounds; ++round) {
     const NearestWall<Real> wall = nearest_wall(view, clearance, x, y);
-    const auto beyond = wall.distance < zero;
+    const auto beyond = wall.distance < outside;
     if (!any(beyond)) {
       return;
     }
@@ -63,6 +67,9 @@ inline void stay_inside(const WallView<T>& view, Real clearance, WallContact con
     y = y + wall.ny * shift;
     touched(wall, beyond);
   }
+  const auto stuck = nearest_wall(view, clearance, x, y).distance < outside;
+  x = select(stuck, from_x, x);
+  y = select(stuck, from_y, y);
 }
 
 DRIFTWALK_LANES_END

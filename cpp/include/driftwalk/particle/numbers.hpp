@@ -68,6 +68,18 @@ inline Real kept_over(T dt, Real time) {
   return select(time > zero, exp(max(-steps, Real(T(-80)))), zero);
 }
 
+// The mean over a step of what starts at 1 and relaxes to 0: (1 - exp(-z)) / z, z = dt / time.
+template <class Real, class T>
+inline Real mean_over(T dt, Real time, Real kept) {
+  const Real one{T(1)}, zero{T(0)};
+  const Real z = Real(dt) / max(time, Real(T(1e-9)));
+  // Of the difference of two numbers that are almost 1, a series keeps all digits.
+  const Real third = one - z * T(0.25) * (one - z * T(0.2));
+  const Real small = one - z * T(0.5) * (one - z * T(1.0 / 3.0) * third);
+  const Real mean = select(z < Real(T(0.02)), small, (one - kept) / z);
+  return select(time > zero, mean, zero);
+}
+
 // What a fresh normal number adds, so that the spread stays the same.
 template <class Real>
 inline Real fresh_with(Real kept) {
@@ -80,6 +92,16 @@ template <class Real>
 inline Real log_std_of(Real cv) {
   using T = typename Numbers<Real>::Scalar;
   return sqrt(max(log(cv * cv + T(1)), Real(T(0))));
+}
+
+// The angle without its whole turns.
+template <class Real>
+inline Real without_turns(Real angle) {
+  using T = typename Numbers<Real>::Scalar;
+  const Real turns = angle * static_cast<T>(0.5 / pi_value);
+  const Real bounded = clamp_to(turns, T(-1e6), T(1e6));
+  const Real whole = to_real(angle, truncate(bounded + copy_sign(Real(T(0.5)), bounded)));
+  return (turns - whole) * static_cast<T>(2 * pi_value);
 }
 
 // exp that stays a number, whatever comes in.

@@ -42,14 +42,15 @@ void run_particles(const Prepared<T>& run, const BatchWorlds& worlds, std::int64
       const Real sample_y = y + (particle.y() - y) * weight;
       rest.add(sample, sample_x, sample_y);
       // Angles cost more than a step: only for those who take them.
-      const Real theta =
-          sink.theta == nullptr ? Real(T(0)) : angle_of(particle.ahead_x(), particle.ahead_y());
+      const Real theta = sink.theta == nullptr
+                             ? Real(T(0))
+                             : angle_of(particle.ahead_x(weight), particle.ahead_y(weight));
       write_sample(run, sink, sample, count, particle.stream(), sample_x, sample_y, theta);
     }
   }
   const Real zero{T(0)};
   const Body<Real> body{{particle.x(), particle.y(), zero},
-                        {particle.ahead_x(), particle.ahead_y(), zero},
+                        {particle.ahead_x(T(1)), particle.ahead_y(T(1)), zero},
                         {zero, zero, zero}};
   write_status(run, body, rest, count, status);
 }

@@ -56,19 +56,25 @@ public:
     const Axes<Real> heading = axes_at(wrap_angle(columns.of(worlds.theta)));
     ahead_x_ = heading.cosine;
     ahead_y_ = heading.sine;
+    from_x_ = ahead_x_;
+    from_y_ = ahead_y_;
     start();
   }
 
   void step(const WallView<T>& wall, const FlowView<T>& flow, std::int64_t index) {
     Real normal[4];
     draw_normals(stream_, Purpose::motion, index, normal);
+    const T slack = (flow.high_x - flow.low_x) * static_cast<T>(contact_slack);
     bout_.left = bout_.left - dt_;
     const Bool ended = bout_.left <= Real(T(0));
     if (any(ended)) {
       change_bout(index, ended);
     }
-    speed_ = bout_.target + (speed_ - bout_.target) * bout_.kept;
-    Real speed = speed_ * factor(normal[1]);
+    from_x_ = ahead_x_;
+    from_y_ = ahead_y_;
+    const Real off = speed_ - bout_.target;
+    Real speed = (bout_.target + off * bout_.mean) * (factor(normal[1]) * bout_.straight);
+    speed_ = bout_.target + off * bout_.kept;
     Real turn = bout_.turn_rate * dt_ + bout_.turn_noise * normal[0];
     if (feels_wall_) {
       feel_wall(wall, speed, turn);
@@ -77,14 +83,15 @@ public:
     if (carried_) {
       water_at(flow, x_, y_, u, v);
     }
-    // It moves along the heading in the middle of the step.
+    // It moves along the heading in the middle of the step, at the mean speed within it.
     Real sine, cosine;
     sincos(bounded_angle(turn * T(0.5)), sine, cosine);
     rotate(cosine, sine);
+    const Real from_x = x_, from_y = y_;
     x_ = x_ + (speed * ahead_x_ + u) * dt_ + spread_ * normal[2];
     y_ = y_ + (speed * ahead_y_ + v) * dt_ + spread_ * normal[3];
     rotate(cosine, sine);
-    stay_inside(wall, clearance_, contact_, x_, y_,
+    stay_inside(wall, slack, clearance_, contact_, from_x, from_y, x_, y_,
                 [&](const NearestWall<Real>& nearest, Bool touched) {
                   if (contact_ == WallContact::reflect) {
                     mirror(nearest, touched, ahead_x_, ahead_y_);
@@ -95,8 +102,9 @@ public:
 
   Real x() const { return x_; }
   Real y() const { return y_; }
-  Real ahead_x() const { return ahead_x_; }
-  Real ahead_y() const { return ahead_y_; }
+  // The heading at a share of the last step.
+  Real ahead_x(T share) const { return from_x_ + (ahead_x_ - from_x_) * share; }
+  Real ahead_y(T share) const { return from_y_ + (ahead_y_ - from_y_) * share; }
   const Philox<typename Numbers<Real>::UInt>& stream() const { return stream_; }
 
 private:
@@ -105,7 +113,7 @@ private:
   void start() {
     constexpr std::int64_t before = std::int64_t(1) << 62;
     const Real zero{T(0)};
-    bout_ = {zero, zero, zero, zero, zero, zero};
+    bout_ = {zero, zero, zero, zero, zero, zero, zero, zero};
     Real uniform[4], normal[4];
     draw_uniforms(stream_, Purpose::bout, before, uniform);
     draw_normals(stream_, Purpose::motion, before, normal);
@@ -185,6 +193,7 @@ private:
   Real clearance_, spread_, slow_std_, slow_kept_, slow_fresh_, stroke_, stroke_turns_;
   Real wall_turn_, wall_follow_, wall_slowing_, per_wall_range_;
   Real ahead_x_, ahead_y_; // the heading, a unit vector
+  Real from_x_, from_y_;   // the same when the last step began
   Real speed_, slow_number_, phase_;
   Bout<Real> bout_;
 };

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from driftwalk.motion.protocol import Details, Floats, Keys, Scores, Values, Wor
 from driftwalk.schema import Parameter
 from driftwalk.simulation.backend import native_scene
 from driftwalk.simulation.initial import Start, world_orientations
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 LONGEST_STEP_S: Final = 0.02
 """Time step, unless samples are so dense that half their interval is shorter."""
@@ -81,7 +84,7 @@ class ParticleModel:
         table = self.table(values, keys.size)
         x, y, theta, status = _core.simulate(
             self.native(like),
-            _rows(table, like.start, keys),
+            self._rows(table, like, keys),
             keys,
             threads=like.threads,
             precision="single",
@@ -108,7 +111,7 @@ class ParticleModel:
         table = self.table(values, keys.size)
         return scored(
             self.native(like),
-            _rows(table, like.start, keys),
+            self._rows(table, like, keys),
             like,
             keys,
             reference,
@@ -168,6 +171,23 @@ class ParticleModel:
             self._ready = ready
         return ready[1]
 
+    def _rows(self, table: ParticleTable, like: Conditions, keys: Keys) -> Floats:
+        """Return starts and numbers of worlds, one row each.
+
+        A body sets out in the direction that it moves in, relative to the water that carries it;
+        where it does not move, in that of its recorded orientation, or a random one.
+        """
+        start = like.start
+        u, v = _water_at(like.flow, start) if self.needs_flow and like.flow is not None else (0, 0)
+        vx, vy = np.asarray(start.vx, dtype=float) - u, np.asarray(start.vy, dtype=float) - v
+        heading = np.where(
+            np.hypot(vx, vy) > 0.0, np.arctan2(vy, vx), np.asarray(start.theta, dtype=float)
+        )
+        given = [np.asarray(one, dtype=float) for one in (start.x, start.y)]
+        rest = [vx, vy, np.asarray(start.omega, dtype=float)]
+        columns = np.broadcast_arrays(*given, world_orientations(heading, keys), *rest)
+        return np.ascontiguousarray(np.column_stack([*columns, table.columns]))
+
     def __getstate__(self) -> dict[str, Any]:
         """Leave the core's form out: it is made again where the model is used."""
         return {**self.__dict__, "_ready": None}
@@ -187,17 +207,14 @@ def time_step_of(sample_time: Floats) -> float:
     return interval / max(int(np.ceil(interval / LONGEST_STEP_S - 1e-9)), 2)
 
 
-def _rows(table: ParticleTable, start: Start, keys: Keys) -> Floats:
-    """Return starts and numbers of worlds, one row each.
+def _water_at(flow: xr.Dataset, start: Start) -> tuple[Floats, Floats]:
+    """Return the water's velocity [m/s] where and when a body starts."""
+    from scipy.interpolate import RegularGridInterpolator
 
-    A body sets out in the direction that it moves in; where it does not move, in that of its
-    recorded orientation, or a random one.
-    """
-    moves = np.hypot(start.vx, start.vy) > 0.0
-    heading = np.where(moves, np.arctan2(start.vy, start.vx), np.asarray(start.theta, dtype=float))
-    columns = np.broadcast_arrays(
-        *(np.asarray(value, dtype=np.float64) for value in (start.x, start.y)),
-        world_orientations(heading, keys),
-        *(np.asarray(value, dtype=np.float64) for value in (start.vx, start.vy, start.omega)),
-    )
-    return np.ascontiguousarray(np.column_stack([*columns, table.columns]))
+    x, y = (flow[axis].values for axis in ("x", "y"))
+    at = np.stack([np.clip(start.y, y[0], y[-1]), np.clip(start.x, x[0], x[-1])], axis=-1)
+    found = []
+    for name in ("u", "v"):
+        values = flow[name].isel(time=0) if "time" in flow[name].dims else flow[name]
+        found.append(RegularGridInterpolator((y, x), values.values)(at).reshape(np.shape(start.x)))
+    return found[0], found[1]
