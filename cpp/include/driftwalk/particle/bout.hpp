@@ -156,8 +156,9 @@ inline Entry<Real> begin_bout(const States<Real>& states,
   // noise's variance by the way in between, a twelfth by the chord. To first order, D dt / 4.
   const Real straight = bounded_exp(state.turn_noise * state.turn_noise * T(-0.125));
   bout.straight = select(where, straight, bout.straight);
-  return {select(where, without_turns(state.turn_std * normal[1]), zero), speed,
-          where & (uniform[2] <= state.reversal_share), where & coasts};
+  const typename Numbers<Real>::Bool reversed = where & (uniform[2] <= state.reversal_share);
+  const typename Numbers<Real>::Bool kicked = where & coasts;
+  return {select(where, without_turns(state.turn_std * normal[1]), zero), speed, reversed, kicked};
 }
 
 DRIFTWALK_LANES_END
