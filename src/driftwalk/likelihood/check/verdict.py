@@ -19,7 +19,7 @@ from driftwalk.likelihood.spline import Floats
 LEVEL = 0.0005
 """A recording of the model itself fails one criterion this often; ten of them, that is one
 recording in 200. One in 50 is allowed: tails of distributions are known only about, so the level
-has a margin. At 0.001 five of 276 failed (docs/explanation/likelihood.md)."""
+has a margin. At 0.001 eleven of 380 failed (docs/explanation/likelihood.md)."""
 MOST_OUTLIERS = 1e-3
 """Share of samples. One in 5e8 is expected, but a tracker may slip now and then."""
 MISSED_MISTAKES = 0.25
