@@ -94,14 +94,19 @@ inline Real log_std_of(Real cv) {
   return sqrt(max(log(cv * cv + T(1)), Real(T(0))));
 }
 
-// The angle without its whole turns.
+// A number of turns without the whole ones: from -1/2 to 1/2.
+template <class Real>
+inline Real part_of_turn(Real turns) {
+  using T = typename Numbers<Real>::Scalar;
+  const Real bounded = clamp_to(turns, T(-1e6), T(1e6));
+  return turns - to_real(turns, truncate(bounded + copy_sign(Real(T(0.5)), bounded)));
+}
+
+// The same of an angle [rad].
 template <class Real>
 inline Real without_turns(Real angle) {
   using T = typename Numbers<Real>::Scalar;
-  const Real turns = angle * static_cast<T>(0.5 / pi_value);
-  const Real bounded = clamp_to(turns, T(-1e6), T(1e6));
-  const Real whole = to_real(angle, truncate(bounded + copy_sign(Real(T(0.5)), bounded)));
-  return (turns - whole) * static_cast<T>(2 * pi_value);
+  return part_of_turn(angle * static_cast<T>(0.5 / pi_value)) * static_cast<T>(2 * pi_value);
 }
 
 // exp that stays a number, whatever comes in.

@@ -53,7 +53,7 @@ public:
     strokes_ = any(abs(stroke_) > zero);
     feels_wall_ =
         any((abs(wall_turn_) > zero) | (abs(wall_follow_) > zero) | (abs(wall_slowing_) > zero));
-    const Axes<Real> heading = axes_at(wrap_angle(columns.of(worlds.theta)));
+    const Axes<Real> heading = axes_at(without_turns(columns.of(worlds.theta)));
     ahead_x_ = heading.cosine;
     ahead_y_ = heading.sine;
     from_x_ = ahead_x_;
@@ -147,8 +147,7 @@ private:
       found = bounded_exp(slow_std_ * (slow_number_ - slow_std_ * T(0.5)));
     }
     if (strokes_) {
-      phase_ = phase_ + stroke_turns_;
-      phase_ = select(phase_ > Real(T(0.5)), phase_ - T(1), phase_);
+      phase_ = part_of_turn(phase_ + stroke_turns_);
       const Axes<Real> swing = axes_at(phase_ * static_cast<T>(2 * pi_value));
       found = found * (Real(T(1)) + stroke_ * swing.cosine);
     }
