@@ -38,14 +38,12 @@ from driftwalk.conditions import load_with_study, recorded_camera, recorded_cond
 from driftwalk.schema import body_track
 
 MODELS: Final = (
-    "inertial", "active", "active+wall", "run_tumble", "run_tumble+wall", "run_rest+wall",
-    "burst_coast+wall", "two_state+wall", "active+stroke+wall", "run_tumble+wall+slow",
-    "run_tumble+wall+follow", "run_rest+wall+follow",
+    "inertial", "active+wall", "run_tumble+wall", "run_tumble+wall+slow", "run_rest+wall",
+    "run_rest+wall+stroke", "burst_coast+wall", "two_state+wall",
 )  # fmt: skip
 SEED: Final = 1
 JUDGED: Final = 16
 """Worlds by which the answer of a search is judged."""
-SCORES: Final = ("steps", "steps_3", "steps_9", "frame", "wall", "memory")
 
 
 class Prepared:
