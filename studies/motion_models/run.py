@@ -29,6 +29,7 @@ from driftwalk.calibration.evolution import (
     wall_distance,
 )
 from driftwalk.comparison.aspects import (
+    AspectReference,
     aspect_reference,
     form_aspects,
     interleaved,
@@ -96,12 +97,9 @@ def judged(prepared: Prepared, name: str) -> dict[str, Any]:
     seconds = time.perf_counter() - began
     worlds, _ = objective.worlds(found.best[None], JUDGED, stage="judged")
     held = aspect_reference(prepared.held, duration=prepared.duration)
-    trained, tested = (one.distances(worlds) for one in (objective.reference, held))
-    own = held.distances([prepared.fitted])[0]
-    floor = np.median([aspect_reference(worlds[0], duration=prepared.duration)
-                       .distances(worlds[1:])], axis=(0, 1))  # fmt: skip
+    apart = held.distances(worlds)
+    again = aspect_reference(worlds[0], duration=prepared.duration)
     values = {key: float(value[0]) for key, value in objective.values(found.best).items()}
-    names = held.names
     return {
         "model": name,
         "parameters": len(values),
@@ -110,12 +108,17 @@ def judged(prepared: Prepared, name: str) -> dict[str, Any]:
         "score": found.score,
         "ends": found.ends.tolist(),
         "values": values,
-        "trained": dict(zip(names, np.median(trained, axis=0).tolist(), strict=True)),
-        "held_out": dict(zip(names, np.median(tested, axis=0).tolist(), strict=True)),
-        "own": dict(zip(names, own.tolist(), strict=True)),
-        "model_floor": dict(zip(names, floor.tolist(), strict=True)),
-        "held_out_score": float(held.overall(tested).mean()),
+        "trained": medians(objective.reference, objective.reference.distances(worlds)),
+        "held_out": medians(held, apart),
+        "own": medians(held, held.distances([prepared.fitted])),
+        "model_floor": medians(again, again.distances(worlds[1:])),
+        "held_out_score": float(held.overall(apart).mean()),
     }
+
+
+def medians(reference: AspectReference, distances: np.ndarray) -> dict[str, float]:
+    """Return the median distance over worlds in each aspect that the reference has."""
+    return dict(zip(reference.names, np.median(distances, axis=0).tolist(), strict=True))
 
 
 def main() -> None:
