@@ -252,6 +252,17 @@ PAGES: dict[str, Page] = {
         not_run={"python studies/*": STUDY},
         holds=("tank.x.shape == tank.assembly.shape == (64,)",),
     ),
+    "docs/explanation/motion-models.md": Page(
+        provide=_files(_minutes(recording=0.5), _tumble_search),
+        # The block of the recording is slower than the page's robot.
+        instead={
+            "dw.calibrate(recording, model)": "dw.calibrate(recording, model, study=SMALL)",
+            "(0.1, 0.6,": "(0.02, 0.12,",
+        },
+        holds=("0.02 < found['estimate'].sel(parameter='speed') < 0.12",),
+        draws=False,
+        slow=True,
+    ),
     "docs/explanation/performance.md": Page(
         not_run={"make bench": TIMES, "python benchmarks/*": TIMES},
     ),

@@ -153,6 +153,7 @@ BAD: dict[str, Callable[[Path, Path], list[Words]]] = {
     "info": lambda bad, out: [["info", bad]],
     "convert": lambda bad, out: [["convert", bad, out / "out.nc"]],
     "flow": lambda bad, out: [["flow", bad, *TANK, "-o", out / "out.nc"]],
+    "models": lambda bad, out: [["models", bad]],
     "simulate": lambda bad, out: [
         ["simulate", "--flow", bad, "--duration", "1s", "-o", out / "out.nc"],
         ["simulate", "--flow", FLOW, "--like", bad, "-o", out / "out.nc"],
@@ -267,6 +268,7 @@ QUICK: dict[str, Callable[[Path, Path, Path], Words]] = {
     "info": lambda place, run, out: ["info", place / "two.csv"],
     "convert": lambda place, run, out: ["convert", place / "two.csv", out / "out.nc"],
     "flow": lambda place, run, out: ["flow", RECORDING, *SHORT, *TANK, "-o", out / "flow.nc"],
+    "models": lambda place, run, out: ["models", "run-rest+wall"],
     "simulate": lambda place, run, out: [
         *("simulate", "--flow", FLOW, "--duration", "10s", "-o", out / "out.nc")
     ],
