@@ -52,7 +52,7 @@ public:
     slow_ = any(slow_std_ > zero);
     strokes_ = any(abs(stroke_) > zero);
     feels_wall_ =
-        any((abs(wall_turn_) > zero) | (abs(wall_follow_) > zero) | (abs(wall_slowing_) > zero));
+        any(abs(wall_turn_) > zero) || any(abs(wall_follow_) > zero) || any(wall_slowing_ > zero);
     const Axes<Real> heading = axes_at(without_turns(columns.of(worlds.theta)));
     ahead_x_ = heading.cosine;
     ahead_y_ = heading.sine;
