@@ -60,11 +60,11 @@ def test_a_search_by_way_of_pieces_ends_where_one_of_the_whole_does(
     study = coarse_study()
     recording = driven(2, 1200.0, {})
     found = fit_motion(recording, study)
-    # Two steps without the noises, and two with them: fewer than a search from afar takes.
-    assert int(found["iterations"]) <= 5
+    # Two steps without the noises, two with them, and what the last nat takes.
+    assert int(found["iterations"]) <= 6
     monkeypatch.setattr(modes, "pieces", lambda passes: None)
     whole = fit_motion(recording, study)
-    assert int(whole["iterations"]) > 5
+    assert int(whole["iterations"]) > int(found["iterations"])
     width = np.ptp(whole["interval"].values, axis=1) / 3.29
     apart = np.abs(found["estimate"].values - whole["estimate"].values)
     # The lever may be known from its prior alone, and the added mass is stated.

@@ -59,11 +59,15 @@ def objective(conditions) -> AspectObjective:
 
 @pytest.mark.slow
 def test_a_model_is_found_again_from_its_own_motion(objective):
-    """Ten minutes determine the speed within 2 %, the diffusion within 15 %: 4 sd of either."""
+    """Ten minutes hold 300 times in which the heading forgets: the diffusion has an error of 8 %.
+
+    The end of a search adds as much again; four standard deviations are 45 %. The speed is known
+    from 3000 steps, within less than 1 %.
+    """
     found = search_minimum(objective, 2, budget=Budget(design=64, starts=2, short=12, long=20))
     values = {name: float(value[0]) for name, value in objective.values(found.best).items()}
     assert values["speed"] == pytest.approx(TRUTH["speed"], rel=0.03)
-    assert values["rotational_diffusion"] == pytest.approx(TRUTH["rotational_diffusion"], rel=0.2)
+    assert values["rotational_diffusion"] == pytest.approx(TRUTH["rotational_diffusion"], rel=0.45)
     assert found.score < 2.0
 
 
