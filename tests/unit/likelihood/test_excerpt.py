@@ -56,7 +56,7 @@ def test_of_many_short_recordings_little_would_be_left_out() -> None:
 def test_a_search_by_way_of_pieces_ends_where_one_of_the_whole_does(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Each ends within a tenth of a standard deviation of the mode: 0.2 apart at most."""
+    """Each ends within 0.15 standard deviations of the mode, as its last step is below 0.25."""
     study = coarse_study()
     recording = driven(2, 1200.0, {})
     found = fit_motion(recording, study)
@@ -69,4 +69,4 @@ def test_a_search_by_way_of_pieces_ends_where_one_of_the_whole_does(
     apart = np.abs(found["estimate"].values - whole["estimate"].values)
     # The lever may be known from its prior alone, and the added mass is stated.
     found_out = ~np.isin(whole["parameter"].values, ["force_lever", "added_mass_share"])
-    assert (apart < 0.2 * width)[found_out].all()
+    assert (apart < 0.3 * width)[found_out].all()
