@@ -41,6 +41,10 @@ MOST_CHANGE = 100 * STEP
 
 MOST_CHANGE_FAR = 1.0
 """The same for a number that is tried far from its value."""
+LEAST_COMPARABLE = 0.95
+"""Part of the samples that a pair of passes has to compare; else its step is too long."""
+LARGEST_OVER_MEDIAN = 8.0
+"""Largest change of a variance over the median one: a wrong time counts with the squared speed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,6 +193,15 @@ class Pair(NamedTuple):
         near = _beside(self.one, self.other, self.most_change)
         return _used(self.one) & _used(self.other) & near
 
+    @property
+    def excess(self) -> float:
+        """Return how many times too long the step is for most samples to be comparable."""
+        both = _used(self.one) & _used(self.other)
+        if not both.any() or np.mean(self.comparable[both]) >= LEAST_COMPARABLE:
+            return 1.0
+        median = float(np.median(_changes(self.one, self.other)[both]))
+        return max(1.0, LARGEST_OVER_MEDIAN * median / self.most_change)
+
 
 class Sums(NamedTuple):
     """Sums of a pass over all samples."""
@@ -325,12 +338,18 @@ class Passes:
             return Pair(base, self._at(series, point, name, point.extras[name] + STEP), STEP)
         number, value = NUMBERS[name], point.number(name)
         most = MOST_CHANGE if number.trial is None else MOST_CHANGE_FAR
-        if name in point.opened:
-            low, high = value, value + number.step
-        else:
+        if number.trial is not None and name not in point.opened:
             low, high = number.tried_from(value)
-        one = base if low == value else self._at(series, point, name, low)
-        return Pair(one, self._at(series, point, name, high), high - low, most)
+            one = base if low == value else self._at(series, point, name, low)
+            return Pair(one, self._at(series, point, name, high), high - low, most)
+
+        def one_step_on(step: float) -> Pair:
+            high = value + step
+            return Pair(base, self._at(series, point, name, high), high - value, most)
+
+        pair = one_step_on(number.step)
+        # Where positions are known to some micrometres, a tenth of a millisecond is a long step.
+        return pair if pair.excess <= 1.0 else one_step_on(number.step / pair.excess)
 
     def _at(self, series: Series, point: Point, name: str, value: float) -> dict[str, Any]:
         return self._run(series, point.with_extra(name, value))
@@ -458,9 +477,15 @@ def _used(found: dict[str, Any]) -> Flags:
 
 def _beside(base: dict[str, Any], other: dict[str, Any], most: float = MOST_CHANGE) -> Flags:
     """Return which innovations have nearly the variances that they have in the other pass."""
+    # A change that is not a number is not a near one.
+    return np.asarray(_changes(base, other) <= most, dtype=bool)
+
+
+def _changes(base: dict[str, Any], other: dict[str, Any]) -> Floats:
+    """Return the largest relative change of a variance at each sample, shape (n,)."""
     one, two = (np.einsum("aan->an", unpacked(found["covariance"])) for found in (base, other))
-    with np.errstate(invalid="ignore"):
-        return np.asarray((np.abs(two - one) <= most * one).all(axis=0), dtype=bool)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray((np.abs(two - one) / one).max(axis=0))
 
 
 def log_densities(passes: Passes, series: Series, point: Point) -> Floats:

@@ -141,6 +141,27 @@ def test_where_one_pass_restarted_the_noises_tell_nothing() -> None:
     assert _beside(other, base).tolist() == [True, False, False]
 
 
+def test_wrong_times_are_tried_on_all_samples_of_an_accurate_camera() -> None:
+    """Positions known to 15 micrometres: what the usual step does then outweighs their noise.
+
+    The derivative is that of the likelihood, by a difference of second order.
+    """
+    noises = {"observation.position_noise_m": 1.5e-5, "observation.orientation_noise_rad": 2e-3}
+    accurate = driven(3, 120.0, noises)
+    estimate = estimate_of(fit_motion(accurate, coarse_study()), [accurate], body=None)
+    passes, point = estimate.passes, estimate.point
+    name = "time_variance"
+    sums = passes.sums(point, tried=(name,))
+    assert sums.used == passes.sums(point, noise="without").used
+
+    def deviance(variance: float) -> float:
+        return passes.sums(replace(point, fixed={name: variance}), noise="without").deviance
+
+    step = 1e-10
+    slope = (4.0 * deviance(step) - 3.0 * deviance(0.0) - deviance(2.0 * step)) / (2.0 * step)
+    assert sums.score[-1] == pytest.approx(-slope, rel=0.05)
+
+
 def test_a_slow_cosine_of_the_flow_is_a_steady_change_times_the_cosine(
     passes: Passes, point: Point
 ) -> None:
