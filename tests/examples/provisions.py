@@ -296,6 +296,8 @@ PAGES: dict[str, Page] = {
         holds=(
             "0 <= found['estimate'].sel(parameter='speed') <= 0.1",
             "TestTumble().model().name == 'tumble'",
+            "own.parameters[0].high == 5e-5",
+            "(other.name, other.parameters[1].scale) == ('simulator', 'log')",
         ),
         draws=False,
         slow=True,

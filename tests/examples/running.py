@@ -98,7 +98,11 @@ class Reader:
         assert not missing, f"{where}\nnot printed: {missing}\n{printed}"
 
     def _python(self, block: Block, text: str) -> None:
+        """Run the example, or write the file that its first line names."""
         assert ">>>" not in text, f"{block}: an example has no prompts"
+        if named := re.match(r"# (\w+\.py)\n", text):
+            Path(named[1]).write_text(text, encoding="utf-8")
+            return
         # Empty lines in front: a traceback names the line of the page.
         with contextlib.redirect_stdout(self._printed):
             exec(compile("\n" * block.line + text, block.page, "exec"), self.names)

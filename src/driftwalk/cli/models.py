@@ -10,7 +10,7 @@ from driftwalk.cli.options.shared import Json
 from driftwalk.cli.terminal.output import print_json, print_table
 
 if TYPE_CHECKING:
-    from driftwalk.motion import Member, Part, ParticleModel
+    from driftwalk.motion import Member, MotionModel, Part, ParticleModel
 
 
 def models(
@@ -27,14 +27,13 @@ def models(
     """List the motion models of bodies that move by themselves.
 
     Without a name: all of them, and the parts that can be added. With one: its equation, its
-    source and its parameters.
+    source and its parameters. A model of your own, such as mine.py:tumbler, has its parameters
+    alone.
     """
-    from driftwalk.motion import MEMBERS, PARTS, ParticleModel, motion_model
+    from driftwalk.motion import MEMBERS, PARTS, motion_model
 
     if name is not None:
-        model = motion_model(name)
-        assert isinstance(model, ParticleModel)
-        _show(model, json=json)
+        _show(motion_model(name), json=json)
     elif json:
         print_json(
             {
@@ -48,18 +47,16 @@ def models(
             print_table(rows, columns=("name", "parameters", "what"), title=title)
 
 
-def _show(model: ParticleModel, *, json: bool) -> None:
+def _show(model: MotionModel, *, json: bool) -> None:
+    from driftwalk.motion import ParticleModel
+
     if json:
-        print_json(
-            {
-                **_described(model.member),
-                "name": model.name,
-                "parts": [_described(one) for one in model.parts],
-                "parameters": [one.describe() for one in model.parameters],
-            }
-        )
+        member = _of_the_family(model) if isinstance(model, ParticleModel) else {}
+        parameters = [one.describe() for one in model.parameters]
+        print_json({**member, "name": model.name, "parameters": parameters})
         return
-    print_table(_rows(model), title=model.name)
+    if isinstance(model, ParticleModel):
+        print_table(_rows(model), title=model.name)
     rows = [
         (one.name, one.unit, f"{one.low:g}", f"{one.high:g}", one.scale, one.meaning)
         for one in model.parameters
@@ -67,6 +64,10 @@ def _show(model: ParticleModel, *, json: bool) -> None:
     print_table(
         rows, columns=("parameter", "unit", "from", "to", "scale", "what"), title="parameters"
     )
+
+
+def _of_the_family(model: ParticleModel) -> dict[str, Any]:
+    return {**_described(model.member), "parts": [_described(one) for one in model.parts]}
 
 
 def _rows(model: ParticleModel) -> list[tuple[str, str]]:

@@ -1,10 +1,11 @@
-"""What can be calibrated? Motion models: block, self-propelled bodies, any Python function."""
+"""What can be calibrated? Motion models: block, self-propelled bodies, any function or program."""
 
 from driftwalk.motion.block import BlockModel
 from driftwalk.motion.camera import observe_worlds
-from driftwalk.motion.choose import motion_model
+from driftwalk.motion.choose import is_family_name, motion_model
 from driftwalk.motion.family import MEMBERS, PARTS, Member, Part, ParticleModel, models
 from driftwalk.motion.function import FunctionModel, Scene
+from driftwalk.motion.program import ProgramModel
 from driftwalk.motion.protocol import Details, MotionModel, Scores, ScoresItself, Worlds
 from driftwalk.motion.random import WorldRandom
 from driftwalk.motion.score import score_worlds
@@ -21,11 +22,13 @@ __all__ = [
     "Parameter",
     "Part",
     "ParticleModel",
+    "ProgramModel",
     "Scene",
     "Scores",
     "ScoresItself",
     "WorldRandom",
     "Worlds",
+    "is_family_name",
     "models",
     "motion_model",
     "observe_worlds",

@@ -1,18 +1,31 @@
-"""Choose a motion model: one of the family by its name, or a Python function of the user's."""
+"""Choose a motion model: one of the family by its name, or a function, file or program."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.motion.family import ParticleModel, family_model
-from driftwalk.motion.function import (
-    FunctionModel,
-    MotionFunction,
-    Settings,
-    function_model,
-)
+from driftwalk.motion.family import family_model
+from driftwalk.motion.function import MotionFunction, Settings, function_model
+from driftwalk.motion.model_file import SUFFIX, model_of_file
+from driftwalk.motion.program import TIMEOUT_S, ProgramModel
+from driftwalk.motion.protocol import MotionModel
+from driftwalk.motion.ranges import given_by_name
 from driftwalk.schema import Parameter
+
+COMMAND: Final = "command:"
+"""Beginning of the address of a program."""
+
+
+def is_family_name(model: str) -> bool:
+    """Return whether a text is a name of the family, and not the address of a file or program.
+
+    Examples
+    --------
+    >>> is_family_name("run_rest+wall"), is_family_name("mine.py:tumbler")
+    (True, False)
+    """
+    return not model.startswith(COMMAND) and SUFFIX not in model
 
 
 def motion_model(
@@ -21,9 +34,10 @@ def motion_model(
     *parameters: Parameter,
     settings: Settings = "one",
     clearance: float = 0.0,
+    timeout: float | None = None,
     **choices: Any,
-) -> ParticleModel | FunctionModel:
-    """Return a motion model: one of the family by its name, or one made of a Python function.
+) -> MotionModel:
+    """Return a motion model: one of the family by its name, or a function, file or program.
 
     A name is a member of the family and parts that are added to it, "run_rest+wall"; `models`
     lists the members with their parameters. A parameter may get a value that is known, and is then
@@ -40,35 +54,51 @@ def motion_model(
     they arrive as columns of shape (worlds, 1), and one call simulates many settings: worth it for
     a function that steps through time in a loop.
 
+    A function may hold the ranges itself, as defaults of its keywords, with a unit:
+    ``def tumbler(scene, *, speed=(0.01, 0.1, "m/s"))``. A given range replaces such a default.
+
+    A text such as "mine.py:tumbler" is a Python file and a name in it: a function, a motion model,
+    or a class that makes one without arguments. The file may import the ones next to it.
+
+    A text such as "command:./simulator fast" is a program, in any language. It names its parameters
+    with their ranges, and answers requests for worlds, one line of JSON each. It is started in the
+    current folder, once per thread that asks, and has the rights of this process.
+
     Parameters
     ----------
     model : str or callable
-        The name, or the function.
+        The name, the function, the file with a name, or the command.
     *parameters : Parameter
         Parameters with a step, a scale or a label of their own.
     settings : {"one", "many"}
         Of a function: whether the worlds of a call share one setting of the parameters.
     clearance : float
         Of the family: distance of the recorded point from the wall at contact [m].
+    timeout : float, optional
+        Of a program: longest time that an answer may take [s], default 60.
     **choices : tuple or float
         The other parameters by name: ``(low, high)`` or ``(low, high, unit)``; of the family also a
         value that is known.
 
     Returns
     -------
-    ParticleModel or FunctionModel
-        What `calibrate` takes.
+    MotionModel
+        What `calibrate` takes: a `ParticleModel`, a `FunctionModel`, the model of a file, or a
+        `ProgramModel`.
 
     Raises
     ------
     ConfigurationError
-        When there is no such member, part or parameter, a range is none, or the function does not
-        take the parameters.
+        When there is no such member, part, parameter, file or program, a range is none, or the
+        function does not take the parameters.
+    InputError
+        When a program does not name its parameters.
 
     Notes
     -----
-    Random numbers are to come from ``scene.random`` alone. `driftwalk.testing.MotionModelContract`
-    tells whether a model keeps to it.
+    Random numbers are to come from ``scene.random`` alone, those of a program from a generator per
+    world that starts with its seed. `driftwalk.testing.MotionModelContract` tells whether a model
+    keeps to it.
 
     Examples
     --------
@@ -84,13 +114,48 @@ def motion_model(
     'diffusivity_m2_s'
     """
     if isinstance(model, str):
-        if settings != "one":
-            raise ConfigurationError(f"{model} takes many settings anyway: leave out `settings`")
-        return family_model(model, *parameters, clearance=clearance, **choices)
+        return _addressed(model, parameters, settings, clearance, timeout, choices)
     if not callable(model):
         raise ConfigurationError(
             f"a motion model is made of a name or a function, got {type(model).__name__}"
         )
-    if clearance:
-        raise ConfigurationError("a function keeps its own distance from the wall: no `clearance`")
+    _refuse(model="a function", clearance=clearance, timeout=timeout)
     return function_model(model, parameters, choices, settings=settings)
+
+
+def _addressed(
+    model: str,
+    parameters: tuple[Parameter, ...],
+    settings: Settings,
+    clearance: float,
+    timeout: float | None,
+    choices: dict[str, Any],
+) -> MotionModel:
+    if model.startswith(COMMAND):
+        _refuse(model="a program", clearance=clearance)
+        if settings != "one":
+            raise ConfigurationError("a program gets one setting at a time: leave out `settings`")
+        limit = TIMEOUT_S if timeout is None else timeout
+        command = model.removeprefix(COMMAND)
+        return ProgramModel(command, given_by_name(parameters, choices), timeout=limit)
+    if SUFFIX in model:
+        _refuse(model="a model in a file", clearance=clearance, timeout=timeout)
+        return model_of_file(model, parameters, choices, settings=settings)
+    _refuse(model=model, settings=settings, timeout=timeout)
+    return family_model(model, *parameters, clearance=clearance, **choices)
+
+
+def _refuse(
+    *,
+    model: str,
+    clearance: float = 0.0,
+    settings: Settings = "one",
+    timeout: float | None = None,
+) -> None:
+    """Refuse what a kind of model has no use for."""
+    if clearance:
+        raise ConfigurationError(f"{model} keeps its own distance from the wall: no `clearance`")
+    if settings != "one":
+        raise ConfigurationError(f"{model} takes many settings anyway: leave out `settings`")
+    if timeout is not None:
+        raise ConfigurationError("only a program has a time limit: leave out `timeout`")

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import hashlib
 import inspect
-import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.conditions.recorded import Conditions
 from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.motion.batches import in_words, world_batches, world_starts
 from driftwalk.motion.camera import observe_worlds
 from driftwalk.motion.protocol import Floats, Keys, Values, Worlds
 from driftwalk.motion.random import WorldRandom
+from driftwalk.motion.ranges import Range, given_by_name, range_parameter, with_given
 from driftwalk.schema import Parameter
-from driftwalk.simulation.initial import Start, world_orientations
+from driftwalk.simulation.initial import Start
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from driftwalk.model import Tank
 
 Settings = Literal["one", "many"]
-Range = tuple[float, float] | tuple[float, float, str]
 Positions = tuple[Floats, Floats] | tuple[Floats, Floats, Floats]
 MotionFunction = Callable[..., Positions]
 
@@ -84,9 +83,13 @@ class FunctionModel:
         InputError
             When the function fails or returns something else than positions.
         """
-        parts = [
-            self._call(values, like, keys, batch) for batch in self._batches(values, like, keys)
-        ]
+        most = max(SAMPLES_PER_CALL // like.sample_time.size, 1)
+        batches = world_batches(
+            [values[one.name] for one in self.parameters],
+            most=most,
+            one_setting=self.settings == "one",
+        )
+        parts = [self._call(values, like, keys, batch) for batch in batches]
         return Worlds(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
     def describe(self) -> dict[str, Any]:
@@ -108,23 +111,10 @@ class FunctionModel:
         hashed = {} if source is None else {"model_source_sha256": source}
         return {"model": self.name, **hashed}
 
-    def _batches(self, values: Values, like: Conditions, keys: Keys) -> list[slice]:
-        """Return the worlds of each call: of one setting, unless many may be in a batch."""
-        most = max(SAMPLES_PER_CALL // like.sample_time.size, 1)
-        settings = np.column_stack([values[one.name] for one in self.parameters])
-        changes = np.flatnonzero((np.diff(settings, axis=0) != 0).any(axis=1)) + 1
-        inner = changes.tolist() if self.settings == "one" else []
-        ends = [0, *inner, keys.size]
-        return [
-            slice(first, min(first + most, stop))
-            for begin, stop in itertools.pairwise(ends)
-            for first in range(begin, stop, most)
-        ]
-
     def _call(self, values: Values, like: Conditions, keys: Keys, batch: slice) -> Worlds:
         own = keys[batch]
         scene = Scene(
-            like.sample_time, own.size, _starts(like.start, own), WorldRandom(own), like.tank,
+            like.sample_time, own.size, world_starts(like.start, own), WorldRandom(own), like.tank,
             like.flow,
         )  # fmt: skip
         given = {one.name: np.asarray(values[one.name][batch]) for one in self.parameters}
@@ -142,7 +132,7 @@ class FunctionModel:
         return observe_worlds(x, y, theta, like, own)
 
     def _called(self, given: Mapping[str, Floats]) -> str:
-        words = ", ".join(f"{name}={column[0]:g}" for name, column in given.items())
+        words = in_words({name: float(column[0]) for name, column in given.items()})
         return f"the model {self.name}({words})"
 
     def _positions(
@@ -187,25 +177,33 @@ def function_model(
         raise ConfigurationError(
             f"settings must be one of {', '.join(get_args(Settings))}, got {settings!r}"
         )
-    named = (*parameters, *(_parameter(name, given) for name, given in ranges.items()))
-    names = [one.name for one in named]
-    if not names:
+    named = with_given(_default_ranges(function), given_by_name(parameters, ranges))
+    if not named:
         raise ConfigurationError("a motion model needs a parameter: speed=(0, 0.1, 'm/s')")
-    if len(set(names)) < len(names):
-        raise ConfigurationError(f"a parameter is given twice: {', '.join(names)}")
-    _require_takes(function, names)
+    _require_takes(function, [one.name for one in named])
     return FunctionModel(function, named, settings=settings)
 
 
-def _parameter(name: str, given: Any) -> Parameter:
-    if not isinstance(given, tuple) or len(given) not in (2, 3):
-        raise ConfigurationError(f"{name}: expected a range such as (0, 0.1, 'm/s'), got {given!r}")
-    low, high, unit = (*given, "1")[:3]
+def _default_ranges(function: MotionFunction) -> dict[str, Parameter]:
+    """Return the parameters whose defaults are ranges: with a unit, as pairs are other things too.
+
+    A default of two numbers without a unit may be a position or a size.
+    """
     try:
-        ends = float(low), float(high)
-    except (TypeError, ValueError) as error:
-        raise ConfigurationError(f"{name}: its range is no two numbers: {given!r}") from error
-    return Parameter(name, str(unit), *ends)
+        arguments = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):
+        return {}
+    return {
+        one.name: range_parameter(one.name, one.default)
+        for one in arguments
+        if one.kind is one.KEYWORD_ONLY and _is_range(one.default)
+    }
+
+
+def _is_range(default: Any) -> bool:
+    if isinstance(default, Parameter):
+        return True
+    return isinstance(default, tuple) and len(default) == 3 and isinstance(default[2], str)
 
 
 def _require_takes(function: MotionFunction, names: list[str]) -> None:
@@ -220,11 +218,3 @@ def _require_takes(function: MotionFunction, names: list[str]) -> None:
         raise ConfigurationError(
             f"{called}{signature} cannot be called with a scene and {', '.join(names)}: {error}"
         ) from error
-
-
-def _starts(start: Start, keys: Keys) -> Start:
-    """Return the start with one entry per world each."""
-    values: dict[str, npt.ArrayLike] = {
-        name: np.full(keys.size, value, dtype=np.float64) for name, value in start._asdict().items()
-    }
-    return Start(**{**values, "theta": world_orientations(start.theta, keys)})

@@ -1,10 +1,11 @@
-"""Random numbers for models written in Python: one stream per world, from the world's address."""
+"""Random numbers for models of users: one stream, or one seed, per world from its address."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.seeds import world_keys
 from driftwalk.core.streams import MotionStream
 
 Floats = npt.NDArray[np.float64]
@@ -57,3 +58,18 @@ class WorldRandom:
 
     def _rows(self, rows: list[Floats], shape: tuple[int, ...]) -> Floats:
         return np.asarray(rows, dtype=np.float64).reshape(len(self.generators), *shape)
+
+
+def world_seeds(keys: Keys) -> list[int]:
+    """Return a seed per world for random numbers that are made elsewhere, below 2**53.
+
+    A program that reads all numbers as floats holds such a seed exactly.
+
+    Examples
+    --------
+    >>> seeds = world_seeds(np.array([1, 2], dtype=np.uint64))
+    >>> max(seeds) < 2**53, seeds[0] == seeds[1]
+    (True, False)
+    """
+    mixed = world_keys(0, trial=keys, replicate=MotionStream.MOTION)
+    return [int(seed) for seed in mixed >> np.uint64(11)]

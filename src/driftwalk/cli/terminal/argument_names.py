@@ -50,6 +50,7 @@ OPTIONS: Final[dict[str, str | None]] = {
     "stop": "--to",
     "tank": "--arena",
     "theta": "--theta",
+    "timeout": None,
     "window": "--window",
     "x": "--x",
     "y": "--y",

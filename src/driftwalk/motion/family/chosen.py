@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.motion.family.members import MEMBERS, Member
 from driftwalk.motion.family.particle import ParticleModel
 from driftwalk.motion.family.parts import PARTS, Part
+from driftwalk.motion.ranges import ranged
 from driftwalk.schema import Parameter
 
 Choice = float | tuple[float, float] | tuple[float, float, str]
@@ -114,27 +114,11 @@ def _value(usual: Parameter, choice: Any) -> float:
 
 
 def _ranged(usual: Parameter, choice: Parameter | tuple[Any, ...]) -> Parameter:
-    """Return the parameter with another range: its scale and meaning stay."""
-    if isinstance(choice, Parameter):
-        unit, chosen = choice.unit, replace(choice, meaning=choice.meaning or usual.meaning)
-    else:
-        low, high, unit = _range_of(usual, choice)
-        chosen = replace(usual, low=low, high=high, step=0.0, refined_step=0.0)
-    if unit != usual.unit:
-        raise ConfigurationError(f"{usual.name} is in {usual.unit}, and its range in {unit}")
+    """Return the parameter with another range, which has nothing below 0 if the usual has not."""
+    chosen = ranged(usual, choice)
     if chosen.low < 0.0 <= usual.low:
         raise ConfigurationError(f"{usual.name}: a value below 0 [{usual.unit}] makes no sense")
     return chosen
-
-
-def _range_of(usual: Parameter, choice: tuple[Any, ...]) -> tuple[float, float, str]:
-    try:
-        low, high, unit = (*choice, usual.unit)[:3] if len(choice) == 2 else choice
-        return float(low), float(high), str(unit)
-    except (TypeError, ValueError) as error:
-        raise ConfigurationError(
-            f"{usual.name}: expected a range such as (0, 0.1, {usual.unit!r}), got {choice!r}"
-        ) from error
 
 
 def models() -> Mapping[str, Member]:

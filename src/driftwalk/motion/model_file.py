@@ -1,0 +1,202 @@
+"""A motion model in a Python file of the user's: "mine.py:tumbler"."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from driftwalk.conditions.recorded import Conditions
+from driftwalk.core.did_you_mean import did_you_mean
+from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.motion.function import Settings, function_model
+from driftwalk.motion.protocol import (
+    Details,
+    Keys,
+    MotionModel,
+    Scores,
+    ScoresItself,
+    Values,
+    Worlds,
+)
+from driftwalk.motion.ranges import Range
+from driftwalk.motion.user_file import UserFile, load_user_file
+from driftwalk.schema import Parameter
+
+if TYPE_CHECKING:
+    from driftwalk.comparison import StepReference
+
+SUFFIX: Final = ".py:"
+"""End of the file in the address of a model; the name in the file comes after it."""
+MEMBERS_OF_A_MODEL: Final = ("name", "parameters", "needs_flow", "simulate", "describe", "facts")
+
+
+class FileModel:
+    """A model from a file: the model itself, with the hash of the file in its description."""
+
+    def __init__(self, model: MotionModel, sha256: str, made_by: tuple[Any, ...]) -> None:
+        self.model = model
+        self.sha256 = sha256
+        self._made_by = made_by
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Load the file again in the other process: its module has no name to import it by."""
+        return _reloaded, (self.sha256, *self._made_by)
+
+    @property
+    def name(self) -> str:
+        """The model's own name."""
+        return self.model.name
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The model's own parameters."""
+        return self.model.parameters
+
+    @property
+    def needs_flow(self) -> bool:
+        """Whether the model has to know the water's velocity."""
+        return self.model.needs_flow
+
+    def simulate(self, values: Values, like: Conditions, keys: Keys) -> Worlds:
+        """Return one world per key; see `MotionModel.simulate`."""
+        return self.model.simulate(values, like, keys)
+
+    def describe(self) -> dict[str, Any]:
+        """Return what the model says of itself, with the hash of the file as that of its source."""
+        return {**self.model.describe(), "source_sha256": self.sha256}
+
+    def facts(self, estimate: Mapping[str, float]) -> dict[str, Any]:
+        """Return the model's own facts, with the hash of the file as that of its source."""
+        return {**self.model.facts(estimate), "model_source_sha256": self.sha256}
+
+
+class ScoringFileModel(FileModel):
+    """A model from a file that compares its worlds itself."""
+
+    model: ScoresItself
+
+    def score(
+        self,
+        values: Values,
+        like: Conditions,
+        keys: Keys,
+        reference: StepReference,
+        *,
+        details: Details = "none",
+    ) -> Scores:
+        """Return the KS distance of every world to the recording; see `score_worlds`."""
+        return self.model.score(values, like, keys, reference, details=details)
+
+
+def model_of_file(
+    address: str,
+    parameters: tuple[Parameter, ...],
+    ranges: Mapping[str, Range],
+    *,
+    settings: Settings,
+) -> FileModel:
+    """Return a motion model from a file; see `driftwalk.motion.motion_model`.
+
+    Raises
+    ------
+    ConfigurationError
+        When the file cannot be loaded, or what it holds under the name is no model.
+    """
+    before, _, name = address.rpartition(SUFFIX)
+    path = Path(f"{before}.py")
+    file = load_user_file(path)
+    model = _model(_named(file, name), file, name, parameters, ranges, settings)
+    kind = ScoringFileModel if isinstance(model, ScoresItself) else FileModel
+    made_by = (f"{path.resolve()}:{name}", parameters, dict(ranges), settings)
+    return kind(model, file.sha256, made_by)
+
+
+def _reloaded(
+    sha256: str,
+    address: str,
+    parameters: tuple[Parameter, ...],
+    ranges: Mapping[str, Range],
+    settings: Settings,
+) -> FileModel:
+    found = model_of_file(address, parameters, ranges, settings=settings)
+    if found.sha256 != sha256:
+        raise InputError(f"{address} has changed since the model was made: make it again")
+    return found
+
+
+def _named(file: UserFile, name: str) -> Any:
+    there = _defined_in(file)
+    known = f"it has {', '.join(there)}" if there else "it defines no function and no class"
+    if not name:
+        raise ConfigurationError(
+            f"say what in {file.path} is the model ({file.path}:NAME): {known}"
+        )
+    try:
+        return getattr(file.module, name)
+    except AttributeError:
+        raise ConfigurationError(
+            f"{file.path} has no {name!r}, {known}{did_you_mean(name, there)}"
+        ) from None
+
+
+def _defined_in(file: UserFile) -> list[str]:
+    """Return the names of the functions, classes and models that a file makes itself."""
+    return [
+        name
+        for name, value in vars(file.module).items()
+        if not name.startswith("_")
+        and (
+            getattr(value, "__module__", None) == file.module.__name__
+            or (isinstance(value, MotionModel) and not inspect.isclass(value))
+        )
+    ]
+
+
+def _model(
+    found: Any,
+    file: UserFile,
+    name: str,
+    parameters: tuple[Parameter, ...],
+    ranges: Mapping[str, Range],
+    settings: Settings,
+) -> MotionModel:
+    where = f"{file.path}:{name}"
+    is_class = inspect.isclass(found)
+    if is_class:
+        found = _instance(found, file, name)
+    if isinstance(found, MotionModel):
+        if parameters or ranges or settings != "one":
+            raise ConfigurationError(
+                f"{where} is a model with ranges and settings of its own: change them in the file"
+            )
+        _require_parameters(found, where)
+        return found
+    if callable(found) and not is_class:
+        try:
+            return function_model(found, parameters, ranges, settings=settings)
+        except ConfigurationError as error:
+            raise ConfigurationError(f"{where}: {error}") from error
+    lacks = [member for member in MEMBERS_OF_A_MODEL if not hasattr(found, member)]
+    what = f"an object without {', '.join(lacks)}" if is_class else type(found).__name__
+    raise ConfigurationError(
+        f"{where} is {what}; expected a motion model, a class that makes one without arguments, or "
+        "a function of a scene and parameters"
+    )
+
+
+def _instance(found: type, file: UserFile, name: str) -> Any:
+    try:
+        return found()
+    except Exception as error:
+        raise ConfigurationError(f"{name}() failed: {file.blame(error)}") from error
+
+
+def _require_parameters(model: MotionModel, where: str) -> None:
+    found: Any = model.parameters
+    if isinstance(found, tuple) and found and all(isinstance(one, Parameter) for one in found):
+        return
+    raise ConfigurationError(
+        f"{where}: its parameters are {found!r}, expected a tuple of driftwalk.motion.Parameter"
+    )

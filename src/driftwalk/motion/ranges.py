@@ -1,0 +1,66 @@
+"""Ranges that a user gives for the parameters of a motion model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from driftwalk.core.errors import ConfigurationError
+from driftwalk.schema import Parameter
+
+Range = tuple[float, float] | tuple[float, float, str]
+Given = Mapping[str, Parameter | Range]
+"""Ranges by the name of the parameter."""
+
+
+def given_by_name(parameters: tuple[Parameter, ...], ranges: Mapping[str, Range]) -> Given:
+    """Return all ranges that a user gave, by name; refuse a parameter that is given twice."""
+    names = [*(one.name for one in parameters), *ranges]
+    if len(set(names)) < len(names):
+        raise ConfigurationError(f"a parameter is given twice: {', '.join(names)}")
+    return {**{one.name: one for one in parameters}, **ranges}
+
+
+def with_given(usual: Mapping[str, Parameter], given: Given) -> tuple[Parameter, ...]:
+    """Return the usual parameters, each with the range given for it, and then the other ones."""
+    return (
+        *(ranged(one, given[name]) if name in given else one for name, one in usual.items()),
+        *(range_parameter(name, one) for name, one in given.items() if name not in usual),
+    )
+
+
+def range_parameter(name: str, given: Parameter | Range) -> Parameter:
+    """Return a parameter about which nothing but its range is known; its unit is 1 by default."""
+    if isinstance(given, Parameter):
+        return given
+    if not isinstance(given, tuple) or len(given) not in (2, 3):
+        raise ConfigurationError(f"{name}: expected a range such as (0, 0.1, 'm/s'), got {given!r}")
+    low, high, unit = (*given, "1")[:3]
+    try:
+        ends = float(low), float(high)
+    except (TypeError, ValueError) as error:
+        raise ConfigurationError(f"{name}: its range is no two numbers: {given!r}") from error
+    return Parameter(name, str(unit), *ends)
+
+
+def ranged(usual: Parameter, choice: Parameter | tuple[Any, ...]) -> Parameter:
+    """Return a parameter with another range: its scale and meaning stay."""
+    if isinstance(choice, Parameter):
+        unit, chosen = choice.unit, replace(choice, meaning=choice.meaning or usual.meaning)
+    else:
+        low, high, unit = _range_of(usual, choice)
+        chosen = replace(usual, low=low, high=high, step=0.0, refined_step=0.0)
+    if unit != usual.unit:
+        raise ConfigurationError(f"{usual.name} is in {usual.unit}, and its range in {unit}")
+    return chosen
+
+
+def _range_of(usual: Parameter, choice: tuple[Any, ...]) -> tuple[float, float, str]:
+    try:
+        low, high, unit = (*choice, usual.unit)[:3] if len(choice) == 2 else choice
+        return float(low), float(high), str(unit)
+    except (TypeError, ValueError) as error:
+        raise ConfigurationError(
+            f"{usual.name}: expected a range such as (0, 0.1, {usual.unit!r}), got {choice!r}"
+        ) from error
