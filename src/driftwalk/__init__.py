@@ -99,6 +99,7 @@ _NAMES = {
         "assemble",
         "calibrate",
         "compare",
+        "compare_models",
         "fit",
         "report",
         "simulate",

@@ -88,6 +88,7 @@ from driftwalk.notebook import (
     assemble as assemble,
     calibrate as calibrate,
     compare as compare,
+    compare_models as compare_models,
     fit as fit,
     report as report,
     simulate as simulate,

@@ -14,7 +14,8 @@ from walkers import diffuse, tumble
 
 import driftwalk as dw
 from driftwalk.assembly import assemble, sobol_design, sobol_indices
-from driftwalk.calibration import calibrate
+from driftwalk.calibration import calibrate, compare_models
+from driftwalk.calibration.evolution import Budget
 from driftwalk.comparison import compare
 from driftwalk.model import apply_overrides
 from driftwalk.motion import MotionModel, Parameter, motion_model
@@ -84,6 +85,11 @@ def calibration_of_a_function(model: MotionModel) -> xr.Dataset:
     return calibrate(track(), model, study=study, threads=2)
 
 
+def model_comparison() -> xr.Dataset:
+    few = Budget(design=16, starts=1, short=2, long=2, retest=2)
+    return compare_models(track(), ["inertial", "active+wall"], budget=few, threads=2)
+
+
 def check() -> xr.Dataset:
     return dw.check_model(every_kind("fit with the angle in the state"), track(), replicates=4)
 
@@ -100,6 +106,7 @@ FORMS: dict[str, Callable[[], xr.Dataset]] = {
     "calibration": calibration,
     "calibration of one parameter": lambda: calibration_of_a_function(DIFFUSE),
     "calibration of two parameters": lambda: calibration_of_a_function(TUMBLE),
+    "model_comparison": model_comparison,
     "fit": lambda: dw.fit_motion(track(), coarse_study(), angle="none"),
     "fit with the angle in the state": lambda: dw.fit_motion(
         track(), coarse_study(), angle="state"

@@ -29,7 +29,9 @@ def test_it_is_what_its_schema_says(form: str, tmp_path) -> None:
     xr.testing.assert_equal(stored, made)
 
 
-@pytest.mark.parametrize("form", ["assembly", "recovery", "sensitivity", "model_check"])
+@pytest.mark.parametrize(
+    "form", ["assembly", "recovery", "sensitivity", "model_check", "model_comparison"]
+)
 def test_every_variable_of_it_is_needed(form: str) -> None:
     """Each variable that is always there is missed, and its units are looked at."""
     made = every_kind(form)

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Final, NamedTuple
 
+import numpy as np
+import numpy.typing as npt
+
 from driftwalk.calibration.problem import Problem
 from driftwalk.comparison import block_permutation_test
+
+Floats = npt.NDArray[np.float64]
 
 PARTS: Final = 20
 """Parts of which halves are drawn at random."""
@@ -40,7 +46,22 @@ class Steadiness(NamedTuple):
 
 
 def steadiness_of(problem: Problem) -> Steadiness | None:
-    """Compare the halves of a recording with each other.
+    """Compare the halves of a recording with each other, by the statistic of its calibration.
+
+    See `steadiness_of_steps`.
+    """
+
+    def distance(first: Floats, second: Floats) -> float:
+        tables = [replace(problem.reference, steps=half).table for half in (first, second)]
+        return float(problem.statistic.matrix(*tables)[0, 0])
+
+    return steadiness_of_steps(problem.steps, distance)
+
+
+def steadiness_of_steps(
+    steps: Floats, distance: Callable[[Floats, Floats], float]
+) -> Steadiness | None:
+    """Compare the halves of a series of steps with each other.
 
     The steps, in their order in time, are cut into 20 parts of equal numbers. Ten of them drawn at
     random, and the other ten, differ by chance and by what lasts less than a part. The first ten
@@ -48,15 +69,16 @@ def steadiness_of(problem: Problem) -> Steadiness | None:
 
     Parameters
     ----------
-    problem : Problem
-        The recording with its steps and the statistic.
+    steps : ndarray, shape (pairs, 2)
+        Step lengths [m] and turning angles [rad].
+    distance : callable
+        Distance between two such series.
 
     Returns
     -------
     Steadiness or None
-        Nothing where the recording has fewer than 200 pairs of steps.
+        Nothing where there are fewer than 200 pairs of steps.
     """
-    steps = problem.steps
     count = len(steps)
     if count < FEWEST_PAIRS:
         return None
@@ -65,6 +87,4 @@ def steadiness_of(problem: Problem) -> Steadiness | None:
     drawn = block_permutation_test(
         first, second, block_length=count // PARTS, permutations=DRAWS, seed=SEED
     )
-    tables = [replace(problem.reference, steps=half).table for half in (first, second)]
-    distance = float(problem.statistic.matrix(*tables)[0, 0])
-    return Steadiness(distance, drawn.noise_floor, drawn.p_value)
+    return Steadiness(distance(first, second), drawn.noise_floor, drawn.p_value)

@@ -41,6 +41,9 @@ COMMANDS: Final[dict[str, Command]] = {
     "models": Command("models", "models", "List the models of bodies that move by themselves."),
     "simulate": Command("simulate", "simulate", "Simulate the motion of the block."),
     "compare": Command("compare", "compare", "Measure how far apart two motions are."),
+    "compare-models": Command(
+        "compare_models", "compare_models", "Say which motion models explain a recording."
+    ),
     "calibrate": Command(
         "calibrate", "calibrate", "Find the drag coefficient and the stochastic force."
     ),

@@ -20,6 +20,11 @@ COMMAND: Final = "command:"
 def is_family_name(model: str) -> bool:
     """Return whether a text is a name of the family, and not the address of a file or program.
 
+    Parameters
+    ----------
+    model : str
+        The text.
+
     Examples
     --------
     >>> is_family_name("run_rest+wall"), is_family_name("mine.py:tumbler")

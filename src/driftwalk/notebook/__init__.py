@@ -7,8 +7,9 @@ loaded; a second, different statement is an error.
 from driftwalk.notebook.assembling import assemble
 from driftwalk.notebook.calibrating import calibrate
 from driftwalk.notebook.comparing import compare
+from driftwalk.notebook.comparing_models import compare_models
 from driftwalk.notebook.fitting import fit
 from driftwalk.notebook.reporting import report
 from driftwalk.notebook.simulating import simulate
 
-__all__ = ["assemble", "calibrate", "compare", "fit", "report", "simulate"]
+__all__ = ["assemble", "calibrate", "compare", "compare_models", "fit", "report", "simulate"]

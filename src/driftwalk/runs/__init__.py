@@ -5,6 +5,7 @@ from driftwalk.runs.calibrated import Calibrated, read_calibrated
 from driftwalk.runs.calibration import CalibrationWork, run_calibration
 from driftwalk.runs.fit import Fitted, FitWork, run_fit
 from driftwalk.runs.folder import Progress
+from driftwalk.runs.model_comparison import ModelComparisonWork, run_model_comparison
 from driftwalk.runs.recovery import RecoveryWork, run_recovery
 from driftwalk.runs.sensitivity import SensitivityResult, SensitivityWork, run_sensitivity
 from driftwalk.schema.netcdf import netcdf_bytes
@@ -16,6 +17,7 @@ __all__ = [
     "CalibrationWork",
     "FitWork",
     "Fitted",
+    "ModelComparisonWork",
     "Progress",
     "RecoveryWork",
     "SensitivityResult",
@@ -25,6 +27,7 @@ __all__ = [
     "run_assembly",
     "run_calibration",
     "run_fit",
+    "run_model_comparison",
     "run_recovery",
     "run_sensitivity",
 ]

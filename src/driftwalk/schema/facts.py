@@ -6,7 +6,7 @@ The command line prints them under these names, and earlier versions stored them
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
@@ -133,7 +133,7 @@ def fit_variables(facts: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, A
     return data, coords
 
 
-def texts(stored: str | list[str]) -> Any:
+def texts(stored: str | Sequence[str]) -> Any:
     """Return sentences as an array; given as a list or as its JSON text.
 
     Text keeps its type where there is none: a variable of length 0 stays one of text in a file.

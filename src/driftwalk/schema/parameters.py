@@ -124,6 +124,17 @@ class Parameter:
         coordinates = np.asarray(coordinate, dtype=np.float64)
         return np.power(10.0, coordinates) if self.scale == "log" else coordinates
 
+    def value_at(self, share: npt.ArrayLike) -> Floats:
+        """Return the values at parts of the range, 0 to 1, on its scale.
+
+        Examples
+        --------
+        >>> float(Parameter("speed", "m/s", 0.01, 1.0, scale="log").value_at(0.5))
+        0.1
+        """
+        low, high = (float(self.to_coordinate(end)) for end in (self.low, self.high))
+        return self.to_value(low + (high - low) * np.asarray(share, dtype=np.float64))
+
     def describe(self) -> dict[str, Any]:
         """Return it as JSON values: ``Parameter(**described)`` is the same parameter."""
         return asdict(self)

@@ -162,6 +162,11 @@ BAD: dict[str, Callable[[Path, Path], list[Words]]] = {
         ["compare", bad, out / "good.csv"],
         ["compare", out / "good.csv", bad],
     ],
+    "compare-models": lambda bad, out: [
+        ["compare-models", bad, "-o", out],
+        ["compare-models", out / "good.csv", "--flow", bad, "-o", out / "run"],
+        ["compare-models", out / "good.csv", "--models", bad, "-o", out / "run"],
+    ],
     "calibrate": lambda bad, out: [
         ["calibrate", bad, "-o", out],
         ["calibrate", out / "good.csv", "--flow", bad, "-o", out / "run"],
@@ -281,6 +286,10 @@ QUICK: dict[str, Callable[[Path, Path, Path], Words]] = {
 LONG: dict[str, Callable[[Path, Path, Path], Words]] = {
     "study recover": lambda place, run, out: [
         *("study", "recover", "--truth", place / "truth.toml", *ONE, "-o", out / "run")
+    ],
+    "compare-models": lambda place, run, out: [
+        *("compare-models", RECORDING, *SHORT, *TANK, "--models", "inertial", *ONE),
+        *("-o", out / "run"),
     ],
     "calibrate": lambda place, run, out: [
         *("calibrate", RECORDING, *SHORT, *TANK, "--study", place / "grid.toml", *ONE),

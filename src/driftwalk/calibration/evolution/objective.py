@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,7 @@ from driftwalk.comparison.aspects.form import WallDistance
 from driftwalk.conditions import Conditions
 from driftwalk.core.seeds import world_keys
 from driftwalk.core.streams import trial_in
-from driftwalk.motion import MotionModel
+from driftwalk.motion import MotionModel, Worlds
 from driftwalk.motion.score import broken_worlds
 from driftwalk.schema import Parameter
 from driftwalk.simulation.backend import wall_edges
@@ -72,6 +73,11 @@ class AspectObjective:
         self, settings: Floats, replicates: int, *, stage: str, first: int = 0
     ) -> tuple[list[Sequence[Aspect]], npt.NDArray[np.bool_]]:
         """Return the aspects of simulated worlds, replicates fastest, and which are broken."""
+        seen = self.simulated(settings, replicates, stage=stage, first=first)
+        return self.aspects(seen), broken_worlds(seen.status)
+
+    def simulated(self, settings: Floats, replicates: int, *, stage: str, first: int = 0) -> Worlds:
+        """Return simulated worlds, replicates fastest."""
         trial = trial_in(stage, np.arange(first, first + len(settings)))
         keys = world_keys(
             self.seed, trial=trial[:, None], replicate=np.arange(replicates)[None, :]
@@ -79,19 +85,24 @@ class AspectObjective:
         values = {
             name: np.repeat(column, replicates) for name, column in self.values(settings).items()
         }
-        seen = self.model.simulate(values, self.like, keys)
+        return self.model.simulate(values, self.like, keys)
+
+    def aspects(self, seen: Worlds) -> list[Sequence[Aspect]]:
+        """Return the aspects of worlds."""
         wall = wall_distance(self.like)
-        aspects = [form_aspects(self.plan, x, y, wall=wall) for x, y in zip(*seen[:2], strict=True)]
-        return list(aspects), broken_worlds(seen.status)
+
+        def one(world: tuple[Floats, Floats]) -> Sequence[Aspect]:
+            return form_aspects(self.plan, *world, wall=wall)
+
+        with ThreadPoolExecutor(max(self.like.threads, 1)) as pool:
+            return list(pool.map(one, zip(seen.x, seen.y, strict=True)))
 
     def values(self, settings: Floats) -> dict[str, Floats]:
         """Return the values of the parameters at points of the unit cube."""
-        settings = np.atleast_2d(settings)
-        found = {}
-        for column, one in zip(settings.T, self.ranges, strict=True):
-            low, high = (float(one.to_coordinate(end)) for end in (one.low, one.high))
-            found[one.name] = one.to_value(low + (high - low) * column)
-        return found
+        columns = np.atleast_2d(settings).T
+        return {
+            one.name: one.value_at(column) for column, one in zip(columns, self.ranges, strict=True)
+        }
 
 
 def wall_distance(like: Conditions) -> WallDistance:

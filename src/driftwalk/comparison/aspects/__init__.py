@@ -1,16 +1,21 @@
 """How far apart are two motions in more than their steps? A set of two-dimensional distances."""
 
 from driftwalk.comparison.aspects.distance import (
+    BLOCKS,
     AspectReference,
     aspect_reference,
     block_of,
     interleaved,
+    own_distance,
+    points_distance,
 )
 from driftwalk.comparison.aspects.form import ASPECTS, Aspect, form_aspects
-from driftwalk.comparison.aspects.plan import AspectPlan, plan_aspects
+from driftwalk.comparison.aspects.plan import FEWEST_POINTS, AspectPlan, plan_aspects
 
 __all__ = [
     "ASPECTS",
+    "BLOCKS",
+    "FEWEST_POINTS",
     "Aspect",
     "AspectPlan",
     "AspectReference",
@@ -18,5 +23,7 @@ __all__ = [
     "block_of",
     "form_aspects",
     "interleaved",
+    "own_distance",
     "plan_aspects",
+    "points_distance",
 ]

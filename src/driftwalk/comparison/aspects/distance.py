@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.comparison.aspects.form import Aspect
+from driftwalk.comparison.aspects.plan import FEWEST_POINTS
 from driftwalk.comparison.ks import KsReference
 from driftwalk.core.errors import InputError
 
@@ -21,7 +22,6 @@ BLOCKS: Final = 20
 """Blocks of time into which a recording is cut."""
 HALVINGS: Final = 16
 """Random halves of the blocks from which the floor is taken."""
-FEWEST_POINTS: Final = 30
 FARTHEST: Final = 1.0
 
 
@@ -60,7 +60,7 @@ class AspectReference:
         def one(aspects: Sequence[Aspect]) -> list[float]:
             by_name = {aspect.name: aspect.points for aspect in aspects}
             return [
-                _distance(reference, by_name[name])
+                points_distance(reference, by_name[name])
                 for name, reference in zip(self.names, self._native, strict=True)
             ]
 
@@ -110,9 +110,11 @@ def aspect_reference(
         )
     random = np.random.default_rng(seed)
     halves = [random.permutation(BLOCKS) < BLOCKS // 2 for _ in range(HALVINGS)]
-    floor = np.array([_own_floor(one, duration, halves) for one in kept])
+    floor = [_between_halves(one, duration, halves, over=np.sqrt(2.0)) for one in kept]
     return AspectReference(
-        tuple(one.name for one in kept), floor, tuple(KsReference(one.points) for one in kept)
+        tuple(one.name for one in kept),
+        np.array(floor),
+        tuple(KsReference(one.points) for one in kept),
     )
 
 
@@ -137,21 +139,46 @@ def interleaved(aspects: Sequence[Aspect], *, duration: float) -> tuple[list[Asp
     )
 
 
-def _distance(reference: KsReference, points: Floats) -> float:
+def points_distance(reference: KsReference, points: Floats) -> float:
+    """Return the KS distance, without a word on ties; 1 where there is no point."""
     if not len(points):
         return FARTHEST
     d1, d2, *_ = reference.native.compare(points, False)
     return (d1 + d2) / (2 * len(reference) * len(points))
 
 
-def _own_floor(aspect: Aspect, duration: float, halves: Sequence[Bools]) -> float:
+def own_distance(aspect: Aspect, *, duration: float, seed: int = 0) -> float:
+    """Return how far the parts of a recording are from each other, when they are interleaved.
+
+    The mean over random choices of one block of each two that follow each other: what changes
+    slowly is in either part.
+
+    Parameters
+    ----------
+    aspect : Aspect
+        Of the recording.
+    duration : float
+        From the first to the last sample [s].
+    seed : int
+        Seed of the choices.
+    """
+    random = np.random.default_rng(seed)
+    first = random.integers(0, 2, size=(HALVINGS, BLOCKS // 2))
+    halves = np.stack([first == 0, first == 1], axis=2).reshape(HALVINGS, BLOCKS)
+    return _between_halves(aspect, duration, list(halves))
+
+
+def _between_halves(
+    aspect: Aspect, duration: float, halves: Sequence[Bools], *, over: float = 1.0
+) -> float:
+    """Return the mean distance between halves of the blocks and the rest, over a number."""
     block = block_of(aspect.time, duration)
     found = []
     for half in halves:
         chosen = half[block]
         if chosen.any() and not chosen.all():
             first, second = aspect.within(chosen), aspect.within(~chosen)
-            found.append(_distance(KsReference(first.points), second.points))
+            found.append(points_distance(KsReference(first.points), second.points))
     # A recording that does not differ from itself: as many steps as it takes to see a difference.
     least = 1.0 / len(aspect.points)
-    return max(float(np.mean(found)) / np.sqrt(2.0), least) if found else FARTHEST
+    return max(float(np.mean(found)) / over, least) if found else FARTHEST

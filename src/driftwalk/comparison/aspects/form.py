@@ -86,7 +86,7 @@ def form_aspects(
         names.append(f"steps_{factor}")
         plans.append(longer)
     found = [_steps(name, one, x, y) for name, one in zip(names, plans, strict=True)]
-    px, py = (_points(plan.short, values) for values in (x, y))
+    px, py = (resampled(plan.short, values) for values in (x, y))
     dx, dy = np.diff(px), np.diff(py)
     length = np.hypot(dx, dy)
     found.append(_frame(plan, dx, dy, length))
@@ -105,7 +105,7 @@ def _steps(name: str, plan: StepPlan, x: Floats, y: Floats) -> Aspect:
     return Aspect(name, np.ascontiguousarray(points), plan.time[found.pair])
 
 
-def _points(plan: StepPlan, values: npt.NDArray[np.floating]) -> Floats:
+def resampled(plan: StepPlan, values: npt.ArrayLike) -> Floats:
     """Return the resampled positions [m]."""
     taken = np.asarray(values, dtype=np.float64)
     right = np.where(plan.weight > 0.0, plan.left + 1, plan.left)

@@ -12,6 +12,7 @@ from driftwalk.schema.kinds import (
     fit,
     flow,
     model_check,
+    model_comparison,
     motion,
     recovery,
     sensitivity,
@@ -20,7 +21,9 @@ from driftwalk.schema.kinds import (
 if TYPE_CHECKING:
     import xarray as xr
 
-_FILES: Final = (motion, flow, calibration, fit, recovery, model_check, assembly, sensitivity)
+_FILES: Final = (
+    motion, flow, calibration, model_comparison, fit, recovery, model_check, assembly, sensitivity,
+)  # fmt: skip
 
 KINDS: Final[dict[str, Kind]] = {kind.name: kind for file in _FILES for kind in file.KINDS}
 """By the attribute ``kind``."""

@@ -1,0 +1,107 @@
+"""Facts of a motion that no model is fitted to: how far it gets, how long its speed lasts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.comparison.aspects import AspectPlan
+from driftwalk.comparison.aspects.form import resampled
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+WallDistance = Callable[[Floats, Floats], Floats]
+
+LAGS: Final = (1, 3, 10, 30, 100)
+"""Of the mean squared displacement, in step intervals."""
+CHECKS: Final = (*(f"displacement_{lag}" for lag in LAGS), "speed_time", "wall_share", "rest_share")
+UNITS: Final = (*("m2" for _ in LAGS), "s", "1", "1")
+NEAR_WALL: Final = 0.2
+"""Part of the way from the wall to the middle that counts as being at the wall."""
+RESTING: Final = 0.2
+"""A step counts as a rest below this part of the recorded median step."""
+ROUNDING: Final = 1e-9
+LONGEST_MEMORY: Final = 500
+"""Longest time over which the speed's memory is followed, in step intervals."""
+
+
+def motion_checks(
+    plan: AspectPlan,
+    x: npt.ArrayLike,
+    y: npt.ArrayLike,
+    *,
+    wall: WallDistance,
+    depth: float,
+    usual_step: float,
+) -> Floats:
+    """Return facts of a motion, shape (checks,); NaN where it is too short for one.
+
+    Parameters
+    ----------
+    plan : AspectPlan
+        Of its time stamps.
+    x, y : array_like, shape (plan.samples,)
+        Positions [m].
+    wall : callable
+        Distance of points from the wall [m].
+    depth : float
+        Largest distance from the wall in the tank [m].
+    usual_step : float
+        Median step of the recording [m].
+
+    Returns
+    -------
+    ndarray
+        In the order of `CHECKS`: mean squared displacement over 1, 3, 10, 30 and 100 step
+        intervals [m2]; time after which the autocorrelation of the speed falls below 1/e [s];
+        share of the time at the wall, in the outer fifth; share of the time at rest, with steps
+        below a fifth of the recording's median.
+    """
+    px, py = resampled(plan.short, x), resampled(plan.short, y)
+    there = np.zeros(px.size - 1, dtype=bool)
+    there[plan.step] = True
+    there &= np.isfinite(np.diff(px)) & np.isfinite(np.diff(py))
+    broken = np.concatenate([[0], np.cumsum(~there)])
+    length = np.hypot(np.diff(px), np.diff(py))
+    found = [_squared_displacement(px, py, broken, lag) for lag in LAGS]
+    found.append(_memory(length, there) * plan.short.step_interval)
+    steps = length[there]
+    if not steps.size:
+        return np.full(len(CHECKS), np.nan)
+    near = wall(px, py)[:-1][there] < NEAR_WALL * depth
+    found += [float(near.mean()), float((steps < RESTING * usual_step).mean())]
+    return np.array(found)
+
+
+def _squared_displacement(x: Floats, y: Floats, broken: npt.NDArray[np.int64], lag: int) -> float:
+    """Return the mean over all stretches without a gap."""
+    whole = broken[lag:] == broken[:-lag]
+    if not whole.any():
+        return float("nan")
+    squares = (x[lag:] - x[:-lag]) ** 2 + (y[lag:] - y[:-lag]) ** 2
+    return float(squares[whole].mean())
+
+
+def _memory(length: Floats, there: Bools) -> float:
+    """Return after how many intervals the autocorrelation of the step lengths falls below 1/e."""
+    if np.count_nonzero(there) < LAGS[-1]:
+        return float("nan")
+    apart = np.where(there, length, 0.0)
+    apart = np.where(there, apart - apart[there].mean(), 0.0)
+    variance = float((apart**2).sum()) / np.count_nonzero(there)
+    # A speed that is the same all along differs by rounding alone.
+    if variance <= (ROUNDING * float(length[there].mean())) ** 2:
+        return float("nan")
+    before = 1.0
+    for lag in range(1, min(LONGEST_MEMORY, length.size // 4)):
+        pairs = int(np.count_nonzero(there[lag:] & there[:-lag]))
+        if not pairs:
+            break
+        now = float((apart[lag:] * apart[:-lag]).sum()) / pairs / variance
+        if now < np.exp(-1.0):
+            return float(lag - 1 + (before - np.exp(-1.0)) / (before - now))
+        before = now
+    return float(min(LONGEST_MEMORY, length.size // 4))

@@ -1,0 +1,322 @@
+"""Which motion model explains a recording? All searched alike, and judged on what none has seen."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from driftwalk.calibration.evolution import Budget
+from driftwalk.calibration.models.baselines import HiddenMarkovWalk, ResampledSteps, runs_of
+from driftwalk.calibration.models.hidden_markov import fit_hidden_walk
+from driftwalk.calibration.models.judge import Contestant, Judged, contestant, judge
+from driftwalk.calibration.models.recorded import RecordedMotion, recorded_motion
+from driftwalk.calibration.models.result import build_comparison
+from driftwalk.comparison.aspects import block_of, interleaved
+from driftwalk.conditions.own_flow import flow_from_track
+from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.motion import BlockModel, MotionModel, is_family_name, motion_model
+from driftwalk.schema import Track, body_track
+from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+DEFAULT_MODELS: Final = (
+    "block", "inertial", "active+wall", "run_tumble+wall", "run_rest+wall", "burst_coast+wall",
+    "two_state+wall",
+)  # fmt: skip
+ALL_MODELS: Final = (*DEFAULT_MODELS, "run_tumble+wall+slow", "run_rest+wall+stroke")
+BLOCK: Final = "block"
+
+Tell = Callable[[int, int, str], None]
+Chosen = str | MotionModel
+
+
+def compare_models(
+    recording: xr.Dataset,
+    models: Sequence[Chosen] = DEFAULT_MODELS,
+    *,
+    study: Study | None = None,
+    flow: xr.Dataset | None = None,
+    body: str | None = None,
+    threads: int | None = None,
+    budget: Budget | None = None,
+    store: Callable[[Mapping[str, Any]], Store] | None = None,
+    tell: Tell | None = None,
+) -> xr.Dataset:
+    """Search several motion models on a recording, and say which is closest and which explains it.
+
+    The recording is cut into 20 blocks of time. Every model is searched on the even ones: by the
+    mean of six two-dimensional KS distances over the recording's own floors, with a Sobol' design
+    and CMA-ES (`driftwalk.calibration.evolution`). All are judged on the odd ones, which none has
+    seen, and so are two walks that only repeat recorded steps: independent draws of them, and a
+    hidden Markov walk of three states. Models are ranked by their distance there.
+
+    A model explains the recording where, in each aspect, it is no farther from the odd blocks than
+    1.5 times the recording's own parts, made of interleaved blocks, are from each other (twice,
+    where the model's own worlds are as far from each other), and where no more than three of eight
+    facts that are not fitted lie beyond all of 20 simulated recordings.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        A `trajectory`.
+    models : sequence of str or MotionModel
+        Names of the family with their parts, "block", or models.
+    study : Study, optional
+        Tank, camera, step interval and seed; default: the paper's, in the arena of the recording.
+    flow : xarray.Dataset, optional
+        The water's velocity. For the block it is extracted from the even blocks when left out.
+    body : str, optional
+        The body, where the recording has several.
+    threads : int, optional
+        Default: all processors. The result does not depend on it.
+    budget : Budget, optional
+        How much each search may simulate.
+    store : callable, optional
+        Returns where finished models are kept, for what determines their numbers; memory when left
+        out.
+    tell : callable, optional
+        Called with the settings done, all of them, and the model under way.
+
+    Returns
+    -------
+    xarray.Dataset
+        A `model_comparison`, the closest model first.
+
+    Raises
+    ------
+    InputError
+        When the recording is too short or does not move, or the block is asked for and no flow can
+        be extracted.
+    ConfigurationError
+        When a model is named twice, or there is none of that name.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> recording = dw.tank30_recording()
+    >>> found = dw.compare_models(recording, ["block", "inertial"])  # doctest: +SKIP
+    """
+    chosen = _study(recording, study)
+    motion = _motion(recording, chosen, flow, body, threads)
+    warnings: list[str] = []
+    entries = [*_entries(_made(models, motion, chosen), motion, chosen, warnings)]
+    entries += _baselines(motion)
+    seed = chosen.calibration.seed
+    judged = _judged_all(entries, motion, seed, budget or Budget(), store, tell)
+    return build_comparison(entries, judged, motion, chosen, recording, warnings)
+
+
+def check_models(
+    recording: xr.Dataset,
+    models: Sequence[Chosen],
+    *,
+    study: Study | None = None,
+    flow: xr.Dataset | None = None,
+    body: str | None = None,
+) -> list[MotionModel]:
+    """Return the models that `compare_models` would compare; refuse what it would refuse.
+
+    Simulates nothing.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        A `trajectory`.
+    models : sequence of str or MotionModel
+        Names of the family with their parts, "block", or models.
+    study : Study, optional
+        As in `compare_models`.
+    flow : xarray.Dataset, optional
+        The water's velocity.
+    body : str, optional
+        The body, where the recording has several.
+
+    Raises
+    ------
+    InputError
+        When the recording is too short or does not move.
+    ConfigurationError
+        When a model is named twice, or there is none of that name.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> models = check_models(dw.tank30_recording(), ["block", "run-rest"])
+    >>> [model.name for model in models]
+    ['block', 'run_rest']
+    """
+    chosen = _study(recording, study)
+    motion = _motion(recording, chosen, flow, body, None)
+    return _made(models, motion, chosen)
+
+
+def _study(recording: xr.Dataset, study: Study | None) -> Study:
+    """Return the given study, or the paper's in the arena of the recording."""
+    from driftwalk.model import Study, Tank
+
+    if study is not None:
+        return study
+    arena = recording.attrs.get("arena")
+    return Study().model_copy(update={} if arena is None else {"tank": Tank.from_arena(arena)})
+
+
+def _motion(
+    recording: xr.Dataset,
+    study: Study,
+    flow: xr.Dataset | None,
+    body: str | None,
+    threads: int | None,
+) -> RecordedMotion:
+    track = body_track(recording, body)
+    if track.time.size < 3:
+        raise InputError(
+            f"the recording has {track.time.size} samples of this body; at least 3 are needed"
+        )
+    quantum = float(recording.attrs.get("position_quantum_m", 0.0))
+    return recorded_motion(track, study, position_quantum=quantum, flow=flow, threads=threads)
+
+
+def _made(models: Sequence[Chosen], motion: RecordedMotion, study: Study) -> list[MotionModel]:
+    """Return the models, made of their names."""
+    found = [_one_made(one, motion, study) for one in models]
+    names = [model.name for model in found]
+    if not names:
+        raise ConfigurationError("no motion model is given to compare")
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise ConfigurationError(f"a motion model is given twice: {twice[0]}")
+    return found
+
+
+def _one_made(one: Chosen, motion: RecordedMotion, study: Study) -> MotionModel:
+    if not isinstance(one, str):
+        return one
+    if one == BLOCK:
+        return BlockModel(study)
+    # Only the family leaves its distance from the wall to the recording.
+    clearance = motion.clearance if is_family_name(one) else 0.0
+    return motion_model(one, clearance=clearance)
+
+
+def _entries(
+    models: Sequence[MotionModel], motion: RecordedMotion, study: Study, warnings: list[str]
+) -> list[Contestant]:
+    """Return the models with their conditions and ranges; without the block where none can be."""
+    found = []
+    for model in models:
+        if not isinstance(model, BlockModel):
+            found.append(contestant(model, motion, motion.like))
+            continue
+        try:
+            found.append(_block(model, motion, study))
+        except InputError as error:
+            if len(models) == 1:
+                raise
+            warnings.append(f"the block is left out: {error}")
+    return found
+
+
+def _block(block: BlockModel, motion: RecordedMotion, study: Study) -> Contestant:
+    """Return the block, in a flow from the even blocks of time where none is given."""
+    like = motion.like
+    if like.flow is None:
+        even = block_of(motion.track.time, motion.duration) % 2 == 0
+        like = replace(
+            like, flow=flow_from_track(Track(*(part[even] for part in motion.track)), study)
+        )
+    return Contestant(block, like, block.parameters, len(block.parameters), baseline=False)
+
+
+def _baselines(motion: RecordedMotion) -> list[Contestant]:
+    """Return walks of the steps in the even blocks."""
+    even, _ = interleaved(motion.aspects, duration=motion.duration)
+    steps = next(one for one in even if one.name == "steps")
+    interval = motion.plan.short.step_interval
+    hidden = fit_hidden_walk(runs_of(steps, interval))
+    return [
+        Contestant(ResampledSteps(steps.points, interval), motion.like, (), 0, baseline=True),
+        Contestant(
+            HiddenMarkovWalk(hidden, interval), motion.like, (), hidden.parameters, baseline=True
+        ),
+    ]
+
+
+def _judged_all(
+    entries: Sequence[Contestant],
+    motion: RecordedMotion,
+    seed: int,
+    budget: Budget,
+    store: Callable[[Mapping[str, Any]], Store] | None,
+    tell: Tell | None,
+) -> list[Judged]:
+    """Judge every model, one work unit each."""
+    most = max(len(entry.ranges) for entry in entries)
+    costs = [budget.evaluations(len(one.ranges)) if one.ranges else 0 for one in entries]
+    before = [0, *itertools.accumulate(costs)]
+
+    def compute(unit: WorkUnit) -> dict[str, np.ndarray]:
+        index = unit.start
+        entry = entries[index]
+
+        def say(done: int, _: int) -> None:
+            if tell is not None:
+                tell(before[index] + done, before[-1], entry.model.name)
+
+        say(0, 0)
+        return _packed(judge(entry, motion, budget=budget, seed=seed, tell=say), most)
+
+    units = grid(model=np.arange(len(entries))).units(1)
+    kept = None if store is None else store(_fingerprint(entries, motion, seed, budget))
+    arrays = run_sweep(compute, units, store=kept)
+    if tell is not None:
+        tell(before[-1], before[-1], "figures")
+    return [
+        _unpacked({name: values[index] for name, values in arrays.items()}, entry)
+        for index, entry in enumerate(entries)
+    ]
+
+
+def _fingerprint(
+    entries: Sequence[Contestant], motion: RecordedMotion, seed: int, budget: Budget
+) -> dict[str, Any]:
+    """Return what determines the numbers of all models, for the store of a run."""
+    return {
+        "models": [entry.model.describe() for entry in entries],
+        "ranges": [[one.describe() for one in entry.ranges] for entry in entries],
+        "seed": seed,
+        "budget": vars(budget),
+        "aspects": list(motion.held.names),
+    }
+
+
+def _packed(judged: Judged, most: int) -> dict[str, np.ndarray]:
+    """Return arrays of the same shapes for every model, with one entry each."""
+    point = np.full(most, np.nan)
+    point[: judged.point.size] = judged.point
+    ends = judged.ends if judged.ends.size else np.empty(0)
+    fixed = np.full(8, np.nan)
+    fixed[: ends.size] = ends
+    arrays = {**judged._asdict(), "point": point, "ends": fixed}
+    return {name: np.asarray(values)[None] for name, values in arrays.items()}
+
+
+def _unpacked(arrays: Mapping[str, np.ndarray], entry: Contestant) -> Judged:
+    return Judged(
+        point=arrays["point"][: len(entry.ranges)],
+        trained=arrays["trained"],
+        held=arrays["held"],
+        score=float(arrays["score"]),
+        without=arrays["without"],
+        apart=arrays["apart"],
+        checks=arrays["checks"],
+        ends=arrays["ends"][np.isfinite(arrays["ends"])],
+        evaluations=int(arrays["evaluations"]),
+    )

@@ -1,0 +1,187 @@
+"""A recording as motion models are compared on it: its blocks of time, aspects and scales."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.calibration.evolution import Scales, scales_of, wall_distance
+from driftwalk.calibration.models.checks import motion_checks
+from driftwalk.comparison import KsReference
+from driftwalk.comparison.aspects import (
+    BLOCKS,
+    FEWEST_POINTS,
+    Aspect,
+    AspectPlan,
+    AspectReference,
+    aspect_reference,
+    block_of,
+    form_aspects,
+    interleaved,
+    own_distance,
+    plan_aspects,
+)
+from driftwalk.conditions import Conditions, recorded_camera, recorded_conditions
+from driftwalk.core.errors import InputError
+from driftwalk.schema import Track
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+Floats = npt.NDArray[np.float64]
+
+CONTACT_QUANTILE: Final = 0.01
+"""The distance at contact is this quantile of the recorded ones: a few may be mistakes."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedMotion:
+    """A recording, cut into 20 blocks of time, ready for any motion model.
+
+    Attributes
+    ----------
+    track : Track
+        The present samples, time from 0 on.
+    like : Conditions
+        Its conditions, for simulations.
+    plan : AspectPlan
+        How a simulated world shows its aspects.
+    aspects : tuple of Aspect
+        Of the whole recording.
+    fitted, held : AspectReference
+        Of the even blocks, on which models are searched, and of the odd ones, on which they are
+        judged.
+    held_aspects : list of Aspect
+        Points of the odd blocks.
+    own : ndarray, shape (aspects,)
+        Distance between parts of the recording that are made of interleaved blocks: no model can
+        be expected below it.
+    scales : Scales
+        Of the motion.
+    clearance : float
+        Distance from the wall at contact [m].
+    depth : float
+        Largest recorded distance from the wall [m].
+    usual_step : float
+        Median step [m].
+    recorded_checks : ndarray, shape (checks,)
+        Facts of the recording that are not fitted, see `motion_checks`.
+    """
+
+    track: Track
+    like: Conditions
+    plan: AspectPlan
+    aspects: tuple[Aspect, ...]
+    fitted: AspectReference
+    held: AspectReference
+    held_aspects: list[Aspect]
+    own: Floats
+    scales: Scales
+    clearance: float
+    depth: float
+    usual_step: float
+    recorded_checks: Floats
+
+    @cached_property
+    def without_each_block(self) -> tuple[AspectReference, ...]:
+        """The odd blocks without each of them, over the same floors."""
+        found = []
+        for block in range(1, BLOCKS, 2):
+            left = [
+                one.within(block_of(one.time, self.duration) != block) for one in self.held_aspects
+            ]
+            natives = tuple(KsReference(one.points) for one in left)
+            found.append(AspectReference(self.held.names, self.held.floor, natives))
+        return tuple(found)
+
+    def checks(self, x: npt.ArrayLike, y: npt.ArrayLike) -> Floats:
+        """Return the facts of `motion_checks` of a world, or of the recording itself."""
+        return motion_checks(
+            self.plan,
+            x,
+            y,
+            wall=wall_distance(self.like),
+            depth=self.depth,
+            usual_step=self.usual_step,
+        )
+
+    @property
+    def duration(self) -> float:
+        """From the first to the last sample [s]."""
+        return float(self.track.time[-1])
+
+
+def recorded_motion(
+    track: Track,
+    study: Study,
+    *,
+    position_quantum: float = 0.0,
+    flow: xr.Dataset | None = None,
+    threads: int | None = None,
+) -> RecordedMotion:
+    """Prepare a recorded track for the comparison of motion models.
+
+    Parameters
+    ----------
+    track : Track
+        The present samples of one body.
+    study : Study
+        Tank, camera and step interval.
+    position_quantum : float
+        Resolution of the recorded positions [m].
+    flow : xarray.Dataset, optional
+        The water's velocity.
+    threads : int, optional
+        Default: all processors.
+
+    Raises
+    ------
+    InputError
+        When the track is too short or does not move.
+    """
+    track = track._replace(time=track.time - track.time[0])
+    camera = recorded_camera(track, study, position_quantum=position_quantum)
+    like = recorded_conditions(track, study, camera=camera, flow=flow, threads=threads)
+    interval = study.steps.step_interval_s
+    plan = plan_aspects(track.time, step_interval=None if interval == "auto" else interval)
+    wall = wall_distance(like)
+    aspects = form_aspects(plan, track.x, track.y, wall=wall)
+    by_name = {one.name: one.points for one in aspects}
+    if not len(by_name["steps"]):
+        raise InputError("the recording does not move: no step has a length")
+    steps, from_wall = by_name["steps"][:, 0], by_name["wall"][:, 0]
+    depth, usual_step = float(from_wall.max()), float(np.median(steps))
+    duration = float(track.time[-1])
+    even, odd = interleaved(aspects, duration=duration)
+    # What one part hardly shows cannot be judged on it.
+    shown = [min(len(one.points), len(other.points)) for one, other in zip(even, odd, strict=True)]
+    even, odd = (
+        [one for one, points in zip(part, shown, strict=True) if points >= FEWEST_POINTS]
+        for part in (even, odd)
+    )
+    fitted, held = (aspect_reference(part, duration=duration) for part in (even, odd))
+    return RecordedMotion(
+        track=track,
+        like=like,
+        plan=plan_aspects(like.sample_time, step_interval=plan.short.step_interval),
+        aspects=aspects,
+        fitted=fitted,
+        held=held,
+        held_aspects=odd,
+        own=np.array(
+            [own_distance(one, duration=duration) for one in aspects if one.name in held.names]
+        ),
+        scales=scales_of(track, step_interval=plan.short.step_interval, steps=steps),
+        clearance=max(float(np.quantile(from_wall, CONTACT_QUANTILE)), 0.0),
+        depth=depth,
+        usual_step=usual_step,
+        recorded_checks=motion_checks(
+            plan, track.x, track.y, wall=wall, depth=depth, usual_step=usual_step
+        ),
+    )

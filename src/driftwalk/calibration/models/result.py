@@ -1,0 +1,210 @@
+"""The `model_comparison` dataset: motion models, from the closest to the farthest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.calibration.models.checks import CHECKS, UNITS
+from driftwalk.calibration.models.judge import JUDGED, Contestant, Judged
+from driftwalk.calibration.models.recorded import RecordedMotion
+from driftwalk.calibration.models.verdict import Verdict, verdict_of
+from driftwalk.calibration.steadiness import Steadiness, steadiness_of_steps
+from driftwalk.comparison import KsReference
+from driftwalk.comparison.aspects import points_distance
+from driftwalk.schema.check import build_dataset
+from driftwalk.schema.facts import texts
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+Floats = npt.NDArray[np.float64]
+
+TIED_SIGMAS: Final = 2.0
+"""Models tie where the difference of their scores is below so many standard errors."""
+AT_THE_END: Final = 0.01
+"""A value is at the end of its range within this part of it."""
+
+
+def build_comparison(
+    entries: Sequence[Contestant],
+    judged: Sequence[Judged],
+    motion: RecordedMotion,
+    study: Study,
+    recording: xr.Dataset,
+    warnings: Sequence[str],
+) -> xr.Dataset:
+    """Return the dataset of a comparison; `entries` and `judged` have one item for each model."""
+    order = np.argsort([one.score for one in judged], kind="stable")
+    entries, judged = [entries[k] for k in order], [judged[k] for k in order]
+    verdicts = [
+        verdict_of(one, motion, baseline=entry.baseline)
+        for entry, one in zip(entries, judged, strict=True)
+    ]
+    behind = np.array([one.score - judged[0].score for one in judged])
+    behind_std = np.array([_error(one.without - judged[0].without) for one in judged])
+    closest = next((k for k, entry in enumerate(entries) if not entry.baseline), 0)
+    tied = [
+        k
+        for k, one in enumerate(judged)
+        if k > closest
+        and one.score - judged[closest].score
+        < TIED_SIGMAS * _error(one.without - judged[closest].without)
+    ]
+    units, values = _estimates(entries, judged)
+    steady = _steadiness(motion)
+    said = [*warnings, *_edge_warnings(entries, judged)]
+    if steady is not None and steady.warning is not None:
+        said.append(steady.warning + _change(motion))
+    names = [entry.model.name for entry in entries]
+    findings = _findings(names, entries, verdicts, closest, tied)
+    data: dict[str, Any] = {
+        "score": ("model", [one.score for one in judged]),
+        "score_std": ("model", [_error(one.without) for one in judged]),
+        "behind": ("model", behind),
+        "behind_std": ("model", behind_std),
+        "free_numbers": ("model", [entry.numbers for entry in entries]),
+        "baseline": ("model", [entry.baseline for entry in entries]),
+        "explained": ("model", [one.explained for one in verdicts]),
+        "verdict": ("model", texts([one.text for one in verdicts])),
+        "held_out_distance": (("model", "aspect"), [one.held for one in judged]),
+        "trained_distance": (("model", "aspect"), [one.trained for one in judged]),
+        "apart": (("model", "aspect"), [one.apart for one in judged]),
+        "own_distance": ("aspect", motion.own),
+        "floor": ("aspect", motion.held.floor),
+        "check_recorded": ("check", motion.recorded_checks),
+        "check_median": (("model", "check"), [np.median(one.checks, axis=0) for one in judged]),
+        "check_low": (("model", "check"), [one.checks.min(axis=0) for one in judged]),
+        "check_high": (("model", "check"), [one.checks.max(axis=0) for one in judged]),
+        "check_unit": ("check", texts(UNITS)),
+        "estimate": (("model", "parameter"), values),
+        "parameter_unit": ("parameter", texts(list(units.values()))),
+        "end_score": (("model", "end"), _padded([one.ends for one in judged])),
+        "evaluations": ("model", [one.evaluations for one in judged]),
+    }
+    coords = {
+        "model": ("model", texts(names)),
+        "aspect": ("aspect", texts(motion.held.names)),
+        "check": ("check", texts(CHECKS)),
+        "parameter": ("parameter", texts(list(units))),
+        "finding": ("finding", texts(findings)),
+        "warning": ("warning", texts(said)),
+    }
+    attrs: dict[str, Any] = {
+        "step_interval_s": float(motion.plan.short.step_interval),
+        "duration_s": motion.duration,
+        "worlds": JUDGED,
+        "seed": study.calibration.seed,
+        "arena": study.tank.to_arena_json(),
+        "source": str(recording.attrs.get("source", "")),
+        "simulated_recording": str(recording.attrs.get("simulated", "no")),
+    }
+    if steady is not None:
+        attrs |= {"halves_ks_distance": steady.distance, "halves_p_value": steady.p_value}
+    return build_dataset("model_comparison", data, coords, attrs)
+
+
+def _error(without: Floats) -> float:
+    """Return the standard error of a mean from what is left without each block (jackknife)."""
+    count = without.size
+    return float(np.sqrt((count - 1) / count * ((without - without.mean()) ** 2).sum()))
+
+
+def _padded(rows: Sequence[Floats]) -> Floats:
+    found = np.full((len(rows), max(1, *(row.size for row in rows))), np.nan)
+    for place, row in zip(found, rows, strict=True):
+        place[: row.size] = row
+    return found
+
+
+def _estimates(
+    entries: Sequence[Contestant], judged: Sequence[Judged]
+) -> tuple[dict[str, str], Floats]:
+    """Return all parameters with their units, and the models' values, (models, parameters)."""
+    units: dict[str, str] = {}
+    answers: list[dict[str, float]] = []
+    for entry, one in zip(entries, judged, strict=True):
+        answer = {}
+        for parameter, share in zip(entry.ranges, one.point, strict=True):
+            # Two models may give one name to numbers of different units.
+            known = units.get(parameter.name, parameter.unit)
+            name = parameter.name if known == parameter.unit else parameter.key
+            units[name] = parameter.unit
+            low, high = (
+                float(parameter.to_coordinate(end)) for end in (parameter.low, parameter.high)
+            )
+            answer[name] = float(parameter.to_value(low + (high - low) * share))
+        answers.append(answer)
+    values = np.array([[answer.get(name, np.nan) for name in units] for answer in answers])
+    return units, values.reshape(len(entries), len(units))
+
+
+def _edge_warnings(entries: Sequence[Contestant], judged: Sequence[Judged]) -> list[str]:
+    """Return a sentence for each model of which a parameter is at the end of its range."""
+    found = []
+    for entry, one in zip(entries, judged, strict=True):
+        at_end = [
+            parameter.name
+            for parameter, share in zip(entry.ranges, one.point, strict=True)
+            if min(share, 1.0 - share) < AT_THE_END
+        ]
+        if at_end:
+            found.append(
+                f"{entry.model.name}: at the end of its range: {', '.join(at_end)}; extend the "
+                "range, or doubt the model"
+            )
+    return found
+
+
+def _steadiness(motion: RecordedMotion) -> Steadiness | None:
+    steps = next(one for one in motion.aspects if one.name == "steps").points
+    return steadiness_of_steps(steps, lambda one, other: points_distance(KsReference(one), other))
+
+
+def _change(motion: RecordedMotion) -> str:
+    """Return when the mean speed changed most, and from what to what."""
+    steps = next(one for one in motion.aspects if one.name == "steps")
+    speed = steps.points[:, 0] / motion.plan.short.step_interval
+    share = steps.time / motion.duration
+    splits = np.arange(0.05, 0.96, 0.05)
+    early = np.array([speed[share < split].mean() for split in splits])
+    late = np.array([speed[share >= split].mean() for split in splits])
+    # Of two means with equal variances: their difference in standard errors goes with this weight.
+    weight = np.sqrt(splits * (1.0 - splits))
+    best = int(np.nanargmax(np.abs(late - early) * weight))
+    return (
+        f"; the mean speed changed most at {splits[best] * motion.duration:.0f} s, from "
+        f"{1e3 * early[best]:.3g} to {1e3 * late[best]:.3g} mm/s"
+    )
+
+
+def _findings(
+    names: Sequence[str],
+    entries: Sequence[Contestant],
+    verdicts: Sequence[Verdict],
+    closest: int,
+    tied: Sequence[int],
+) -> list[str]:
+    """Return the answer in sentences."""
+    found = [f"{names[closest]} is the closest model"]
+    rivals = [names[k] for k in tied if not entries[k].baseline]
+    if rivals:
+        found[0] += f"; no clear difference from {', '.join(rivals)}"
+    explained = [name for name, one in zip(names, verdicts, strict=True) if one.explained]
+    if explained:
+        verb = "explain" if len(explained) > 1 else "explains"
+        found.append(f"{', '.join(explained)} {verb} the recording")
+    else:
+        found.append(f"no model explains the recording; {names[closest]}: {verdicts[closest].text}")
+    walks = [names[k] for k in tied if entries[k].baseline]
+    nearer = [names[k] for k in range(closest)]
+    if nearer:
+        found.append(f"a walk of recorded steps is closer than all models: {', '.join(nearer)}")
+    elif walks:
+        found.append(f"no clear difference from a walk of recorded steps: {', '.join(walks)}")
+    return found

@@ -1,0 +1,87 @@
+"""`driftwalk compare-models`: which motion model explains a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from driftwalk.cli.inputs.study_recording import read_for_run, tank_note
+from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
+from driftwalk.cli.options.shared import FlowFile, Json
+from driftwalk.cli.options.study import StudyOptions, with_study_options
+from driftwalk.cli.terminal.models_answer import print_answer, summary
+from driftwalk.cli.terminal.output import print_json
+from driftwalk.cli.terminal.progress import reported
+from driftwalk.core.study_keys import CALIBRATION_KEYS
+
+
+@with_recording_options
+@with_study_options(
+    CALIBRATION_KEYS,
+    *("tank_diameter", "side", "mass", "depth", "force_interval"),
+    *("wall_friction", "wall_restitution", "time_step", "step_interval"),
+    *("position_noise", "orientation_noise", "seed"),
+)
+def compare_models(
+    recording: RecordingFile,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="DIR", help="Run directory to make or continue.")
+    ],
+    given: StudyOptions,
+    how: RecordingOptions,
+    models: Annotated[
+        str | None,
+        typer.Option(
+            "--models",
+            metavar="NAMES",
+            help="Models, separated by commas, such as block,run_tumble+wall; or all. Default: the "
+            "block and the family with an interaction with the wall.",
+            show_default=False,
+        ),
+    ] = None,
+    flow: FlowFile = None,
+    threads: Annotated[
+        int | None,
+        typer.Option(
+            "--threads", min=1, help="Worker threads (default: all cores).", show_default=False
+        ),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Move a finished run aside and start a new one.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Say which motion models explain a recording.
+
+    Searches every model on one half of the recording's blocks of time, and judges all of them on
+    the other half, together with walks that only repeat recorded steps. Reports the ranking, and
+    where a model differs from the recording. After a kill, the same command continues.
+    """
+    from driftwalk.calibration import ALL_MODELS, DEFAULT_MODELS
+    from driftwalk.flow import load_flow
+    from driftwalk.runs import ModelComparisonWork, run_model_comparison
+
+    read = read_for_run([recording], given, how)
+    inputs = {"recording": recording}
+    inputs.update({"flow": flow} if flow is not None else {})
+    inputs.update({"study": given.file} if given.file is not None else {})
+    field = None
+    if flow is not None:
+        field = load_flow(flow, arena=read.study.tank.to_arena(), own_flags="keep")
+    if models is None:
+        chosen: tuple[str, ...] = DEFAULT_MODELS
+    elif models.strip() == "all":
+        chosen = ALL_MODELS
+    else:
+        chosen = tuple(name for name in map(str.strip, models.split(",")) if name)
+    work = ModelComparisonWork(
+        read.trajectories[0], chosen, read.study, field, how.body, inputs, threads
+    )
+    with reported("compare models") as told:
+        found = run_model_comparison(work, out, overwrite=overwrite, begun=tank_note(read), **told)
+    if json:
+        print_json(summary(found))
+    else:
+        print_answer(found, out)

@@ -1,0 +1,208 @@
+"""The figures of compared motion models: their ranking, and what was not fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from driftwalk.core.errors import InputError
+from driftwalk.figures.write import write_each
+from driftwalk.plot.parts.style import (
+    BLUE,
+    DOUBLE_COLUMN_MM,
+    INK,
+    MUTED,
+    ORANGE,
+    axes_or_new,
+    letter_panels,
+    new_figure,
+)
+from driftwalk.schema.model_words import ASPECT_WORDS
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SHOWN: Final = 3
+"""Models of which the facts that were not fitted are drawn."""
+COLORS: Final = (BLUE, ORANGE, "#009E73")
+ROW_MM: Final = 5.0
+AXIS_MM: Final = 12.0
+BELOW_MM: Final = 60.0
+OTHERS_MM: Final = 82.0
+MARKERS: Final = ("o", "s", "^")
+CHECK_LABELS: Final = {
+    "displacement_1": "msd, 1 step", "displacement_3": "msd, 3 steps",
+    "displacement_10": "msd, 10 steps", "displacement_30": "msd, 30 steps",
+    "displacement_100": "msd, 100 steps", "speed_time": "speed lasts",
+    "wall_share": "at the wall", "rest_share": "at rest",
+}  # fmt: skip
+
+
+def write_model_figures(
+    folder: str | Path, *, comparison: xr.Dataset, formats: Sequence[str] = ("png", "svg")
+) -> list[Path]:
+    """Write the figures of a comparison of motion models.
+
+    Parameters
+    ----------
+    folder : path-like
+        Where to write; made when absent.
+    comparison : xarray.Dataset
+        A `model_comparison`.
+    formats : sequence of {"png", "svg", "pdf"}
+        File formats.
+
+    Returns
+    -------
+    list of pathlib.Path
+        ``models`` in every format.
+
+    Raises
+    ------
+    InputError
+        When a format is not known, or the dataset is of another kind.
+    RunDirectoryError
+        When a figure cannot be written.
+
+    Examples
+    --------
+    ``write_model_figures("compare/figures", comparison=comparison)``
+    """
+    _require_comparison(comparison)
+    return write_each({"models": lambda: _figure(comparison)}, folder, formats)
+
+
+def _figure(comparison: xr.Dataset) -> Figure:
+    rows = comparison.sizes["model"]
+    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=ROW_MM * rows + OTHERS_MM)
+    grid = figure.add_gridspec(2, 2, height_ratios=(ROW_MM * rows + AXIS_MM, BELOW_MM))
+    scores = figure.add_subplot(grid[0, :])
+    aspects, checks = figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1])
+    plot_models(comparison, scores)
+    _plot_aspects(comparison, aspects)
+    _plot_checks(comparison, checks)
+    letter_panels(
+        [scores, aspects, checks],
+        ["on blocks that none was fitted to", "the same by aspect", "not fitted, 20 worlds"],
+    )
+    return figure
+
+
+def plot_models(comparison: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Plot how far each motion model is from the part of a recording that none was fitted to.
+
+    Parameters
+    ----------
+    comparison : xarray.Dataset
+        A `model_comparison`.
+    ax : matplotlib.axes.Axes, optional
+        Where to plot; a new figure when left out.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind.
+
+    Examples
+    --------
+    ``plot_models(comparison)``
+    """
+    _require_comparison(comparison)
+    ax = axes_or_new(ax)
+    shown = comparison.isel(model=slice(None, None, -1))
+    place = np.arange(shown.sizes["model"])
+    for baseline, color, marker in ((False, BLUE, "o"), (True, MUTED, "D")):
+        of = shown["baseline"].values.astype(bool) == baseline
+        if of.any():
+            ax.errorbar(
+                shown["score"].values[of],
+                place[of],
+                xerr=shown["score_std"].values[of],
+                fmt=marker,
+                ms=3.5,
+                lw=0.9,
+                capsize=2.0,
+                color=color,
+                label="walk of recorded steps" if baseline else "motion model",
+            )
+    own = float((comparison["own_distance"] / comparison["floor"]).mean())
+    ax.axvline(own, color=INK, lw=0.6, ls="--", label="the recording's own parts")
+    names = [
+        f"{name}{' (explains)' if explained else ''}"
+        for name, explained in zip(shown["model"].values, shown["explained"].values, strict=True)
+    ]
+    ax.set_yticks(place, names)
+    ax.set_ylim(-0.6, place.size - 0.4)
+    ax.set_xlim(left=0.0)
+    ax.set_xlabel("distance, mean of D / floor over the aspects")
+    ax.legend(loc="lower left")
+    return ax
+
+
+def _plot_aspects(comparison: xr.Dataset, ax: Axes) -> None:
+    """Draw the distances of the first models in each aspect, and the recording's own."""
+    aspects = [str(name) for name in comparison["aspect"].values]
+    place = np.arange(len(aspects))
+    for index, color, marker in zip(range(SHOWN), COLORS, MARKERS, strict=True):
+        if index < comparison.sizes["model"]:
+            one = comparison.isel(model=index)
+            ax.plot(
+                one["held_out_distance"].values,
+                place,
+                marker,
+                ms=3.5,
+                color=color,
+                label=str(one["model"].values),
+            )
+    ax.plot(comparison["own_distance"].values, place, "|", ms=9.0, mew=1.4, color=INK, label="own")
+    ax.set_yticks(place, [ASPECT_WORDS.get(name, name) for name in aspects])
+    ax.invert_yaxis()
+    ax.set_xlim(left=0.0)
+    ax.set_xlabel("KS distance D")
+    ax.legend(loc="best")
+
+
+def _plot_checks(comparison: xr.Dataset, ax: Axes) -> None:
+    """Draw facts that were not fitted, over those of the recording."""
+    names = [str(name) for name in comparison["check"].values]
+    place = np.arange(len(names), dtype=np.float64)
+    recorded = comparison["check_recorded"].values
+    for index, color, marker in zip(range(SHOWN), COLORS, MARKERS, strict=True):
+        if index >= comparison.sizes["model"]:
+            break
+        one = comparison.isel(model=index)
+        low, middle, high = (one[f"check_{name}"].values for name in ("low", "median", "high"))
+        # On a logarithmic axis there is no place for what is 0.
+        known = (low > 0.0) & (recorded > 0.0) & np.isfinite(low + middle + high)
+        low, middle, high = (part[known] / recorded[known] for part in (low, middle, high))
+        ax.errorbar(
+            middle,
+            place[known] + 0.2 * (index - 1),
+            xerr=[middle - low, high - middle],
+            fmt=marker,
+            ms=3.0,
+            lw=0.9,
+            color=color,
+        )
+    ax.axvline(1.0, color=INK, lw=0.6)
+    ax.set_xscale("log")
+    ax.set_yticks(place, [CHECK_LABELS.get(name, name) for name in names])
+    ax.invert_yaxis()
+    ax.set_xlabel("model / recording")
+
+
+def _require_comparison(comparison: xr.Dataset) -> None:
+    if comparison.attrs.get("kind") != "model_comparison":
+        raise InputError(
+            f"expected a model_comparison, got {comparison.attrs.get('kind', 'another dataset')}"
+        )

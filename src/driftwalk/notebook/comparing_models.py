@@ -1,0 +1,113 @@
+"""Compare motion models on a recording, in memory or in a run directory that resumes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Unpack
+
+from driftwalk.conditions import require_motion, study_for
+from driftwalk.core.study_keys import CALIBRATION_KEYS, study_overrides
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+    from driftwalk.motion import MotionModel
+    from driftwalk.notebook.settings import StudySettings
+    from driftwalk.runs import Progress
+
+
+def compare_models(
+    recording: xr.Dataset,
+    models: Sequence[str | MotionModel] | Literal["usual", "all"] = "usual",
+    *,
+    study: Study | None = None,
+    flow: xr.Dataset | None = None,
+    body: str | None = None,
+    folder: str | PathLike[str] | None = None,
+    overwrite: bool = False,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    **settings: Unpack[StudySettings],
+) -> xr.Dataset:
+    """Say which motion models explain a recording.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        A `trajectory` as `load` returns it.
+    models : sequence of str or MotionModel, "usual" or "all"
+        Names such as "block" and "run_tumble+wall", or models of `motion_model`. The usual ones are
+        the block and the family with an interaction with the wall.
+    study : Study, optional
+        Tank, camera, step interval and seed; default: the paper's.
+    flow : xarray.Dataset, optional
+        The water's velocity: a `flow_field` or a `fit`. For the block it is extracted from the
+        recording when left out.
+    body : str, optional
+        The body, where the recording has several.
+    folder : path-like, optional
+        Run directory to make or continue, the same as that of ``driftwalk compare-models``.
+    overwrite : bool
+        Whether a finished run there is moved aside; it is refused otherwise.
+    threads : int, optional
+        Default: all processors. The result does not depend on it.
+    progress : callable, optional
+        Called as ``progress(done, total, text)`` while the work goes on.
+    **settings
+        Keys of the study by their short names: ``step_interval=0.2``, ``seed=3``.
+
+    Returns
+    -------
+    xarray.Dataset
+        A `model_comparison`, the closest model first: see `driftwalk.calibration.compare_models`.
+
+    Raises
+    ------
+    InputError
+        When the recording cannot be compared, or it and the study state two tanks or blocks.
+    ConfigurationError
+        When there is no such model, or one is given twice.
+    RunDirectoryError
+        When the directory is in use, holds another run, or cannot be written.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> recording = dw.tank30_recording()
+    >>> found = dw.compare_models(recording, ["block", "run_tumble+wall"])  # doctest: +SKIP
+    >>> found["model"].values[0]  # doctest: +SKIP
+    'block'
+    """
+    from driftwalk.calibration import ALL_MODELS, DEFAULT_MODELS, compare_models as compare
+    from driftwalk.likelihood import fitted_flow
+    from driftwalk.runs import ModelComparisonWork, run_model_comparison
+    from driftwalk.runs.folder import silent
+    from driftwalk.schema.netcdf import open_netcdf
+
+    named = {"usual": DEFAULT_MODELS, "all": ALL_MODELS}
+    chosen = named.get(models, (models,)) if isinstance(models, str) else tuple(models)
+    given: dict[str, Any] = dict(settings)
+    require_motion(recording, body=body)
+    overrides = study_overrides(keys=CALIBRATION_KEYS, **given)
+    conditions = study_for(
+        [recording], study, overrides, body=body, needs_tank=chosen == ("block",)
+    )
+    field = fitted_flow(flow) if flow is not None and flow.attrs.get("kind") == "fit" else flow
+    say = progress or silent
+    if folder is None:
+        return compare(
+            recording, chosen, study=conditions, flow=field, body=body, threads=threads, tell=say
+        )
+    place = Path(folder)
+    work = ModelComparisonWork(recording, chosen, conditions, field, body, {}, threads)
+    run_model_comparison(
+        work,
+        place,
+        overwrite=overwrite,
+        progress=say,
+        command=f"driftwalk.compare_models(..., folder={str(folder)!r})",
+    )
+    return open_netcdf(place / "comparison.nc")

@@ -1,0 +1,111 @@
+"""Compare models on simulated recordings of known truth; count how often it is named.
+
+    python studies/motion_models/truth.py DATA OUT.jsonl [--recording NAME ...] [--model NAME ...]
+
+A recording is simulated under the conditions of a real one, by a model with the values that it got
+there (`results/models.jsonl`). OUT gets a line of JSON for each; what is there is not done again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from recordings import RECORDINGS
+from run import Prepared
+
+import driftwalk as dw
+from driftwalk.calibration import DEFAULT_MODELS
+from driftwalk.core.seeds import world_keys
+from driftwalk.schema import build_trajectory
+
+RESULTS: Final = Path(__file__).resolve().parent / "results" / "models.jsonl"
+SEED: Final = 77
+
+
+def simulated(prepared: Prepared, line: dict[str, Any]) -> Any:
+    """Return a recording by a model, with the values and conditions of a real one."""
+    model = dw.motion_model(line["model"], clearance=prepared.clearance)
+    values = {name: np.array([value]) for name, value in line["values"].items()}
+    keys = world_keys(SEED, trial=0, replicate=0)
+    seen = model.simulate(values, prepared.like, keys)
+    return build_trajectory(
+        prepared.like.sample_time,
+        seen.x[0],
+        seen.y[0],
+        attrs={"arena": prepared.study.tank.to_arena_json(), "simulated": "yes"},
+    )
+
+
+def compared(prepared: Prepared, line: dict[str, Any], threads: int) -> dict[str, Any]:
+    """Compare models on a recording of the line's model."""
+    began = time.perf_counter()
+    found = dw.calibration.compare_models(
+        simulated(prepared, line), DEFAULT_MODELS, study=prepared.study, threads=threads
+    )
+    names = [str(name) for name in found["model"].values]
+    at = names.index(line["model"])
+    return {
+        "recording": line["recording"],
+        "model": line["model"],
+        "ranking": names,
+        "behind": float(found["behind"][at]),
+        "behind_std": float(found["behind_std"][at]),
+        "explained": [
+            name for name, one in zip(names, found["explained"].values, strict=True) if one
+        ],
+        "verdict": str(found["verdict"].values[at]),
+        **{name: found[name].values.tolist() for name in ("held_out_distance", "apart")},
+        "own_distance": found["own_distance"].values.tolist(),
+        "checks_off": checks_off(found),
+        "findings": [str(text) for text in found["finding"].values],
+        "errors": {
+            name: float(found["estimate"].sel(parameter=name)[at]) / value - 1.0
+            for name, value in line["values"].items()
+        },
+        "seconds": round(time.perf_counter() - began, 1),
+    }
+
+
+def checks_off(found: Any) -> list[int]:
+    """Return how many facts of the recording lie beyond all worlds of each model."""
+    recorded = found["check_recorded"]
+    inside = (found["check_low"] <= recorded) & (recorded <= found["check_high"])
+    return [int(count) for count in (~inside & np.isfinite(recorded)).sum("check").values]
+
+
+def main() -> None:
+    """Do what is not done yet."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("data", type=Path)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--recording", action="append", choices=RECORDINGS)
+    parser.add_argument("--model", action="append")
+    parser.add_argument("--threads", type=int, default=2)
+    given = parser.parse_args()
+    done = set()
+    if given.out.exists():
+        lines = map(json.loads, given.out.read_text().splitlines())
+        done = {(one["recording"], one["model"]) for one in lines}
+    for line in map(json.loads, RESULTS.read_text().splitlines()):
+        wanted = line["model"] in (given.model or DEFAULT_MODELS)
+        here = line["recording"] in (given.recording or RECORDINGS)
+        if not (wanted and here) or (line["recording"], line["model"]) in done:
+            continue
+        prepared = Prepared(given.data, RECORDINGS[line["recording"]], given.threads)
+        found = compared(prepared, line, given.threads)
+        with given.out.open("a") as file:
+            file.write(json.dumps(found) + "\n")
+        print(
+            f"{line['recording']}, {line['model']}: {found['ranking'][:3]}, "
+            f"explained {found['explained']}; {found['seconds']:.0f} s",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,79 @@
+"""`driftwalk compare-models` on a minute of the bundled recording."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from command_line import RECORDING, here, leave_out_figures, refusal
+
+from driftwalk.calibration import DEFAULT_MODELS
+from driftwalk.schema.netcdf import open_netcdf
+
+SHORT = (RECORDING, "--to", "60s", "--tank-diameter", "30cm", "--models", "inertial,active")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
+    folder = tmp_path_factory.mktemp("models") / "run"
+    done = here("compare-models", *SHORT, "-o", folder, "--json")
+    assert done.code == 0, done.err
+    return folder, json.loads(done.out)
+
+
+def test_json_holds_the_ranking(run: tuple[Path, dict]) -> None:
+    _, said = run
+    names = [one["model"] for one in said["models"]]
+    assert set(names) == {"inertial", "active", "resampled steps", "hidden Markov walk"}
+    scores = [one["score"] for one in said["models"]]
+    assert scores == sorted(scores)
+    inertial = said["models"][names.index("inertial")]
+    assert inertial["estimate"]["memory_time"]["unit"] == "s"
+    assert set(inertial["held_out_distance"]) == set(said["own_distance"])
+    walk = said["models"][names.index("resampled steps")]
+    assert walk["baseline"]
+    assert not walk["explained"]
+    assert walk["estimate"] == {}
+
+
+def test_the_folder_holds_everything(run: tuple[Path, dict]) -> None:
+    folder, said = run
+    stored = open_netcdf(folder / "comparison.nc")
+    assert stored["model"].values.tolist() == [one["model"] for one in said["models"]]
+    for name in ("recording.nc", "manifest.json", "figures/models.png", "figures/models.svg"):
+        assert (folder / name).stat().st_size > 0
+    manifest = json.loads((folder / "manifest.json").read_text())
+    assert manifest["inputs"]["recording"]["sha256"]
+
+
+def test_people_read_the_answer(
+    run: tuple[Path, dict], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    leave_out_figures(monkeypatch)
+    _, said = run
+    done = here("compare-models", *SHORT, "-o", tmp_path / "run")
+    assert done.code == 0
+    for one in said["models"]:
+        assert one["model"] in done.out
+    for text in said["findings"]:
+        assert f"{text}." in done.out
+    assert "the recording's own parts" in done.out
+
+
+def test_mistakes_are_one_line(tmp_path: Path) -> None:
+    words = ("compare-models", RECORDING, "--to", "60s", "--tank-diameter", "30cm")
+    out = tmp_path / "run"
+    assert "run_tumbel" in refusal(here(*words, "--models", "run_tumbel", "-o", out))
+    assert "twice" in refusal(here(*words, "--models", "active,active", "-o", out))
+    assert "no motion model" in refusal(here(*words, "--models", " , ", "-o", out))
+    assert not out.exists()
+
+
+def test_a_finished_run_is_kept(run: tuple[Path, dict]) -> None:
+    folder, _ = run
+    assert "--overwrite" in refusal(here("compare-models", *SHORT, "-o", folder))
+
+
+def test_the_usual_models_begin_with_the_block() -> None:
+    assert DEFAULT_MODELS[0] == "block"
