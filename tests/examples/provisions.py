@@ -242,6 +242,7 @@ PAGES: dict[str, Page] = {
             "driftwalk assemble *": Numbers.RUNS,
             "driftwalk report *": Numbers.CLOSE,
         },
+        draws=False,
         slow=True,
     ),
     "CONTRIBUTING.md": Page(
@@ -411,6 +412,7 @@ PAGES: dict[str, Page] = {
         numbers=Numbers.SAME,
         # Both simulate in a fitted flow; of half an hour in one world chance makes what it likes.
         numbers_of={"driftwalk fit *": Numbers.CLOSE, "driftwalk compare *": Numbers.ANY},
+        draws=False,
         slow=True,
     ),
     "docs/validation.md": Page(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from driftwalk.calibration.problem import prepare_problem
+from driftwalk.calibration.refuse import require_searchable
 from driftwalk.conditions import recorded_camera
 from driftwalk.motion import BlockModel, MotionModel
 from driftwalk.schema import body_track
@@ -23,7 +24,7 @@ def check_recording(
     body: str | None = None,
     model: MotionModel | None = None,
 ) -> None:
-    """Refuse a recording that `calibrate` would refuse; takes almost no time.
+    """Refuse a recording or a model that `calibrate` would refuse; takes almost no time.
 
     Parameters
     ----------
@@ -42,12 +43,16 @@ def check_recording(
     ------
     InputError
         When the recording is too short, does not move, or several bodies are there and none named.
+    ConfigurationError
+        When the model has more than two parameters, or a name that a calibration uses itself.
 
     Examples
     --------
     >>> import driftwalk as dw
     >>> dw.calibration.check_recording(dw.tank30_recording(), dw.Study(), flow=dw.tank30_flow())
     """
+    if model is not None:
+        require_searchable(model)
     track = body_track(recording, body)
     camera = recorded_camera(track, study, position_quantum=0.0)
     problem = prepare_problem(track, study, flow, camera=camera, model=model)

@@ -26,7 +26,8 @@ def require_searchable(model: MotionModel) -> None:
     if not 1 <= len(names) <= MOST_PARAMETERS:
         raise ConfigurationError(
             f"the model {model.name} has {len(names)} parameters ({', '.join(names)}), and a "
-            f"calibration searches one or two: give the others a fixed value in the model"
+            "calibration searches one or two: give the others a fixed value, or let compare-models "
+            "search all of them"
         )
     taken, taken_flat = taken_names(), taken_keys()
     for parameter in model.parameters:

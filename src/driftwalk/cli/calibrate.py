@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from driftwalk.cli.inputs.study_recording import read_for_run, tank_note
+from driftwalk.cli.options.model import ModelName, ParameterChoices, chosen_model
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowFile, Json
 from driftwalk.cli.options.study import StudyOptions, with_study_options
@@ -41,6 +42,8 @@ def calibrate(
     ],
     given: StudyOptions,
     how: RecordingOptions,
+    model: ModelName = None,
+    parameters: ParameterChoices = None,
     flow: FlowFile = None,
     threads: Threads = None,
     overwrite: Overwrite = False,
@@ -48,13 +51,15 @@ def calibrate(
 ) -> None:
     """Find the drag coefficient and the stochastic force that explain a recording.
 
-    Simulates every setting of a grid for the length of the recording, compares step lengths and
-    turning angles, and refines the grid around the minimum. Reports how well the parameters are
-    known and whether the model explains the motion. After a kill, the same command continues.
+    With --model: the one or two unknown parameters of another motion model. Simulates every setting
+    of a grid for the length of the recording, compares step lengths and turning angles, and refines
+    the grid around the minimum. Reports how well the parameters are known and whether the model
+    explains the motion. After a kill, the same command continues.
     """
     from driftwalk.flow import load_flow
     from driftwalk.runs import CalibrationWork, run_calibration
 
+    chosen = chosen_model(model, parameters)
     read = read_for_run([recording], given, how)
     inputs = {"recording": recording}
     inputs.update({"flow": flow} if flow is not None else {})
@@ -62,7 +67,9 @@ def calibrate(
     field = None
     if flow is not None:
         field = load_flow(flow, arena=read.study.tank.to_arena(), own_flags="keep")
-    work = CalibrationWork(read.trajectories[0], read.study, field, how.body, inputs, threads)
+    work = CalibrationWork(
+        read.trajectories[0], read.study, field, how.body, inputs, threads, chosen
+    )
     with reported("calibrate") as told:
         found = run_calibration(work, out, overwrite=overwrite, begun=tank_note(read), **told)
     if json:

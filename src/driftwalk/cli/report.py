@@ -34,10 +34,11 @@ def report(
 ) -> None:
     """Write a report of a run or a recording: one HTML file that loads nothing from anywhere.
 
-    Takes a run directory of calibrate, fit, assemble, sensitivity or study recover. The report has
-    the answer in words with its uncertainty, recording, flow, maps to click, outcomes to replay,
-    the manifest and how to cite. It opens with a double click, without a network. For a simulation
-    it shows the first replicate. The options on reading are for a recording.
+    Takes a run directory of calibrate, compare-models, fit, assemble, sensitivity or study recover.
+    The report has the answer in words with its uncertainty, recording, flow, maps to click,
+    outcomes to replay, the manifest and how to cite. It opens with a double click, without a
+    network. For a simulation it shows the first replicate. The options on reading are for a
+    recording.
     """
     from driftwalk.page import write_report
 

@@ -20,6 +20,7 @@ from driftwalk.page.sections.assembly import assembly_sections
 from driftwalk.page.sections.calibration import calibration_sections
 from driftwalk.page.sections.fit import fit_sections
 from driftwalk.page.sections.manifest import manifest_section
+from driftwalk.page.sections.models import model_sections
 from driftwalk.page.sections.recording import noise_of, recording_sections
 from driftwalk.page.sections.recovery import recovery_sections
 from driftwalk.page.sections.sensitivity import sensitivity_sections
@@ -39,6 +40,7 @@ TITLES: Final = {
     "assembly": "Self-assembly",
     "sensitivity": "Sensitivity of self-assembly",
     "recovery": "Recovery study",
+    "model_comparison": "Comparison of motion models",
     None: "Run",
 }
 
@@ -55,8 +57,8 @@ def report_page(folder: str | Path) -> dict[str, Any]:
     Parameters
     ----------
     folder : path-like
-        A run directory of `driftwalk calibrate`, `fit`, `assemble`, `sensitivity` or `study
-        recover`.
+        A run directory of `driftwalk calibrate`, `compare-models`, `fit`, `assemble`,
+        `sensitivity` or `study recover`.
 
     Returns
     -------
@@ -102,7 +104,7 @@ def dataset_page(dataset: xr.Dataset) -> dict[str, Any]:
     Parameters
     ----------
     dataset : xarray.Dataset
-        A `fit`, `calibration`, `assembly`, `sensitivity` or `recovery`.
+        A `fit`, `calibration`, `model_comparison`, `assembly`, `sensitivity` or `recovery`.
 
     Returns
     -------
@@ -348,12 +350,22 @@ def _recovery(run: Run) -> list[Section]:
     return recovery_sections(run.dataset(MAIN_FILES["recovery"]))
 
 
+def _models(run: Run) -> list[Section]:
+    recordings = run.recordings()
+    return model_sections(
+        run.dataset(MAIN_FILES["model_comparison"]),
+        recording=recordings[0] if recordings else None,
+        body=run.body,
+    )
+
+
 _SECTIONS: Final[dict[str, Callable[[Run], list[Section]]]] = {
     "calibration": _calibration,
     "fit": _fit,
     "assembly": _assembly,
     "sensitivity": _sensitivity,
     "recovery": _recovery,
+    "model_comparison": _models,
 }
 
 _SECTIONS_OF_ONE: Final[dict[str, Callable[[xr.Dataset], list[Section]]]] = {
@@ -362,4 +374,5 @@ _SECTIONS_OF_ONE: Final[dict[str, Callable[[xr.Dataset], list[Section]]]] = {
     "assembly": lambda found: assembly_sections(assembly=found),
     "sensitivity": lambda found: sensitivity_sections(sensitivity=found),
     "recovery": recovery_sections,
+    "model_comparison": model_sections,
 }

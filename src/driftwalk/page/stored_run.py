@@ -24,6 +24,7 @@ MAIN_FILES: Final = {
     "assembly": "assembly.nc",
     "sensitivity": "sensitivity.nc",
     "recovery": "recovery.nc",
+    "model_comparison": "comparison.nc",
 }
 
 
@@ -158,6 +159,6 @@ def _no_run(folder: Path) -> str:
     if inside:
         return f"{folder} is not a run directory, but holds some: name {' or '.join(inside)} in it"
     return (
-        f"{folder} is not a run directory: give one that calibrate, fit, assemble, sensitivity or "
-        "study recover made, or a recording"
+        f"{folder} is not a run directory: give one that calibrate, compare-models, fit, assemble, "
+        "sensitivity or study recover made, or a recording"
     )

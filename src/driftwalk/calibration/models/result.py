@@ -200,11 +200,11 @@ def _findings(
         verb = "explain" if len(explained) > 1 else "explains"
         found.append(f"{', '.join(explained)} {verb} the recording")
     else:
-        found.append(f"no model explains the recording; {names[closest]}: {verdicts[closest].text}")
+        found.append(f"No model explains the recording; {names[closest]}: {verdicts[closest].text}")
     walks = [names[k] for k in tied if entries[k].baseline]
     nearer = [names[k] for k in range(closest)]
     if nearer:
-        found.append(f"a walk of recorded steps is closer than all models: {', '.join(nearer)}")
+        found.append(f"A walk of recorded steps is closer than all models: {', '.join(nearer)}")
     elif walks:
-        found.append(f"no clear difference from a walk of recorded steps: {', '.join(walks)}")
+        found.append(f"No clear difference from a walk of recorded steps: {', '.join(walks)}")
     return found

@@ -13,6 +13,7 @@ from driftwalk.cli.terminal.answer import (
     print_row,
     print_warnings,
 )
+from driftwalk.schema.calibration import is_block, stored_parameters
 from driftwalk.schema.calibration_facts import calibration_facts
 
 if TYPE_CHECKING:
@@ -54,8 +55,14 @@ _KEYS: Final = (
 def summary(found: xr.Dataset) -> dict[str, Any]:
     """Return what ``--json`` prints: the answer with units in its keys."""
     facts = calibration_facts(found)
+    if is_block(found):
+        answer = {key: facts.get(key) for key in _KEYS}
+    else:
+        own = [one.key for one in stored_parameters(found)]
+        keys = ("model", *own, *(f"{key}_interval" for key in own), *_KEYS)
+        answer = {key: facts[key] for key in keys if key in facts}
     return {
-        **{key: facts.get(key) for key in _KEYS},
+        **answer,
         "recording": facts["recording_name"],
         "warnings": facts["warnings"],
     }
@@ -65,8 +72,9 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
     """Print the answer for people, and where the figures are."""
     facts = calibration_facts(found)
     print_origin(found)
-    print_estimates(found, "drag_coefficient", "force_std")
-    print_intensity(facts["force_noise_intensity_N2_s"])
+    print_estimates(found, *map(str, found["parameter"].values))
+    if is_block(found):
+        print_intensity(facts["force_noise_intensity_N2_s"])
     print_row(
         "KS distance",
         f"{facts['ks_distance']:.4f} at the optimum, noise floor {facts['noise_floor']:.4f}",

@@ -41,6 +41,12 @@ NO_CELL: Final[dict[str, Any]] = dict.fromkeys(
     )
 )
 """Answer for a setting that has not been simulated."""
+UNDER_WAY: Final = {
+    "fit": "A fit under way",
+    "recovery": "A recovery study under way",
+    "model_comparison": "A comparison of motion models under way",
+}
+"""Titles by the kind of run."""
 
 
 class RunningOther:
@@ -60,8 +66,7 @@ class RunningOther:
         self._reader = RunReader(folder)
         self._done = 0
         kind = specification.get("kind")
-        if kind in ("fit", "recovery"):
-            self.title = {"fit": "A fit under way", "recovery": "A recovery study under way"}[kind]
+        self.title = UNDER_WAY.get(str(kind), self.title)
 
     def look(self) -> list[Section]:
         """Count what is finished."""

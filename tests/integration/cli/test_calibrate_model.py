@@ -1,0 +1,99 @@
+"""`driftwalk calibrate --model`: another model than the block, on a minute of its own motion."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import GRID, here, leave_out_figures, refusal
+
+import driftwalk as dw
+from driftwalk.core.seeds import world_keys
+from driftwalk.record import save_trajectory
+from driftwalk.schema import Track, build_trajectory
+
+SPEED = 0.05
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with a recording of an active body (synthetic), a study and a model file."""
+    folder = tmp_path_factory.mktemp("model")
+    time = np.arange(0.0, 120.0, 0.1)
+    track = Track(time, SPEED + 0.0 * time, 0.0 * time, np.full(time.size, np.nan))
+    study = dw.Study()
+    camera = dw.conditions.recorded_camera(track, study, position_quantum=0.0)
+    like = dw.conditions.recorded_conditions(track, study, camera=camera)
+    model = dw.motion_model("active", turn_rate=0.0, clearance=0.015)
+    values = {"speed": np.array([SPEED]), "rotational_diffusion": np.array([0.5])}
+    seen = model.simulate(values, like, world_keys(1, trial=0, replicate=0))
+    moved = build_trajectory(
+        time, seen.x[0], seen.y[0], attrs={"arena": study.tank.to_arena_json()}
+    )
+    save_trajectory(moved, folder / "recording.nc")
+    (folder / "grid.toml").write_text(GRID)
+    (folder / "mine.py").write_text(
+        "import numpy as np\n\n\n"
+        "def diffuse(scene, *, diffusivity=(1e-6, 1e-2, 'm2/s')):\n"
+        "    spread = np.sqrt(2 * diffusivity * np.diff(scene.times, prepend=0.0))\n"
+        "    x, y = (np.cumsum(spread * scene.random.normal(spread.size), axis=1) for _ in 'xy')\n"
+        "    return scene.start.x[:, None] + x, scene.start.y[:, None] + y\n"
+    )
+    return folder
+
+
+def words(place: Path, out: Path) -> tuple[object, ...]:
+    return ("calibrate", place / "recording.nc", "--study", place / "grid.toml", "-o", out)
+
+
+def test_the_speed_of_an_active_body_is_found(
+    place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A constant speed: its error is that of the camera over some steps, and the grid's step."""
+    leave_out_figures(monkeypatch)
+    chosen = ("--model", "active", "--parameter", "turn_rate=0", "--parameter", "clearance=0.015")
+    ranges = ("--parameter", "speed=0.03,0.08", "--parameter", "rotational_diffusion=0.1,2")
+    done = here(*words(place, tmp_path / "run"), *chosen, *ranges, "--json")
+    assert done.code == 0, done.err
+    said = json.loads(done.out)
+    assert said["model"] == "active"
+    assert said["speed_m_s"] == pytest.approx(SPEED, rel=0.05)
+    low, high = said["rotational_diffusion_rad2_s_interval"]
+    assert low <= said["rotational_diffusion_rad2_s"] <= high
+    assert "drag_coefficient" not in said
+    assert "force_interval_s" not in said
+
+
+def test_a_model_in_a_file_of_the_users(
+    place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    leave_out_figures(monkeypatch)
+    done = here(*words(place, tmp_path / "run"), "--model", f"{place / 'mine.py'}:diffuse")
+    assert done.code == 0, done.err
+    assert done.out.startswith("diffusivity")
+    assert "m2/s" in done.out.splitlines()[0]
+    manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
+    assert manifest["specification"]["model"]["source_sha256"]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--model", "run_rest"), "let compare-models search all of them"),
+        (("--model", "activ"), "activ"),
+        (("--model", "nowhere.py:diffuse"), "nowhere.py"),
+        (("--parameter", "speed=0.1"), "belongs to a --model"),
+        (("--model", "active", "--parameter", "speed"), "expected NAME=VALUE"),
+        (("--model", "active", "--parameter", "speed=a,b"), "expected NAME=VALUE"),
+        (("--model", "active", "--parameter", "speed=1,2,3"), "expected NAME=VALUE"),
+        (("--model", "active", "--parameter", "sped=1"), "sped"),
+        (("--model", "active", "--parameter", "speed=1", "--parameter", "speed=2"), "twice"),
+    ],
+)
+def test_mistakes_are_one_line(
+    place: Path, tmp_path: Path, options: tuple[str, ...], said: str
+) -> None:
+    assert said in refusal(here(*words(place, tmp_path / "run"), *options))
+    assert not (tmp_path / "run").exists()
