@@ -59,9 +59,12 @@ def compared(prepared: Prepared, line: dict[str, Any], threads: int) -> dict[str
             name for name, one in zip(names, found["explained"].values, strict=True) if one
         ],
         "verdict": str(found["verdict"].values[at]),
-        **{name: found[name].values.tolist() for name in ("held_out_distance", "apart")},
+        "held_out_distance": found["held_out_distance"].values.tolist(),
         "own_distance": found["own_distance"].values.tolist(),
-        "checks_off": checks_off(found),
+        "checks": {
+            name: found[f"check_{name}"].values.tolist()
+            for name in ("recorded", "low", "median", "high")
+        },
         "findings": [str(text) for text in found["finding"].values],
         "errors": {
             name: float(found["estimate"].sel(parameter=name)[at]) / value - 1.0
@@ -69,13 +72,6 @@ def compared(prepared: Prepared, line: dict[str, Any], threads: int) -> dict[str
         },
         "seconds": round(time.perf_counter() - began, 1),
     }
-
-
-def checks_off(found: Any) -> list[int]:
-    """Return how many facts of the recording lie beyond all worlds of each model."""
-    recorded = found["check_recorded"]
-    inside = (found["check_low"] <= recorded) & (recorded <= found["check_high"])
-    return [int(count) for count in (~inside & np.isfinite(recorded)).sum("check").values]
 
 
 def main() -> None:

@@ -59,9 +59,9 @@ def compare_models(
     hidden Markov walk of three states. Models are ranked by their distance there.
 
     A model explains the recording where, in each aspect, it is no farther from the odd blocks than
-    1.5 times the recording's own parts, made of interleaved blocks, are from each other (twice,
-    where the model's own worlds are as far from each other), and where no more than three of eight
-    facts that are not fitted lie beyond all of 20 simulated recordings.
+    twice the distance of the recording's own parts, made of interleaved blocks, from each other,
+    where no more than one of eight facts that are not fitted is far off, and where no other one is
+    clearly closer.
 
     Parameters
     ----------
@@ -315,7 +315,6 @@ def _unpacked(arrays: Mapping[str, np.ndarray], entry: Contestant) -> Judged:
         held=arrays["held"],
         score=float(arrays["score"]),
         without=arrays["without"],
-        apart=arrays["apart"],
         checks=arrays["checks"],
         ends=arrays["ends"][np.isfinite(arrays["ends"])],
         evaluations=int(arrays["evaluations"]),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -15,8 +15,7 @@ from driftwalk.calibration.evolution import (
     search_minimum,
 )
 from driftwalk.calibration.models.recorded import RecordedMotion
-from driftwalk.comparison import KsReference
-from driftwalk.comparison.aspects import Aspect, AspectReference, interleaved
+from driftwalk.comparison.aspects import AspectReference
 from driftwalk.conditions import Conditions
 from driftwalk.motion import MotionModel, ParticleModel
 from driftwalk.motion.score import broken_worlds
@@ -27,8 +26,6 @@ Tell = Callable[[int, int], None]
 
 JUDGED: Final = 20
 """Worlds by which the answer of a search is judged."""
-AS_RECORDINGS: Final = 8
-"""Of these, taken for recordings: how far is the rest from them?"""
 
 
 class Contestant(NamedTuple):
@@ -56,9 +53,6 @@ class Judged(NamedTuple):
     """Mean of distance over floor in the odd blocks."""
     without: Floats
     """The same without each of the odd blocks, shape (blocks / 2,)."""
-    apart: Floats
-    """How far worlds of the model are from each other in each aspect, shape (aspects,): the largest
-    median distance between the odd blocks of one of eight worlds and the others."""
     checks: Floats
     """Facts that are not fitted, of each world, shape (worlds, checks)."""
     ends: Floats
@@ -103,24 +97,7 @@ def judge(
         without=np.array(
             [float(part.overall(distances(part)).mean()) for part in motion.without_each_block]
         ),
-        apart=_apart(aspects, motion, threads=entry.like.threads),
         checks=np.array([motion.checks(x, y) for x, y in zip(seen.x, seen.y, strict=True)]),
         ends=ends,
         evaluations=evaluations,
     )
-
-
-def _apart(aspects: Sequence[Sequence[Aspect]], motion: RecordedMotion, *, threads: int) -> Floats:
-    """Return how far worlds are from each other, when one is judged as the recording is."""
-    found = []
-    for world in aspects[:AS_RECORDINGS]:
-        _, odd = interleaved(
-            [one for one in world if one.name in motion.held.names], duration=motion.duration
-        )
-        if not all(len(one.points) for one in odd):
-            continue
-        natives = tuple(KsReference(one.points) for one in odd)
-        reference = AspectReference(motion.held.names, motion.held.floor, natives)
-        others = reference.distances(aspects[AS_RECORDINGS:], threads=threads)
-        found.append(np.median(others, axis=0))
-    return np.max(found, axis=0) if found else np.zeros(len(motion.held.names))

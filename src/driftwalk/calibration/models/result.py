@@ -42,12 +42,18 @@ def build_comparison(
     """Return the dataset of a comparison; `entries` and `judged` have one item for each model."""
     order = np.argsort([one.score for one in judged], kind="stable")
     entries, judged = [entries[k] for k in order], [judged[k] for k in order]
-    verdicts = [
-        verdict_of(one, motion, baseline=entry.baseline)
-        for entry, one in zip(entries, judged, strict=True)
-    ]
     behind = np.array([one.score - judged[0].score for one in judged])
     behind_std = np.array([_error(one.without - judged[0].without) for one in judged])
+    names = [entry.model.name for entry in entries]
+    verdicts = [
+        verdict_of(
+            one,
+            motion,
+            baseline=entry.baseline,
+            clearly_behind=names[0] if behind[k] > TIED_SIGMAS * behind_std[k] else None,
+        )
+        for k, (entry, one) in enumerate(zip(entries, judged, strict=True))
+    ]
     closest = next((k for k, entry in enumerate(entries) if not entry.baseline), 0)
     tied = [
         k
@@ -61,7 +67,6 @@ def build_comparison(
     said = [*warnings, *_edge_warnings(entries, judged)]
     if steady is not None and steady.warning is not None:
         said.append(steady.warning + _change(motion))
-    names = [entry.model.name for entry in entries]
     findings = _findings(names, entries, verdicts, closest, tied)
     data: dict[str, Any] = {
         "score": ("model", [one.score for one in judged]),
@@ -74,7 +79,6 @@ def build_comparison(
         "verdict": ("model", texts([one.text for one in verdicts])),
         "held_out_distance": (("model", "aspect"), [one.held for one in judged]),
         "trained_distance": (("model", "aspect"), [one.trained for one in judged]),
-        "apart": (("model", "aspect"), [one.apart for one in judged]),
         "own_distance": ("aspect", motion.own),
         "floor": ("aspect", motion.held.floor),
         "check_recorded": ("check", motion.recorded_checks),

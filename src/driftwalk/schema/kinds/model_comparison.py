@@ -37,10 +37,6 @@ MODEL_COMPARISON: Final = Kind(
         Variable("held_out_distance", "model aspect", "1", "KS distance", note=_HELD),
         Variable("trained_distance", "model aspect", "1", "KS distance", note="even blocks"),
         Variable(
-            "apart", "model aspect", "1", "KS distance between worlds of the model",
-            note="the largest median distance between one of eight worlds and the others",
-        ),
-        Variable(
             "own_distance", "aspect", "1", "KS distance of the recording's own parts",
             note="mean over parts of interleaved blocks",
         ),
