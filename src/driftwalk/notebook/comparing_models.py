@@ -63,6 +63,7 @@ def compare_models(
     -------
     xarray.Dataset
         A `model_comparison`, the closest model first: see `driftwalk.calibration.compare_models`.
+        Printed, it begins with the ranking.
 
     Raises
     ------
@@ -83,6 +84,7 @@ def compare_models(
     """
     from driftwalk.calibration import ALL_MODELS, DEFAULT_MODELS, compare_models as compare
     from driftwalk.likelihood import fitted_flow
+    from driftwalk.notebook.result import as_result
     from driftwalk.runs import ModelComparisonWork, run_model_comparison
     from driftwalk.runs.folder import silent
     from driftwalk.schema.netcdf import open_netcdf
@@ -98,9 +100,10 @@ def compare_models(
     field = fitted_flow(flow) if flow is not None and flow.attrs.get("kind") == "fit" else flow
     say = progress or silent
     if folder is None:
-        return compare(
+        found = compare(
             recording, chosen, study=conditions, flow=field, body=body, threads=threads, tell=say
         )
+        return as_result(found)
     place = Path(folder)
     work = ModelComparisonWork(recording, chosen, conditions, field, body, {}, threads)
     run_model_comparison(
@@ -110,4 +113,4 @@ def compare_models(
         progress=say,
         command=f"driftwalk.compare_models(..., folder={str(folder)!r})",
     )
-    return open_netcdf(place / "comparison.nc")
+    return as_result(open_netcdf(place / "comparison.nc"))

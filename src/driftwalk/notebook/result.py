@@ -10,7 +10,7 @@ from driftwalk.schema.answer import answer_lines
 
 
 class Result(xr.Dataset):  # type: ignore[no-untyped-call]
-    """A fit or a calibration: an `xarray.Dataset` whose text begins with the answer.
+    """A fit, a calibration or a comparison: an `xarray.Dataset` whose text begins with the answer.
 
     Everything else is as in any dataset, and it is stored as one.
 

@@ -72,18 +72,19 @@ def estimate_of(found: xr.Dataset, parameter: str) -> Estimate:
 
 
 def answer_lines(found: xr.Dataset) -> list[str]:
-    """Return what a fit or a calibration says, a line each; nothing for any other dataset.
+    """Return what a fit, a calibration or a comparison of models says, a line each.
 
     Parameters
     ----------
     found : xarray.Dataset
-        With ``estimate`` by parameter, as a `fit` and a `calibration` have it.
+        With ``estimate`` by parameter, as a `fit` and a `calibration` have it, or with ``score`` by
+        model; of any other dataset nothing is said.
 
     Returns
     -------
     list of str
         The parameters in the units of a reader, what the intervals hold for, the verdict of the
-        check, findings and warnings.
+        check, findings and warnings; or the models with their distances, findings and warnings.
 
     Examples
     --------
@@ -96,6 +97,8 @@ def answer_lines(found: xr.Dataset) -> list[str]:
     ['C_d  0.4  [0.38, 0.42]', 'intervals of 90 %']
     """
     needed = ("estimate", "parameter", "unit")
+    if "score" in found.variables and "model" in found.variables:
+        return [*_ranking(found), *_remarks(found)]
     if any(name not in found.variables for name in needed) or found["estimate"].ndim != 1:
         return []
     names = [str(name) for name in found["parameter"].values]
@@ -110,10 +113,32 @@ def answer_lines(found: xr.Dataset) -> list[str]:
         lines.append(f"explains the recording: {'yes' if bool(found['explained']) else 'NO'}")
     elif "check_left_out" in found.attrs:
         lines.append(f"not checked: {found.attrs['check_left_out']}")
-    for name in ("finding", "warning"):
-        if name in found.variables:
-            lines += [f"{name}: {text}" for text in found[name].values]
-    return lines
+    return [*lines, *_remarks(found)]
+
+
+def _ranking(found: xr.Dataset) -> list[str]:
+    """Return the models of a comparison with their distances."""
+    names = [str(name) for name in found["model"].values]
+    width = max(map(len, names), default=0)
+    return [
+        f"{name:{width}}  {score:.2f} ± {std:.2f}{'  explains the recording' if explained else ''}"
+        for name, score, std, explained in zip(
+            names,
+            found["score"].values,
+            found["score_std"].values,
+            found["explained"].values,
+            strict=True,
+        )
+    ]
+
+
+def _remarks(found: xr.Dataset) -> list[str]:
+    return [
+        f"{name}: {text}"
+        for name in ("finding", "warning")
+        if name in found.variables
+        for text in found[name].values
+    ]
 
 
 def _text(found: Estimate) -> str:

@@ -103,3 +103,19 @@ def test_numbers_survive_to_four_digits(value: float, low: float, high: float) -
     numbers = [1e-3 * float(part) for part in shown.replace(",", " ").split()]
     # Four significant digits: half a unit of the fourth.
     np.testing.assert_allclose(numbers, [value, low * value, high * value], rtol=5.1e-4)
+
+
+def test_a_comparison_of_models_begins_with_the_ranking() -> None:
+    comparison = xr.Dataset(
+        {
+            "score": ("model", [0.8, 1.25]),
+            "score_std": ("model", [0.1, 0.2]),
+            "explained": ("model", [True, False]),
+        },
+        {"model": ["run_rest", "block"], "finding": ("finding", ["run_rest is the closest model"])},
+    )
+    assert answer_lines(comparison) == [
+        "run_rest  0.80 ± 0.10  explains the recording",
+        "block     1.25 ± 0.20",
+        "finding: run_rest is the closest model",
+    ]
