@@ -47,6 +47,8 @@ from driftwalk.comparison import Statistic
 from driftwalk.conditions import recorded_camera
 from driftwalk.core.errors import InputError
 from driftwalk.motion import BlockModel, Details, MotionModel
+from driftwalk.motion.batches import no_numbers
+from driftwalk.motion.score import broken_worlds
 from driftwalk.schema import Track, body_track
 
 if TYPE_CHECKING:
@@ -229,6 +231,7 @@ class _Calibration:
         search = self.problem.study.calibration
         axes = tuple(np.array(one.coordinates) for one in self.problem.parameters)
         self.coarse = self._map("coarse", axes, search.replicates, "all")
+        self._require_numbers()
         cell = self.coarse.cell_of_minimum()
         self.optimum = Optimum(self.coarse.point(cell), float(self.coarse.mean[cell]))
         self.floor = noise_floor_at(self.problem, self.optimum.point)
@@ -240,6 +243,17 @@ class _Calibration:
         if search.bootstrap >= 2 and self.refined is not None:
             self._bootstrap(search.bootstrap)
         return self
+
+    def _require_numbers(self) -> None:
+        """Refuse a model that has lost its numbers in every world."""
+        if not broken_worlds(self.coarse.arrays["status"]).all():
+            return
+        first = self.coarse.point((0,) * len(self.coarse.axes))
+        setting = {
+            one.name: float(one.to_value(value))
+            for one, value in zip(self.problem.parameters, first, strict=True)
+        }
+        raise InputError(no_numbers(self.problem.model.name, setting))
 
     def _map(self, stage: str, window: Axes, replicates: int, details: Details) -> Map:
         store = self._keep(

@@ -38,9 +38,10 @@ WORK: Final[dict[str, int]] = {
     "first_half_refined": 7,
     "second_half": 8,
     "coverage": 9,
-    # the search over several parameters: its settings, and worlds to judge its answer by
+    # the search over several parameters: its settings, worlds to judge its answer by, and a trial
     "evolution": 10,
     "judged": 11,
+    "tried": 12,
     # self-assembly: its runs, the parameters drawn for them, the flows drawn for them
     "run": 32,
     "parameters": 33,

@@ -42,6 +42,14 @@ def world_starts(start: Start, keys: Keys) -> Start:
     return Start(**{**values, "theta": world_orientations(start.theta, keys)})
 
 
+def no_numbers(model: str, setting: Mapping[str, float]) -> str:
+    """Return what there is to say of a model without a sound world, with one of its settings."""
+    return (
+        f"the model {model} gave positions that are no finite numbers in every world that was "
+        f"tried, such as at {in_words(setting)}"
+    )
+
+
 def in_words(setting: Mapping[str, float]) -> str:
     """Return a setting of the parameters for a message: "speed=0.1, tumble_rate=2"."""
     return ", ".join(f"{name}={value:g}" for name, value in setting.items())

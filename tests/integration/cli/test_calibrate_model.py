@@ -39,7 +39,11 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "def diffuse(scene, *, diffusivity=(1e-6, 1e-2, 'm2/s')):\n"
         "    spread = np.sqrt(2 * diffusivity * np.diff(scene.times, prepend=0.0))\n"
         "    x, y = (np.cumsum(spread * scene.random.normal(spread.size), axis=1) for _ in 'xy')\n"
-        "    return scene.start.x[:, None] + x, scene.start.y[:, None] + y\n"
+        "    return scene.start.x[:, None] + x, scene.start.y[:, None] + y\n\n\n"
+        "def nowhere(scene, *, speed=(0.01, 0.1, 'm/s')):\n"
+        "    return (np.full((scene.worlds, scene.times.size), np.nan),) * 2\n\n\n"
+        "def fails(scene, *, speed=(0.01, 0.1, 'm/s')):\n"
+        "    raise ValueError('no such speed')\n"
     )
     return folder
 
@@ -97,3 +101,25 @@ def test_mistakes_are_one_line(
 ) -> None:
     assert said in refusal(here(*words(place, tmp_path / "run"), *options))
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("nowhere", "no finite numbers in every world that was tried, such as at speed="),
+        ("fails", "failed: ValueError: no such speed; what was finished is kept"),
+    ],
+)
+def test_a_model_that_fails_is_one_line_with_its_setting(
+    place: Path, tmp_path: Path, name: str, said: str
+) -> None:
+    address = f"{place / 'mine.py'}:{name}"
+    done = here(*words(place, tmp_path / "run"), "--model", address)
+    assert said in refusal(done)
+    others = ("compare-models", place / "recording.nc", "--models", f"{address},inertial")
+    done = here(*others, "-o", tmp_path / "compared")
+    line = done.err.splitlines()[-1]
+    assert done.code == 2
+    assert "Traceback" not in done.err
+    assert said.removesuffix("; what was finished is kept") in line
+    assert "speed=" in line

@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from driftwalk.calibration.evolution import Budget
-from driftwalk.calibration.models.baselines import HiddenMarkovWalk, ResampledSteps, runs_of
-from driftwalk.calibration.models.hidden_markov import fit_hidden_walk
-from driftwalk.calibration.models.judge import Contestant, Judged, contestant, judge
+from driftwalk.calibration.models.contestants import (
+    BLOCK,
+    Chosen,
+    Contestant,
+    contestants,
+    made_models,
+    walks,
+)
+from driftwalk.calibration.models.judge import Judged, judge
 from driftwalk.calibration.models.recorded import RecordedMotion, recorded_motion
 from driftwalk.calibration.models.result import build_comparison
-from driftwalk.comparison.aspects import block_of, interleaved
-from driftwalk.conditions.own_flow import flow_from_track
-from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.motion import BlockModel, MotionModel, is_family_name, motion_model
-from driftwalk.schema import Track, body_track
+from driftwalk.core.errors import InputError
+from driftwalk.motion import MotionModel
+from driftwalk.schema import body_track
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
 
 if TYPE_CHECKING:
@@ -28,14 +31,11 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 DEFAULT_MODELS: Final = (
-    "block", "inertial", "active+wall", "run_tumble+wall", "run_rest+wall", "burst_coast+wall",
+    BLOCK, "inertial", "active+wall", "run_tumble+wall", "run_rest+wall", "burst_coast+wall",
     "two_state+wall",
 )  # fmt: skip
 ALL_MODELS: Final = (*DEFAULT_MODELS, "run_tumble+wall+slow", "run_rest+wall+stroke")
-BLOCK: Final = "block"
-
 Tell = Callable[[int, int, str], None]
-Chosen = str | MotionModel
 
 
 def compare_models(
@@ -106,9 +106,8 @@ def compare_models(
     """
     chosen = _study(recording, study)
     motion = _motion(recording, chosen, flow, body, threads)
-    warnings: list[str] = []
-    entries = [*_entries(_made(models, motion, chosen), motion, chosen, warnings)]
-    entries += _baselines(motion)
+    entries, warnings = contestants(made_models(models, motion, chosen), motion, chosen)
+    entries += walks(motion)
     seed = chosen.calibration.seed
     judged = _judged_all(entries, motion, seed, budget or Budget(), store, tell)
     return build_comparison(entries, judged, motion, chosen, recording, warnings)
@@ -155,7 +154,7 @@ def check_models(
     """
     chosen = _study(recording, study)
     motion = _motion(recording, chosen, flow, body, None)
-    return _made(models, motion, chosen)
+    return made_models(models, motion, chosen)
 
 
 def _study(recording: xr.Dataset, study: Study | None) -> Study:
@@ -184,71 +183,6 @@ def _motion(
     return recorded_motion(track, study, position_quantum=quantum, flow=flow, threads=threads)
 
 
-def _made(models: Sequence[Chosen], motion: RecordedMotion, study: Study) -> list[MotionModel]:
-    """Return the models, made of their names."""
-    found = [_one_made(one, motion, study) for one in models]
-    names = [model.name for model in found]
-    if not names:
-        raise ConfigurationError("no motion model is given to compare")
-    twice = [name for name in names if names.count(name) > 1]
-    if twice:
-        raise ConfigurationError(f"a motion model is given twice: {twice[0]}")
-    return found
-
-
-def _one_made(one: Chosen, motion: RecordedMotion, study: Study) -> MotionModel:
-    if not isinstance(one, str):
-        return one
-    if one == BLOCK:
-        return BlockModel(study)
-    # Only the family leaves its distance from the wall to the recording.
-    clearance = motion.clearance if is_family_name(one) else 0.0
-    return motion_model(one, clearance=clearance)
-
-
-def _entries(
-    models: Sequence[MotionModel], motion: RecordedMotion, study: Study, warnings: list[str]
-) -> list[Contestant]:
-    """Return the models with their conditions and ranges; without the block where none can be."""
-    found = []
-    for model in models:
-        if not isinstance(model, BlockModel):
-            found.append(contestant(model, motion, motion.like))
-            continue
-        try:
-            found.append(_block(model, motion, study))
-        except InputError as error:
-            if len(models) == 1:
-                raise
-            warnings.append(f"the block is left out: {error}")
-    return found
-
-
-def _block(block: BlockModel, motion: RecordedMotion, study: Study) -> Contestant:
-    """Return the block, in a flow from the even blocks of time where none is given."""
-    like = motion.like
-    if like.flow is None:
-        even = block_of(motion.track.time, motion.duration) % 2 == 0
-        like = replace(
-            like, flow=flow_from_track(Track(*(part[even] for part in motion.track)), study)
-        )
-    return Contestant(block, like, block.parameters, len(block.parameters), baseline=False)
-
-
-def _baselines(motion: RecordedMotion) -> list[Contestant]:
-    """Return walks of the steps in the even blocks."""
-    even, _ = interleaved(motion.aspects, duration=motion.duration)
-    steps = next(one for one in even if one.name == "steps")
-    interval = motion.plan.short.step_interval
-    hidden = fit_hidden_walk(runs_of(steps, interval))
-    return [
-        Contestant(ResampledSteps(steps.points, interval), motion.like, (), 0, baseline=True),
-        Contestant(
-            HiddenMarkovWalk(hidden, interval), motion.like, (), hidden.parameters, baseline=True
-        ),
-    ]
-
-
 def _judged_all(
     entries: Sequence[Contestant],
     motion: RecordedMotion,
@@ -271,7 +205,8 @@ def _judged_all(
                 tell(before[index] + done, before[-1], entry.model.name)
 
         say(0, 0)
-        return _packed(judge(entry, motion, budget=budget, seed=seed, tell=say), most)
+        found = judge(entry, motion, budget=budget, seed=seed, tell=say)
+        return _packed(found, most, budget.starts + 1)
 
     units = grid(model=np.arange(len(entries))).units(1)
     kept = None if store is None else store(_fingerprint(entries, motion, seed, budget))
@@ -297,14 +232,13 @@ def _fingerprint(
     }
 
 
-def _packed(judged: Judged, most: int) -> dict[str, np.ndarray]:
+def _packed(judged: Judged, most: int, searches: int) -> dict[str, np.ndarray]:
     """Return arrays of the same shapes for every model, with one entry each."""
     point = np.full(most, np.nan)
     point[: judged.point.size] = judged.point
-    ends = judged.ends if judged.ends.size else np.empty(0)
-    fixed = np.full(8, np.nan)
-    fixed[: ends.size] = ends
-    arrays = {**judged._asdict(), "point": point, "ends": fixed}
+    ends = np.full(searches, np.nan)
+    ends[: judged.ends.size] = judged.ends
+    arrays = {**judged._asdict(), "point": point, "ends": ends}
     return {name: np.asarray(values)[None] for name, values in arrays.items()}
 
 

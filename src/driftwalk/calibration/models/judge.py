@@ -11,33 +11,22 @@ import numpy.typing as npt
 from driftwalk.calibration.evolution import (
     AspectObjective,
     Budget,
-    recorded_ranges,
     search_minimum,
 )
+from driftwalk.calibration.models.contestants import Contestant
 from driftwalk.calibration.models.recorded import RecordedMotion
 from driftwalk.comparison.aspects import AspectReference
-from driftwalk.conditions import Conditions
-from driftwalk.motion import MotionModel, ParticleModel
+from driftwalk.core.errors import InputError
+from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.score import broken_worlds
-from driftwalk.schema import Parameter
 
 Floats = npt.NDArray[np.float64]
 Tell = Callable[[int, int], None]
 
 JUDGED: Final = 20
 """Worlds by which the answer of a search is judged."""
-
-
-class Contestant(NamedTuple):
-    """A model that takes part in a comparison."""
-
-    model: MotionModel
-    like: Conditions
-    ranges: tuple[Parameter, ...]
-    """Of the search; none for a walk that was fitted by other means."""
-    numbers: int
-    """That are fitted."""
-    baseline: bool
+TRIED: Final = 8
+"""Settings at which a model is tried before it is searched."""
 
 
 class Judged(NamedTuple):
@@ -60,14 +49,6 @@ class Judged(NamedTuple):
     evaluations: int
 
 
-def contestant(model: MotionModel, motion: RecordedMotion, like: Conditions) -> Contestant:
-    """Return a model with the ranges of its search: of the family those of the recording."""
-    ranges = model.parameters
-    if isinstance(model, ParticleModel):
-        ranges = recorded_ranges(ranges, motion.scales)
-    return Contestant(model, like, ranges, len(ranges), baseline=False)
-
-
 def judge(
     entry: Contestant, motion: RecordedMotion, *, budget: Budget, seed: int, tell: Tell | None
 ) -> Judged:
@@ -76,6 +57,7 @@ def judge(
         entry.model, entry.ranges, entry.like, motion.plan, motion.fitted, seed
     )
     if entry.ranges:
+        _require_numbers(objective)
         found = search_minimum(objective, len(entry.ranges), budget=budget, seed=seed, tell=tell)
         point, ends, evaluations = found.best, found.ends, found.evaluations
     else:
@@ -101,3 +83,14 @@ def judge(
         ends=ends,
         evaluations=evaluations,
     )
+
+
+def _require_numbers(objective: AspectObjective) -> None:
+    """Refuse a model that loses its numbers wherever it is tried: no search could mend that."""
+    from scipy.stats import qmc
+
+    tried = qmc.Sobol(len(objective.ranges), seed=objective.seed).random(TRIED)
+    seen = objective.simulated(tried, 1, stage="tried")
+    if broken_worlds(seen.status).all():
+        values = {name: float(column[0]) for name, column in objective.values(tried).items()}
+        raise InputError(no_numbers(objective.model.name, values))

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.calibration.models.checks import CHECKS, UNITS
-from driftwalk.calibration.models.judge import JUDGED, Contestant, Judged
+from driftwalk.calibration.models.contestants import Contestant
+from driftwalk.calibration.models.judge import JUDGED, Judged
 from driftwalk.calibration.models.recorded import RecordedMotion
 from driftwalk.calibration.models.verdict import Verdict, verdict_of
 from driftwalk.calibration.steadiness import Steadiness, steadiness_of_steps

@@ -67,6 +67,8 @@ def one_line(error: BaseException) -> str | None:
     """Return the message of an error that is the user's to mend, on one line; else None."""
     if isinstance(error, DriftwalkError):
         return _joined(to_options(str(error)))
+    if isinstance(error.__cause__, DriftwalkError) and _is_of_a_sweep(error):
+        return _joined(to_options(f"{error.__cause__}; what was finished is kept"))
     if hasattr(error, "format_message"):  # what typer raises for a mistake in the options
         return _usage_message(error)
     if isinstance(error, MemoryError):
@@ -74,6 +76,13 @@ def one_line(error: BaseException) -> str | None:
     if isinstance(error, OSError):
         return _joined(_operating_system_message(error))
     return None
+
+
+def _is_of_a_sweep(error: BaseException) -> bool:
+    """Return whether a unit of a sweep failed, such as one that runs a user's model."""
+    from driftwalk.sweep import SweepError
+
+    return isinstance(error, SweepError)
 
 
 def _usage_message(error: BaseException) -> str:
