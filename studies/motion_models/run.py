@@ -56,6 +56,7 @@ class Prepared:
         study = load_study(recording.study_file)
         given = {} if recording.body is None else {"body": recording.body}
         loaded = load_with_study(data / recording.file, study, given)
+        self.loaded = loaded
         self.study = study_for([loaded], study, **given)
         track = body_track(loaded, body=recording.body)
         camera = recorded_camera(

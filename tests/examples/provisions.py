@@ -303,6 +303,13 @@ PAGES: dict[str, Page] = {
         draws=False,
         slow=True,
     ),
+    "docs/how-to/compare-models.md": Page(
+        provide=_recording(20.0),
+        instead={"-o compare": "--models inertial,active+wall -o compare"},
+        makes=("compare/comparison.nc",),
+        draws=False,
+        slow=True,
+    ),
     "docs/how-to/design-an-experiment.md": Page(
         provide=_files(_flow("flow_true.csv"), _truth),
         instead={

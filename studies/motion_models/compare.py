@@ -1,0 +1,58 @@
+"""Compare all models on the real recordings, as `driftwalk compare-models --models all` does.
+
+    python studies/motion_models/compare.py DATA OUT.jsonl [--recording NAME ...]
+
+OUT gets a line of JSON for each recording; what is there is not done again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+from recordings import RECORDINGS
+from run import Prepared
+
+import driftwalk as dw
+from driftwalk.calibration import ALL_MODELS
+from driftwalk.cli.terminal.models_answer import summary
+
+
+def compared(data: Path, name: str, threads: int) -> dict[str, Any]:
+    """Compare all models on a recording."""
+    recording = RECORDINGS[name]
+    prepared = Prepared(data, recording, threads)
+    began = time.perf_counter()
+    found = dw.calibration.compare_models(
+        prepared.loaded, ALL_MODELS, study=prepared.study, body=recording.body, threads=threads
+    )
+    seconds = round(time.perf_counter() - began, 1)
+    return {"recording": name, "seconds": seconds, **summary(found)}
+
+
+def main() -> None:
+    """Do what is not done yet."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("data", type=Path)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--recording", action="append", choices=RECORDINGS)
+    parser.add_argument("--threads", type=int, default=2)
+    given = parser.parse_args()
+    done = set()
+    if given.out.exists():
+        lines = map(json.loads, given.out.read_text().splitlines())
+        done = {one["recording"] for one in lines}
+    for name in given.recording or RECORDINGS:
+        if name in done:
+            continue
+        line = compared(given.data, name, given.threads)
+        with given.out.open("a") as file:
+            file.write(json.dumps(line) + "\n")
+        print(f"{name}, {line['seconds']:.0f} s: {'. '.join(line['findings'])}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
