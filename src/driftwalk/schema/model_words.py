@@ -14,10 +14,10 @@ ASPECT_WORDS: Final = {
 }
 CHECK_WORDS: Final = {
     "displacement_1": "mean squared displacement over 1 step interval",
-    "displacement_3": "the same over 3",
-    "displacement_10": "the same over 10",
-    "displacement_30": "the same over 30",
-    "displacement_100": "the same over 100",
+    "displacement_3": "mean squared displacement over 3",
+    "displacement_10": "mean squared displacement over 10",
+    "displacement_30": "mean squared displacement over 30",
+    "displacement_100": "mean squared displacement over 100",
     "speed_time": "time over which the speed lasts",
     "wall_share": "share of the time at the wall",
     "rest_share": "share of the time at rest",
