@@ -94,9 +94,14 @@ class RecordedMotion:
         found = []
         for block in range(1, BLOCKS, 2):
             left = [
-                one.within(block_of(one.time, self.duration) != block) for one in self.held_aspects
+                one.within(block_of(one.time, self.duration) != block).points
+                for one in self.held_aspects
             ]
-            natives = tuple(KsReference(one.points) for one in left)
+            # After long gaps one block may have all the points.
+            natives = tuple(
+                KsReference(points if len(points) else one.points)
+                for points, one in zip(left, self.held_aspects, strict=True)
+            )
             found.append(AspectReference(self.held.names, self.held.floor, natives))
         return tuple(found)
 
@@ -143,7 +148,7 @@ def recorded_motion(
     Raises
     ------
     InputError
-        When the track is too short or does not move.
+        When the track is too short or does not move, or has too few steps in a half.
     """
     track = track._replace(time=track.time - track.time[0])
     camera = recorded_camera(track, study, position_quantum=position_quantum)
@@ -165,6 +170,12 @@ def recorded_motion(
         [one for one, points in zip(part, shown, strict=True) if points >= FEWEST_POINTS]
         for part in (even, odd)
     )
+    if not even or even[0].name != "steps":
+        raise InputError(
+            f"one half of the recording's blocks of time has fewer than {FEWEST_POINTS} steps with "
+            "a direction: it is too short, or too much at rest, for the step interval "
+            "(`step_interval`)"
+        )
     fitted, held = (aspect_reference(part, duration=duration) for part in (even, odd))
     return RecordedMotion(
         track=track,

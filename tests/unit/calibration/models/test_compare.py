@@ -134,6 +134,8 @@ def test_mistakes_are_said(recorded: xr.Dataset) -> None:
     still["x"][:] = still["y"][:] = 0.0
     with pytest.raises(InputError):
         check_models(still, ["active"])
+    with pytest.raises(InputError, match="fewer than 30 steps with a direction"):
+        check_models(recorded.isel(time=slice(0, 40)), ["active"])
     with pytest.raises(InputError, match="at least 3"):
         check_models(recorded.isel(time=slice(0, 2)), ["active"])
 
