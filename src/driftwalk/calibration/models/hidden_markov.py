@@ -65,8 +65,8 @@ def fit_hidden_walk(runs: Sequence[Floats], *, states: int = STATES) -> HiddenWa
     >>> slow = np.column_stack([random.gamma(4.0, 1e-3, 300), random.vonmises(0.0, 1.0, 300)])
     >>> quick = np.column_stack([random.gamma(4.0, 1e-2, 300), random.vonmises(0.0, 9.0, 300)])
     >>> walk = fit_hidden_walk([slow, quick], states=2)
-    >>> (walk.shape * walk.scale).round(3)
-    array([0.004, 0.04 ])
+    >>> (1e3 * walk.shape * walk.scale).round()  # mean lengths [mm]; the truth is 4 and 40
+    array([ 4., 42.])
     """
     steps, there = _side_by_side(runs)
     walk = _first(steps[there], states)
