@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from driftwalk.cli.calibrate import Overwrite, Threads
 from driftwalk.cli.inputs.assembly_source import (
     RUN_NAMES,
     refuse_found,
     source_from_calibration,
     source_from_flow,
 )
-from driftwalk.cli.options.shared import FlowFile, Json
+from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.answer import print_figures, print_warnings
 from driftwalk.cli.terminal.output import print_json, print_table
@@ -35,9 +34,7 @@ MOST_ROWS = 16
 
 @with_study_options(ASSEMBLY_KEYS, "runs", *RUN_NAMES)
 def assemble(
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="DIR", help="Run directory to make or continue.")
-    ],
+    out: RunFolder,
     given: StudyOptions,
     run: Annotated[
         Path | None,

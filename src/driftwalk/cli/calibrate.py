@@ -2,30 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
-import typer
-
-from driftwalk.cli.inputs.study_recording import read_for_run, tank_note
+from driftwalk.cli.inputs.study_recording import read_with_flow, tank_note
 from driftwalk.cli.options.model import ModelName, ParameterChoices, chosen_model
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import FlowFile, Json
+from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.calibration_answer import print_answer, summary
 from driftwalk.cli.terminal.output import print_json
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.study_keys import CALIBRATION_KEYS
-
-Threads = Annotated[
-    int | None,
-    typer.Option(
-        "--threads", min=1, help="Worker threads (default: all cores).", show_default=False
-    ),
-]
-Overwrite = Annotated[
-    bool, typer.Option("--overwrite", help="Move a finished run aside and start a new one.")
-]
 
 
 @with_recording_options
@@ -37,9 +22,7 @@ Overwrite = Annotated[
 )
 def calibrate(
     recording: RecordingFile,
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="DIR", help="Run directory to make or continue.")
-    ],
+    out: RunFolder,
     given: StudyOptions,
     how: RecordingOptions,
     model: ModelName = None,
@@ -56,17 +39,10 @@ def calibrate(
     the grid around the minimum. Reports how well the parameters are known and whether the model
     explains the motion. After a kill, the same command continues.
     """
-    from driftwalk.flow import load_flow
     from driftwalk.runs import CalibrationWork, run_calibration
 
     chosen = chosen_model(model, parameters)
-    read = read_for_run([recording], given, how)
-    inputs = {"recording": recording}
-    inputs.update({"flow": flow} if flow is not None else {})
-    inputs.update({"study": given.file} if given.file is not None else {})
-    field = None
-    if flow is not None:
-        field = load_flow(flow, arena=read.study.tank.to_arena(), own_flags="keep")
+    read, field, inputs = read_with_flow(recording, flow, given, how)
     work = CalibrationWork(
         read.trajectories[0], read.study, field, how.body, inputs, threads, chosen
     )

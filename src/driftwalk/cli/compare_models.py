@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from driftwalk.cli.inputs.study_recording import read_for_run, tank_note
+from driftwalk.cli.inputs.study_recording import read_with_flow, tank_note
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import FlowFile, Json
+from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.models_answer import print_answer, summary
 from driftwalk.cli.terminal.output import print_json
@@ -26,9 +25,7 @@ from driftwalk.core.study_keys import CALIBRATION_KEYS
 )
 def compare_models(
     recording: RecordingFile,
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="DIR", help="Run directory to make or continue.")
-    ],
+    out: RunFolder,
     given: StudyOptions,
     how: RecordingOptions,
     models: Annotated[
@@ -42,15 +39,8 @@ def compare_models(
         ),
     ] = None,
     flow: FlowFile = None,
-    threads: Annotated[
-        int | None,
-        typer.Option(
-            "--threads", min=1, help="Worker threads (default: all cores).", show_default=False
-        ),
-    ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Move a finished run aside and start a new one.")
-    ] = False,
+    threads: Threads = None,
+    overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
     """Say which motion models explain a recording.
@@ -60,16 +50,9 @@ def compare_models(
     where a model differs from the recording. After a kill, the same command continues.
     """
     from driftwalk.calibration import ALL_MODELS, DEFAULT_MODELS
-    from driftwalk.flow import load_flow
     from driftwalk.runs import ModelComparisonWork, run_model_comparison
 
-    read = read_for_run([recording], given, how)
-    inputs = {"recording": recording}
-    inputs.update({"flow": flow} if flow is not None else {})
-    inputs.update({"study": given.file} if given.file is not None else {})
-    field = None
-    if flow is not None:
-        field = load_flow(flow, arena=read.study.tank.to_arena(), own_flags="keep")
+    read, field, inputs = read_with_flow(recording, flow, given, how)
     if models is None:
         chosen: tuple[str, ...] = DEFAULT_MODELS
     elif models.strip() == "all":

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from driftwalk.cli.calibrate import Overwrite, Threads
-from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.shared import Json, Overwrite, Threads
 from driftwalk.cli.terminal.demo_answer import (
     Fitted,
     in_json,

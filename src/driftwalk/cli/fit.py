@@ -9,7 +9,7 @@ import typer
 
 from driftwalk.cli.inputs.study_recording import read_for_run, tank_note
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.shared import Json, Overwrite
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_json
 from driftwalk.cli.terminal.progress import reported
@@ -54,9 +54,7 @@ def fit(
             "--wall", help="Estimate restitution and friction of the wall from the contacts."
         ),
     ] = False,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Move a finished run aside and start a new one.")
-    ] = False,
+    overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
     """Fit flow, drag, stochastic force and tracking noise to recordings, together.

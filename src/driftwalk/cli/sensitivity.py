@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from driftwalk.cli.calibrate import Overwrite, Threads
 from driftwalk.cli.inputs.assembly_source import (
     RUN_NAMES,
     Source,
@@ -18,7 +17,7 @@ from driftwalk.cli.inputs.assembly_source import (
     source_from_calibration,
     source_from_flow,
 )
-from driftwalk.cli.options.shared import FlowFile, Json
+from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.options.vary import VARY_KEYS, Vary, vary_overrides
 from driftwalk.cli.terminal.answer import print_warnings
@@ -34,9 +33,7 @@ if TYPE_CHECKING:
 
 @with_study_options(SENSITIVITY_KEYS, "runs", "realisations", *RUN_NAMES)
 def sensitivity(
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="DIR", help="Run directory to make or continue.")
-    ],
+    out: RunFolder,
     given: StudyOptions,
     run: Annotated[
         Path | None,

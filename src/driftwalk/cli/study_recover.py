@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.shared import Json, Overwrite, RunFolder
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_json
 from driftwalk.cli.terminal.progress import reported
@@ -34,9 +34,7 @@ def recover(
             "--truth", metavar="FILE", help="Study file with the true values and \\[recover]."
         ),
     ],
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="DIR", help="Run directory to make or continue.")
-    ],
+    out: RunFolder,
     given: StudyOptions,
     threads: Annotated[
         int | None,
@@ -47,9 +45,7 @@ def recover(
             show_default=False,
         ),
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Move a finished run aside and start a new one.")
-    ] = False,
+    overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
     """Simulate recordings of known truth, fit them, and report how well the fit recovers the truth.

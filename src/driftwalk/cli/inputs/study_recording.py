@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
+from driftwalk.cli.inputs.assembly_source import load_flow_for
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.study import StudyOptions
 from driftwalk.cli.terminal.output import print_note
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from driftwalk.conditions import ReadRecordings
     from driftwalk.model import Study
 
@@ -46,6 +49,45 @@ def read_for_run(
             tank="stated" if said else "unsaid",
             body=how.body,
         )
+
+
+class ReadForModel(NamedTuple):
+    """A recording and a flow, for a run that simulates motion models."""
+
+    read: ReadRecordings
+    flow: xr.Dataset | None
+    """The given flow field."""
+    inputs: dict[str, Path]
+    """The files that were read, by their role."""
+
+
+def read_with_flow(
+    recording: Path, flow: Path | None, given: StudyOptions, how: RecordingOptions
+) -> ReadForModel:
+    """Read one recording, and the flow field where one is given.
+
+    Parameters
+    ----------
+    recording : Path
+        The recording.
+    flow : Path or None
+        The flow field.
+    given : StudyOptions
+        The study.
+    how : RecordingOptions
+        How to read the recording.
+
+    Raises
+    ------
+    InputError
+        As `read_for_run`, and when the flow field cannot be read.
+    """
+    read = read_for_run([recording], given, how)
+    inputs = {"recording": recording, "flow": flow, "study": given.file}
+    field = None if flow is None else load_flow_for(flow, read.study)
+    return ReadForModel(
+        read, field, {role: path for role, path in inputs.items() if path is not None}
+    )
 
 
 def tank_note(read: ReadRecordings) -> Callable[[], None] | None:

@@ -70,3 +70,15 @@ FlowFile = Annotated[
     typer.Option("--flow", metavar="FILE", help="Flow field to use.", show_default=False),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
+RunFolder = Annotated[
+    Path, typer.Option("--out", "-o", metavar="DIR", help="Run directory to make or continue.")
+]
+Threads = Annotated[
+    int | None,
+    typer.Option(
+        "--threads", min=1, help="Worker threads (default: all cores).", show_default=False
+    ),
+]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Move a finished run aside and start a new one.")
+]
