@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.calibration.refuse import require_samples
 from driftwalk.comparison import Statistic, StepDistance, StepReference, plan_steps
 from driftwalk.conditions import Conditions, recorded_conditions
-from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.core.streams import trial_in
 from driftwalk.motion import BlockModel, Details, MotionModel, Parameter, Scores, score_worlds
@@ -107,10 +107,7 @@ def prepare_problem(
     InputError
         When the track is too short to form steps, or never moves.
     """
-    if track.time.size < 3:
-        raise InputError(
-            f"the recording has {track.time.size} samples of this body; at least 3 are needed"
-        )
+    require_samples(track)
     chosen = StepDistance() if statistic is None else statistic
     interval = study.steps.step_interval_s
     reference = chosen.prepare(track, step_interval=None if interval == "auto" else interval)

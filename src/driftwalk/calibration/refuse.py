@@ -1,16 +1,33 @@
-"""Which models a calibration takes: one or two parameters, by names that are free."""
+"""Which models and tracks a calibration takes: one or two parameters, by names that are free."""
 
 from __future__ import annotations
 
 import math
 from typing import Final
 
-from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.grid import MOST_SETTINGS
 from driftwalk.motion import MotionModel
+from driftwalk.schema import Track
 from driftwalk.schema.calibration_facts import taken_keys, taken_names
 
 MOST_PARAMETERS: Final = 2
+FEWEST_SAMPLES: Final = 3
+
+
+def require_samples(track: Track) -> None:
+    """Refuse a track on which no step turns.
+
+    Raises
+    ------
+    InputError
+        When it has fewer than three samples.
+    """
+    if track.time.size < FEWEST_SAMPLES:
+        raise InputError(
+            f"the recording has {track.time.size} samples of this body; at least {FEWEST_SAMPLES} "
+            "are needed"
+        )
 
 
 def require_searchable(model: MotionModel) -> None:

@@ -44,7 +44,7 @@ from driftwalk.calibration.steadiness import Steadiness, steadiness_of
 from driftwalk.calibration.surface import Optimum
 from driftwalk.calibration.wall import wall_warning
 from driftwalk.comparison import Statistic
-from driftwalk.conditions import recorded_camera
+from driftwalk.conditions import recorded_camera, study_in_arena
 from driftwalk.core.errors import InputError
 from driftwalk.motion import BlockModel, Details, MotionModel
 from driftwalk.motion.batches import no_numbers
@@ -172,7 +172,7 @@ def _study_and_model(
     model: MotionModel | Study | None, study: Study | None, recording: xr.Dataset
 ) -> tuple[Study, MotionModel]:
     """Return the conditions and the search, and what is searched."""
-    from driftwalk.model import Study, Tank
+    from driftwalk.model import Study
 
     if isinstance(model, Study):
         if study is not None:
@@ -191,9 +191,7 @@ def _study_and_model(
     if isinstance(model, BlockModel):
         return model.study, model
     # Nothing but the recording says in which tank a model without a study moves.
-    arena = recording.attrs.get("arena")
-    tank = {} if arena is None else {"tank": Tank.from_arena(arena)}
-    return Study().model_copy(update=tank), model
+    return study_in_arena(Study(), recording), model
 
 
 def _in_memory(name: str, fingerprint: dict[str, Any]) -> Store | None:  # noqa: ARG001

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 from driftwalk.conditions import require_motion, study_for
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import CALIBRATION_KEYS, study_overrides
+from driftwalk.notebook.model_of import flow_field_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -77,7 +78,6 @@ def calibrate(
     >>> found = dw.calibrate(dw.tank30_recording(), flow=dw.tank30_flow())  # doctest: +SKIP
     """
     from driftwalk.calibration import calibrate as calibrate_model
-    from driftwalk.likelihood import fitted_flow
     from driftwalk.model import Study
     from driftwalk.motion import BlockModel
     from driftwalk.notebook.result import as_result
@@ -96,7 +96,7 @@ def calibrate(
     require_motion(recording, body=body)
     overrides = study_overrides(keys=CALIBRATION_KEYS, **given)
     chosen = study_for([recording], study, overrides, body=body, needs_tank=is_block)
-    field = fitted_flow(flow) if flow is not None and flow.attrs.get("kind") == "fit" else flow
+    field = None if flow is None else flow_field_of(flow)
     say = progress or silent
     if folder is None:
         found = calibrate_model(

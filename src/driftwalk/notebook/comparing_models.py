@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 from driftwalk.conditions import require_motion, study_for
 from driftwalk.core.study_keys import CALIBRATION_KEYS, study_overrides
+from driftwalk.notebook.model_of import flow_field_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,7 +84,6 @@ def compare_models(
     'block'
     """
     from driftwalk.calibration import ALL_MODELS, DEFAULT_MODELS, compare_models as compare
-    from driftwalk.likelihood import fitted_flow
     from driftwalk.notebook.result import as_result
     from driftwalk.runs import ModelComparisonWork, run_model_comparison
     from driftwalk.runs.folder import silent
@@ -97,7 +97,7 @@ def compare_models(
     conditions = study_for(
         [recording], study, overrides, body=body, needs_tank=chosen == ("block",)
     )
-    field = fitted_flow(flow) if flow is not None and flow.attrs.get("kind") == "fit" else flow
+    field = None if flow is None else flow_field_of(flow)
     say = progress or silent
     if folder is None:
         found = compare(

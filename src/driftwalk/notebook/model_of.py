@@ -72,12 +72,17 @@ def model_of(
     return FoundModel(study, field, source)
 
 
-def _flow(flow: xr.Dataset | None) -> xr.Dataset:
+def flow_field_of(flow: xr.Dataset) -> xr.Dataset:
+    """Return a flow field: the given one, or that of a given fit."""
     from driftwalk.likelihood import fitted_flow
 
+    return fitted_flow(flow) if flow.attrs.get("kind") == "fit" else flow
+
+
+def _flow(flow: xr.Dataset | None) -> xr.Dataset:
     if flow is None:
         raise InputError("a study says nothing of the water: give `flow`, a flow field or a fit")
-    return fitted_flow(flow) if flow.attrs.get("kind") == "fit" else flow
+    return flow_field_of(flow)
 
 
 def _stored_flow(calibration: xr.Dataset, study: Study) -> xr.Dataset:

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import CALIBRATION_STAGES
-from driftwalk.runs.folder import Progress, open_run, silent
+from driftwalk.runs.folder import Progress, naming_recording, open_run, silent
 from driftwalk.runs.stored import dataset_hash
 from driftwalk.schema.netcdf import netcdf_bytes
 
@@ -148,15 +147,11 @@ def _checked_flow(work: CalibrationWork) -> xr.Dataset | None:
     from driftwalk.calibration import check_recording
     from driftwalk.conditions import recording_flow
 
-    try:
+    with naming_recording(work.inputs):
         flow = work.flow
         if flow is None and (work.model is None or work.model.needs_flow):
             flow = recording_flow(work.recording, work.study, body=work.body)
         check_recording(work.recording, work.study, flow=flow, body=work.body, model=work.model)
-    except InputError as error:
-        if "recording" not in work.inputs:
-            raise
-        raise InputError(f"{work.inputs['recording']}: {error}") from error
     return flow
 
 

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from driftwalk.core.errors import InputError
+
 if TYPE_CHECKING:
     from driftwalk.core.rundir import RunDirectory
     from driftwalk.model import Study
@@ -21,6 +23,23 @@ class Progress(Protocol):
 
 def silent(done: int, total: int, text: str = "") -> None:
     """Tell nobody how much of a run is done."""
+
+
+@contextmanager
+def naming_recording(inputs: Mapping[str, Path]) -> Iterator[None]:
+    """Put the file of the recording in front of what is said against it, where there is one.
+
+    Raises
+    ------
+    InputError
+        The one that ends what is within.
+    """
+    try:
+        yield
+    except InputError as error:
+        if "recording" not in inputs:
+            raise
+        raise InputError(f"{inputs['recording']}: {error}") from error
 
 
 @contextmanager

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from driftwalk.core.errors import InputError
-from driftwalk.runs.folder import Progress, open_run, silent
+from driftwalk.runs.folder import Progress, naming_recording, open_run, silent
 from driftwalk.runs.stored import dataset_hash
 from driftwalk.schema.netcdf import netcdf_bytes
 
@@ -102,14 +101,10 @@ def run_model_comparison(
     from driftwalk.calibration import check_models, compare_models
     from driftwalk.figures import write_model_figures
 
-    try:
+    with naming_recording(work.inputs):
         models = check_models(
             work.recording, work.models, study=work.study, flow=work.flow, body=work.body
         )
-    except InputError as error:
-        if "recording" not in work.inputs:
-            raise
-        raise InputError(f"{work.inputs['recording']}: {error}") from error
     with open_run(
         folder,
         specification=_specification(work, models),

@@ -20,7 +20,8 @@ from driftwalk.calibration.models.contestants import (
 from driftwalk.calibration.models.judge import Judged, judge
 from driftwalk.calibration.models.recorded import RecordedMotion, recorded_motion
 from driftwalk.calibration.models.result import build_comparison
-from driftwalk.core.errors import InputError
+from driftwalk.calibration.refuse import require_samples
+from driftwalk.conditions import study_in_arena
 from driftwalk.motion import MotionModel
 from driftwalk.schema import body_track
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
@@ -159,12 +160,9 @@ def check_models(
 
 def _study(recording: xr.Dataset, study: Study | None) -> Study:
     """Return the given study, or the paper's in the arena of the recording."""
-    from driftwalk.model import Study, Tank
+    from driftwalk.model import Study
 
-    if study is not None:
-        return study
-    arena = recording.attrs.get("arena")
-    return Study().model_copy(update={} if arena is None else {"tank": Tank.from_arena(arena)})
+    return study_in_arena(Study(), recording) if study is None else study
 
 
 def _motion(
@@ -175,10 +173,7 @@ def _motion(
     threads: int | None,
 ) -> RecordedMotion:
     track = body_track(recording, body)
-    if track.time.size < 3:
-        raise InputError(
-            f"the recording has {track.time.size} samples of this body; at least 3 are needed"
-        )
+    require_samples(track)
     quantum = float(recording.attrs.get("position_quantum_m", 0.0))
     return recorded_motion(track, study, position_quantum=quantum, flow=flow, threads=threads)
 
