@@ -20,6 +20,7 @@ from driftwalk.plot.parts.style import (
     letter_panels,
     new_figure,
 )
+from driftwalk.schema.compared_models import own_score
 from driftwalk.schema.model_words import ASPECT_WORDS
 
 if TYPE_CHECKING:
@@ -135,7 +136,7 @@ def plot_models(comparison: xr.Dataset, ax: Axes | None = None) -> Axes:
                 color=color,
                 label="walk of recorded steps" if baseline else "motion model",
             )
-    own = float((comparison["own_distance"] / comparison["floor"]).mean())
+    own = own_score(comparison)
     ax.axvline(own, color=INK, lw=0.6, ls="--", label="the recording's own parts")
     names = [
         f"{name}{' (explains)' if explained else ''}"

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.comparison.aspects import AspectPlan
-from driftwalk.comparison.aspects.form import resampled
+from driftwalk.comparison.aspects.form import WallDistance, resampled
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
-WallDistance = Callable[[Floats, Floats], Floats]
 
 LAGS: Final = (1, 3, 10, 30, 100)
 """Of the mean squared displacement, in step intervals."""

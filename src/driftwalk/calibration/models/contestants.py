@@ -93,8 +93,7 @@ def contestants(
 
 def walks(motion: RecordedMotion) -> list[Contestant]:
     """Return walks of the steps in the even blocks."""
-    even, _ = interleaved(motion.aspects, duration=motion.duration)
-    steps = next(one for one in even if one.name == "steps")
+    (steps,), _ = interleaved([motion.steps], duration=motion.duration)
     interval = motion.plan.short.step_interval
     hidden = fit_hidden_walk(runs_of(steps, interval))
     return [

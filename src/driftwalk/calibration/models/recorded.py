@@ -106,7 +106,7 @@ class RecordedMotion:
         return tuple(found)
 
     def checks(self, x: npt.ArrayLike, y: npt.ArrayLike) -> Floats:
-        """Return the facts of `motion_checks` of a world, or of the recording itself."""
+        """Return the facts of a simulated world, see `motion_checks`."""
         return motion_checks(
             self.plan,
             x,
@@ -115,6 +115,11 @@ class RecordedMotion:
             depth=self.depth,
             usual_step=self.usual_step,
         )
+
+    @property
+    def steps(self) -> Aspect:
+        """Step lengths [m] and turning angles [rad] of the whole recording."""
+        return next(one for one in self.aspects if one.name == "steps")
 
     @property
     def duration(self) -> float:

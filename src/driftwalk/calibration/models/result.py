@@ -173,7 +173,7 @@ def _steadiness(motion: RecordedMotion) -> Steadiness | None:
 
 def _change(motion: RecordedMotion) -> str:
     """Return when the mean speed changed most, and from what to what."""
-    steps = next(one for one in motion.aspects if one.name == "steps")
+    steps = motion.steps
     speed = steps.points[:, 0] / motion.plan.short.step_interval
     share = steps.time / motion.duration
     splits = np.arange(0.05, 0.96, 0.05)

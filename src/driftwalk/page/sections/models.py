@@ -22,6 +22,7 @@ from driftwalk.page.parts import (
 )
 from driftwalk.page.sections.recording import recording_sections
 from driftwalk.page.words import quantity
+from driftwalk.schema.compared_models import own_score
 from driftwalk.schema.model_words import ASPECT_WORDS, CHECK_WORDS
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ def models_summary(comparison: xr.Dataset) -> Section:
         "own floor."
     )
     best = comparison.isel(model=0)
-    own = float((comparison["own_distance"] / comparison["floor"]).mean())
+    own = own_score(comparison)
     shown = [
         figure(f"distance of {best['model'].item()}", number(best["score"]), "1"),
         figure("distance of the recording's own parts", own, "1"),
@@ -135,7 +136,7 @@ def scores_section(comparison: xr.Dataset) -> Section:
         for words, of in (("motion models", ~walk), ("walks of recorded steps", walk))
         if of.any()
     ]
-    own = float((comparison["own_distance"] / comparison["floor"]).mean())
+    own = own_score(comparison)
     return chart(
         "scores", "Distances", "In the order of the ranking, with standard errors.",
         x=label("place in the ranking"), y=label("distance, mean of D / floor"), series=drawn,
