@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from recordings import RECORDINGS
+from recordings import RECORDINGS, read_lines
 from run import Prepared
 
 import driftwalk as dw
@@ -41,10 +41,7 @@ def main() -> None:
     parser.add_argument("--recording", action="append", choices=RECORDINGS)
     parser.add_argument("--threads", type=int, default=2)
     given = parser.parse_args()
-    done = set()
-    if given.out.exists():
-        lines = map(json.loads, given.out.read_text().splitlines())
-        done = {one["recording"] for one in lines}
+    done = {one["recording"] for one in read_lines(given.out)}
     for name in given.recording or RECORDINGS:
         if name in done:
             continue

@@ -5,11 +5,11 @@ The first is of recordings of known truth (`truth.py`), the second of real ones 
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import Any
 
+from recordings import read_lines
 from table import rows_of
 
 Line = dict[str, Any]
@@ -65,9 +65,7 @@ def compared_table(lines: list[Line]) -> str:
 
 def main() -> None:
     """Print both tables."""
-    truth, compared = (
-        [json.loads(line) for line in Path(name).read_text().splitlines()] for name in sys.argv[1:3]
-    )
+    truth, compared = (read_lines(Path(name)) for name in sys.argv[1:3])
     print(truth_table(truth), compared_table(compared), sep="\n\n")
 
 

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Final, NamedTuple
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "likelihood"))
+
+from lines import read_lines
+
+__all__ = ["RECORDINGS", "Recording", "read_lines"]
 
 REAL: Final = Path(__file__).resolve().parents[1] / "real"
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from recordings import RECORDINGS, Recording
+from recordings import RECORDINGS, Recording, read_lines
 
 import driftwalk as dw
 from driftwalk.calibration.evolution import (
@@ -131,10 +131,7 @@ def main() -> None:
     parser.add_argument("--model", action="append")
     parser.add_argument("--threads", type=int, default=2)
     given = parser.parse_args()
-    done = set()
-    if given.out.exists():
-        lines = [json.loads(line) for line in given.out.read_text().splitlines()]
-        done = {(one["recording"], one["model"]) for one in lines}
+    done = {(one["recording"], one["model"]) for one in read_lines(given.out)}
     for name in given.recording or RECORDINGS:
         prepared = Prepared(given.data, RECORDINGS[name], given.threads)
         for model in given.model or MODELS:

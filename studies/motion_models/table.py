@@ -8,10 +8,11 @@ recording's own floors.
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import Any
+
+from recordings import read_lines
 
 Line = dict[str, Any]
 
@@ -77,8 +78,7 @@ def all_table(by_recording: dict[str, list[Line]]) -> str:
 def main(path: Path) -> None:
     """Print both tables."""
     by_recording: dict[str, list[Line]] = {}
-    for text in path.read_text().splitlines():
-        line = json.loads(text)
+    for line in read_lines(path):
         by_recording.setdefault(line["recording"], []).append(line)
     print(chosen_table(by_recording))
     print()

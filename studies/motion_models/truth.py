@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from recordings import RECORDINGS
+from recordings import RECORDINGS, read_lines
 from run import Prepared
 
 import driftwalk as dw
@@ -83,11 +83,8 @@ def main() -> None:
     parser.add_argument("--model", action="append")
     parser.add_argument("--threads", type=int, default=2)
     given = parser.parse_args()
-    done = set()
-    if given.out.exists():
-        lines = map(json.loads, given.out.read_text().splitlines())
-        done = {(one["recording"], one["model"]) for one in lines}
-    for line in map(json.loads, RESULTS.read_text().splitlines()):
+    done = {(one["recording"], one["model"]) for one in read_lines(given.out)}
+    for line in read_lines(RESULTS):
         wanted = line["model"] in (given.model or DEFAULT_MODELS)
         here = line["recording"] in (given.recording or RECORDINGS)
         if not (wanted and here) or (line["recording"], line["model"]) in done:
