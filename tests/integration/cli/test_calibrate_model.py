@@ -5,33 +5,20 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 from command_line import GRID, here, leave_out_figures, refusal
+from self_propelled import SPEED, moving
 
 import driftwalk as dw
-from driftwalk.core.seeds import world_keys
 from driftwalk.record import save_trajectory
-from driftwalk.schema import Track, build_trajectory
-
-SPEED = 0.05
 
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with a recording of an active body (synthetic), a study and a model file."""
     folder = tmp_path_factory.mktemp("model")
-    time = np.arange(0.0, 120.0, 0.1)
-    track = Track(time, SPEED + 0.0 * time, 0.0 * time, np.full(time.size, np.nan))
-    study = dw.Study()
-    camera = dw.conditions.recorded_camera(track, study, position_quantum=0.0)
-    like = dw.conditions.recorded_conditions(track, study, camera=camera)
     model = dw.motion_model("active", turn_rate=0.0, clearance=0.015)
-    values = {"speed": np.array([SPEED]), "rotational_diffusion": np.array([0.5])}
-    seen = model.simulate(values, like, world_keys(1, trial=0, replicate=0))
-    moved = build_trajectory(
-        time, seen.x[0], seen.y[0], attrs={"arena": study.tank.to_arena_json()}
-    )
+    moved = moving(model, {"speed": SPEED, "rotational_diffusion": 0.5}, 120.0, seed=1)
     save_trajectory(moved, folder / "recording.nc")
     (folder / "grid.toml").write_text(GRID)
     (folder / "mine.py").write_text(

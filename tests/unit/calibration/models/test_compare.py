@@ -8,35 +8,26 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from self_propelled import moving
 
 import driftwalk as dw
 from driftwalk.calibration import check_models, compare_models
 from driftwalk.calibration.evolution import Budget
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.core.seeds import world_keys
-from driftwalk.schema import Track, build_trajectory
 from driftwalk.schema.check import check_dataset
 from driftwalk.sweep import MemoryStore, SweepError
 
 SMALL = Budget(design=32, starts=1, short=6, long=6, retest=2)
 TRUTH = {
-    "speed": 0.05, "speed_cv": 0.4, "speed_time": 0.5, "run_time": 2.0, "turn_spread": 1.2,
-    "rotational_diffusion": 0.3,
+    "speed": 0.05, "speed_cv": 0.4, "run_time": 2.0, "turn_std": 1.2, "rotational_diffusion": 0.3,
+    "turn_rate": 0.0,
 }  # fmt: skip
 
 
 def recording(seconds: float) -> xr.Dataset:
-    """Return a run and tumble in the paper's tank, at 10 Hz."""
-    time = np.arange(0.0, seconds, 0.1)
-    model = dw.motion_model("run_tumble")
-    study = dw.Study()
-    track = Track(time, 0.05 + 0.0 * time, 0.0 * time, np.full(time.size, np.nan))
-    camera = dw.conditions.recorded_camera(track, study, position_quantum=0.0)
-    like = dw.conditions.recorded_conditions(track, study, camera=camera)
-    values = {one.name: np.array([TRUTH.get(one.name, 0.0)]) for one in model.parameters}
-    seen = model.simulate(values, like, world_keys(5, trial=0, replicate=0))
-    attrs = {"arena": study.tank.to_arena_json(), "simulated": "yes"}
-    return build_trajectory(time, seen.x[0], seen.y[0], attrs=attrs)
+    """Return a run and tumble in the paper's tank."""
+    moved = moving(dw.motion_model("run_tumble"), TRUTH, seconds, seed=5)
+    return moved.assign_attrs(simulated="yes")
 
 
 @pytest.fixture(scope="module")
