@@ -7,16 +7,23 @@ says what a recording holds; `save_trajectory` keeps it.
 from driftwalk.record.circle import CircleFit, fit_circle, tank_radius_bound
 from driftwalk.record.info import describe
 from driftwalk.record.io import load, readable_formats
-from driftwalk.record.noise import NoiseEstimate, estimate_tracking_noise
+from driftwalk.record.noise import (
+    NoiseBound,
+    NoiseEstimate,
+    estimate_tracking_noise,
+    noise_bound,
+)
 from driftwalk.record.write import save_trajectory
 
 __all__ = [
     "CircleFit",
+    "NoiseBound",
     "NoiseEstimate",
     "describe",
     "estimate_tracking_noise",
     "fit_circle",
     "load",
+    "noise_bound",
     "readable_formats",
     "save_trajectory",
     "tank_radius_bound",

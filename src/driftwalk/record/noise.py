@@ -21,6 +21,10 @@ BLOCK = 500
 """Windows in a block; blocks are left out in turn for the standard error."""
 MAX_BLOCKS = 100
 MIN_WINDOWS = 50
+STILLEST = (0.01, 0.02, 0.05, 0.1, 0.2)
+"""Shares of the steps from one sample to the next, the shortest, that bound the noise."""
+SURE = 5.0
+"""Standard errors by which the estimate has to be above the bound before it gives way."""
 
 
 class NoiseEstimate(NamedTuple):
@@ -61,6 +65,10 @@ def estimate_tracking_noise(track: Track) -> NoiseEstimate:
     With n samples the estimate is good to about ``r * 1.3 / sqrt(n)`` for q h^3 up to 5 r^2. Noise
     that is not white (a slowly moving body in whole pixels) is underestimated.
 
+    A body that jerks and rests is no integrated Wiener process: its jerks would pass for noise. So
+    the steps of its rests bound the noise (`noise_bound`), and where the estimate is above that
+    bound by more than chance, the bound takes its place.
+
     Parameters
     ----------
     track : Track
@@ -79,7 +87,7 @@ def estimate_tracking_noise(track: Track) -> NoiseEstimate:
     >>> round(estimate_tracking_noise(track).position_noise_m, 4)
     0.0003
     """
-    position = _estimate(track.time, (track.x, track.y))
+    position = _bounded(_estimate(track.time, (track.x, track.y)), track)
     turned = np.isfinite(track.theta)
     orientation = _estimate(track.time[turned], (np.unwrap(track.theta[turned]),))
     return NoiseEstimate(
@@ -92,11 +100,72 @@ def estimate_tracking_noise(track: Track) -> NoiseEstimate:
     )
 
 
+class NoiseBound(NamedTuple):
+    """The largest noise that leaves steps as short as the shortest ones of a recording."""
+
+    position_noise_m: float
+    """Standard deviation of the position, per axis [m]; infinite with too few steps."""
+    standard_error_m: float
+    """Its standard error [m]."""
+
+
+def noise_bound(track: Track) -> NoiseBound:
+    """Return the largest white noise that the shortest steps of a recording allow.
+
+    Two positions with independent noise r per axis differ by at most u with the probability
+    ``1 - exp(-u^2 / 4 r^2)`` if the body rests, and more rarely if it moves in any way that is
+    independent of the noise (Anderson, Proc. Am. Math. Soc. 6 (1955) 170). So where a share s of
+    the steps is no longer than u, ``r <= u / sqrt(-4 ln(1 - s))``. The smallest of these bounds
+    for the shortest 1 to 20 % is returned.
+
+    A position that is repeated to the last digit was not measured again: steps of length zero are
+    left out. Rounding to a resolution d moves a step by sqrt(2) d at most, and u is longer by that;
+    d is the smallest difference of two coordinates.
+
+    Parameters
+    ----------
+    track : Track
+        One body.
+
+    Examples
+    --------
+    >>> time = np.arange(1000) * 0.1
+    >>> noise = np.random.default_rng(1).normal(0.0, 3e-4, (2, 1000))
+    >>> round(noise_bound(Track(time, noise[0], noise[1], 0 * time)).position_noise_m, 4)
+    0.0003
+    """
+    step = np.diff(np.stack([track.x, track.y]), axis=1)
+    usual = float(np.median(np.diff(track.time))) if track.time.size > 1 else 0.0
+    step = step[:, np.diff(track.time) < 1.5 * usual]
+    step = step[:, np.isfinite(step).all(axis=0)]
+    apart = np.abs(step[step != 0.0])
+    length = np.sort(np.hypot(*step[:, (step != 0.0).any(axis=0)]))
+    found = NoiseBound(math.inf, math.inf)
+    for share in STILLEST:
+        count = int(share * length.size)
+        if count < MIN_WINDOWS:
+            continue
+        longest = float(length[count - 1]) + math.sqrt(2.0) * float(apart.min())
+        bound = longest / math.sqrt(-4.0 * math.log1p(-count / length.size))
+        # u^2 is to first order proportional to the share of steps below it.
+        if bound < found.position_noise_m:
+            found = NoiseBound(bound, 0.5 * bound / math.sqrt(count))
+    return found
+
+
 class _Estimate(NamedTuple):
     noise: float
     standard_error: float
     intensity: float
     windows: int
+
+
+def _bounded(estimate: _Estimate, track: Track) -> _Estimate:
+    """Return the estimate, or the bound on the noise where it is clearly above that."""
+    bound = noise_bound(track)
+    if not estimate.noise > bound.position_noise_m + SURE * bound.standard_error_m:
+        return estimate
+    return estimate._replace(noise=bound.position_noise_m, standard_error=bound.standard_error_m)
 
 
 _NOTHING = _Estimate(math.nan, math.nan, math.nan, 0)
