@@ -34,7 +34,8 @@ TARGET: Final = 15e6
 BLOCK_STEPS: Final = 2000
 MODELS: Final = (
     "inertial", "active", "active+wall", "run_tumble+wall", "run_rest+wall", "burst_coast+wall",
-    "two_state+wall", "active+wall+follow+slow+stroke+diffusion",
+    "two_state+wall", "run_rest+wall+reverse", "run_tumble+wall+follow+keep",
+    "active+wall+follow+keep+slow+stroke+diffusion",
 )  # fmt: skip
 VALUES: Final = {
     "speed_std": 0.02, "memory_time": 1.5, "speed": 0.03, "rotational_diffusion": 0.15,
@@ -44,7 +45,7 @@ VALUES: Final = {
     "fast_speed": 0.05, "slow_time": 4.0, "fast_time": 2.0, "slow_rotational_diffusion": 2.0,
     "fast_rotational_diffusion": 0.05, "relaxation_time": 0.3, "wall_turn": 2.0,
     "wall_slowing": 0.5, "wall_range": 0.02, "wall_follow": 3.0, "slow_std": 0.6, "stroke": 1.0,
-    "stroke_frequency": 0.5, "diffusion": 1e-7,
+    "stroke_frequency": 0.5, "diffusion": 1e-7, "wall_gap": 0.02, "reversal_share": 0.5,
 }  # fmt: skip
 """Of every parameter, SI."""
 

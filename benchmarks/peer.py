@@ -1,7 +1,8 @@
 """Programs on the Open Dynamics Engine: built, given a case, run.
 
 `ode/ode_peer.cpp` is the peer of the simulation benchmarks, `ode/ode_recording.cpp` makes the
-recordings of another engine in `studies/likelihood`.
+recordings of another engine in `studies/likelihood`; `ode/ode_model.py` offers it to
+`driftwalk calibrate --model`.
 """
 
 from __future__ import annotations

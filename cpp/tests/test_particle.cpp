@@ -40,7 +40,7 @@ struct Particles {
 
   static std::vector<double> two_states() {
     return {// clearance, diffusion, slow, stroke, wall
-            0.01, 1e-7, 0.3, 3.0, 0.5, 1.3, 3.0, 2.0, 0.5, 0.02,
+            0.01, 1e-7, 0.3, 3.0, 0.5, 1.3, 3.0, 2.0, 0.5, 0.02, 0.03,
             // a run: dwell, share, speed, relaxation, turns, the state that follows
             0.8, 0.6, 0.5, 0.04, 0.4, 0.0, 0.0, 0.4, 0.3, 0.5, 1.0, 0.2, 0.3, 0.7,
             // a glide

@@ -31,7 +31,8 @@ RATE_HZ: Final = 20.0
 FASTEST_CM_S: Final = 6.0
 NAMES: Final = (
     "inertial", "active", "run_tumble", "run_rest", "burst_coast", "two_state",
-    "active+wall", "active+wall+follow", "run_tumble+slow", "active+stroke",
+    "active+wall", "active+wall+follow", "active+follow+keep", "run_rest+reverse",
+    "run_tumble+slow", "active+stroke",
 )  # fmt: skip
 VALUES: Final = {
     "speed_std": 0.02, "memory_time": 1.5, "speed": 0.03, "rotational_diffusion": 0.15,
@@ -41,7 +42,8 @@ VALUES: Final = {
     "fast_speed": 0.05, "slow_time": 4.0, "fast_time": 2.0, "slow_rotational_diffusion": 2.0,
     "fast_rotational_diffusion": 0.05, "relaxation_time": 0.3, "wall_turn": 2.0,
     "wall_slowing": 0.5, "wall_range": 0.02, "wall_follow": 3.0, "slow_std": 0.6,
-    "slow_time_": 10.0, "stroke": 3.0, "stroke_frequency": 0.5,
+    "slow_time_": 10.0, "stroke": 3.0, "stroke_frequency": 0.5, "wall_gap": 0.03,
+    "reversal_share": 0.8,
 }  # fmt: skip
 """Of every parameter, SI; `slow_time_` is that of the part `slow`."""
 
@@ -92,8 +94,8 @@ def main(out: Path) -> None:
     """Draw all, and write the picture."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11.0, 5.2), layout="constrained")
-    panels = figure.subplots(2, 5, sharex=True, sharey=True)
+    figure = Figure(figsize=(13.0, 5.2), layout="constrained")
+    panels = figure.subplots(2, 6, sharex=True, sharey=True)
     for number, (axes, name) in enumerate(zip(panels.flat, NAMES, strict=True)):
         lines = draw(axes, name, number)
     for axes in panels[-1]:

@@ -169,6 +169,21 @@ def test_the_share_of_reversals(fresh_seed: Seed) -> None:
     assert errors_off((np.abs(turn) > np.pi / 2).astype(float).ravel(), share) < SIGMAS
 
 
+@pytest.mark.false_alarm(FALSE_ALARM)
+def test_runs_that_reverse_lose_their_direction_as_the_formula(fresh_seed: Seed) -> None:
+    # A turn of pi at the share r, and N(0, s) in any case: E[cos turn] = (1 - 2 r) exp(-s^2 / 2). A
+    # clock of 0.5 s for runs and rests begins one run a second, and a rest reverses nothing.
+    share, std = 0.8, 0.7
+    table = of(
+        "run_rest+reverse", 4000, speed=0.01, speed_cv=0.0, run_time=0.5, run_time_cv=0.0,
+        rest_time=0.5, rest_time_cv=0.0, turn_std=std, rotational_diffusion=0.0,
+        reversal_share=share,
+    )  # fmt: skip
+    _, phi = paths(table, [0.25, 1.25], seed=fresh_seed(18))
+    memory = np.cos(phi[:, 1] - phi[:, 0])
+    assert errors_off(memory, (1 - 2 * share) * np.exp(-(std**2) / 2)) < SIGMAS
+
+
 # --- slow changes and a stroke --------------------------------------------------------------------
 
 

@@ -75,6 +75,40 @@ def test_a_heading_turns_at_a_wall_as_the_formula(name: str, psi: float) -> None
         assert np.abs(off).max() < 2e-3, "steps of rate dt turn by a share of rate dt too little"
 
 
+@pytest.mark.parametrize("gap", [0.004, 0.02, 0.1])
+def test_beyond_the_gap_a_heading_turns_towards_the_wall(gap: float) -> None:
+    # As above at a rate (1 - d / gap) times as large, which is below 0 beyond the gap.
+    rate, depth, reach, psi = 1.5, 0.01, 0.03, 1.2
+    felt = {"wall_turn": rate, "wall_range": reach, "wall_gap": gap}
+    table = switching_table([State(0.0)], felt, worlds=1)
+    time = np.arange(1, 21) * 0.1
+    strength = rate * (1 - depth / gap) * np.exp(-depth / reach) * time
+    expected = 2 * np.arctan(np.tan(psi / 2) * np.exp(strength))
+    _, phi = paths(
+        table, time, tank=HALL, start=1j * (0.2 - depth), heading=psi + np.pi / 2, time_step=1e-3,
+        precision="double",
+    )  # fmt: skip
+    found = np.mod(phi[0] - np.pi / 2, 2 * np.pi)
+    assert np.abs(found - expected).max() < 2e-3
+    assert (found[-1] > psi) == (depth < gap)
+
+
+def test_a_particle_swings_about_the_gap() -> None:
+    # Along the wall, at d = gap + s: ds/dt = v sin(delta), d delta/dt = -a w s / gap, so small s
+    # swing at the frequency sqrt(v a w / gap), w = exp(-gap / range). Here by 1 % of the gap: what
+    # is left out is of that order of the swing.
+    speed, rate, gap, reach = 0.03, 2.0, 0.02, 0.04
+    off = 0.01 * gap
+    felt = {"wall_turn": rate, "wall_range": reach, "wall_gap": gap}
+    table = switching_table([State(speed)], felt, worlds=1)
+    time = np.arange(0.0, 12.0, 0.1)
+    place = -0.8 + 1j * (0.2 - gap - off)
+    z, _ = paths(table, time, tank=HALL, start=place, time_step=2e-3, precision="double")
+    swing = np.sqrt(speed * rate * np.exp(-gap / reach) / gap)
+    expected = off * np.cos(swing * time)
+    np.testing.assert_allclose(0.2 - gap - z[0].imag, expected, atol=0.03 * off)
+
+
 def test_a_particle_slows_down_near_a_wall_as_the_formula() -> None:
     # Along a wall at the distance d from contact: v (1 - slowing exp(-d / range)).
     speed, slowing, reach, clearance = 0.05, 0.6, 0.03, 0.01

@@ -93,7 +93,13 @@ WALLS: dict[str, dict[str, Any]] = {
     "turn": {"wall_turn": spread(0.5, 8.0)},
     "follow": {"wall_follow": spread(0.5, 8.0)},
     "slowing": {"wall_slowing": spread(0.1, 0.9)},
-    "all": {"wall_turn": 2.0, "wall_follow": spread(1.0, 4.0), "wall_slowing": 0.3},
+    "gap": {"wall_turn": 4.0, "wall_gap": spread(0.0, 0.03)},
+    "all": {
+        "wall_turn": 2.0,
+        "wall_follow": spread(1.0, 4.0),
+        "wall_slowing": 0.3,
+        "wall_gap": 0.01,
+    },
 }
 
 
@@ -275,6 +281,7 @@ EVERYTHING = Case(
     {
         "clearance": 0.01, "diffusion": 1e-7, "slow_std": 0.3, "slow_time": 3.0, "stroke": 0.5,
         "stroke_frequency": 1.3, "wall_turn": 3.0, "wall_follow": 2.0, "wall_slowing": 0.5,
+        "wall_gap": 0.02,
     },
     carried=True,
 )  # fmt: skip

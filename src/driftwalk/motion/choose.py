@@ -38,7 +38,7 @@ def motion_model(
     /,
     *parameters: Parameter,
     settings: Settings = "one",
-    clearance: float = 0.0,
+    clearance: float | None = None,
     timeout: float | None = None,
     **choices: Any,
 ) -> MotionModel:
@@ -77,8 +77,9 @@ def motion_model(
         Parameters with a step, a scale or a label of their own.
     settings : {"one", "many"}
         Of a function: whether the worlds of a call share one setting of the parameters.
-    clearance : float
-        Of the family: distance of the recorded point from the wall at contact [m].
+    clearance : float, optional
+        Of the family: distance of the recorded point from the wall at contact [m]. Left out, a
+        simulation takes 0 and a calibration that of the recording.
     timeout : float, optional
         Of a program: longest time that an answer may take [s], default 60.
     **choices : tuple or float
@@ -132,7 +133,7 @@ def _addressed(
     model: str,
     parameters: tuple[Parameter, ...],
     settings: Settings,
-    clearance: float,
+    clearance: float | None,
     timeout: float | None,
     choices: dict[str, Any],
 ) -> MotionModel:
@@ -153,12 +154,12 @@ def _addressed(
 def _refuse(
     *,
     model: str,
-    clearance: float = 0.0,
+    clearance: float | None = None,
     settings: Settings = "one",
     timeout: float | None = None,
 ) -> None:
     """Refuse what a kind of model has no use for."""
-    if clearance:
+    if clearance is not None:
         raise ConfigurationError(f"{model} keeps its own distance from the wall: no `clearance`")
     if settings != "one":
         raise ConfigurationError(f"{model} takes many settings anyway: leave out `settings`")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -54,6 +55,24 @@ def ranged(usual: Parameter, choice: Parameter | tuple[Any, ...]) -> Parameter:
     if unit != usual.unit:
         raise ConfigurationError(f"{usual.name} is in {usual.unit}, and its range in {unit}")
     return chosen
+
+
+def known_value(usual: Parameter, choice: Any) -> float:
+    """Return a known value: not below 0 where the range has nothing below, no share above 1."""
+    try:
+        value = float(choice)
+    except (TypeError, ValueError) as error:
+        raise ConfigurationError(
+            f"{usual.name}: expected a value or a range such as (0, 0.1), got {choice!r}"
+        ) from error
+    least = 0.0 if usual.low >= 0.0 else -math.inf
+    most = 1.0 if usual.unit == "1" and usual.high == 1.0 else math.inf
+    if not (math.isfinite(value) and least <= value <= most):
+        raise ConfigurationError(
+            f"{usual.name} is {value:g}, expected a number from {least:g} to {most:g} "
+            f"[{usual.unit}]"
+        )
+    return value
 
 
 def _range_of(usual: Parameter, choice: tuple[Any, ...]) -> tuple[float, float, str]:

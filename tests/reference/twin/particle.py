@@ -291,7 +291,9 @@ def felt_wall(scene: Scene, columns: Columns, one: Swimmer) -> tuple[Floats, Flo
     ranges = distance / np.maximum(shared["wall_range"], 1e-6)
     near = np.where(ranges < FARTHEST_RANGES, np.exp(-np.maximum(ranges, 0.0)), 0.0)
     psi = one.heading - np.angle(normal)
-    rate = shared["wall_turn"] * np.sin(psi) + shared["wall_follow"] * np.sin(2 * psi)
+    gap = shared["wall_gap"]
+    gaps = np.where(gap > 0, np.maximum(distance, 0.0) / np.where(gap > 0, gap, 1.0), 0.0)
+    rate = shared["wall_turn"] * (1 - gaps) * np.sin(psi) + shared["wall_follow"] * np.sin(2 * psi)
     return rate * near, 1 - shared["wall_slowing"] * near
 
 

@@ -56,8 +56,12 @@ class TestTwoState(FamilyContract):
     name = "two_state"
 
 
-class TestActiveWithAllParts(FamilyContract):
+class TestActiveWithManyParts(FamilyContract):
     name = "active+wall+follow+slow+stroke+diffusion+flow+reflect"
+
+
+class TestRunRestBackAndForth(FamilyContract):
+    name = "run_rest+keep+reverse"
 
 
 def test_every_member_is_held_to_the_contract():
@@ -85,6 +89,7 @@ def test_every_member_says_what_it_is(name):
         ("active+gills", "has no part 'gills'; there are wall, follow"),
         ("active+wall+wall", "is named twice"),
         ("inertial+wall", "inertial has no heading"),
+        ("active+reverse", "has one bout without end"),
     ],
 )
 def test_a_wrong_name_says_which_there_are(name, words):
@@ -101,6 +106,19 @@ def test_a_clearance_is_a_length(clearance):
 def test_parts_that_feel_the_wall_share_its_range():
     names = [one.name for one in family_model("active+wall+follow").parameters]
     assert names.count("wall_range") == 1
+
+
+def test_what_parts_say_of_a_state_is_said_of_those_that_move():
+    model = family_model("run_rest+reverse")
+    values = {one.name: np.full(2, one.low) for one in model.parameters}
+    plain = family_model("run_rest").table(
+        {name: value for name, value in values.items() if name != "reversal_share"}, 2
+    )
+    table = model.table({**values, "reversal_share": np.array([0.2, 0.7])}, 2)
+    of_run = len(SHARED) + STATE.index("reversal_share")
+    changed = np.flatnonzero((table.columns != plain.columns).any(axis=0))
+    assert changed.tolist() == [of_run]
+    np.testing.assert_allclose(table.columns[:, of_run], [0.2, 0.7], rtol=1e-7)
 
 
 def test_a_hyphen_counts_as_an_underscore():

@@ -27,6 +27,7 @@ enum SharedColumn : int {
   column_wall_follow,      // rate of turning along the wall, at contact [rad/s]
   column_wall_slowing,     // share of the speed that is lost at contact [1]
   column_wall_range,       // over which these three decay [m]
+  column_wall_gap,         // where turning away becomes turning towards; 0: nowhere [m]
   shared_columns
 };
 

@@ -4,8 +4,8 @@
 //
 // The speed v relaxes to that of the bout, times a slow factor exp(m - var/2), times a stroke
 // 1 + s cos(2 pi f t). Near the wall, with w = exp(-d / range) and psi the angle between the
-// outward normal and the heading, it turns at (away sin(psi) + along sin(2 psi)) w, and loses
-// the share `slowing` w of its speed.
+// outward normal and the heading, it turns at (away (1 - d / gap) sin(psi) + along sin(2 psi)) w,
+// and loses the share `slowing` w of its speed.
 #pragma once
 
 #include "driftwalk/flow/bilinear.hpp"
@@ -49,6 +49,8 @@ public:
     wall_follow_ = columns(column_wall_follow);
     wall_slowing_ = columns(column_wall_slowing);
     per_wall_range_ = Real(T(1)) / max(columns(column_wall_range), Real(T(1e-6)));
+    const Real gap = columns(column_wall_gap);
+    per_wall_gap_ = select(gap > zero, Real(T(1)) / max(gap, Real(T(1e-6))), zero);
     slow_ = any(slow_std_ > zero);
     strokes_ = any(abs(stroke_) > zero);
     feels_wall_ =
@@ -165,7 +167,10 @@ private:
     const Real strength = select(near, bounded_exp(away), Real(T(0)));
     const Real across = nearest.nx * ahead_y_ - nearest.ny * ahead_x_;
     const Real along = nearest.nx * ahead_x_ + nearest.ny * ahead_y_;
-    const Real rate = across * (wall_turn_ + wall_follow_ * along * T(2));
+    // Without a gap the factor is exactly 1.
+    const Real gaps = max(nearest.distance, Real(T(0))) * per_wall_gap_;
+    const Real turn_here = wall_turn_ * (Real(T(1)) - gaps);
+    const Real rate = across * (turn_here + wall_follow_ * along * T(2));
     turn = turn + rate * strength * dt_;
     speed = speed * (Real(T(1)) - wall_slowing_ * strength);
   }
@@ -190,7 +195,7 @@ private:
   T dt_;
   Real x_, y_;
   Real clearance_, spread_, slow_std_, slow_kept_, slow_fresh_, stroke_, stroke_turns_;
-  Real wall_turn_, wall_follow_, wall_slowing_, per_wall_range_;
+  Real wall_turn_, wall_follow_, wall_slowing_, per_wall_range_, per_wall_gap_;
   Real ahead_x_, ahead_y_; // the heading, a unit vector
   Real from_x_, from_y_;   // the same when the last step began
   Real speed_, slow_number_, phase_;

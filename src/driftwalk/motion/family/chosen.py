@@ -10,7 +10,7 @@ from driftwalk.core.errors import ConfigurationError
 from driftwalk.motion.family.members import MEMBERS, Member
 from driftwalk.motion.family.particle import ParticleModel
 from driftwalk.motion.family.parts import PARTS, Part
-from driftwalk.motion.ranges import ranged
+from driftwalk.motion.ranges import known_value, ranged
 from driftwalk.schema import Parameter
 
 Choice = float | tuple[float, float] | tuple[float, float, str]
@@ -18,7 +18,7 @@ Choice = float | tuple[float, float] | tuple[float, float, str]
 
 
 def family_model(
-    name: str, /, *parameters: Parameter, clearance: float = 0.0, **choices: Choice
+    name: str, /, *parameters: Parameter, clearance: float | None = None, **choices: Choice
 ) -> ParticleModel:
     """Return a member of the family of self-propelled bodies, with parts.
 
@@ -29,8 +29,9 @@ def family_model(
         as an underscore.
     *parameters : Parameter
         Parameters of the member with a range, step or scale of their own.
-    clearance : float
-        Distance of the recorded point from the wall at contact [m]: half the body's width.
+    clearance : float, optional
+        Distance of the recorded point from the wall at contact [m]: half the body's width. Left
+        out, a simulation takes 0 and a calibration of many parameters that of the recording.
     **choices : float or tuple
         Of the member's parameters by name: a value that is known, or a range ``(low, high)`` or
         ``(low, high, unit)``. The others keep their wide ranges.
@@ -47,7 +48,7 @@ def family_model(
     ('run_tumble+wall', 8, 0.1)
     """
     member, parts = _member_and_parts(name)
-    if not (math.isfinite(clearance) and clearance >= 0.0):
+    if clearance is not None and not (math.isfinite(clearance) and clearance >= 0.0):
         raise ConfigurationError(f"clearance is {clearance}, expected a length from 0 m on")
     groups = [member.parameters, *(part.parameters for part in parts)]
     # Two parts that feel the wall have one range.
@@ -61,7 +62,7 @@ def family_model(
             f"the model {name} has no parameter {unknown!r}; it has {', '.join(usual)}"
         )
     fixed = {
-        key: _value(usual[key], choice)
+        key: known_value(usual[key], choice)
         for key, choice in given.items()
         if not isinstance(choice, tuple | Parameter)
     }
@@ -70,7 +71,7 @@ def family_model(
         for key, one in usual.items()
         if key not in fixed
     )
-    return ParticleModel(member, parts, searched, fixed=fixed, clearance=float(clearance))
+    return ParticleModel(member, parts, searched, fixed=fixed, clearance=clearance)
 
 
 def _member_and_parts(name: str) -> tuple[Member, tuple[Part, ...]]:
@@ -92,25 +93,12 @@ def _member_and_parts(name: str) -> tuple[Member, tuple[Part, ...]]:
         raise ConfigurationError(
             f"{first} has no heading: it takes the parts flow and reflect, not {', '.join(unfit)}"
         )
-    return member, tuple(PARTS[part] for part in rest)
-
-
-def _value(usual: Parameter, choice: Any) -> float:
-    """Return a known value: not below 0 where the range has nothing below, no share above 1."""
-    try:
-        value = float(choice)
-    except (TypeError, ValueError) as error:
+    if "reverse" in rest and member.name == "active":
         raise ConfigurationError(
-            f"{usual.name}: expected a value or a range such as (0, 0.1), got {choice!r}"
-        ) from error
-    least = 0.0 if usual.low >= 0.0 else -math.inf
-    most = 1.0 if usual.unit == "1" and usual.high == 1.0 else math.inf
-    if not (math.isfinite(value) and least <= value <= most):
-        raise ConfigurationError(
-            f"{usual.name} is {value:g}, expected a number from {least:g} to {most:g} "
-            f"[{usual.unit}]"
+            f"{first} has one bout without end, so none begins with a reversal: leave the part "
+            "reverse out"
         )
-    return value
+    return member, tuple(PARTS[part] for part in rest)
 
 
 def _ranged(usual: Parameter, choice: Parameter | tuple[Any, ...]) -> Parameter:

@@ -34,6 +34,9 @@ class Member:
         Values by name in, its states out.
     kind : {"switching", "inertial"}
         Whether it swims along a heading, or has a velocity that forgets.
+    exchanged : tuple of pairs of str
+        Parameters of two states that could change places: the motion would be the same. The first
+        of the first pair is the smaller.
     """
 
     name: str
@@ -43,6 +46,7 @@ class Member:
     parameters: tuple[Parameter, ...]
     states: Callable[[Numbers], Sequence[State]]
     kind: Literal["switching", "inertial"] = "switching"
+    exchanged: tuple[tuple[str, str], ...] = ()
 
 
 _SPEED = Parameter("speed", "m/s", 1e-6, 10.0, scale="log", meaning="Mean speed.")
@@ -242,6 +246,11 @@ MEMBERS: Final[Mapping[str, Member]] = {
                 ),
             ),
             _two_state,
+            exchanged=(
+                ("slow_speed", "fast_speed"),
+                ("slow_time", "fast_time"),
+                ("slow_rotational_diffusion", "fast_rotational_diffusion"),
+            ),
         ),
     )
 }  # fmt: skip

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from dataclasses import replace
+from typing import Any, Final
 
 import numpy as np
 
@@ -12,8 +13,10 @@ from driftwalk.comparison import StepReference
 from driftwalk.conditions.recorded import Conditions
 from driftwalk.core.errors import InputError
 from driftwalk.motion.family.columns import (
+    STATE,
     Numbers,
     ParticleTable,
+    State,
     inertial_table,
     switching_table,
 )
@@ -21,12 +24,10 @@ from driftwalk.motion.family.members import Member
 from driftwalk.motion.family.parts import Part
 from driftwalk.motion.native import scored
 from driftwalk.motion.protocol import Details, Floats, Keys, Scores, Values, Worlds
+from driftwalk.motion.water import water_velocity
 from driftwalk.schema import Parameter
 from driftwalk.simulation.backend import native_scene
-from driftwalk.simulation.initial import Start, world_orientations
-
-if TYPE_CHECKING:
-    import xarray as xr
+from driftwalk.simulation.initial import world_orientations
 
 LONGEST_STEP_S: Final = 0.02
 """Time step, unless samples are so dense that half their interval is shorter."""
@@ -45,8 +46,13 @@ class ParticleModel:
         What is searched.
     fixed : mapping of str to float
         Values of its other parameters.
-    clearance : float
-        Distance of the recorded point from the wall at contact [m].
+    clearance : float, optional
+        Distance of the recorded point from the wall at contact [m]; 0 when left out.
+
+    Attributes
+    ----------
+    states_clearance : bool
+        Whether it was given.
 
     Examples
     --------
@@ -62,16 +68,24 @@ class ParticleModel:
         parameters: tuple[Parameter, ...],
         *,
         fixed: Mapping[str, float],
-        clearance: float,
+        clearance: float | None,
     ) -> None:
         self.member, self.parts, self.parameters = member, parts, parameters
-        self.fixed, self.clearance = dict(fixed), clearance
+        self.fixed = dict(fixed)
+        self.states_clearance = clearance is not None
+        self.clearance = 0.0 if clearance is None else float(clearance)
         named = [part.name for part in parts]
         self.name = "+".join([member.name, *named])
         self.needs_flow = "flow" in named
         self.contact = "reflect" if "reflect" in named else "slide"
         # Of the latest conditions: made once for all work units of a search.
         self._ready: tuple[Conditions, _core.Model] | None = None
+
+    def with_clearance(self, clearance: float) -> ParticleModel:
+        """Return the same model with another distance from the wall at contact [m]."""
+        return ParticleModel(
+            self.member, self.parts, self.parameters, fixed=self.fixed, clearance=clearance
+        )
 
     def simulate(self, values: Values, like: Conditions, keys: Keys) -> Worlds:
         """Return one world per key; see `MotionModel.simulate`.
@@ -124,7 +138,16 @@ class ParticleModel:
         given: Numbers = {"clearance": self.clearance, **self.fixed, **values}
         if self.member.kind == "inertial":
             return inertial_table(given, worlds=worlds)
-        return switching_table(self.member.states(given), given, worlds=worlds)
+        return switching_table(self._states(given), given, worlds=worlds)
+
+    def _states(self, given: Numbers) -> list[State]:
+        """Return the states, with what the parts say of those that move: a rest stays a rest."""
+        said = [one.name for part in self.parts for one in part.parameters if one.name in STATE]
+        numbers: dict[str, Any] = {name: given[name] for name in said}
+        return [
+            replace(one, **numbers) if np.any(np.asarray(one.speed) != 0.0) else one
+            for one in self.member.states(given)
+        ]
 
     def particle(self, table: ParticleTable) -> _core.Particle:
         """Return the core's form of what all worlds have in common."""
@@ -144,6 +167,14 @@ class ParticleModel:
     def facts(self, estimate: Mapping[str, float]) -> dict[str, Any]:  # noqa: ARG002
         """Return which model it was."""
         return {"model": self.name}
+
+    @property
+    def known(self) -> dict[str, float]:
+        """Its known values under names with units: "turn_rate_rad_s", "clearance_m"."""
+        groups = [self.member.parameters, *(part.parameters for part in self.parts)]
+        usual = {one.name: one for group in groups for one in group}
+        values = {one.key: self.fixed[name] for name, one in usual.items() if name in self.fixed}
+        return {**values, "clearance_m": self.clearance}
 
     def native(self, like: Conditions) -> _core.Model:
         """Return the core's form of the conditions of a recording.
@@ -178,7 +209,11 @@ class ParticleModel:
         where it does not move, in that of its recorded orientation, or a random one.
         """
         start = like.start
-        u, v = _water_at(like.flow, start) if self.needs_flow and like.flow is not None else (0, 0)
+        u, v = (
+            water_velocity(like.flow, start)
+            if self.needs_flow and like.flow is not None
+            else (0, 0)
+        )
         vx, vy = np.asarray(start.vx, dtype=float) - u, np.asarray(start.vy, dtype=float) - v
         heading = np.where(
             np.hypot(vx, vy) > 0.0, np.arctan2(vy, vx), np.asarray(start.theta, dtype=float)
@@ -205,16 +240,3 @@ def time_step_of(sample_time: Floats) -> float:
         return LONGEST_STEP_S
     interval = float(np.median(np.diff(sample_time)))
     return interval / max(int(np.ceil(interval / LONGEST_STEP_S - 1e-9)), 2)
-
-
-def _water_at(flow: xr.Dataset, start: Start) -> tuple[Floats, Floats]:
-    """Return the water's velocity [m/s] where and when a body starts."""
-    from scipy.interpolate import RegularGridInterpolator
-
-    x, y = (flow[axis].values for axis in ("x", "y"))
-    at = np.stack([np.clip(start.y, y[0], y[-1]), np.clip(start.x, x[0], x[-1])], axis=-1)
-    found = []
-    for name in ("u", "v"):
-        values = flow[name].isel(time=0) if "time" in flow[name].dims else flow[name]
-        found.append(RegularGridInterpolator((y, x), values.values)(at).reshape(np.shape(start.x)))
-    return found[0], found[1]

@@ -1,4 +1,4 @@
-"""Parts that any member of the family can have: a wall that it feels, a slow change, a stroke."""
+"""Parts that a member of the family can have: a wall that it feels, reversals, a slow change."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ class Part:
     formula : str
         Its equation.
     parameters : tuple of Parameter
-        Its parameters; each fills the shared column of its own name.
+        Its parameters; each fills the column of its own name: the shared one, or that of every
+        state that moves.
     """
 
     name: str
@@ -31,6 +32,10 @@ class Part:
     parameters: tuple[Parameter, ...]
 
 
+_TURN = Parameter(
+    "wall_turn", "rad/s", 0.01, 100.0, scale="log",
+    meaning="Rate of turning away from the wall at contact, heading along it.",
+)  # fmt: skip
 _RANGE = Parameter(
     "wall_range", "m", 1e-4, 1.0, scale="log",
     meaning="Distance over which the wall is felt: its effect falls by e.",
@@ -45,10 +50,7 @@ PARTS: Final[Mapping[str, Part]] = {
             "dphi = wall_turn exp(-d / wall_range) sin(psi) dt;"
             " v (1 - wall_slowing exp(-d / wall_range))",
             (
-                Parameter(
-                    "wall_turn", "rad/s", 0.01, 100.0, scale="log",
-                    meaning="Rate of turning away from the wall at contact, heading along it.",
-                ),
+                _TURN,
                 Parameter(
                     "wall_slowing", "1", 0.0, 1.0,
                     meaning="Share of the speed that is lost at contact.",
@@ -66,6 +68,30 @@ PARTS: Final[Mapping[str, Part]] = {
                     meaning="Rate of turning along the wall at contact.",
                 ),
                 _RANGE,
+            ),
+        ),
+        Part(
+            "keep",
+            "The body keeps a distance: nearer the wall it turns away, farther off it turns back.",
+            "dphi = wall_turn (1 - d / wall_gap) exp(-d / wall_range) sin(psi) dt",
+            (
+                _TURN,
+                Parameter(
+                    "wall_gap", "m", 1e-4, 1.0, scale="log",
+                    meaning="Distance from contact at which turning away becomes turning towards.",
+                ),
+                _RANGE,
+            ),
+        ),
+        Part(
+            "reverse",
+            "Bouts set out backwards: a push, and the way back.",
+            "a bout begins with phi + pi at the chance reversal_share, besides its turn",
+            (
+                Parameter(
+                    "reversal_share", "1", 0.0, 1.0,
+                    meaning="Share of the bouts that begin with a turn by half a circle.",
+                ),
             ),
         ),
         Part(
