@@ -50,6 +50,7 @@ _NAMES = {
         "sensitivity_map",
         "sensitivity_reference",
     ),
+    "driftwalk.calibration": ("recover_model",),
     "driftwalk.comparison": (
         "ComparisonWarning",
         "compare_replicates",

@@ -34,6 +34,9 @@ from driftwalk.assembly import (
     sensitivity_map as sensitivity_map,
     sensitivity_reference as sensitivity_reference,
 )
+from driftwalk.calibration import (
+    recover_model as recover_model,
+)
 from driftwalk.comparison import (
     ComparisonWarning as ComparisonWarning,
     compare_replicates as compare_replicates,

@@ -47,8 +47,8 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     | {"assembly", "calibration", "likelihood", "page", "runs"},
     # `track` for its live server, through which the playground's tank can be watched.
     "viewer": GROUND
-    | {"record", "flow", "model", "comparison", "simulation", "conditions", "assembly", "track"}
-    | {"plot", "page"},
+    | {"record", "flow", "model", "comparison", "simulation", "conditions", "motion"}
+    | {"assembly", "track", "plot", "page"},
     "cli": GROUND
     | {"record", "flow", "model", "comparison", "sweep", "simulation", "motion", "conditions"}
     | {"assembly", "calibration", "likelihood", "track", "datasets", "plot", "figures", "page"}

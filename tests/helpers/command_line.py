@@ -44,7 +44,8 @@ FIGURE_WRITERS = (
     *("figures.write_figures", "figures.write_fit_figures", "figures.write_check_figures"),
     *("figures.write_recovery_figures", "figures.write_assembly_figures"),
     *("figures.write_sensitivity_figures", "figures.write_model_figures"),
-    "plot.write_animation",
+    *("figures.write_model_calibration_figures", "plot.write_animation"),
+    "figures.write_model_recovery_figures",
 )
 
 # Lines for `start` and `apart`: no figures and no film, which take most of the time of a short run.

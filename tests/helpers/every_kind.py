@@ -8,6 +8,7 @@ from functools import cache
 import xarray as xr
 from fit_worlds import coarse_study, recording
 from recovery_worlds import small_study
+from self_propelled import moving
 from small_sensitivity import FLOW, small
 from switching_worlds import START_S, coarse_study as switched_study, two_flows
 from walkers import diffuse, tumble
@@ -90,6 +91,28 @@ def model_comparison() -> xr.Dataset:
     return compare_models(track(), ["inertial", "active+wall"], budget=few, threads=2)
 
 
+def model_calibration() -> xr.Dataset:
+    model = motion_model("inertial")
+    values = {"speed_std": 0.02, "memory_time": 0.8, "turn_rate": 0.5}
+    return calibrate(moving(model, values, 40.0, seed=1), model, threads=2)
+
+
+def model_recovery() -> xr.Dataset:
+    values = {"speed": 0.03, "rotational_diffusion": 0.5}
+    short = {"recover.recordings": 2, "recover.durations_s": [40.0], "calibration.bootstrap": 10}
+    coarse = {"calibration.replicates": 1, "calibration.refined_replicates": 1}
+    study = apply_overrides(dw.Study(), {**short, **coarse})
+    model = motion_model(
+        "active",
+        Parameter("speed", "m/s", 0.01, 0.1, step=0.2, refined_step=0.1, scale="log"),
+        Parameter(
+            "rotational_diffusion", "rad2/s", 0.1, 2.5, step=0.2, refined_step=0.1, scale="log"
+        ),
+        turn_rate=0.0,
+    )
+    return dw.recover_model(model, values, study, threads=2)
+
+
 def check() -> xr.Dataset:
     return dw.check_model(every_kind("fit with the angle in the state"), track(), replicates=4)
 
@@ -107,6 +130,7 @@ FORMS: dict[str, Callable[[], xr.Dataset]] = {
     "calibration of one parameter": lambda: calibration_of_a_function(DIFFUSE),
     "calibration of two parameters": lambda: calibration_of_a_function(TUMBLE),
     "model_comparison": model_comparison,
+    "model_calibration": model_calibration,
     "fit": lambda: dw.fit_motion(track(), coarse_study(), angle="none"),
     "fit with the angle in the state": lambda: dw.fit_motion(
         track(), coarse_study(), angle="state"
@@ -114,6 +138,7 @@ FORMS: dict[str, Callable[[], xr.Dataset]] = {
     "fit of several flows": switched_fit,
     "model_check": check,
     "recovery": recovery,
+    "model_recovery": model_recovery,
     "assembly": lambda: assemble(small(), FLOW, runs=12, seed=5),
     "assembly_path": lambda: dw.assembly_path(small(), FLOW, runs=[0], seed=5),
     "outcome_distribution": lambda: dw.outcome_distribution(every_kind("assembly")),

@@ -17,11 +17,21 @@ SPEED = 0.05
 
 
 def moving(
-    model: MotionModel, values: Mapping[str, float], seconds: float, *, seed: int
+    model: MotionModel,
+    values: Mapping[str, float],
+    seconds: float,
+    *,
+    seed: int,
+    noise: float | None = None,
 ) -> xr.Dataset:
-    """Return a recording of a model in the paper's tank, at 10 Hz; it sets out along x."""
+    """Return a recording of a model in the paper's tank, at 10 Hz; it sets out along x.
+
+    `noise` is that of the camera [m]; by default there is none.
+    """
     time = np.arange(0.0, seconds, 0.1)
     study = dw.Study()
+    if noise is not None:
+        study = dw.apply_overrides(study, {"observation.position_noise_m": noise})
     track = Track(time, SPEED + 0.0 * time, 0.0 * time, np.full(time.size, np.nan))
     camera = dw.conditions.recorded_camera(track, study, position_quantum=0.0)
     like = dw.conditions.recorded_conditions(track, study, camera=camera)

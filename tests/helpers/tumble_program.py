@@ -123,6 +123,9 @@ def parameters():
     wrong = {
         "no-list": {},
         "no-name": {"parameters": [{"low": 0, "high": 1}]},
+        "steps": {"parameters": [{**speed, "step": 0.03, "refined_step": 0.01}]},
+        "no-step": {"parameters": [{**speed, "step": 0}]},
+        "text-step": {"parameters": [{**speed, "refined_step": "fine"}]},
         "no-high": {"parameters": [{"name": "speed", "low": 0}]},
         "unknown-key": {"parameters": [{**speed, "units": "m/s"}]},
         "twice": {"parameters": [speed, speed]},

@@ -169,7 +169,6 @@ def still(scene, *, a, b=0.0, c=0.0):
 @pytest.mark.parametrize(
     ("model", "message"),
     [
-        (motion_model(still, a=(0, 1), b=(0, 1), c=(0, 1)), "has 3 parameters .a, b, c., and a"),
         (
             motion_model(lambda scene, *, status: still(scene, a=status), status=(0, 1)),
             "a parameter 'status', a name that a calibration uses itself",

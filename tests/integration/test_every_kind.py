@@ -30,7 +30,11 @@ def test_it_is_what_its_schema_says(form: str, tmp_path) -> None:
 
 
 @pytest.mark.parametrize(
-    "form", ["assembly", "recovery", "sensitivity", "model_check", "model_comparison"]
+    "form",
+    [
+        *("assembly", "recovery", "sensitivity", "model_check", "model_comparison"),
+        *("model_calibration", "model_recovery"),
+    ],
 )
 def test_every_variable_of_it_is_needed(form: str) -> None:
     """Each variable that is always there is missed, and its units are looked at."""

@@ -7,13 +7,18 @@ from driftwalk.calibration.models import (
     check_models,
     compare_models,
 )
+from driftwalk.calibration.recover import check_model_recovery, recover_model
+from driftwalk.calibration.refuse import MOST_PARAMETERS
 from driftwalk.calibration.run import calibrate
 
 __all__ = [
     "ALL_MODELS",
     "DEFAULT_MODELS",
+    "MOST_PARAMETERS",
     "calibrate",
+    "check_model_recovery",
     "check_models",
     "check_recording",
     "compare_models",
+    "recover_model",
 ]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from driftwalk.calibration.models.recorded import body_motion
 from driftwalk.calibration.problem import prepare_problem
-from driftwalk.calibration.refuse import require_searchable
+from driftwalk.calibration.refuse import MOST_PARAMETERS, require_searchable
 from driftwalk.conditions import recorded_camera
 from driftwalk.motion import BlockModel, MotionModel
 from driftwalk.schema import body_track
@@ -44,13 +45,16 @@ def check_recording(
     InputError
         When the recording is too short, does not move, or several bodies are there and none named.
     ConfigurationError
-        When the model has more than two parameters, or a name that a calibration uses itself.
+        When the model has no parameter, or a name that a calibration uses itself.
 
     Examples
     --------
     >>> import driftwalk as dw
     >>> dw.calibration.check_recording(dw.tank30_recording(), dw.Study(), flow=dw.tank30_flow())
     """
+    if model is not None and len(model.parameters) > MOST_PARAMETERS:
+        body_motion(recording, study, flow=flow, body=body)
+        return
     if model is not None:
         require_searchable(model)
     track = body_track(recording, body)

@@ -1,4 +1,4 @@
-"""Which models and tracks a calibration takes: one or two parameters, by names that are free."""
+"""Which models and tracks a calibration takes, and over which parameters a grid is laid."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from driftwalk.schema import Track
 from driftwalk.schema.calibration_facts import taken_keys, taken_names
 
 MOST_PARAMETERS: Final = 2
+"""Of a grid; with more a model is searched."""
 FEWEST_SAMPLES: Final = 3
 
 
@@ -42,9 +43,8 @@ def require_searchable(model: MotionModel) -> None:
     names = [parameter.name for parameter in model.parameters]
     if not 1 <= len(names) <= MOST_PARAMETERS:
         raise ConfigurationError(
-            f"the model {model.name} has {len(names)} parameters ({', '.join(names)}), and a "
-            "calibration searches one or two: give the others a fixed value, or let compare-models "
-            "search all of them"
+            f"the model {model.name} has {len(names)} parameters to search"
+            f"{': ' + ', '.join(names) if names else ''}; a grid takes one or two"
         )
     taken, taken_flat = taken_names(), taken_keys()
     for parameter in model.parameters:

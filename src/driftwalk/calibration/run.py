@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from driftwalk.calibration.estimation import Stores, Tell, calibrate_many
 from driftwalk.calibration.problem import Axes, Problem, prepare_problem
 from driftwalk.calibration.quality import (
     FAR_ABOVE_FLOOR,
@@ -16,7 +17,7 @@ from driftwalk.calibration.quality import (
     quality_of_fit,
     validate_on_halves,
 )
-from driftwalk.calibration.refuse import require_searchable
+from driftwalk.calibration.refuse import MOST_PARAMETERS, require_searchable
 from driftwalk.calibration.region import (
     Bootstrap,
     Region,
@@ -45,7 +46,7 @@ from driftwalk.calibration.surface import Optimum
 from driftwalk.calibration.wall import wall_warning
 from driftwalk.comparison import Statistic
 from driftwalk.conditions import recorded_camera, study_in_arena
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.motion import BlockModel, Details, MotionModel
 from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.score import broken_worlds
@@ -60,15 +61,7 @@ if TYPE_CHECKING:
 MOST_RECENTRINGS = 3
 WIDE_SHARE = 0.05
 
-Tell = Callable[[str, int, int], None]
 FlowSource = Callable[[Track], "xr.Dataset | None"]
-
-
-class Stores(Protocol):
-    """Gives the store in which a stage of a calibration keeps its finished work units."""
-
-    def __call__(self, name: str, fingerprint: dict[str, Any]) -> Store | None:
-        """Return the store of a stage; None keeps results in memory."""
 
 
 def calibrate(
@@ -143,6 +136,22 @@ def calibrate(
     0.39
     """
     chosen, searched = _study_and_model(model, study, recording)
+    if len(searched.parameters) > MOST_PARAMETERS:
+        if statistic is not None:
+            raise ConfigurationError(
+                f"a statistic of its own is for one or two parameters; {searched.name} has "
+                f"{len(searched.parameters)}"
+            )
+        return calibrate_many(
+            recording,
+            searched,
+            chosen,
+            flow=flow,
+            body=body,
+            threads=threads,
+            stores=stores if stores is not None else _in_memory,
+            tell=tell if tell is not None else _silent,
+        )
     require_searchable(searched)
     track = body_track(recording, body)
     quantum = float(recording.attrs.get("position_quantum_m", 0.0))

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import typer
+
 from driftwalk.cli.inputs.study_recording import read_with_flow, tank_note
 from driftwalk.cli.options.model import ModelName, ParameterChoices, chosen_model
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.calibration_answer import print_answer, summary
+from driftwalk.cli.terminal import calibration_answer, model_answer
 from driftwalk.cli.terminal.output import print_json
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.study_keys import CALIBRATION_KEYS
@@ -28,27 +32,38 @@ def calibrate(
     model: ModelName = None,
     parameters: ParameterChoices = None,
     flow: FlowFile = None,
+    posterior: Annotated[
+        bool,
+        typer.Option(
+            "--posterior",
+            help="Write posterior.csv as well: values of a --model with more than two parameters "
+            "that could have given the recording.",
+        ),
+    ] = False,
     threads: Threads = None,
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
     """Find the drag coefficient and the stochastic force that explain a recording.
 
-    With --model: the one or two unknown parameters of another motion model. Simulates every setting
-    of a grid for the length of the recording, compares step lengths and turning angles, and refines
-    the grid around the minimum. Reports how well the parameters are known and whether the model
-    explains the motion. After a kill, the same command continues.
+    With --model: the unknown parameters of another motion model. One or two are searched on a grid:
+    every setting is simulated for the length of the recording, step lengths and turning angles are
+    compared, and the grid is refined around the minimum. More are found by summaries of the motion.
+    Reports how well the parameters are known and whether the model explains the motion. After a
+    kill, the same command continues.
     """
     from driftwalk.runs import CalibrationWork, run_calibration
 
     chosen = chosen_model(model, parameters)
     read, field, inputs = read_with_flow(recording, flow, given, how)
     work = CalibrationWork(
-        read.trajectories[0], read.study, field, how.body, inputs, threads, chosen
+        read.trajectories[0], read.study, field, how.body, inputs, threads, chosen, posterior
     )
     with reported("calibrate") as told:
         found = run_calibration(work, out, overwrite=overwrite, begun=tank_note(read), **told)
+    many = found.attrs["kind"] == "model_calibration"
+    answer = model_answer if many else calibration_answer
     if json:
-        print_json(summary(found))
+        print_json(answer.summary(found))
     else:
-        print_answer(found, out)
+        answer.print_answer(found, out)

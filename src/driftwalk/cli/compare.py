@@ -62,9 +62,6 @@ def compare(
         str | None,
         typer.Option("--body-b", help="Body in B (default: same as A).", show_default=False),
     ] = None,
-    replicate: Annotated[
-        int, typer.Option("--replicate", min=0, help="Replicate of a simulation.")
-    ] = 0,
     step_interval: Annotated[Any, study_option("step_interval")] = None,
     ties: Annotated[
         Literal["strict", "limits"],
@@ -99,7 +96,7 @@ def compare(
     if out is not None:
         require_place(out, existing="replace" if overwrite else "error")
     how_b = how if body_b is None else replace(how, body=body_b)
-    motions = (load_motion(a, how, replicate=replicate), load_motion(b, how_b, replicate=replicate))
+    motions = load_motion(a, how), load_motion(b, how_b)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         result = compare_motions(

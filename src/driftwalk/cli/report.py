@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -37,7 +37,7 @@ def report(
     Takes a run directory of calibrate, compare-models, fit, assemble, sensitivity or study recover.
     The report has the answer in words with its uncertainty, recording, flow, maps to click,
     outcomes to replay, the manifest and how to cite. It opens with a double click, without a
-    network. For a simulation it shows the first replicate. The options on reading are for a
+    network. For a simulation it shows one replicate. The options on reading are for a
     recording.
     """
     from driftwalk.page import write_report
@@ -61,11 +61,12 @@ def _page(path: Path, how: RecordingOptions, tank_diameter: float | None) -> dic
         if path.is_dir():
             _refuse_reading_options(f"{path} is a directory, read as a run", how, tank_diameter)
         return report_page(path)
-    trajectory = load_simulation(path)
+    trajectory = load_simulation(path, replicate=how.replicate or 0)
     if trajectory is None:
         trajectory = how.load(path, tank_diameter=tank_diameter)
     else:
-        _refuse_reading_options(f"{path} is a simulation", how, tank_diameter)
+        others = replace(how, replicate=None)
+        _refuse_reading_options(f"{path} is a simulation", others, tank_diameter)
     return recording_page(trajectory, describe(trajectory))
 
 

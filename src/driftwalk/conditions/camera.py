@@ -10,6 +10,8 @@ from driftwalk.record import estimate_tracking_noise
 from driftwalk.simulation.backend import Camera
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from driftwalk.model import Study
     from driftwalk.schema import Track
 
@@ -63,3 +65,38 @@ def recorded_camera(track: Track, study: Study, *, position_quantum: float) -> C
     if seen.position_quantum_m == "recording" and quantum < NEGLIGIBLE_QUANTUM * float(position):
         quantum = 0.0
     return Camera(float(position), angle, float(quantum))
+
+
+def study_as_seen(study: Study, recording: xr.Dataset, track: Track) -> Study:
+    """Return a study whose [observation] has numbers: its own, or those of the recording's camera.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    recording : xarray.Dataset
+        A `trajectory`.
+    track : Track
+        The body of it that counts.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> from driftwalk.schema import body_track
+    >>> recording = dw.tank30_recording()
+    >>> seen = study_as_seen(dw.Study(), recording, body_track(recording)).observation
+    >>> round(seen.position_noise_m, 4)
+    0.0003
+    """
+    from driftwalk.model import apply_overrides
+
+    quantum = float(recording.attrs.get("position_quantum_m", 0.0))
+    camera = recorded_camera(track, study, position_quantum=quantum)
+    return apply_overrides(
+        study,
+        {
+            "observation.position_noise_m": camera.position_noise,
+            "observation.orientation_noise_rad": camera.orientation_noise,
+            "observation.position_quantum_m": camera.position_quantum,
+        },
+    )

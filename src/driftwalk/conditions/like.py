@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from driftwalk.conditions.camera import recorded_camera
+from driftwalk.conditions.camera import study_as_seen
 from driftwalk.conditions.recorded import sample_times
 from driftwalk.conditions.start import recorded_start
 from driftwalk.simulation import simulate
@@ -56,20 +56,10 @@ def simulate_like(
     >>> run.sizes["time"]
     100
     """
-    from driftwalk.model import apply_overrides
     from driftwalk.schema import body_track
 
     track = body_track(recording, body)
-    quantum = float(recording.attrs.get("position_quantum_m", 0.0))
-    camera = recorded_camera(track, study, position_quantum=quantum)
-    study = apply_overrides(
-        study,
-        {
-            "observation.position_noise_m": camera.position_noise,
-            "observation.orientation_noise_rad": camera.orientation_noise,
-            "observation.position_quantum_m": camera.position_quantum,
-        },
-    )
+    study = study_as_seen(study, recording, track)
     begin = recorded_start(track)
     return simulate(
         study,

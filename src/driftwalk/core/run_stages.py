@@ -30,4 +30,9 @@ CALIBRATION_STAGES: Final[dict[str, Stage]] = {
     "refined": Stage("refined map", 40.0, 65.0),
     "bootstrap": Stage("bootstrap", 65.0, 93.0),
     "validation": Stage("halves", 93.0, 98.0),
+    # of more than two parameters: the search is made only where the summaries find no match
+    "summaries": Stage("summaries", 0.0, 90.0),
+    "search": Stage("search", 40.0, 60.0),
+    "longer-search": Stage("longer search", 90.0, 95.0),
+    "judged": Stage("held-out blocks", 95.0, 98.0),
 }

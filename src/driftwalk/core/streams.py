@@ -42,6 +42,9 @@ WORK: Final[dict[str, int]] = {
     "evolution": 10,
     "judged": 11,
     "tried": 12,
+    # the second stage of an estimation: its boxes, and worlds by which both stages are judged
+    "estimation": 13,
+    "weighed": 14,
     # self-assembly: its runs, the parameters drawn for them, the flows drawn for them
     "run": 32,
     "parameters": 33,
@@ -64,6 +67,7 @@ class RecoveryStream(IntEnum):
     FLOW = 0
     WORLD = 1
     GAPS = 2
+    SEARCH = 3
 
 
 class MotionStream(IntEnum):

@@ -101,6 +101,10 @@ RECOVER_KEYS: Final[dict[str, str]] = {
     "flow": "recover.flow",
     "precision": "recover.drag_coefficient_precision",
     "seed": "recover.seed",
+    "tank_diameter": "tank.diameter_m",
+    "position_noise": "observation.position_noise_m",
+    "step_interval": "steps.step_interval_s",
+    "bootstrap": "calibration.bootstrap",
 }
 """The same for a recovery study."""
 

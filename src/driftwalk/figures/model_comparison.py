@@ -10,6 +10,7 @@ import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.figures.write import write_each
+from driftwalk.plot.parts.model_panels import label_checks, plot_check_ratios, plot_own_aspects
 from driftwalk.plot.parts.style import (
     BLUE,
     DOUBLE_COLUMN_MM,
@@ -21,7 +22,6 @@ from driftwalk.plot.parts.style import (
     new_figure,
 )
 from driftwalk.schema.compared_models import own_score
-from driftwalk.schema.model_words import ASPECT_WORDS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,12 +36,6 @@ AXIS_MM: Final = 12.0
 BELOW_MM: Final = 60.0
 OTHERS_MM: Final = 82.0
 MARKERS: Final = ("o", "s", "^")
-CHECK_LABELS: Final = {
-    "displacement_1": "msd, 1 step", "displacement_3": "msd, 3 steps",
-    "displacement_10": "msd, 10 steps", "displacement_30": "msd, 30 steps",
-    "displacement_100": "msd, 100 steps", "speed_time": "speed lasts",
-    "wall_share": "at the wall", "rest_share": "at rest",
-}  # fmt: skip
 
 
 def write_model_figures(
@@ -152,54 +146,26 @@ def plot_models(comparison: xr.Dataset, ax: Axes | None = None) -> Axes:
 
 def _plot_aspects(comparison: xr.Dataset, ax: Axes) -> None:
     """Draw the distances of the first models in each aspect, and the recording's own."""
-    aspects = [str(name) for name in comparison["aspect"].values]
-    place = np.arange(len(aspects))
-    for index, color, marker in zip(range(SHOWN), COLORS, MARKERS, strict=True):
-        if index < comparison.sizes["model"]:
-            one = comparison.isel(model=index)
-            ax.plot(
-                one["held_out_distance"].values,
-                place,
-                marker,
-                ms=3.5,
-                color=color,
-                label=str(one["model"].values),
-            )
-    ax.plot(comparison["own_distance"].values, place, "|", ms=9.0, mew=1.4, color=INK, label="own")
-    ax.set_yticks(place, [ASPECT_WORDS.get(name, name) for name in aspects])
-    ax.invert_yaxis()
-    ax.set_xlim(left=0.0)
-    ax.set_xlabel("KS distance D")
+    place = np.arange(comparison.sizes["aspect"])
+    for one, color, marker in _first(comparison):
+        held, name = one["held_out_distance"].values, str(one["model"].values)
+        ax.plot(held, place, marker, ms=3.5, color=color, label=name)
+    plot_own_aspects(comparison, ax, label="own")
     ax.legend(loc="best")
 
 
 def _plot_checks(comparison: xr.Dataset, ax: Axes) -> None:
     """Draw facts that were not fitted, over those of the recording."""
-    names = [str(name) for name in comparison["check"].values]
-    place = np.arange(len(names), dtype=np.float64)
-    recorded = comparison["check_recorded"].values
-    for index, color, marker in zip(range(SHOWN), COLORS, MARKERS, strict=True):
-        if index >= comparison.sizes["model"]:
-            break
-        one = comparison.isel(model=index)
-        low, middle, high = (one[f"check_{name}"].values for name in ("low", "median", "high"))
-        # On a logarithmic axis there is no place for what is 0.
-        known = (low > 0.0) & (recorded > 0.0) & np.isfinite(low + middle + high)
-        low, middle, high = (part[known] / recorded[known] for part in (low, middle, high))
-        ax.errorbar(
-            middle,
-            place[known] + 0.2 * (index - 1),
-            xerr=[middle - low, high - middle],
-            fmt=marker,
-            ms=3.0,
-            lw=0.9,
-            color=color,
-        )
-    ax.axvline(1.0, color=INK, lw=0.6)
-    ax.set_xscale("log")
-    ax.set_yticks(place, [CHECK_LABELS.get(name, name) for name in names])
-    ax.invert_yaxis()
-    ax.set_xlabel("model / recording")
+    for index, (one, color, marker) in enumerate(_first(comparison)):
+        plot_check_ratios(one, ax, color=color, marker=marker, shift=0.2 * (index - 1))
+    label_checks(comparison, ax)
+
+
+def _first(comparison: xr.Dataset) -> list[tuple[xr.Dataset, str, str]]:
+    """Return the first models with their colours and markers."""
+    count = min(SHOWN, comparison.sizes["model"])
+    models = [comparison.isel(model=index) for index in range(count)]
+    return list(zip(models, COLORS, MARKERS, strict=False))
 
 
 def _require_comparison(comparison: xr.Dataset) -> None:

@@ -9,6 +9,8 @@ from driftwalk.motion.program import ProgramModel
 from driftwalk.motion.protocol import Details, MotionModel, Scores, ScoresItself, Worlds
 from driftwalk.motion.random import WorldRandom
 from driftwalk.motion.score import score_worlds
+from driftwalk.motion.simulated import model_start, simulate_motion
+from driftwalk.motion.values import estimated_values, known_values
 from driftwalk.schema import Parameter
 
 __all__ = [
@@ -28,9 +30,13 @@ __all__ = [
     "ScoresItself",
     "WorldRandom",
     "Worlds",
+    "estimated_values",
     "is_family_name",
+    "known_values",
+    "model_start",
     "models",
     "motion_model",
     "observe_worlds",
     "score_worlds",
+    "simulate_motion",
 ]

@@ -22,6 +22,7 @@ from driftwalk.core.file_names import text_of_name
 from driftwalk.core.provenance import file_sha256
 from driftwalk.motion.batches import in_words, world_batches
 from driftwalk.motion.camera import observe_worlds
+from driftwalk.motion.program_flow import FlowFile
 from driftwalk.motion.program_lines import (
     Positions,
     read_parameters,
@@ -152,6 +153,7 @@ class ProgramModel:
 
     def _open(self) -> None:
         self._pool = ProgramPool(self.command, self.words, self.folder, self.timeout)
+        self._flow_file = FlowFile()
         self._numbers = count(1)
         self._lock = Lock()
         self._probed_like: Conditions | None = None
@@ -179,7 +181,8 @@ class ProgramModel:
         keys: Keys,
         stop: Event,
     ) -> Positions:
-        request = world_request(next(self._numbers), setting, like, keys)
+        flow = None if like.flow is None else self._flow_file.path_of(like.flow)
+        request = world_request(next(self._numbers), setting, like, keys, flow=flow)
         return read_positions(self._pool.ask(program, request, stop), request)
 
     def _require_repeats(self, program: Program, like: Conditions, stop: Event) -> None:

@@ -37,7 +37,8 @@ UNITS: Final = {
     "omega": "omega_rad_s",
 }
 """From the names of a start to the keys of its numbers."""
-KEYS_OF_A_PARAMETER: Final = ("name", "unit", "low", "high", "scale", "meaning")
+STEPS: Final = ("step", "refined_step")
+KEYS_OF_A_PARAMETER: Final = ("name", "unit", "low", "high", *STEPS, "scale", "meaning")
 
 
 class Positions(NamedTuple):
@@ -66,11 +67,16 @@ PARAMETERS_REQUEST: Final = Request(
 
 
 def world_request(
-    number: int, setting: Mapping[str, float], like: Conditions, keys: Keys
+    number: int,
+    setting: Mapping[str, float],
+    like: Conditions,
+    keys: Keys,
+    *,
+    flow: str | None = None,
 ) -> WorldRequest:
-    """Return the request for the worlds of one setting, one per key."""
+    """Return the request for the worlds of one setting, one per key; `flow` is a file."""
     start = world_starts(like.start, keys)._asdict()
-    asked = {
+    asked: dict[str, Any] = {
         "id": number,
         "parameters": dict(setting),
         "times_s": like.sample_time.tolist(),
@@ -78,6 +84,8 @@ def world_request(
         "seeds": world_seeds(keys),
         "tank": like.tank.to_arena(),
     }
+    if flow is not None:
+        asked["flow_file"] = flow
     shape = keys.size, like.sample_time.size
     most = MIB + 3 * BYTES_PER_NUMBER * keys.size * like.sample_time.size
     line = json.dumps(asked, separators=(",", ":")).encode() + b"\n"
@@ -175,13 +183,19 @@ def _parameter(given: Any) -> Parameter:
         value = given.get(key)
         if value is None or not _is_number_or_null(value) or not math.isfinite(value):
             raise ConfigurationError(f"its parameter {name} has no number {key}: {value!r:.80}")
+    for key in STEPS:
+        value = given.get(key)
+        if not _is_number_or_null(value) or (value is not None and not 0.0 < value < math.inf):
+            raise ConfigurationError(f"its parameter {name} has no {key} above 0: {value!r:.80}")
     scale: Any = given.get("scale") or "linear"
     return Parameter(
         name,
         str(given.get("unit") or "1"),
         float(given["low"]),
         float(given["high"]),
+        float(given.get("step") or 0.0),
         scale=scale,
+        refined_step=float(given.get("refined_step") or 0.0),
         meaning=str(given.get("meaning") or ""),
     )
 

@@ -13,6 +13,7 @@ from driftwalk.page.sections.fit import fit_sections
 from driftwalk.page.sections.flow import flow_section
 from driftwalk.page.sections.manifest import manifest_section
 from driftwalk.page.sections.map import map_section
+from driftwalk.page.sections.model_recovery import model_recovery_sections
 from driftwalk.page.sections.models import model_sections
 from driftwalk.page.sections.recording import trajectory_section
 from driftwalk.page.sections.recovery import recovery_sections
@@ -30,6 +31,7 @@ __all__ = [
     "joined_page",
     "manifest_section",
     "map_section",
+    "model_recovery_sections",
     "model_sections",
     "profile_sections",
     "recording_page",

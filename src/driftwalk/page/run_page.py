@@ -20,6 +20,8 @@ from driftwalk.page.sections.assembly import assembly_sections
 from driftwalk.page.sections.calibration import calibration_sections
 from driftwalk.page.sections.fit import fit_sections
 from driftwalk.page.sections.manifest import manifest_section
+from driftwalk.page.sections.many import many_sections
+from driftwalk.page.sections.model_recovery import model_recovery_sections
 from driftwalk.page.sections.models import model_sections
 from driftwalk.page.sections.recording import noise_of, recording_sections
 from driftwalk.page.sections.recovery import recovery_sections
@@ -41,6 +43,8 @@ TITLES: Final = {
     "sensitivity": "Sensitivity of self-assembly",
     "recovery": "Recovery study",
     "model_comparison": "Comparison of motion models",
+    "model_calibration": "Calibration of a motion model",
+    "model_recovery": "Recovery study of a motion model",
     None: "Run",
 }
 
@@ -104,7 +108,8 @@ def dataset_page(dataset: xr.Dataset) -> dict[str, Any]:
     Parameters
     ----------
     dataset : xarray.Dataset
-        A `fit`, `calibration`, `model_comparison`, `assembly`, `sensitivity` or `recovery`.
+        A `fit`, `calibration`, `model_calibration`, `model_comparison`, `assembly`, `sensitivity`,
+        `recovery` or `model_recovery`.
 
     Returns
     -------
@@ -350,10 +355,23 @@ def _recovery(run: Run) -> list[Section]:
     return recovery_sections(run.dataset(MAIN_FILES["recovery"]))
 
 
+def _model_recovery(run: Run) -> list[Section]:
+    return model_recovery_sections(run.dataset(MAIN_FILES["model_recovery"]))
+
+
 def _models(run: Run) -> list[Section]:
     recordings = run.recordings()
     return model_sections(
         run.dataset(MAIN_FILES["model_comparison"]),
+        recording=recordings[0] if recordings else None,
+        body=run.body,
+    )
+
+
+def _many(run: Run) -> list[Section]:
+    recordings = run.recordings()
+    return many_sections(
+        run.dataset(MAIN_FILES["model_calibration"]),
         recording=recordings[0] if recordings else None,
         body=run.body,
     )
@@ -366,6 +384,8 @@ _SECTIONS: Final[dict[str, Callable[[Run], list[Section]]]] = {
     "sensitivity": _sensitivity,
     "recovery": _recovery,
     "model_comparison": _models,
+    "model_calibration": _many,
+    "model_recovery": _model_recovery,
 }
 
 _SECTIONS_OF_ONE: Final[dict[str, Callable[[xr.Dataset], list[Section]]]] = {
@@ -375,4 +395,6 @@ _SECTIONS_OF_ONE: Final[dict[str, Callable[[xr.Dataset], list[Section]]]] = {
     "sensitivity": lambda found: sensitivity_sections(sensitivity=found),
     "recovery": recovery_sections,
     "model_comparison": model_sections,
+    "model_calibration": many_sections,
+    "model_recovery": model_recovery_sections,
 }

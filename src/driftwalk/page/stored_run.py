@@ -25,6 +25,8 @@ MAIN_FILES: Final = {
     "sensitivity": "sensitivity.nc",
     "recovery": "recovery.nc",
     "model_comparison": "comparison.nc",
+    "model_calibration": "model_calibration.nc",
+    "model_recovery": "model_recovery.nc",
 }
 
 

@@ -26,6 +26,7 @@ from driftwalk.record.registry import find_loader
 from driftwalk.record.text import DAMAGED_GZIP
 from driftwalk.record.warn import angle_warnings, plausibility_warnings
 from driftwalk.schema import build_trajectory
+from driftwalk.schema.netcdf import kind_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,6 +53,7 @@ def load(
     y: str | PathLike[str] | None = None,
     theta: str | PathLike[str] | None = None,
     keypoint: str | None = None,
+    replicate: int | None = None,
 ) -> xr.Dataset:
     """Load a recording as a `trajectory` dataset in SI units, y up.
 
@@ -95,6 +97,8 @@ def load(
         One matrix per coordinate: a row per frame, a column per body.
     keypoint : str, optional
         Keypoint of a pose file that is the body.
+    replicate : int, optional
+        Replicate of a simulation, counted from 0; default: the first.
 
     Returns
     -------
@@ -127,7 +131,10 @@ def load(
         y=None if y is None else Path(y),
         theta=None if theta is None else Path(theta),
         keypoint=keypoint,
+        replicate=replicate or 0,
     )
+    if replicate is not None and kind_of(source) != "simulation":
+        raise InputError(f"{source}: no simulation, so it has no replicates: omit `replicate`")
     loader = find_loader(source, format=format or ("matrices" if options.y is not None else None))
     try:
         raw = loader.read(source, options)

@@ -130,3 +130,5 @@ class ReadOptions:
     """File of the orientation matrix."""
     keypoint: str | None = None
     """Keypoint of a pose file that is the body."""
+    replicate: int = 0
+    """Replicate of a simulation, counted from 0."""

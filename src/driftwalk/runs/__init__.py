@@ -2,10 +2,12 @@
 
 from driftwalk.runs.assembly import AssemblyResult, AssemblyWork, run_assembly
 from driftwalk.runs.calibrated import Calibrated, read_calibrated
-from driftwalk.runs.calibration import CalibrationWork, run_calibration
+from driftwalk.runs.calibration import CalibrationWork, result_file, run_calibration
 from driftwalk.runs.fit import Fitted, FitWork, run_fit
 from driftwalk.runs.folder import Progress
+from driftwalk.runs.found_values import FoundValues, read_found_values
 from driftwalk.runs.model_comparison import ModelComparisonWork, run_model_comparison
+from driftwalk.runs.model_recovery import ModelRecoveryWork, run_model_recovery
 from driftwalk.runs.recovery import RecoveryWork, run_recovery
 from driftwalk.runs.sensitivity import SensitivityResult, SensitivityWork, run_sensitivity
 from driftwalk.schema.netcdf import netcdf_bytes
@@ -17,17 +19,22 @@ __all__ = [
     "CalibrationWork",
     "FitWork",
     "Fitted",
+    "FoundValues",
     "ModelComparisonWork",
+    "ModelRecoveryWork",
     "Progress",
     "RecoveryWork",
     "SensitivityResult",
     "SensitivityWork",
     "netcdf_bytes",
     "read_calibrated",
+    "read_found_values",
+    "result_file",
     "run_assembly",
     "run_calibration",
     "run_fit",
     "run_model_comparison",
+    "run_model_recovery",
     "run_recovery",
     "run_sensitivity",
 ]

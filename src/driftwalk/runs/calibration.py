@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.run_stages import CALIBRATION_STAGES
 from driftwalk.runs.folder import Progress, naming_recording, open_run, silent
 from driftwalk.runs.stored import dataset_hash
 from driftwalk.schema.netcdf import netcdf_bytes
+from driftwalk.schema.parameters import unit_suffix
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,6 +43,8 @@ class CalibrationWork:
         Threads; the result does not depend on them.
     model : MotionModel or None
         The model to calibrate; None for the block of the study.
+    posterior : bool
+        Whether the values that could have given the recording are written as a table, too.
     """
 
     recording: xr.Dataset
@@ -50,6 +54,7 @@ class CalibrationWork:
     inputs: Mapping[str, Path]
     threads: int | None = None
     model: MotionModel | None = None
+    posterior: bool = False
 
 
 def run_calibration(
@@ -64,7 +69,8 @@ def run_calibration(
     """Calibrate in a run directory and return the calibration.
 
     Writes ``calibration.nc``, ``flow.nc``, ``recording.nc``, ``figures/`` and, last,
-    ``manifest.json``. Killed at any moment and started again it continues.
+    ``manifest.json``; with more than two parameters ``model_calibration.nc``. Killed at any moment
+    and started again it continues.
 
     Parameters
     ----------
@@ -84,12 +90,14 @@ def run_calibration(
     Returns
     -------
     xarray.Dataset
-        A `calibration`.
+        A `calibration`, or with more than two parameters a `model_calibration`.
 
     Raises
     ------
     InputError
         When the recording cannot be calibrated on; nothing is written then.
+    ConfigurationError
+        When a posterior is asked for of a model with one or two parameters, or without a bootstrap.
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
 
@@ -100,8 +108,9 @@ def run_calibration(
     >>> found = run_calibration(work, Path("run"))  # doctest: +SKIP
     """
     from driftwalk.calibration import calibrate
-    from driftwalk.figures import write_figures
 
+    if work.posterior:
+        _require_draws(work)
     flow = _checked_flow(work)
     with open_run(
         folder,
@@ -127,16 +136,68 @@ def run_calibration(
             stores=_stores(run),
             tell=lambda stage, done, total: progress(*_overall(stage, done, total)),
         )
-        run.write("calibration.nc", netcdf_bytes(found))
+        run.write(result_file(work.model), netcdf_bytes(found))
+        if work.posterior:
+            run.write("posterior.csv", _posterior_table(found))
         progress(100, 100, "figures")
-        write_figures(
-            found,
-            flow=flow,
-            trajectory=work.recording,
-            folder=run.folder("figures"),
-            body=work.body,
-        )
+        _write_figures(found, work, flow, run)
     return found
+
+
+def result_file(model: MotionModel | None) -> str:
+    """Return the name of the file that a calibration of a model writes.
+
+    Parameters
+    ----------
+    model : MotionModel or None
+        The model; None for the block.
+
+    Examples
+    --------
+    >>> result_file(None)
+    'calibration.nc'
+    """
+    return "model_calibration.nc" if _is_searched(model) else "calibration.nc"
+
+
+def _is_searched(model: MotionModel | None) -> bool:
+    from driftwalk.calibration import MOST_PARAMETERS
+
+    return model is not None and len(model.parameters) > MOST_PARAMETERS
+
+
+def _require_draws(work: CalibrationWork) -> None:
+    """Refuse to write draws where there will be none."""
+    if not _is_searched(work.model):
+        raise ConfigurationError(
+            "a posterior is drawn for models with more than two parameters; with one or two, the "
+            "bootstrap's estimates are in the calibration"
+        )
+    if work.study.calibration.bootstrap < 2 or work.study.calibration.refine == "none":
+        raise ConfigurationError(
+            "a posterior needs the summaries: `calibration.bootstrap` of 2 or more"
+        )
+
+
+def _posterior_table(found: xr.Dataset) -> bytes:
+    """Return the draws as CSV, a column for each parameter with its unit in the name."""
+    names, units = found["parameter"].values.tolist(), found["unit"].values.tolist()
+    suffixes = [unit_suffix(unit) for unit in units]
+    keys = [f"{name}_{end}" if end else name for name, end in zip(names, suffixes, strict=True)]
+    rows = [",".join(map(repr, row)) for row in found["draws"].values.tolist()]
+    return "\n".join([",".join(keys), *rows, ""]).encode()
+
+
+def _write_figures(
+    found: xr.Dataset, work: CalibrationWork, flow: xr.Dataset | None, run: RunDirectory
+) -> None:
+    from driftwalk.figures import write_figures, write_model_calibration_figures
+
+    folder = run.folder("figures")
+    if _is_searched(work.model):
+        write_model_calibration_figures(folder, calibration=found)
+    else:
+        write_figures(found, flow=flow, trajectory=work.recording, folder=folder, body=work.body)
 
 
 def _checked_flow(work: CalibrationWork) -> xr.Dataset | None:
@@ -164,6 +225,7 @@ def _specification(work: CalibrationWork) -> dict[str, Any]:
         "flow_sha256": None if work.flow is None else dataset_hash(work.flow, ("u", "v")),
         # Runs of the block have no such entry: those begun by earlier versions go on.
         **({} if work.model is None else {"model": work.model.describe()}),
+        **({"kind": "model_calibration"} if _is_searched(work.model) else {}),
     }
 
 

@@ -97,7 +97,7 @@ def answer_lines(found: xr.Dataset) -> list[str]:
     ['C_d  0.4  [0.38, 0.42]', 'intervals of 90 %']
     """
     needed = ("estimate", "parameter", "unit")
-    if "score" in found.variables and "model" in found.variables:
+    if "score" in found.variables and "model" in found.dims:
         return [*_ranking(found), *_remarks(found)]
     if any(name not in found.variables for name in needed) or found["estimate"].ndim != 1:
         return []
@@ -105,7 +105,7 @@ def answer_lines(found: xr.Dataset) -> list[str]:
     heads = [symbol_of(name) for name in names]
     width = max(map(len, heads), default=0)
     lines = [
-        f"{head:{width}}  {_text(estimate_of(found, name))}"
+        f"{head:{width}}  {_text(estimate_of(found, name))}{_open(found, name)}"
         for head, name in zip(heads, names, strict=True)
     ]
     lines += _conditions(found)
@@ -114,6 +114,12 @@ def answer_lines(found: xr.Dataset) -> list[str]:
     elif "check_left_out" in found.attrs:
         lines.append(f"not checked: {found.attrs['check_left_out']}")
     return [*lines, *_remarks(found)]
+
+
+def _open(found: xr.Dataset, name: str) -> str:
+    """Return a remark on a parameter that the recording does not determine."""
+    known = "determined" not in found or bool(found["determined"].sel(parameter=name))
+    return "" if known else "  not determined"
 
 
 def _ranking(found: xr.Dataset) -> list[str]:

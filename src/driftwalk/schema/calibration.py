@@ -64,8 +64,12 @@ def stored_parameters(calibration: xr.Dataset) -> tuple[StoredParameter, ...]:
 
 
 def is_block(calibration: xr.Dataset) -> bool:
-    """Return whether a calibration is about the block in a stirred tank."""
-    return tuple(one.name for one in stored_parameters(calibration)) == BLOCK
+    """Return whether a calibration is about the block in a stirred tank.
+
+    Another model names itself, and may have parameters of the same names.
+    """
+    names = tuple(one.name for one in stored_parameters(calibration))
+    return names == BLOCK and "model" not in calibration.attrs
 
 
 def _parameter(calibration: xr.Dataset, name: str) -> StoredParameter:

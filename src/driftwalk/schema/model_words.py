@@ -22,3 +22,10 @@ CHECK_WORDS: Final = {
     "wall_share": "share of the time at the wall",
     "rest_share": "share of the time at rest",
 }
+CHECK_LABELS: Final = {
+    "displacement_1": "msd, 1 step", "displacement_3": "msd, 3 steps",
+    "displacement_10": "msd, 10 steps", "displacement_30": "msd, 30 steps",
+    "displacement_100": "msd, 100 steps", "speed_time": "speed lasts",
+    "wall_share": "at the wall", "rest_share": "at rest",
+}  # fmt: skip
+"""Short ones, for figures."""

@@ -69,10 +69,19 @@ def test_a_model_in_a_file_of_the_users(
     assert manifest["specification"]["model"]["source_sha256"]
 
 
+FIXED = (
+    *("--parameter", "speed=0.1", "--parameter", "rotational_diffusion=1"),
+    *("--parameter", "turn_rate=0"),
+)
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--model", "run_rest"), "let compare-models search all of them"),
+        (
+            ("--model", "active", *FIXED),
+            "active has 0 parameters to search; a grid takes one or two",
+        ),
         (("--model", "activ"), "activ"),
         (("--model", "nowhere.py:diffuse"), "nowhere.py"),
         (("--parameter", "speed=0.1"), "belongs to a --model"),

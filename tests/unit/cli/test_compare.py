@@ -128,6 +128,6 @@ def test_replicates_of_a_simulation_are_trajectories(synthetic: dict[str, Path])
     from driftwalk.cli.inputs.motion import load_motion
     from driftwalk.cli.options.recording import RecordingOptions
 
-    motion = load_motion(synthetic["simulation"], RecordingOptions(), replicate=1)
+    motion = load_motion(synthetic["simulation"], RecordingOptions(replicate=1))
     assert motion.attrs["kind"] == "trajectory"
     assert body_track(motion).x.size == 400

@@ -17,7 +17,6 @@ RECORDING = Path(str(files("driftwalk.datasets") / "tank30_ode_a" / "recording.c
 @pytest.mark.parametrize(
     ("kind", "command"),
     [
-        ("simulation", "driftwalk compare"),
         ("assembly_path", "driftwalk classify"),
         ("flow_field", "--flow"),
         ("fit", "driftwalk report"),

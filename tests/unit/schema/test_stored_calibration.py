@@ -17,7 +17,7 @@ from driftwalk.core.errors import ConfigurationError, FormatError, InputError
 from driftwalk.motion import motion_model
 from driftwalk.page.run_page import dataset_page
 from driftwalk.schema import check_dataset
-from driftwalk.schema.calibration import stored_parameters
+from driftwalk.schema.calibration import is_block, stored_parameters
 from driftwalk.schema.calibration_facts import calibration_facts, calibration_parts, facts_of
 from driftwalk.schema.check import unknown_names
 from driftwalk.schema.earlier import current_form
@@ -40,6 +40,13 @@ def stored(dataset: xr.Dataset, folder: Path) -> xr.Dataset:
     path = folder / "calibration.nc"
     path.write_bytes(bytes(dataset.to_netcdf(engine="h5netcdf")))
     return open_netcdf(path)
+
+
+def test_a_model_with_the_block_s_parameters_is_not_the_block() -> None:
+    dims = ("drag_coefficient", "force_std")
+    found = xr.Dataset({"ks_distance": (dims, np.ones((2, 3)))}, attrs={"kind": "calibration"})
+    assert is_block(found)
+    assert not is_block(found.assign_attrs(model="ode_model"))
 
 
 @pytest.mark.slow

@@ -31,6 +31,9 @@ APART: Final = 0.15
 class Budget:
     """How much a search may simulate.
 
+    The default spends its worlds on many starts and generations, one world per setting: a setting
+    that was lucky is forgotten in the next generation, and a start in the wrong valley is not.
+
     Attributes
     ----------
     design : int
@@ -45,11 +48,11 @@ class Budget:
         Worlds for each mean that is evaluated again.
     """
 
-    design: int = 256
-    starts: int = 3
+    design: int = 512
+    starts: int = 6
     short: int = 25
-    long: int = 60
-    replicates: int = 2
+    long: int = 140
+    replicates: int = 1
     retest: int = 8
 
     def evaluations(self, parameters: int) -> int:
@@ -69,6 +72,8 @@ class Found(NamedTuple):
     """Scores at the ends of the short searches and of the long one: how much they differ says how
     far the search is to be trusted."""
     evaluations: int
+    settings: Floats
+    """The settings at these ends, shape (ends, parameters)."""
 
 
 def population(parameters: int) -> int:
@@ -141,7 +146,7 @@ class _Search:
         means = np.array([*ends, long])
         found = np.array([*first, *last])
         best = int(found.argmin())
-        return Found(means[best], float(found[best]), found, self.done)
+        return Found(means[best], float(found[best]), found, self.done, means)
 
     def _design(self) -> Floats:
         from scipy.stats import qmc
@@ -170,7 +175,8 @@ class _Search:
             mean=np.clip(start, 0.01, 0.99),
             sigma=sigma,
             bounds=bounds,
-            seed=self.seed * 1009 + number,
+            # The generator of the older kind that it takes has seeds of 32 bits.
+            seed=(self.seed * 1009 + number) % 2**32,
             population_size=size,
         )
         settings = np.empty((0, self.parameters))

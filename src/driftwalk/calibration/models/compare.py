@@ -18,12 +18,10 @@ from driftwalk.calibration.models.contestants import (
     walks,
 )
 from driftwalk.calibration.models.judge import Judged, judge
-from driftwalk.calibration.models.recorded import RecordedMotion, recorded_motion
+from driftwalk.calibration.models.recorded import RecordedMotion, body_motion
 from driftwalk.calibration.models.result import build_comparison
-from driftwalk.calibration.refuse import require_samples
 from driftwalk.conditions import study_in_arena
 from driftwalk.motion import MotionModel
-from driftwalk.schema import body_track
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
 
 if TYPE_CHECKING:
@@ -35,7 +33,10 @@ DEFAULT_MODELS: Final = (
     BLOCK, "inertial", "active+wall", "run_tumble+wall", "run_rest+wall", "burst_coast+wall",
     "two_state+wall",
 )  # fmt: skip
-ALL_MODELS: Final = (*DEFAULT_MODELS, "run_tumble+wall+slow", "run_rest+wall+stroke")
+ALL_MODELS: Final = (
+    *DEFAULT_MODELS, "run_tumble+wall+slow", "run_rest+wall+stroke", "run_rest+wall+reverse",
+    "run_tumble+wall+follow+keep",
+)  # fmt: skip
 Tell = Callable[[int, int, str], None]
 
 
@@ -106,7 +107,7 @@ def compare_models(
     >>> found = dw.compare_models(recording, ["block", "inertial"])  # doctest: +SKIP
     """
     chosen = _study(recording, study)
-    motion = _motion(recording, chosen, flow, body, threads)
+    motion = body_motion(recording, chosen, flow=flow, body=body, threads=threads)
     entries, warnings = contestants(made_models(models, motion, chosen), motion, chosen)
     entries += walks(motion)
     seed = chosen.calibration.seed
@@ -154,7 +155,7 @@ def check_models(
     ['block', 'run_rest']
     """
     chosen = _study(recording, study)
-    motion = _motion(recording, chosen, flow, body, None)
+    motion = body_motion(recording, chosen, flow=flow, body=body)
     return made_models(models, motion, chosen)
 
 
@@ -163,19 +164,6 @@ def _study(recording: xr.Dataset, study: Study | None) -> Study:
     from driftwalk.model import Study
 
     return study_in_arena(Study(), recording) if study is None else study
-
-
-def _motion(
-    recording: xr.Dataset,
-    study: Study,
-    flow: xr.Dataset | None,
-    body: str | None,
-    threads: int | None,
-) -> RecordedMotion:
-    track = body_track(recording, body)
-    require_samples(track)
-    quantum = float(recording.attrs.get("position_quantum_m", 0.0))
-    return recorded_motion(track, study, position_quantum=quantum, flow=flow, threads=threads)
 
 
 def _judged_all(

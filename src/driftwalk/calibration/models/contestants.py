@@ -110,7 +110,7 @@ def _made(one: Chosen, motion: RecordedMotion, study: Study) -> MotionModel:
     if one == BLOCK:
         return BlockModel(study)
     # Only the family leaves its distance from the wall to the recording.
-    clearance = motion.clearance if is_family_name(one) else 0.0
+    clearance = motion.clearance if is_family_name(one) else None
     return motion_model(one, clearance=clearance)
 
 

@@ -53,20 +53,27 @@ def judge(
     entry: Contestant, motion: RecordedMotion, *, budget: Budget, seed: int, tell: Tell | None
 ) -> Judged:
     """Search a model on the even blocks of a recording, and judge it on the odd ones."""
-    objective = AspectObjective(
-        entry.model, entry.ranges, entry.like, motion.plan, motion.fitted, seed
-    )
-    if entry.ranges:
-        _require_numbers(objective)
-        found = search_minimum(objective, len(entry.ranges), budget=budget, seed=seed, tell=tell)
-        point, ends, evaluations = found.best, found.ends, found.evaluations
-    else:
-        point, ends, evaluations = np.empty(0), np.empty(0), 0
+    objective = even_blocks(entry, motion, seed)
+    if not entry.ranges:
+        return judge_setting(objective, motion, np.empty(0))
+    require_numbers(objective)
+    found = search_minimum(objective, len(entry.ranges), budget=budget, seed=seed, tell=tell)
+    judged = judge_setting(objective, motion, found.best)
+    return judged._replace(ends=found.ends, evaluations=found.evaluations)
+
+
+def even_blocks(entry: Contestant, motion: RecordedMotion, seed: int) -> AspectObjective:
+    """Return how far a model's settings are from the even blocks of a recording."""
+    return AspectObjective(entry.model, entry.ranges, entry.like, motion.plan, motion.fitted, seed)
+
+
+def judge_setting(objective: AspectObjective, motion: RecordedMotion, point: Floats) -> Judged:
+    """Judge a setting, in the unit cube, on the odd blocks of a recording."""
     seen = objective.simulated(point[None], JUDGED, stage="judged")
     aspects, broken = objective.aspects(seen), broken_worlds(seen.status)
 
     def distances(reference: AspectReference) -> Floats:
-        apart = reference.distances(aspects, threads=entry.like.threads)
+        apart = reference.distances(aspects, threads=objective.like.threads)
         apart[broken] = 1.0
         return apart
 
@@ -80,12 +87,12 @@ def judge(
             [float(part.overall(distances(part)).mean()) for part in motion.without_each_block]
         ),
         checks=np.array([motion.checks(x, y) for x, y in zip(seen.x, seen.y, strict=True)]),
-        ends=ends,
-        evaluations=evaluations,
+        ends=np.empty(0),
+        evaluations=0,
     )
 
 
-def _require_numbers(objective: AspectObjective) -> None:
+def require_numbers(objective: AspectObjective) -> None:
     """Refuse a model that loses its numbers wherever it is tried: no search could mend that."""
     from scipy.stats import qmc
 

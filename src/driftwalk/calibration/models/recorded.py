@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from driftwalk.calibration.evolution import Scales, scales_of, wall_distance
 from driftwalk.calibration.models.checks import motion_checks
+from driftwalk.calibration.refuse import require_samples
 from driftwalk.comparison import KsReference
 from driftwalk.comparison.aspects import (
     BLOCKS,
@@ -27,7 +28,7 @@ from driftwalk.comparison.aspects import (
 )
 from driftwalk.conditions import Conditions, recorded_camera, recorded_conditions
 from driftwalk.core.errors import InputError
-from driftwalk.schema import Track
+from driftwalk.schema import Track, body_track
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,6 +51,8 @@ class RecordedMotion:
         The present samples, time from 0 on.
     like : Conditions
         Its conditions, for simulations.
+    own_plan : AspectPlan
+        How the track shows its aspects.
     plan : AspectPlan
         How a simulated world shows its aspects.
     aspects : tuple of Aspect
@@ -76,6 +79,7 @@ class RecordedMotion:
 
     track: Track
     like: Conditions
+    own_plan: AspectPlan
     plan: AspectPlan
     aspects: tuple[Aspect, ...]
     fitted: AspectReference
@@ -125,6 +129,27 @@ class RecordedMotion:
     def duration(self) -> float:
         """From the first to the last sample [s]."""
         return float(self.track.time[-1])
+
+
+def body_motion(
+    recording: xr.Dataset,
+    study: Study,
+    *,
+    flow: xr.Dataset | None,
+    body: str | None,
+    threads: int | None = None,
+) -> RecordedMotion:
+    """Prepare a body of a recording for motion models; see `recorded_motion`.
+
+    Raises
+    ------
+    InputError
+        When it is too short, does not move, or several bodies are there and none is named.
+    """
+    track = body_track(recording, body)
+    require_samples(track)
+    quantum = float(recording.attrs.get("position_quantum_m", 0.0))
+    return recorded_motion(track, study, position_quantum=quantum, flow=flow, threads=threads)
 
 
 def recorded_motion(
@@ -185,6 +210,7 @@ def recorded_motion(
     return RecordedMotion(
         track=track,
         like=like,
+        own_plan=plan,
         plan=plan_aspects(like.sample_time, step_interval=plan.short.step_interval),
         aspects=aspects,
         fitted=fitted,

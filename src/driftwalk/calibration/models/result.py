@@ -44,7 +44,7 @@ def build_comparison(
     order = np.argsort([one.score for one in judged], kind="stable")
     entries, judged = [entries[k] for k in order], [judged[k] for k in order]
     behind = np.array([one.score - judged[0].score for one in judged])
-    behind_std = np.array([_error(one.without - judged[0].without) for one in judged])
+    behind_std = np.array([without_error(one.without - judged[0].without) for one in judged])
     names = [entry.model.name for entry in entries]
     verdicts = [
         verdict_of(
@@ -61,17 +61,15 @@ def build_comparison(
         for k, one in enumerate(judged)
         if k > closest
         and one.score - judged[closest].score
-        < TIED_SIGMAS * _error(one.without - judged[closest].without)
+        < TIED_SIGMAS * without_error(one.without - judged[closest].without)
     ]
     units, values = _estimates(entries, judged)
     steady = _steadiness(motion)
-    said = [*warnings, *_edge_warnings(entries, judged)]
-    if steady is not None and steady.warning is not None:
-        said.append(steady.warning + _change(motion))
+    said = [*warnings, *_edge_warnings(entries, judged), *steadiness_warnings(motion)]
     findings = _findings(names, entries, verdicts, closest, tied)
     data: dict[str, Any] = {
         "score": ("model", [one.score for one in judged]),
-        "score_std": ("model", [_error(one.without) for one in judged]),
+        "score_std": ("model", [without_error(one.without) for one in judged]),
         "behind": ("model", behind),
         "behind_std": ("model", behind_std),
         "free_numbers": ("model", [entry.numbers for entry in entries]),
@@ -114,7 +112,7 @@ def build_comparison(
     return build_dataset("model_comparison", data, coords, attrs)
 
 
-def _error(without: Floats) -> float:
+def without_error(without: Floats) -> float:
     """Return the standard error of a mean from what is left without each block (jackknife)."""
     count = without.size
     return float(np.sqrt((count - 1) / count * ((without - without.mean()) ** 2).sum()))
@@ -169,6 +167,14 @@ def _edge_warnings(entries: Sequence[Contestant], judged: Sequence[Judged]) -> l
 def _steadiness(motion: RecordedMotion) -> Steadiness | None:
     steps = next(one for one in motion.aspects if one.name == "steps").points
     return steadiness_of_steps(steps, lambda one, other: points_distance(KsReference(one), other))
+
+
+def steadiness_warnings(motion: RecordedMotion) -> list[str]:
+    """Return a sentence where the halves of a recording differ, and when its speed changed."""
+    steady = _steadiness(motion)
+    if steady is None or steady.warning is None:
+        return []
+    return [steady.warning + _change(motion)]
 
 
 def _change(motion: RecordedMotion) -> str:

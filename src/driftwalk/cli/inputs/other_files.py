@@ -11,7 +11,6 @@ from driftwalk.core.errors import FormatError, InputError
 
 VIDEOS: Final = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpeg", ".mpg", ".webm", ".wmv")
 KINDS: Final = {
-    "simulation": "a simulation: driftwalk report and driftwalk compare take it",
     "assembly_path": "the motion of runs of driftwalk assemble: driftwalk classify takes it, and "
     "driftwalk report its run directory",
     "flow_field": "a flow field, and no positions: it is for --flow",
@@ -74,4 +73,4 @@ def _netcdf_kind(path: Path) -> str | None:
     if path.suffix.lower() != ".nc":
         return None
     kind = kind_of(path)
-    return None if kind == "trajectory" else kind
+    return None if kind in ("trajectory", "simulation") else kind

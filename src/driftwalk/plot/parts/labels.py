@@ -13,6 +13,7 @@ from driftwalk.schema.calibration_facts import facts_of
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
 
 # (unit in the dataset, unit in the figure) -> factor
 FACTORS: dict[tuple[str, str], float] = {
@@ -101,3 +102,13 @@ def interval_of(calibration: xr.Dataset, name: str) -> tuple[float, float] | Non
 def number_fact(dataset: xr.Dataset, name: str) -> float:
     """Return a number of the facts, NaN when it is absent."""
     return float(facts_of(dataset).get(name, math.nan))
+
+
+def ratio_axis(ax: Axes) -> None:
+    """Make the horizontal axis logarithmic, with plain numbers that have room: 0.5, 1, 2."""
+    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullLocator
+
+    ax.set_xscale("log")
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.xaxis.set_major_formatter(FormatStrFormatter("%g"))
+    ax.xaxis.set_minor_locator(NullLocator())

@@ -1,4 +1,4 @@
-"""driftwalk's own NetCDF: a `trajectory` dataset as `save_trajectory` wrote it."""
+"""driftwalk's own NetCDF: a `trajectory` as `save_trajectory` wrote it, or a `simulation`."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError
+from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.raw import Extra, RawBody, RawRecording, ReadOptions
 from driftwalk.schema import body_names, check_trajectory
 from driftwalk.schema.contents import check_contents
+from driftwalk.schema.kinds import KINDS
 from driftwalk.schema.netcdf import MAGIC, kind_of, open_netcdf
 from driftwalk.schema.trajectory import POSE
 
@@ -26,12 +27,14 @@ class DriftwalkLoader:
 
     def sniff(self, head: bytes, path: Path) -> float:
         """Recognise the attribute ``kind``."""
-        known = head.startswith(MAGIC) and kind_of(path) == "trajectory"
+        known = head.startswith(MAGIC) and kind_of(path) in ("trajectory", "simulation")
         return 1.0 if known else 0.0
 
-    def read(self, path: Path, _options: ReadOptions) -> RawRecording:
-        """Read every body and carry the attributes over."""
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read every body and carry the attributes over; of a simulation one replicate."""
         dataset = check_contents(open_netcdf(path), path)
+        if dataset.attrs["kind"] == "simulation":
+            dataset = _replicate(dataset, options.replicate)
         try:
             check_trajectory(dataset)
         except ValueError as error:
@@ -62,6 +65,18 @@ class DriftwalkLoader:
             attrs=kept,
             extra=extra,
         )
+
+
+def _replicate(simulation: xr.Dataset, replicate: int) -> xr.Dataset:
+    """Return one simulated world as a recording; of the attributes the tank stays."""
+    count = simulation.sizes["replicate"]
+    if not 0 <= replicate < count:
+        raise InputError(f"no `replicate` {replicate}: the simulation has {count}, counted from 0")
+    chosen = simulation[list(POSE)].isel(replicate=replicate, drop=True)
+    kept = {name: simulation.attrs[name] for name in ("arena",) if name in simulation.attrs}
+    version = KINDS["trajectory"].version
+    chosen.attrs = {"kind": "trajectory", "schema_version": version, "simulated": "yes", **kept}
+    return chosen
 
 
 def _extra(dataset: xr.Dataset) -> dict[str, Extra]:

@@ -11,8 +11,10 @@ from driftwalk.schema.kinds import (
     calibration,
     fit,
     flow,
+    model_calibration,
     model_check,
     model_comparison,
+    model_recovery,
     motion,
     recovery,
     sensitivity,
@@ -22,7 +24,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _FILES: Final = (
-    motion, flow, calibration, model_comparison, fit, recovery, model_check, assembly, sensitivity,
+    motion, flow, calibration, model_calibration, model_comparison, fit, recovery, model_recovery,
+    model_check, assembly, sensitivity,
 )  # fmt: skip
 
 KINDS: Final[dict[str, Kind]] = {kind.name: kind for file in _FILES for kind in file.KINDS}

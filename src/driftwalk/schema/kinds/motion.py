@@ -73,14 +73,20 @@ TRAJECTORY: Final = Kind(
     read="x y theta time body",
 )  # fmt: skip
 
+_BLOCK: Final = "the block"
+_OTHER: Final = "another motion model"
+
 SIMULATION: Final = Kind(
     name="simulation",
     version=1,
-    dimensions={"replicate": "simulated worlds", "time": "samples", "body": "the block"},
+    dimensions={"replicate": "simulated worlds", "time": "samples", "body": "the block or body"},
     variables=(
         Variable("x", "replicate time body", "m", "position x"),
         Variable("y", "replicate time body", "m", "position y"),
-        Variable("theta", "replicate time body", "rad", "orientation", note="in (-π, π]"),
+        Variable(
+            "theta", "replicate time body", "rad", "orientation",
+            note="in (-π, π]; NaN where a model has none",
+        ),
         Variable(
             "status", "replicate", None, "problems in a world", "int",
             note="0 is sound", flags=WORLD_STATUS, bits=True,
@@ -91,13 +97,24 @@ SIMULATION: Final = Kind(
     ),
     attributes=(
         ARENA,
-        Attribute("drag_coefficient", "number", "drag coefficient C_d"),
-        Attribute("force_std_N", "number", "standard deviation σ_F of the force"),
-        Attribute("force_interval_s", "number", "how long a force lasts"),
-        Attribute("force_noise_intensity_N2_s", "number", "σ_F² times the force interval"),
-        Attribute("time_step_s", "number", "step of the integrator"),
+        Attribute("drag_coefficient", "number", "drag coefficient C_d", _BLOCK),
+        Attribute("force_std_N", "number", "standard deviation σ_F of the force", _BLOCK),
+        Attribute("force_interval_s", "number", "how long a force lasts", _BLOCK),
+        Attribute("force_noise_intensity_N2_s", "number", "σ_F² times the force interval", _BLOCK),
+        Attribute("backend", "text", "what computed it", _BLOCK),
+        Attribute("model", "text", "name of the motion model", _OTHER),
+        Attribute(
+            "model_parameters", "object", "value of each parameter, by its name with the unit",
+            _OTHER,
+        ),
+        Attribute(
+            "model_source_sha256", "text", "hash of the model's source",
+            f"{_OTHER}, and its source is known",
+        ),
+        Attribute(
+            "time_step_s", "number", "step of the integrator", "the block, or one of the family"
+        ),
         Attribute("seed", "number", "seed of the random numbers"),
-        Attribute("backend", "text", "what computed it"),
         STUDY,
     ),
     read="x y theta time body",

@@ -1,0 +1,80 @@
+"""Calibrate a model with more parameters than a map can show."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from driftwalk.calibration.estimation.contact import contact_distance
+from driftwalk.calibration.estimation.result import build_model_calibration
+from driftwalk.calibration.estimation.run import Stores, Tell, estimate
+from driftwalk.calibration.evolution import wall_distance
+from driftwalk.calibration.models.contestants import contestants
+from driftwalk.calibration.models.recorded import RecordedMotion, body_motion
+from driftwalk.motion import MotionModel, ParticleModel
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+
+def calibrate_many(
+    recording: xr.Dataset,
+    model: MotionModel,
+    study: Study,
+    *,
+    flow: xr.Dataset | None,
+    body: str | None,
+    threads: int | None,
+    stores: Stores,
+    tell: Tell,
+) -> xr.Dataset:
+    """Return the `model_calibration` of a model with any number of parameters.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        A `trajectory`.
+    model : MotionModel
+        What is calibrated. A self-propelled body without a clearance has that of the recording.
+    study : Study
+        Tank, camera, step interval, seed, confidence; ``bootstrap`` is the number of simulated
+        recordings by which the misfit is judged, 0 leaves the second stage out.
+    flow : xarray.Dataset or None
+        The water's velocity.
+    body : str or None
+        The body, where the recording has several.
+    threads : int or None
+        None: all processors. The result does not depend on it.
+    stores : callable
+        Where each stage keeps finished work.
+    tell : callable
+        Called with the stage and its progress.
+
+    Raises
+    ------
+    InputError
+        When the recording is too short or does not move, or the model gives no numbers.
+    """
+    motion = body_motion(recording, study, flow=flow, body=body, threads=threads)
+    entries, warnings = contestants([_at_the_wall(model, motion)], motion, study)
+    search = study.calibration
+    found = estimate(
+        entries[0],
+        motion,
+        seed=search.seed,
+        worlds=search.bootstrap if search.refine == "auto" else 0,
+        confidence=search.confidence,
+        stores=stores,
+        tell=tell,
+    )
+    return build_model_calibration(found, entries[0], motion, study, recording, warnings)
+
+
+def _at_the_wall(model: MotionModel, motion: RecordedMotion) -> MotionModel:
+    """Return the model with the recording's distance from the wall, if it states none."""
+    if not isinstance(model, ParticleModel) or model.states_clearance:
+        return model
+    from_wall = wall_distance(motion.like)(motion.track.x, motion.track.y)
+    noise = motion.like.camera.position_noise
+    return model.with_clearance(contact_distance(from_wall, noise))

@@ -1,0 +1,75 @@
+"""Which parameters a recording determines, from settings that could have given it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.schema import Parameter
+
+Floats = npt.NDArray[np.float64]
+
+DETERMINED: Final = 0.25
+"""A parameter is determined where its 90 % interval ends no farther than this part of its value
+from its middle: half of the answers are then within a tenth of the truth."""
+QUOTED: Final = 0.9
+"""The confidence for which that is said."""
+SMALL_PART: Final = 0.1
+"""On a linear scale a value near 0 counts as large as this part of the range."""
+AT_THE_END: Final = 0.01
+
+
+class Determination(NamedTuple):
+    """How well a recording determines parameters."""
+
+    interval: Floats
+    """In the units of the parameters, shape (parameters, 2)."""
+    half_width: Floats
+    """Half the 90 % interval over the value: of a logarithmic scale, in its logarithm."""
+    determined: npt.NDArray[np.bool_]
+
+
+def determination(
+    draws: Floats, ranges: Sequence[Parameter], *, confidence: float
+) -> Determination:
+    """Return the intervals of parameters, and which of them are determined.
+
+    Parameters
+    ----------
+    draws : ndarray, shape (draws, parameters)
+        Settings in the unit cube that could have given the recording.
+    ranges : sequence of Parameter
+        The parameters with the ranges of the search.
+    confidence : float
+        Of the intervals.
+
+    Examples
+    --------
+    >>> speed = Parameter("speed", "m/s", 0.01, 1.0, scale="log")
+    >>> found = determination(np.linspace(0.49, 0.51, 101)[:, None], [speed], confidence=0.9)
+    >>> found.interval.round(3).tolist(), found.determined.tolist()
+    ([[0.096, 0.104]], [True])
+    """
+    intervals, widths = [], []
+    for column, one in zip(draws.T, ranges, strict=True):
+        tail = 0.5 * (1.0 - confidence)
+        intervals.append(one.value_at(np.quantile(column, [tail, 1.0 - tail])))
+        widths.append(_half_width(column, one))
+    half_width = np.array(widths)
+    return Determination(np.array(intervals), half_width, half_width <= DETERMINED)
+
+
+def _half_width(column: Floats, parameter: Parameter) -> float:
+    """Return half the 90 % interval over the value; infinite where it reaches the range's end."""
+    tail = 0.5 * (1.0 - QUOTED)
+    low, middle, high = np.quantile(column, [tail, 0.5, 1.0 - tail])
+    if low < AT_THE_END or high > 1.0 - AT_THE_END:
+        return float("inf")
+    start, value, end = (float(parameter.value_at(share)) for share in (low, middle, high))
+    if parameter.scale == "log":
+        return 0.5 * float(np.log(end / start))
+    size = max(abs(value), SMALL_PART * (parameter.high - parameter.low))
+    return 0.5 * (end - start) / size

@@ -1,0 +1,203 @@
+"""How summaries depend on a model's parameters in a small box, from simulations there.
+
+Their means are quadratic functions of the parameters; what is left has a covariance. Where that is
+so, the setting of a recording is that of least squares, each summary weighed by its covariance: the
+maximum of the synthetic likelihood (Wood, Nature 466 (2010) 1102).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+ENOUGH: Final = 4
+"""Simulations for each coefficient from which products of two parameters are fitted, too."""
+SHRUNK: Final = 0.05
+"""Part of the correlations of the summaries that is taken away: they come from simulations."""
+CONSTANT: Final = 1e-9
+"""A summary that varies by less than this part of its size says nothing."""
+MOST_STEPS: Final = 40
+MOST_CORRECTED: Final = 3
+"""Degrees of freedom beyond the summaries from which the errors of a covariance are known."""
+
+
+class Solved(NamedTuple):
+    """The setting that fits summaries best."""
+
+    setting: Floats
+    """In the unit cube, shape (parameters,)."""
+    place: Floats
+    """The same in the box: 0 is its centre, 1 its end."""
+    misfit: float
+    """Sum of the squares of what is left, in standard deviations."""
+    std: Floats
+    """Standard deviations by the curvature there, in parts of the ranges."""
+
+
+@dataclass(frozen=True, eq=False)
+class LocalEmulator:
+    """The summaries of a model in a box.
+
+    Attributes
+    ----------
+    centre, width : ndarray, shape (parameters,)
+        The box, in the unit cube.
+    products : bool
+        Whether products of two parameters are fitted.
+    coefficients : ndarray, shape (summaries, coefficients)
+        Of the whitened summaries.
+    whitening : ndarray, shape (summaries, summaries)
+        Makes what is left of the summaries independent, with variance 1.
+    used : ndarray of bool
+        Which summaries say anything.
+    freedom : int
+        Simulations less the coefficients of a summary's mean: what the covariance comes from.
+    """
+
+    centre: Floats
+    width: Floats
+    products: bool
+    coefficients: Floats
+    whitening: Floats
+    used: npt.NDArray[np.bool_]
+    freedom: int
+
+    @property
+    def widening(self) -> float:
+        """Factor by which errors are larger than the likelihood says.
+
+        The covariance of the summaries comes from simulations. Its inverse is too large on average
+        (Hartlap et al., Astron. Astrophys. 464 (2007) 399), and its errors scatter the estimate
+        (Percival et al., Mon. Not. R. Astron. Soc. 439 (2014) 2531, Eq. 18).
+        """
+        count, parameters = self.summaries, self.centre.size
+        more = self.freedom - count
+        if more <= MOST_CORRECTED:
+            return float("inf")
+        inverse = self.freedom / (more - 1.0)
+        first, second = (top / (more * (more - 3.0)) for top in (2.0, more - 1.0))
+        scatter = 1.0 + second * (count - parameters)
+        return float(np.sqrt(inverse * scatter / (1.0 + first + second * (parameters + 1.0))))
+
+    @property
+    def summaries(self) -> int:
+        """How many summaries say anything."""
+        return int(self.used.sum())
+
+    def whitened(self, summaries: Floats) -> Floats:
+        """Return summaries as they are compared."""
+        return np.asarray(self.whitening @ summaries[self.used])
+
+    def misfits(self, settings: Floats, summaries: Floats) -> Floats:
+        """Return how far summaries are from those expected at each setting, shape (settings,)."""
+        place = (settings - self.centre) / self.width
+        left = _basis(place, self.products) @ self.coefficients.T - self.whitened(summaries)
+        return np.asarray((left**2).sum(axis=1))
+
+    def solve(self, summaries: Floats, *, reach: float, start: Floats | None = None) -> Solved:
+        """Return the setting that fits summaries best.
+
+        Parameters
+        ----------
+        summaries : ndarray, shape (summaries,)
+            Of a recording.
+        reach : float
+            How far outside the box it may lie, 1 is the end of the box.
+        start : ndarray, optional
+            Setting to begin at; default: the centre.
+        """
+        from scipy.optimize import least_squares
+
+        low = np.maximum(-reach, (0.0 - self.centre) / self.width)
+        high = np.minimum(reach, (1.0 - self.centre) / self.width)
+        wanted = self.whitened(summaries)
+
+        def left(place: Floats) -> Floats:
+            return np.asarray(self.coefficients @ _basis(place[None], self.products)[0] - wanted)
+
+        def slope(place: Floats) -> Floats:
+            return np.asarray(self.coefficients @ _basis_slope(place, self.products))
+
+        begin = np.zeros(self.centre.size)
+        if start is not None:
+            begin = (start - self.centre) / self.width
+        inside = 1e-6 * (high - low)
+        found = least_squares(
+            left,
+            np.clip(begin, low + inside, high - inside),
+            jac=slope,
+            bounds=(low, high),
+            max_nfev=MOST_STEPS,
+        )
+        # A box as wide as its standard deviation keeps the inverse finite.
+        slopes = slope(found.x)
+        curvature = slopes.T @ slopes + np.eye(begin.size)
+        return Solved(
+            setting=self.centre + found.x * self.width,
+            place=found.x,
+            misfit=2.0 * float(found.cost),
+            std=np.sqrt(np.diag(np.linalg.inv(curvature))) * self.width,
+        )
+
+
+def fit_emulator(
+    settings: Floats, summaries: Floats, *, centre: Floats, width: Floats
+) -> LocalEmulator:
+    """Return the summaries of a model as a function of its parameters.
+
+    Parameters
+    ----------
+    settings : ndarray, shape (simulations, parameters)
+        In the unit cube.
+    summaries : ndarray, shape (simulations, summaries)
+        Of one simulated recording each.
+    centre, width : ndarray, shape (parameters,)
+        The box that the settings fill.
+    """
+    place = (settings - centre) / width
+    products = len(settings) >= ENOUGH * _basis(place[:1], True).shape[1]
+    basis = _basis(place, products)
+    coefficients, *_ = np.linalg.lstsq(basis, summaries, rcond=None)
+    left = summaries - basis @ coefficients
+    freedom = max(len(settings) - basis.shape[1], 1)
+    spread = np.sqrt((left**2).sum(axis=0) / freedom)
+    used = spread > CONSTANT * (np.abs(summaries).max(axis=0) + CONSTANT)
+    scaled = left[:, used] / spread[used]
+    correlation = (1.0 - SHRUNK) * (scaled.T @ scaled) / freedom + SHRUNK * np.eye(used.sum())
+    whitening = np.linalg.cholesky(np.linalg.inv(correlation)).T / spread[used]
+    return LocalEmulator(
+        centre, width, products, whitening @ coefficients[:, used].T, whitening, used, freedom
+    )
+
+
+def _pairs(count: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    first, second = np.triu_indices(count, 1)
+    return first, second
+
+
+def _basis(place: Floats, products: bool) -> Floats:
+    """Return 1, each coordinate, its square and, where asked for, the products of two."""
+    columns = [np.ones((len(place), 1)), place, place**2]
+    if products:
+        first, second = _pairs(place.shape[1])
+        columns.append(place[:, first] * place[:, second])
+    return np.concatenate(columns, axis=1)
+
+
+def _basis_slope(place: Floats, products: bool) -> Floats:
+    """Return the derivatives of `_basis`, shape (coefficients, parameters)."""
+    count = place.size
+    rows = [np.zeros((1, count)), np.eye(count), np.diag(2.0 * place)]
+    if products:
+        first, second = _pairs(count)
+        mixed = np.zeros((first.size, count))
+        at = np.arange(first.size)
+        mixed[at, first] = place[second]
+        mixed[at, second] = place[first]
+        rows.append(mixed)
+    return np.concatenate(rows)

@@ -1,0 +1,112 @@
+"""Summaries of simulated recordings: of the whole, and of the blocks of time that are searched."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.calibration.estimation.series import SummaryPlan, plan_summaries
+from driftwalk.calibration.estimation.summaries import summarise
+from driftwalk.calibration.evolution import AspectObjective, wall_distance
+from driftwalk.calibration.evolution.search import Tell
+from driftwalk.calibration.models.recorded import RecordedMotion
+from driftwalk.comparison.aspects import block_of
+from driftwalk.motion.score import broken_worlds
+from driftwalk.sweep import Store, WorkUnit, run_sweep
+
+Floats = npt.NDArray[np.float64]
+
+AT_ONCE: Final = 64
+"""Settings of a work unit."""
+
+
+class SummaryObjective:
+    """Simulates settings of a model and summarises what the camera saw.
+
+    Parameters
+    ----------
+    worlds : AspectObjective
+        The model, its ranges and its conditions.
+    motion : RecordedMotion
+        The recording.
+    store : Store or None
+        Where finished work is kept; None keeps nothing.
+    tell : callable
+        Called with the settings done and the largest number of them.
+    most : int
+        That number.
+
+    Attributes
+    ----------
+    recorded : ndarray, shape (2, summaries)
+        Summaries of the whole recording, and of its even blocks of time.
+    """
+
+    def __init__(
+        self,
+        worlds: AspectObjective,
+        motion: RecordedMotion,
+        *,
+        store: Store | None,
+        tell: Tell,
+        most: int,
+    ) -> None:
+        self.worlds, self.store, self.tell, self.most = worlds, store, tell, most
+        self.done = 0
+
+        def all_of(time: Floats) -> npt.NDArray[np.bool_]:
+            return np.ones(time.shape, dtype=bool)
+
+        def even(time: Floats) -> npt.NDArray[np.bool_]:
+            return np.asarray(block_of(time, motion.duration) % 2 == 0)
+
+        wall, scale = wall_distance(worlds.like), {"unit": motion.usual_step, "depth": motion.depth}
+        recorded, simulated = (
+            [plan_summaries(plan, wall=wall, counts=counts, **scale) for counts in (all_of, even)]
+            for plan in (motion.own_plan, motion.plan)
+        )
+        self.plans = simulated
+        self.recorded = np.array([summarise(one, *motion.track[1:3]) for one in recorded])
+
+    def __call__(self, settings: Floats, *, parts: int = 1) -> Floats:
+        """Return the summaries of settings in the unit cube, shape (settings, parts, summaries).
+
+        Parameters
+        ----------
+        settings : ndarray, shape (settings, parameters)
+            In the unit cube.
+        parts : {1, 2}
+            Of the whole recording alone, or of its even blocks, too.
+        """
+        first = self.done
+        units = [
+            WorkUnit(first + at, first + min(at + AT_ONCE, len(settings)), {})
+            for at in range(0, len(settings), AT_ONCE)
+        ]
+
+        def compute(unit: WorkUnit) -> dict[str, Floats]:
+            here = settings[unit.start - first : unit.stop - first]
+            return {"summaries": self._summaries(here, unit.start, self.plans[:parts])}
+
+        def say(done: int, _: int) -> None:
+            self.tell(first + done, self.most)
+
+        found = run_sweep(compute, units, store=self.store, progress=say)["summaries"]
+        self.done += len(settings)
+        return np.asarray(found)
+
+    def _summaries(self, settings: Floats, first: int, plans: Sequence[SummaryPlan]) -> Floats:
+        seen = self.worlds.simulated(settings, 1, stage="estimation", first=first)
+
+        def one(world: tuple[Floats, Floats]) -> list[Floats]:
+            return [summarise(plan, *world) for plan in plans]
+
+        with ThreadPoolExecutor(max(self.worlds.like.threads, 1)) as pool:
+            found = np.array(list(pool.map(one, zip(seen.x, seen.y, strict=True))))
+        # A world that lost its numbers is like none.
+        found[broken_worlds(seen.status)] = 0.0
+        return found

@@ -1,0 +1,163 @@
+"""The `model_calibration` dataset: the estimate, what it is worth, and how good the model is."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.calibration.estimation.run import Estimation
+from driftwalk.calibration.models.checks import CHECKS, UNITS
+from driftwalk.calibration.models.contestants import Contestant
+from driftwalk.calibration.models.judge import JUDGED
+from driftwalk.calibration.models.recorded import RecordedMotion
+from driftwalk.calibration.models.result import steadiness_warnings, without_error
+from driftwalk.calibration.models.verdict import verdict_of
+from driftwalk.motion import ParticleModel
+from driftwalk.schema.check import build_dataset
+from driftwalk.schema.facts import BOUNDS, texts
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+Floats = npt.NDArray[np.float64]
+
+AT_THE_END: Final = 0.01
+"""A value is at the end of its range within this part of it."""
+
+
+def build_model_calibration(
+    found: Estimation,
+    entry: Contestant,
+    motion: RecordedMotion,
+    study: Study,
+    recording: xr.Dataset,
+    warnings: Sequence[str],
+) -> xr.Dataset:
+    """Return the dataset of a calibration of many parameters."""
+    ranges, judged = entry.ranges, found.judged
+    verdict = verdict_of(judged, motion, baseline=False)
+    count = len(ranges)
+    known = found.known
+    data: dict[str, Any] = {
+        "estimate": ("parameter", _values(entry, found.point[None])[0]),
+        "interval": (
+            ("parameter", "bound"),
+            np.full((count, 2), np.nan) if known is None else known.interval,
+        ),
+        "determined": (
+            "parameter", np.zeros(count, dtype=bool) if known is None else known.determined,
+        ),
+        "half_width": ("parameter", np.full(count, np.nan) if known is None else known.half_width),
+        "range": (("parameter", "bound"), np.array([(one.low, one.high) for one in ranges])),
+        "unit": ("parameter", texts([one.unit for one in ranges])),
+        "scale": ("parameter", texts([one.scale for one in ranges])),
+        "meaning": ("parameter", texts([one.meaning or one.label for one in ranges])),
+        "held_out_distance": ("aspect", judged.held),
+        "trained_distance": ("aspect", judged.trained),
+        "own_distance": ("aspect", motion.own),
+        "floor": ("aspect", motion.held.floor),
+        "check_recorded": ("check", motion.recorded_checks),
+        "check_median": ("check", np.median(judged.checks, axis=0)),
+        "check_low": ("check", judged.checks.min(axis=0)),
+        "check_high": ("check", judged.checks.max(axis=0)),
+        "check_unit": ("check", texts(UNITS)),
+        "score": ((), judged.score),
+        "score_std": ((), without_error(judged.without)),
+        "explained": ((), verdict.explained),
+        "verdict": ((), np.array(verdict.text)),
+        **_stages(found, entry),
+    }  # fmt: skip
+    said = [*warnings, *_said(found, entry, verdict.explained), *steadiness_warnings(motion)]
+    coords: dict[str, Any] = {
+        "parameter": ("parameter", texts([one.name for one in ranges])),
+        "bound": ("bound", texts(BOUNDS)),
+        "aspect": ("aspect", texts(motion.held.names)),
+        "check": ("check", texts(CHECKS)),
+        "warning": ("warning", texts(said)),
+    }
+    attrs: dict[str, Any] = {
+        "model": entry.model.name,
+        "estimate_from": "search" if known is None else "summaries",
+        "fixed": json.dumps(_fixed(entry)),
+        "confidence": study.calibration.confidence,
+        "step_interval_s": float(motion.plan.short.step_interval),
+        "duration_s": motion.duration,
+        "position_noise_m": motion.like.camera.position_noise,
+        "worlds": JUDGED,
+        "seed": study.calibration.seed,
+        "arena": study.tank.to_arena_json(),
+        "source": str(recording.attrs.get("source", "")),
+        "simulated_recording": str(recording.attrs.get("simulated", "no")),
+    }
+    return build_dataset("model_calibration", data, coords, attrs)
+
+
+def _stages(found: Estimation, entry: Contestant) -> dict[str, Any]:
+    """Return what the two stages left, where they were made."""
+    data: dict[str, Any] = {}
+    if found.searched is not None:
+        data["searched_estimate"] = ("parameter", _values(entry, found.searched[None])[0])
+        data["searched_score"] = ((), found.scores["searched"])
+    matched = found.matched
+    if matched is not None:
+        data |= {
+            "draws": (("draw", "parameter"), _values(entry, matched.draws)),
+            "matched_score": ((), found.scores["matched"]),
+            "misfit": ((), matched.misfit),
+            "usual_misfit": ((), matched.usual_misfit),
+            "most_misfit": ((), matched.most_misfit),
+            "interval_stretch": ((), matched.stretch),
+        }
+    return data
+
+
+def _values(entry: Contestant, points: Floats) -> Floats:
+    """Return the values at points of the unit cube, shape (points, parameters)."""
+    columns = [one.value_at(share) for one, share in zip(entry.ranges, points.T, strict=True)]
+    return np.stack(columns, axis=1)
+
+
+def _fixed(entry: Contestant) -> dict[str, float]:
+    model = entry.model
+    if not isinstance(model, ParticleModel):
+        return {}
+    return {**model.fixed, "clearance": model.clearance}
+
+
+def _said(found: Estimation, entry: Contestant, explained: bool) -> list[str]:
+    """Return the warnings of the estimate."""
+    said = []
+    matched = found.matched
+    if matched is not None and found.known is None:
+        said.append(
+            "the summaries of the motion pull the model away from it: in the six distances their "
+            f"answer comes to {found.scores['matched']:.2f} noise floors, that of the search to "
+            f"{found.scores['searched']:.2f}; the values are the search's, and none is determined"
+        )
+    elif matched is not None and not matched.usual:
+        said.append(
+            f"the summaries of the motion differ from the model's: a misfit of {matched.misfit:.0f}"
+            f" where its own recordings come to {matched.usual_misfit:.0f} (95 % below "
+            f"{matched.most_misfit:.0f}); the intervals are {matched.stretch:.1f} times as wide as "
+            "the draws"
+        )
+    if not explained:
+        said.append(
+            "the model does not explain the recording; its parameters are the best of bad fits"
+        )
+    ended = [
+        one.name
+        for one, share in zip(entry.ranges, found.point, strict=True)
+        if min(share, 1.0 - share) < AT_THE_END
+    ]
+    if ended:
+        said.append(
+            f"at the end of its range: {', '.join(ended)}; extend the range, or doubt the model"
+        )
+    return said

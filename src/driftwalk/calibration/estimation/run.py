@@ -1,0 +1,222 @@
+"""The calibration of a model with many parameters: estimate, uncertainty, and a held-out check."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.calibration.estimation.determined import Determination, determination
+from driftwalk.calibration.estimation.estimate import Matched, match_summaries, most_simulations
+from driftwalk.calibration.estimation.exchange import Order, order_of
+from driftwalk.calibration.estimation.objective import SummaryObjective
+from driftwalk.calibration.evolution import AspectObjective, Budget, Found, search_minimum
+from driftwalk.calibration.evolution.kept import KeptScores
+from driftwalk.calibration.models.contestants import Contestant
+from driftwalk.calibration.models.judge import (
+    Judged,
+    even_blocks,
+    judge_setting,
+    require_numbers,
+)
+from driftwalk.calibration.models.recorded import RecordedMotion
+from driftwalk.core.processors import one_blas_thread
+
+if TYPE_CHECKING:
+    from driftwalk.sweep import Store
+
+Floats = npt.NDArray[np.float64]
+Tell = Callable[[str, int, int], None]
+
+SEARCH: Final = Budget(design=256, starts=3, short=20, long=30, replicates=2, retest=8)
+WEIGHED: Final = 20
+"""Worlds by which the answers of two stages are compared."""
+AS_CLOSE: Final = 1.25
+"""The second stage's answer counts where it is no farther than the first's by this factor."""
+
+
+class Stores(Protocol):
+    """Gives the store in which a stage keeps its finished work units."""
+
+    def __call__(self, name: str, fingerprint: dict[str, Any]) -> Store | None:
+        """Return the store of a stage; None keeps results in memory."""
+
+
+@dataclass(frozen=True)
+class Estimation:
+    """Everything that was found of a model's parameters.
+
+    Attributes
+    ----------
+    point : ndarray, shape (parameters,)
+        The estimate, in the unit cube.
+    searched : ndarray or None
+        The answer of the first stage; None where it was not needed.
+    matched : Matched or None
+        That of the second stage; None where it was not asked for.
+    scores : mapping of str to float
+        Mean of distance over floor in the even blocks of time, of each answer.
+    known : Determination or None
+        How well the parameters are determined; None where the second stage does not count.
+    judged : Judged
+        The answer for the even blocks, judged on the odd ones.
+    """
+
+    point: Floats
+    searched: Floats | None
+    matched: Matched | None
+    scores: Mapping[str, float]
+    known: Determination | None
+    judged: Judged
+
+
+@one_blas_thread()
+def estimate(
+    entry: Contestant,
+    motion: RecordedMotion,
+    *,
+    seed: int,
+    worlds: int,
+    confidence: float,
+    stores: Stores,
+    tell: Tell,
+) -> Estimation:
+    """Estimate the parameters of a model, and judge it on blocks of time that it has not seen.
+
+    Two stages. One searches the even blocks of time by six two-dimensional KS distances. The other
+    matches summaries of the whole recording. Where these are like those of the model's own
+    recordings, the search is not needed. Where they are not, both are made, and the answer of the
+    summaries counts only if it is as close in the six distances: summaries that a model cannot give
+    at once pull it away from the motion.
+
+    Parameters
+    ----------
+    entry : Contestant
+        The model, with its ranges and conditions.
+    motion : RecordedMotion
+        The recording.
+    seed : int
+        Of the search and of all simulations.
+    worlds : int
+        Recordings of the model by which the misfit of the summaries is judged; 0 leaves the
+        summaries out.
+    confidence : float
+        Of the intervals.
+    stores : callable
+        Where each stage keeps finished work.
+    tell : callable
+        Called with the stage, the settings done and the largest number of them.
+
+    Raises
+    ------
+    InputError
+        When the model loses its numbers wherever it is tried.
+    """
+    even = even_blocks(entry, motion, seed)
+    require_numbers(even)
+    order = order_of(entry)
+    search = _Search(even, stores, tell)
+    matched = _matched(even, motion, search, order, worlds, stores, tell) if worlds > 1 else None
+    if matched is None or not matched.usual:
+        search.ends()
+    answers = {
+        **({} if search.best is None else {"searched": order(search.best[None])[0]}),
+        **({} if matched is None else {"matched": matched.point, "even": matched.even_point}),
+    }
+    scores = _weighed(even, answers)
+    counts = _counts(scores)
+    if not counts and matched is not None:
+        # The search's answer will stay: it is worth the usual search of a comparison.
+        longer = {"longer": order(search.longer()[None])[0]}
+        score = _weighed(even, longer)["longer"]
+        if score < scores["searched"]:
+            answers["searched"], scores["searched"] = longer["longer"], score
+    known = None
+    if matched is not None and counts:
+        known = determination(matched.draws, entry.ranges, confidence=confidence)
+    # The odd blocks judge the better answer that has not seen them.
+    unseen = [name for name in ("searched", "even")[: 1 + counts] if name in answers]
+    best = min(unseen, key=scores.__getitem__)
+    tell("judged", 0, 1)
+    return Estimation(
+        point=answers["matched" if counts else "searched"],
+        searched=answers.get("searched"),
+        matched=matched,
+        scores=scores,
+        known=known,
+        judged=judge_setting(even, motion, answers[best]),
+    )
+
+
+def _counts(scores: Mapping[str, float]) -> bool:
+    """Return whether the answer of the summaries is as close as that of the search."""
+    if "matched" not in scores:
+        return False
+    return "searched" not in scores or scores["matched"] <= AS_CLOSE * scores["searched"]
+
+
+class _Search:
+    """The first stage, made when it is asked for."""
+
+    def __init__(self, even: AspectObjective, stores: Stores, tell: Tell) -> None:
+        self.best: Floats | None = None
+        self._even, self._stores, self._tell = even, stores, tell
+        self._ends: Floats | None = None
+
+    def ends(self) -> Floats:
+        """Return the ends of the searches, the best first."""
+        if self._ends is None:
+            found = self._search("search", SEARCH)
+            self.best = found.best
+            self._ends = found.settings[np.argsort(found.ends, kind="stable")]
+        return self._ends
+
+    def longer(self) -> Floats:
+        """Return the answer of a longer search."""
+        return self._search("longer-search", Budget()).best
+
+    def _search(self, stage: str, budget: Budget) -> Found:
+        count = len(self._even.ranges)
+        most = budget.evaluations(count)
+        return search_minimum(
+            KeptScores(self._even, self._stores(stage, {"budget": vars(budget)})),
+            count,
+            budget=budget,
+            seed=self._even.seed,
+            tell=lambda done, _: self._tell(stage, done, most),
+        )
+
+
+def _matched(
+    even: AspectObjective,
+    motion: RecordedMotion,
+    search: _Search,
+    order: Order,
+    worlds: int,
+    stores: Stores,
+    tell: Tell,
+) -> Matched:
+    count = len(even.ranges)
+    objective = SummaryObjective(
+        even,
+        motion,
+        store=stores("summaries", {"worlds": worlds}),
+        tell=lambda done, most: tell("summaries", done, most),
+        most=most_simulations(count, worlds),
+    )
+    return match_summaries(
+        objective, count, search.ends, order=order, worlds=worlds, seed=even.seed
+    )
+
+
+def _weighed(even: AspectObjective, answers: Mapping[str, Floats]) -> dict[str, float]:
+    """Return the scores of answers in the even blocks, from the same random numbers."""
+    return {
+        name: float(
+            even.reference.overall(even.distances(point[None], WEIGHED, stage="weighed")[0]).mean()
+        )
+        for name, point in answers.items()
+    }

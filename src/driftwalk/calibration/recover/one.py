@@ -1,0 +1,161 @@
+"""One simulated recording of a recovery study: what its calibration says of each parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.calibration.estimation.determined import (
+    AT_THE_END,
+    DETERMINED,
+    QUOTED,
+    SMALL_PART,
+)
+from driftwalk.calibration.recover.truth import KnownTruth
+from driftwalk.calibration.run import calibrate
+from driftwalk.core.errors import InputError
+from driftwalk.schema import Parameter
+from driftwalk.schema.kinds.model_recovery import CALIBRATED_STATUS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Floats = npt.NDArray[np.float64]
+Tell = Callable[[str, int, int], None]
+
+MESSAGE: Final = 400
+"""Letters of a message that are kept."""
+
+
+def recover_one(
+    truth: KnownTruth, number: int, *, threads: int | None, tell: Tell | None
+) -> dict[str, Any]:
+    """Simulate and calibrate one recording.
+
+    Returns
+    -------
+    dict
+        ``estimate``, ``interval``, ``range``, ``determined``, ``half_width`` by parameter,
+        ``status`` and ``message``. NaN where there is no calibration.
+    """
+    try:
+        recording = truth.recording(number)
+    except InputError as error:
+        return _nothing(truth, "not_simulated", error)
+    try:
+        found = calibrate(
+            recording,
+            truth.model,
+            study=truth.search_study(number),
+            flow=truth.flow,
+            threads=threads,
+            tell=tell,
+        )
+    except InputError as error:
+        return _nothing(truth, "not_calibrated", error)
+    return {
+        **answer_of(found, truth.model.parameters),
+        "status": CALIBRATED_STATUS["calibrated"],
+        "message": "",
+    }
+
+
+def answer_of(found: xr.Dataset, parameters: Sequence[Parameter]) -> dict[str, Any]:
+    """Return what a calibration says of its parameters.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        A `model_calibration`, or the `calibration` of one or two parameters. This has no draws: its
+        parameters are judged by the widths of their intervals.
+    parameters : sequence of Parameter
+        The parameters, in their order.
+    """
+    names = [one.name for one in parameters]
+    found = found.sel(parameter=names)
+    estimate = found["estimate"].values.astype(np.float64)
+    interval = np.full((len(names), 2), np.nan)
+    if "interval" in found:
+        interval = found["interval"].transpose("parameter", "bound").values.astype(np.float64)
+    # The ranges of the family go with the recording.
+    searched = np.array([(one.low, one.high) for one in parameters])
+    if "half_width" in found:
+        searched = found["range"].transpose("parameter", "bound").values.astype(np.float64)
+        half_width = found["half_width"].values.astype(np.float64)
+        determined = found["determined"].values.astype(bool)
+    else:
+        confidence = float(found["confidence"]) if np.isfinite(interval).any() else QUOTED
+        half_width = np.array(
+            [
+                interval_half_width(ends, value, one, confidence=confidence)
+                for ends, value, one in zip(interval, estimate, parameters, strict=True)
+            ]
+        )
+        determined = half_width <= DETERMINED
+    return {
+        "estimate": estimate,
+        "interval": interval,
+        "range": searched,
+        "determined": determined,
+        "half_width": half_width,
+    }
+
+
+def interval_half_width(
+    ends: Floats, value: float, parameter: Parameter, *, confidence: float
+) -> float:
+    """Return half the 90 % interval over the value, from an interval of another confidence.
+
+    Parameters
+    ----------
+    ends : ndarray, shape (2,)
+        The interval, in the unit of the parameter.
+    value : float
+        The estimate.
+    parameter : Parameter
+        The parameter with its range.
+    confidence : float
+        Of the interval; its width is scaled as that of a normal distribution.
+
+    Returns
+    -------
+    float
+        On a logarithmic scale half the width of the logarithm. Infinite where the interval reaches
+        the end of the range, NaN without an interval.
+
+    Examples
+    --------
+    >>> speed = Parameter("speed", "m/s", 0.0, 0.1)
+    >>> round(interval_half_width(np.array([0.04, 0.06]), 0.05, speed, confidence=0.9), 3)
+    0.2
+    """
+    from scipy.special import ndtri
+
+    if not np.isfinite(ends).all():
+        return float("nan")
+    low, high = (float(parameter.to_coordinate(end)) for end in (parameter.low, parameter.high))
+    room = AT_THE_END * (high - low)
+    start, end = (float(one) for one in parameter.to_coordinate(ends))
+    if start < low + room or end > high - room:
+        return float("inf")
+    factor = float(ndtri(0.5 + 0.5 * QUOTED) / ndtri(0.5 + 0.5 * confidence))
+    if parameter.scale == "log":
+        return 0.5 * factor * float(np.log(ends[1] / ends[0]))
+    size = max(abs(value), SMALL_PART * (parameter.high - parameter.low))
+    return 0.5 * factor * float(ends[1] - ends[0]) / size
+
+
+def _nothing(truth: KnownTruth, status: str, error: InputError) -> dict[str, Any]:
+    count = len(truth.model.parameters)
+    return {
+        "estimate": np.full(count, np.nan),
+        "interval": np.full((count, 2), np.nan),
+        "range": np.full((count, 2), np.nan),
+        "determined": np.zeros(count, dtype=bool),
+        "half_width": np.full(count, np.nan),
+        "status": CALIBRATED_STATUS[status],
+        "message": str(error)[:MESSAGE],
+    }

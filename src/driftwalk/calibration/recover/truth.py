@@ -1,0 +1,185 @@
+"""Recordings of a motion model whose parameters are known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.conditions.camera import study_as_seen
+from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.seeds import world_keys
+from driftwalk.core.streams import RecoveryStream
+from driftwalk.model import Study, apply_overrides
+from driftwalk.motion import BlockModel, MotionModel, known_values, simulate_motion
+from driftwalk.schema import body_track, build_trajectory
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Floats = npt.NDArray[np.float64]
+Noise = Literal["estimated", "known"]
+
+
+@dataclass(frozen=True)
+class KnownTruth:
+    """Everything that makes the recordings of a recovery study.
+
+    Attributes
+    ----------
+    model : MotionModel
+        The model; its parameters are those that the study looks at.
+    values : mapping of str to float
+        Their true values.
+    study : Study
+        Tank, camera, [recover], and the search.
+    flow : xarray.Dataset or None
+        The water's velocity.
+    like : xarray.Dataset or None
+        A recording that gives start, time stamps, gaps and camera.
+    body : str or None
+        Its body, where it has several.
+    noise : {"estimated", "known"}
+        Whether the calibrations know the noise of the camera.
+    """
+
+    model: MotionModel
+    values: Mapping[str, float]
+    study: Study
+    flow: xr.Dataset | None
+    like: xr.Dataset | None
+    body: str | None
+    noise: Noise = "estimated"
+
+    @property
+    def seen(self) -> Study:
+        """The study with the numbers of the camera, those of a recording where there is one."""
+        if self.like is None:
+            return self.study
+        return study_as_seen(self.study, self.like, body_track(self.like, self.body))
+
+    @property
+    def position_noise(self) -> float:
+        """Standard deviation of what the camera adds to a position [m]; "estimate" adds none."""
+        noise = self.seen.observation.position_noise_m
+        return 0.0 if isinstance(noise, str) else noise
+
+    @property
+    def times(self) -> Floats:
+        """Time stamps of each recording [s]; of one that is like another without its gaps."""
+        if self.like is not None:
+            return body_track(self.like, self.body).time
+        settings = self.study.recover
+        samples = math.floor(settings.durations_s[0] / settings.sample_interval_s + 1e-6) + 1
+        return np.asarray(np.arange(samples) * settings.sample_interval_s, np.float64)
+
+    @property
+    def missing_share(self) -> float:
+        """Share of the samples that each recording lacks."""
+        if self.like is None:
+            return self.study.recover.missing_share
+        return 1.0 - self.times.size / self.like.sizes["time"]
+
+    def seed_of(self, recording: int, stream: RecoveryStream) -> int:
+        """Return the seed of a stream of random numbers of a recording."""
+        seed = self.study.recover.seed
+        return int(world_keys(seed, trial=recording, replicate=stream)[0] >> np.uint64(1))
+
+    def recording(self, number: int) -> xr.Dataset:
+        """Return what the camera records of one world, a `trajectory`.
+
+        Raises
+        ------
+        InputError
+            When the simulation gives no numbers.
+        """
+        time = self.times
+        settling = self.study.recover.settling_s if self.like is None else 0.0
+        # A body starts at rest: the camera is switched on when its motion has settled.
+        begun = np.concatenate([[0.0], settling + time]) if settling > 0.0 else time
+        when: dict[str, Any] = (
+            {"like": self.like, "body": self.body}
+            if self.like is not None
+            else {"sample_time": begun}
+        )
+        run = simulate_motion(
+            self.model,
+            self.values,
+            self.study,
+            flow=self.flow,
+            replicates=1,
+            seed=self.seed_of(number, RecoveryStream.WORLD),
+            threads=1,
+            **when,
+        )
+        x, y = (run[name].values[0, -time.size :, 0].astype(np.float64) for name in ("x", "y"))
+        if self.like is None:
+            generator = np.random.default_rng(self.seed_of(number, RecoveryStream.GAPS))
+            lost = generator.random(time.size) < self.study.recover.missing_share
+            x, y = np.where(lost, np.nan, x), np.where(lost, np.nan, y)
+        quantum = self.seen.observation.position_quantum_m
+        attrs: dict[str, Any] = {"arena": self.study.tank.to_arena_json(), "simulated": "yes"}
+        if not isinstance(quantum, str) and quantum > 0.0:
+            attrs["position_quantum_m"] = quantum
+        return build_trajectory(time, x, y, attrs=attrs)
+
+    def search_study(self, number: int) -> Study:
+        """Return the study that a recording is calibrated with; it does not know the camera."""
+        known = self.noise == "known"
+        return apply_overrides(
+            self.study,
+            {
+                "observation.position_noise_m": self.position_noise if known else "estimate",
+                "observation.orientation_noise_rad": "estimate",
+                "observation.position_quantum_m": "recording",
+                # Two recordings shall not share the chance of the search.
+                "calibration.seed": self.seed_of(number, RecoveryStream.SEARCH),
+            },
+        )
+
+
+def known_truth(
+    model: MotionModel,
+    truth: Mapping[str, float],
+    study: Study,
+    *,
+    flow: xr.Dataset | None,
+    like: xr.Dataset | None,
+    body: str | None,
+    noise: Noise = "estimated",
+) -> KnownTruth:
+    """Return a truth that recordings can be made of.
+
+    Raises
+    ------
+    ConfigurationError
+        When a value is missing, is none, or belongs to no parameter.
+    InputError
+        When it is the block's, or several lengths are given.
+    """
+    if isinstance(model, BlockModel):
+        raise InputError("the block has a recovery study of its own: see recovery_study")
+    if not model.parameters:
+        raise ConfigurationError(
+            f"all parameters of the model {model.name} are known: leave one open"
+        )
+    values = known_values(model, truth)
+    for one in model.parameters:
+        value, unit = values[one.name], "" if one.unit == "1" else f" {one.unit}"
+        if not one.low <= value <= one.high:
+            raise ConfigurationError(
+                f"{one.name} is {value:g}{unit}, and is searched from {one.low:g} to {one.high:g}: "
+                "no calibration finds it; keep it known, or give a value within"
+            )
+    lengths = study.recover.durations_s
+    if like is None and len(lengths) != 1:
+        raise InputError(
+            f"`recover.durations_s` holds {len(lengths)} lengths: a motion model is studied at one"
+        )
+    if noise not in get_args(Noise):
+        raise ConfigurationError(f"`noise` is one of {', '.join(get_args(Noise))}, got {noise!r}")
+    return KnownTruth(model, values, study, flow, like, body, noise)

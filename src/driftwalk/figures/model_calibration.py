@@ -1,0 +1,161 @@
+"""The figures of a calibration of many parameters: draws of each pair, and the quality."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from driftwalk.core.errors import InputError
+from driftwalk.figures.write import write_each
+from driftwalk.plot.parts.model_panels import label_checks, plot_check_ratios, plot_own_aspects
+from driftwalk.plot.parts.style import (
+    BLUE,
+    DOUBLE_COLUMN_MM,
+    INK,
+    MUTED,
+    ORANGE,
+    letter_panels,
+    new_figure,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import Locator
+
+PANEL_MM: Final = 24.0
+LEAST_MM: Final = 90.0
+ABOVE_MM: Final = 14.0
+BINS: Final = 24
+WORDS: Final = 11
+"""Letters in a line of a label."""
+
+
+def write_model_calibration_figures(
+    folder: str | Path, *, calibration: xr.Dataset, formats: Sequence[str] = ("png", "svg")
+) -> list[Path]:
+    """Write the figures of a calibration of more than two parameters.
+
+    Parameters
+    ----------
+    folder : path-like
+        Where to write; made when absent.
+    calibration : xarray.Dataset
+        A `model_calibration`.
+    formats : sequence of {"png", "svg", "pdf"}
+        File formats.
+
+    Returns
+    -------
+    list of pathlib.Path
+        ``pairs``, where there are draws, and ``quality`` in every format.
+
+    Raises
+    ------
+    InputError
+        When a format is not known, or the dataset is of another kind.
+    RunDirectoryError
+        When a figure cannot be written.
+
+    Examples
+    --------
+    ``write_model_calibration_figures("run/figures", calibration=calibration)``
+    """
+    kind = calibration.attrs.get("kind", "another dataset")
+    if kind != "model_calibration":
+        raise InputError(f"expected a model_calibration, got {kind}")
+    makers = {"quality": lambda: quality_figure(calibration)}
+    if "draws" in calibration:
+        makers["pairs"] = lambda: pairs_figure(calibration)
+    return write_each(makers, folder, formats)
+
+
+def pairs_figure(calibration: xr.Dataset) -> Figure:
+    """Return the draws of each pair of parameters, with those of each on the diagonal."""
+    names = [str(name) for name in calibration["parameter"].values]
+    count = len(names)
+    width = max(DOUBLE_COLUMN_MM, PANEL_MM * count)
+    figure = new_figure(width_mm=width, height_mm=max(LEAST_MM, PANEL_MM * count) + ABOVE_MM)
+    axes = figure.subplots(count, count, sharex="col", squeeze=False)
+    for row in range(count):
+        for column in range(count):
+            ax = axes[row, column]
+            if column > row:
+                ax.set_visible(False)
+            elif column == row:
+                _plot_one(calibration, row, ax)
+            else:
+                _plot_pair(calibration, column, row, ax)
+            if row == count - 1:
+                ax.set_xlabel(_label(calibration, column))
+            if column == 0 and row:
+                ax.set_ylabel(_label(calibration, row))
+            elif column:
+                ax.tick_params(labelleft=False)
+    axes[0, 0].set_yticks([])
+    figure.suptitle(
+        f"{calibration.attrs['model']}: values that could have given the recording "
+        "(orange: estimate)"
+        + ("" if _counts(calibration) else "; they do not count, the estimate is the search's")
+    )
+    return figure
+
+
+def quality_figure(calibration: xr.Dataset) -> Figure:
+    """Return the distances in each aspect, and facts that were not fitted."""
+    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=72.0)
+    aspects, checks = figure.subplots(1, 2)
+    held = calibration["held_out_distance"].values
+    name = str(calibration.attrs["model"])
+    aspects.plot(held, np.arange(held.size), "o", ms=3.5, color=BLUE, label=name)
+    plot_own_aspects(calibration, aspects, label="the recording's own parts")
+    plot_check_ratios(calibration, checks, color=BLUE)
+    label_checks(calibration, checks)
+    letter_panels([aspects, checks], ["distance from blocks not seen", "not fitted, 20 worlds"])
+    figure.legend(*aspects.get_legend_handles_labels(), loc="outside upper center", ncols=2)
+    return figure
+
+
+def _plot_one(calibration: xr.Dataset, index: int, ax: Axes) -> None:
+    """Draw the histogram of a parameter's draws, its interval and its estimate."""
+    one = calibration.isel(parameter=index)
+    values = one["draws"].values
+    ax.hist(values, bins=BINS, color=MUTED)
+    for end in one["interval"].values:
+        if np.isfinite(end):
+            ax.axvline(float(end), color=BLUE, lw=0.8, ls="--")
+    ax.axvline(float(one["estimate"]), color=ORANGE, lw=1.2)
+    ax.set_yticks([])
+    ax.xaxis.set_major_locator(_few_ticks())
+    if not bool(one["determined"]):
+        ax.set_title("not determined", loc="left", fontsize="x-small", color=INK)
+
+
+def _plot_pair(calibration: xr.Dataset, column: int, row: int, ax: Axes) -> None:
+    """Draw the draws of two parameters and the estimate."""
+    across, up = (calibration.isel(parameter=index) for index in (column, row))
+    ax.plot(across["draws"].values, up["draws"].values, ".", ms=1.2, color=BLUE, alpha=0.6)
+    ax.plot(float(across["estimate"]), float(up["estimate"]), "+", ms=5.0, mew=1.2, color=ORANGE)
+    ax.yaxis.set_major_locator(_few_ticks())
+
+
+def _few_ticks() -> Locator:
+    from matplotlib.ticker import MaxNLocator
+
+    return MaxNLocator(nbins=3, steps=[1, 2, 5, 10])
+
+
+def _label(calibration: xr.Dataset, index: int) -> str:
+    one = calibration.isel(parameter=index)
+    unit = str(one["unit"].values)
+    words = fill(str(one["parameter"].values).replace("_", " "), width=WORDS)
+    return words if unit == "1" else f"{words}\n[{unit}]"
+
+
+def _counts(calibration: xr.Dataset) -> bool:
+    return bool(calibration.attrs["estimate_from"] == "summaries")

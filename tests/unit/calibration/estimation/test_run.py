@@ -1,0 +1,189 @@
+"""A calibration of many parameters as a whole, on simulated recordings of real models.
+
+The quick tests make every stage with few simulations: their answers are coarse, but must not depend
+on threads, interruptions or chance. The slow ones make them as they are made for users.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from self_propelled import moving
+
+import driftwalk as dw
+from driftwalk.calibration.estimation import approach, descend, posterior, run
+from driftwalk.calibration.evolution import Budget
+from driftwalk.calibration.run import calibrate
+from driftwalk.sweep import ShardStore
+
+ACTIVE = {"speed": 0.03, "rotational_diffusion": 0.8, "turn_rate": 0.3}
+RESTING = {
+    "speed": 0.04, "speed_cv": 0.2, "run_time": 1.0, "run_time_cv": 0.5, "rest_time": 1.0,
+    "rest_time_cv": 0.5, "turn_std": 1.0, "rotational_diffusion": 0.1,
+}  # fmt: skip
+NOISE = 2e-4
+
+
+@pytest.fixture(scope="module")
+def recording() -> xr.Dataset:
+    return moving(dw.motion_model("active"), ACTIVE, 60.0, seed=3, noise=NOISE)
+
+
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let every stage simulate little."""
+    monkeypatch.setattr(run, "SEARCH", Budget(design=16, starts=1, short=2, long=2))
+    monkeypatch.setattr(approach, "SIMULATIONS", 64)
+    monkeypatch.setattr(approach, "MOST_ROUNDS", 2)
+    monkeypatch.setattr(descend, "FEWEST_SIMULATIONS", (128, 128))
+    monkeypatch.setattr(descend, "COEFFICIENTS", (4, 8))
+    monkeypatch.setattr(descend, "MOST_ROUNDS", 2)
+    monkeypatch.setattr(posterior, "MOST_ROUNDS", 2)
+    monkeypatch.setattr(posterior, "STEPS", 60)
+
+
+def study(*, bootstrap: int = 10, seed: int = 1) -> dw.Study:
+    return dw.apply_overrides(
+        dw.Study(),
+        {
+            "calibration.bootstrap": bootstrap,
+            "calibration.seed": seed,
+            "observation.position_noise_m": NOISE,
+        },
+    )
+
+
+def calibrated(recording: xr.Dataset, model: str = "active", **options: Any) -> xr.Dataset:
+    chosen = options.pop("study", study())
+    options.setdefault("threads", 1)
+    return calibrate(recording, dw.motion_model(model), study=chosen, **options)
+
+
+def truth_of(found: xr.Dataset, values: dict[str, float]) -> np.ndarray:
+    return np.array([values[name] for name in found["parameter"].values])
+
+
+@pytest.mark.usefixtures("few")
+def test_neither_threads_nor_repetition_change_anything(recording: xr.Dataset) -> None:
+    first = calibrated(recording)
+    assert "draws" in first
+    xr.testing.assert_identical(first, calibrated(recording, threads=2))
+
+
+class Interrupted(Exception):
+    pass
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("few")
+def test_an_interrupted_calibration_goes_on_where_it_was(tmp_path: Path) -> None:
+    """A recording of another model needs both stages; each is interrupted once."""
+    resting = moving(dw.motion_model("run_rest"), RESTING, 60.0, seed=5, noise=NOISE)
+    whole = calibrated(resting, "inertial")
+
+    def stores(name: str, fingerprint: dict[str, Any]) -> ShardStore:
+        return ShardStore(tmp_path / name, fingerprint=fingerprint)
+
+    kept = []
+    for stage in ("summaries", "search"):
+        told: list[str] = []
+
+        def stop(name: str, done: int, most: int, stage: str = stage) -> None:
+            told.append(name)  # noqa: B023
+            assert done <= most
+            if told.count(stage) == 5:  # noqa: B023
+                raise Interrupted
+
+        with pytest.raises(Interrupted):
+            calibrated(resting, "inertial", stores=stores, tell=stop)
+        kept.append({path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.npz")})
+    assert 1 < len(kept[0]) < len(kept[1])
+    again = calibrated(resting, "inertial", stores=stores)
+    xr.testing.assert_identical(again, whole)
+    # What had been finished was not made a second time.
+    for path, written in {**kept[0], **kept[1]}.items():
+        assert path.stat().st_mtime_ns == written
+
+
+@pytest.mark.usefixtures("few")
+def test_without_a_bootstrap_there_is_one_stage(recording: xr.Dataset) -> None:
+    told: list[str] = []
+    found = calibrated(
+        recording, study=study(bootstrap=0), tell=lambda stage, _done, _most: told.append(stage)
+    )
+    assert list(dict.fromkeys(told)) == ["search", "judged"]
+    assert found.attrs["estimate_from"] == "search"
+    assert np.isnan(found["interval"]).all()
+    assert np.isnan(found["half_width"]).all()
+    assert not found["determined"].any()
+    assert "draws" not in found
+    np.testing.assert_array_equal(found["estimate"], found["searched_estimate"])
+
+
+def test_a_model_that_ignores_its_parameters_is_refused() -> None:
+    """Without noise of the camera nothing varies at all."""
+
+    def straight(
+        scene: dw.motion.Scene, speed: float, first: float, second: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        way = np.tile(0.001 * np.sin(scene.times), (scene.worlds, 1))
+        return scene.start.x[:, None] + way, scene.start.y[:, None] + 0.0 * way
+
+    model = dw.motion_model(
+        straight, speed=(0.01, 0.1, "m/s"), first=(0.0, 1.0, "1/s"), second=(0.0, 1.0, "1/s")
+    )
+    recording = moving(dw.motion_model("active"), ACTIVE, 60.0, seed=3)
+    chosen = dw.apply_overrides(study(), {"observation.position_noise_m": 0.0})
+    with pytest.raises(dw.InputError, match="in the same way at all settings of its parameters"):
+        calibrate(recording, model, study=chosen, threads=1)
+
+
+@pytest.mark.slow
+def test_a_model_is_found_again_and_says_how_well() -> None:
+    """100 s of a particle that forgets its heading 80 times.
+
+    The speed is known from a thousand steps, within a percent or two. All estimates lie within two
+    half-widths of their 90 % interval: three standard deviations, of three parameters.
+    """
+    recording = moving(dw.motion_model("active"), ACTIVE, 100.0, seed=3, noise=NOISE)
+    told: list[str] = []
+    found = calibrated(
+        recording, study=study(bootstrap=20), tell=lambda stage, _done, _most: told.append(stage)
+    )
+    assert "search" not in told
+    assert found.attrs["estimate_from"] == "summaries"
+    truth = truth_of(found, ACTIVE)
+    low, high = found["interval"].values.T
+    assert (np.abs(found["estimate"] - truth) < high - low).all()
+    assert ((low < found["estimate"]) & (found["estimate"] < high)).all()
+    by_name = found.sel(parameter="speed")
+    assert float(by_name["estimate"]) == pytest.approx(ACTIVE["speed"], rel=0.03)
+    assert bool(by_name["determined"])
+    assert float(found["misfit"]) <= float(found["most_misfit"])
+    assert float(found["interval_stretch"]) == 1.0
+    assert bool(found["explained"])
+    assert found["warning"].size == 0
+
+
+@pytest.mark.slow
+def test_another_model_is_not_believed() -> None:
+    """A body without rests on the recording of one that rests half of the time."""
+    resting = moving(dw.motion_model("run_rest"), RESTING, 100.0, seed=3, noise=NOISE)
+    told: list[str] = []
+    found = calibrated(resting, "inertial", tell=lambda stage, _done, _most: told.append(stage))
+    assert "search" in told
+    assert float(found["misfit"]) > 3 * float(found["most_misfit"])
+    warnings = " ".join(found["warning"].values.tolist())
+    if found.attrs["estimate_from"] == "search":
+        assert not found["determined"].any()
+        assert "the summaries of the motion pull the model away" in warnings
+    else:
+        assert float(found["matched_score"]) <= run.AS_CLOSE * float(found["searched_score"])
+        assert float(found["interval_stretch"]) > 2.0
+        assert "the summaries of the motion differ from the model's" in warnings
+    assert not bool(found["explained"])
+    assert "the model does not explain the recording" in warnings

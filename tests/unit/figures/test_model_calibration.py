@@ -1,0 +1,53 @@
+"""The figures of a calibration of many parameters: a panel for each pair, labels that fit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import xarray as xr
+from every_kind import every_kind
+
+from driftwalk.core.errors import InputError
+from driftwalk.figures import write_model_calibration_figures
+from driftwalk.figures.model_calibration import pairs_figure, quality_figure
+
+
+@pytest.fixture(scope="module")
+def found() -> xr.Dataset:
+    return every_kind("model_calibration")
+
+
+def test_every_pair_has_a_panel_and_its_draws(found: xr.Dataset) -> None:
+    figure = pairs_figure(found)
+    shown = [ax for ax in figure.axes if ax.get_visible()]
+    assert len(shown) == 6
+    below = figure.axes[3]
+    draws, estimate = below.lines
+    assert draws.get_xdata().tolist() == found["draws"][:, 0].values.tolist()
+    assert draws.get_ydata().tolist() == found["draws"][:, 1].values.tolist()
+    assert estimate.get_xdata() == [float(found["estimate"][0])]
+
+
+def test_labels_have_units_and_stay_on_the_page(found: xr.Dataset) -> None:
+    figure = pairs_figure(found)
+    figure.draw_without_rendering()
+    labels = [ax.xaxis.label for ax in figure.axes if ax.get_visible() and ax.get_xlabel()]
+    assert [one.get_text().splitlines()[-1] for one in labels] == ["[m/s]", "[s]", "[rad/s]"]
+    for one in labels:
+        box = one.get_window_extent()
+        assert 0.0 <= box.x0 < box.x1 <= figure.bbox.width
+
+
+def test_the_quality_shows_the_distances(found: xr.Dataset) -> None:
+    aspects, checks = quality_figure(found).axes
+    assert aspects.lines[0].get_xdata().tolist() == found["held_out_distance"].values.tolist()
+    assert checks.get_xlabel() == "model / recording"
+
+
+def test_without_draws_there_are_no_pairs(found: xr.Dataset, tmp_path: Path) -> None:
+    rest = found.drop_vars("draws")
+    written = write_model_calibration_figures(tmp_path, calibration=rest, formats=("png",))
+    assert [path.name for path in written] == ["quality.png"]
+    with pytest.raises(InputError, match="expected a model_calibration"):
+        write_model_calibration_figures(tmp_path, calibration=xr.Dataset())
