@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import json
+import re
 import shutil
 import signal
 import socketserver
@@ -309,6 +310,30 @@ def test_a_slider_changes_the_picture(
     assert best_of_some_seconds(page, "time", 3.0) > 3.0
     page.wait_for_selector("[data-steps]")
     picture(page, "play-desktop")
+
+
+def test_bodies_of_a_motion_model(
+    visit: Callable[..., Visit], picture: Callable[..., Path]
+) -> None:
+    """A slider for each parameter; the trails fill more of the picture than the dots alone."""
+    choices = ("--parameter", "speed=0.02", "--parameter", "turn_rate=-1,1")
+    with served("play", "--model", "active", *choices) as started:
+        page = visit(f"http://127.0.0.1:{started.port}/").open(started.address)
+        canvas = page.locator("canvas.tank-canvas")
+        until_tank(page, "frames", 20)
+        assert canvas.get_attribute("data-blocks") == "4"
+        assert canvas.get_attribute("aria-label") == "The tank: bodies and their trails"
+        early = drawn_share(pixels(canvas))
+        names = [knob.get_attribute("name") for knob in page.locator("input[type=range]").all()]
+        wanted = [f"parameter:{name}" for name in ("speed", "rotational_diffusion", "turn_rate")]
+        assert names == [*wanted, "bodies", "speed"]
+        until_tank(page, "frames", 150)
+        assert drawn_share(pixels(canvas)) > early
+        turn(page, '"parameter:speed"', 0.7)
+        expect(page.locator("label", has_text="speed").first).to_contain_text("cm/s")
+        turn(page, "bodies", 0.9)
+        expect(canvas).to_have_attribute("data-blocks", re.compile("2[0-9]|3[0-2]"))
+        picture(page, "play-model-desktop")
 
 
 def test_thirty_pictures_a_second_with_64_blocks(visit: Callable[..., Visit]) -> None:

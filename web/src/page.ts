@@ -294,7 +294,16 @@ const controls = object({
 
 const arrows = object({ x: numbers, y: numbers, u: numbers, v: numbers });
 /** The tank of the playground. */
-const tank = object({ ...base, arena: nullable(arena), side: number, flow: nullable(arrows) });
+const tank = object({
+  ...base,
+  arena: nullable(arena),
+  side: number,
+  flow: nullable(arrows),
+  /** Bodies without a shape of their own are dots. */
+  shape: withDefault(text, "square"),
+  /** How far back the trails go [s]; 0 for none. */
+  trail_s: withDefault(number, 0),
+});
 
 export { tank as checkTank, controls as checkControls, overTime as checkOverTime };
 export type Arena = Checked<typeof arena>;

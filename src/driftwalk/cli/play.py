@@ -9,16 +9,25 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from driftwalk.cli.inputs.other_files import explained
+from driftwalk.cli.options.model import (
+    KnownModel,
+    ModelName,
+    ParametersFrom,
+    PlayedParameters,
+    playable_model,
+)
 from driftwalk.cli.options.shared import FlowFile
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_note
 from driftwalk.cli.view import Host, Open, Port, show
+from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
+    from driftwalk.viewer import Source
 
 FLOW_SEED = 1
 BLOCKS = 4
@@ -28,12 +37,15 @@ BLOCKS = 4
 def play(
     given: StudyOptions,
     flow: FlowFile = None,
+    model: ModelName = None,
+    parameters: PlayedParameters = None,
+    parameters_from: ParametersFrom = None,
     recording: Annotated[
         Path | None,
         typer.Option(
             "--recording",
             metavar="FILE",
-            help="Recording to compare the blocks' steps with.",
+            help="Recording to compare the steps with.",
             show_default=False,
         ),
     ] = None,
@@ -57,11 +69,20 @@ def play(
     """Turn the knobs of the model while the tank moves.
 
     Study, flow and recording default to those of the bundled example. In a tank without a flow
-    field the water moves in a random flow. Ctrl-C ends the server.
+    field the water moves in a random flow. With --model: bodies of that model, with a slider for
+    each of its parameters. Ctrl-C ends the server.
     """
     from driftwalk.viewer import PlaySource, hello_line, require_server
 
     require_server()
+    if model is not None:
+        if live is not None:
+            raise InputError("--live publishes a tank of blocks: leave it out with --model")
+        known = playable_model(model, parameters, parameters_from)
+        show(_of_model(known, given, flow, recording, body), host=host, port=port, open=open)
+        return
+    if parameters or parameters_from is not None:
+        raise InputError("--parameter and --parameters-from belong to a --model")
     bundled = not given.states_tank and flow is None
     chosen = given.over(_bundled(), base="the bundled example") if bundled else given.study()
     source = PlaySource(
@@ -79,6 +100,43 @@ def play(
             source.stream_to(server)
             print_note(f"the tank as a tracker's stream on {server.host}, port {server.port}")
         show(source, host=host, port=port, open=open)
+
+
+def _of_model(
+    known: KnownModel,
+    given: StudyOptions,
+    flow: Path | None,
+    recording: Path | None,
+    body: str | None,
+) -> Source:
+    """Return the playground of a motion model: in the recording's tank, where one is given."""
+    from driftwalk.conditions import study_for
+    from driftwalk.viewer import ModelPlaySource
+
+    _refuse_blocks(given)
+    chosen, beside = given.study(), None
+    if recording is not None:
+        beside = _recording(recording, chosen, body, bundled=not given.states_tank)
+        chosen = study_for([] if beside is None else [beside], chosen, body=body)
+    field = None
+    if flow is not None or known.model.needs_flow:
+        field = _flow(flow, chosen, bundled=False)
+    for warning in known.warnings:
+        print_note(f"warning: {warning}")
+    return ModelPlaySource(
+        known.model,
+        known.values,
+        chosen,
+        flow=field,
+        recording=beside,
+        body=body,
+        seed=chosen.assembly.seed,
+    )
+
+
+def _refuse_blocks(given: StudyOptions) -> None:
+    if "assembly.blocks" in given.overrides:
+        raise InputError("--blocks: the page of a --model has a slider for its bodies")
 
 
 def _bundled() -> Study:

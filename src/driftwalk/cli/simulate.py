@@ -1,22 +1,37 @@
-"""`driftwalk simulate`: trajectories of a block in a stirred tank."""
+"""`driftwalk simulate`: trajectories of a block in a stirred tank, or of a motion model."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 import typer
 
+from driftwalk.cli.inputs.assembly_source import load_flow_for
+from driftwalk.cli.options.model import (
+    KnownModel,
+    ModelName,
+    ParametersFrom,
+    ParameterValues,
+    known_model,
+)
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.shared import Json
-from driftwalk.cli.options.study import StudyOptions, with_study_options
+from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
 from driftwalk.cli.terminal.output import print_json, print_note, require_place
 from driftwalk.core.errors import InputError
+from driftwalk.core.json_text import parse_json
 from driftwalk.core.study_keys import STUDY_KEYS
 
 if TYPE_CHECKING:
     import xarray as xr
+
+OF_THE_BLOCK: Final = (
+    *("drag_coefficient", "force_std_N", "force_interval_s", "force_noise_intensity_N2_s"),
+    "time_step_s",
+)
+"""Attributes that a simulation of the block has."""
 
 
 @with_study_options(
@@ -26,12 +41,21 @@ if TYPE_CHECKING:
     *("position_noise", "orientation_noise", "replicates", "seed"),
 )
 def simulate(
-    flow: Annotated[
-        Path,
-        typer.Option("--flow", metavar="FILE", help="Flow field: NetCDF, or CSV with x, y, u, v."),
-    ],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.nc", help="File to write.")],
     given: StudyOptions,
+    flow: Annotated[
+        Path | None,
+        typer.Option(
+            "--flow",
+            metavar="FILE",
+            help="Flow field: NetCDF, or CSV with x, y, u, v. For the block, and for a --model "
+            "that has a use for it.",
+            show_default=False,
+        ),
+    ] = None,
+    model: ModelName = None,
+    parameters: ParameterValues = None,
+    parameters_from: ParametersFrom = None,
     like: Annotated[
         Path | None,
         typer.Option(
@@ -59,25 +83,29 @@ def simulate(
     ] = False,
     json: Json = False,
 ) -> None:
-    """Simulate the motion of the block."""
-    from driftwalk.conditions import simulate_like, study_for
+    """Simulate the motion of the block, or of another motion model.
+
+    With --model: a body that moves by itself, or a model of one's own; every parameter gets a
+    value. It starts where the recording of --like does, otherwise anywhere in the tank, at rest.
+    """
     from driftwalk.core.atomic import write_atomic
-    from driftwalk.flow import load_flow
     from driftwalk.schema.netcdf import netcdf_bytes
-    from driftwalk.simulation import simulate as run
 
     if backend not in ("cpu", "reference"):
         raise InputError(f"--backend takes cpu or reference, got '{backend}'")
     if like is not None and backend == "reference":
         raise InputError("--like runs on the cpu backend only: leave out --backend")
     require_place(out, existing="replace" if overwrite else "error")
-    chosen = given.study()
-    field = load_flow(flow)
-    if like is None:
-        result = run(chosen, field, backend="reference" if backend == "reference" else "cpu")
+    recording = None if like is None else RecordingOptions(body=body).load(like)
+    if model is not None:
+        if backend != "cpu":
+            raise InputError("--backend is for the block: leave it out with --model")
+        known = known_model(model, parameters, parameters_from)
+        result = _of_model(known, given, flow, recording, body)
+    elif parameters or parameters_from is not None:
+        raise InputError("--parameter and --parameters-from belong to a --model")
     else:
-        recording = RecordingOptions(body=body).load(like)
-        result = simulate_like(study_for([recording], chosen, body=body), field, recording)
+        result = _of_block(given, flow, recording, body, backend=backend)
     write_atomic(out, netcdf_bytes(result))
     facts = summary(result)
     if json:
@@ -85,12 +113,73 @@ def simulate(
         return
     print_note(
         f"wrote {out}: {facts['replicates']} x {facts['samples']} samples over "
-        f"{facts['duration_s']:g} s; σ_F = {1e3 * facts['force_std_N']:g} mN redrawn every "
-        f"{1e3 * facts['force_interval_s']:g} ms"
+        f"{facts['duration_s']:g} s; {_in_words(facts)}"
     )
     for name, count in facts["status"].items():
         if count:
             print_note(f"warning: {count} of {facts['replicates']} replicates: {name}")
+
+
+def _of_block(
+    given: StudyOptions,
+    flow: Path | None,
+    recording: xr.Dataset | None,
+    body: str | None,
+    *,
+    backend: str,
+) -> xr.Dataset:
+    from driftwalk.conditions import simulate_like, study_for
+    from driftwalk.flow import load_flow
+    from driftwalk.simulation import simulate as run
+
+    if flow is None:
+        raise InputError("the flow of the water is missing: give a flow field (--flow)")
+    chosen, field = given.study(), load_flow(flow)
+    if recording is None:
+        return run(chosen, field, backend="reference" if backend == "reference" else "cpu")
+    return simulate_like(study_for([recording], chosen, body=body), field, recording)
+
+
+def _of_model(
+    known: KnownModel,
+    given: StudyOptions,
+    flow: Path | None,
+    recording: xr.Dataset | None,
+    body: str | None,
+) -> xr.Dataset:
+    from driftwalk.conditions import study_for
+    from driftwalk.motion import simulate_motion
+
+    _refuse_block(given)
+    chosen = given.study()
+    if recording is not None:
+        chosen = study_for([recording], chosen, body=body)
+    field = None if flow is None else load_flow_for(flow, chosen)
+    result = simulate_motion(known.model, known.values, chosen, flow=field, like=recording)
+    if recording is None and not given.states_tank:
+        print_note(f"the tank is the default study's, a {chosen.tank.describe()}")
+    for warning in known.warnings:
+        print_note(f"warning: {warning}")
+    return result
+
+
+def _refuse_block(given: StudyOptions) -> None:
+    """Refuse options about the block and its force, which another model does not have."""
+    of_block = [key for key in given.overrides if key.startswith(("block.", "forces."))]
+    of_block += [key for key in given.overrides if key == "simulation.time_step_s"]
+    if of_block:
+        names = ", ".join(option_name(key, keys=given.keys) for key in of_block)
+        raise InputError(f"{names}: about the block, which --model replaces; leave it out")
+
+
+def _in_words(facts: dict[str, Any]) -> str:
+    if "model" in facts:
+        values = ", ".join(f"{name} {value:g}" for name, value in facts["parameters"].items())
+        return f"{facts['model']} with {values}"
+    return (
+        f"σ_F = {1e3 * facts['force_std_N']:g} mN redrawn every "
+        f"{1e3 * facts['force_interval_s']:g} ms"
+    )
 
 
 def summary(result: xr.Dataset) -> dict[str, Any]:
@@ -100,15 +189,17 @@ def summary(result: xr.Dataset) -> dict[str, Any]:
     names = status.attrs["flag_meanings"].split()
     path = np.hypot(*(np.diff(result[name].values, axis=1) for name in ("x", "y")))
     elapsed = float(result["time"].values[-1] - result["time"].values[0])
+    of_model: dict[str, Any]
+    if "model" in result.attrs:
+        values = parse_json(result.attrs["model_parameters"])
+        of_model = {"model": result.attrs["model"], "parameters": values}
+    else:
+        of_model = {name: result.attrs[name] for name in OF_THE_BLOCK}
     return {
         "replicates": int(result.sizes["replicate"]),
         "samples": int(result.sizes["time"]),
         "duration_s": elapsed,
-        "drag_coefficient": result.attrs["drag_coefficient"],
-        "force_std_N": result.attrs["force_std_N"],
-        "force_interval_s": result.attrs["force_interval_s"],
-        "force_noise_intensity_N2_s": result.attrs["force_noise_intensity_N2_s"],
-        "time_step_s": result.attrs["time_step_s"],
+        **of_model,
         "seed": result.attrs["seed"],
         "mean_speed_m_s": float(np.nansum(path) / (elapsed * path.shape[0])) if elapsed else 0.0,
         "status": {

@@ -81,7 +81,7 @@ def calibrate(
     from driftwalk.model import Study
     from driftwalk.motion import BlockModel
     from driftwalk.notebook.result import as_result
-    from driftwalk.runs import CalibrationWork, run_calibration
+    from driftwalk.runs import CalibrationWork, result_file, run_calibration
     from driftwalk.runs.folder import silent
     from driftwalk.schema.netcdf import open_netcdf
 
@@ -118,4 +118,4 @@ def calibrate(
         progress=say,
         command=f"driftwalk.calibrate(..., folder={str(folder)!r})",
     )
-    return as_result(open_netcdf(place / "calibration.nc"))
+    return as_result(open_netcdf(place / result_file(model)))

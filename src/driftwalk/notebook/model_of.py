@@ -54,6 +54,11 @@ def model_of(
 
     if isinstance(source, Study):
         return FoundModel(apply_overrides(source, overrides), _flow(flow), None)
+    if not hasattr(source, "attrs"):
+        raise InputError(
+            f"a study, a fit or a calibration is needed, got {source!r}; `motion_model` makes a "
+            "motion model of a name"
+        )
     source = current_form(source)
     kind = source.attrs.get("kind")
     if kind not in ("fit", "calibration"):

@@ -1,12 +1,20 @@
-"""Simulate: a study in a flow, or what a fit or a calibration found, like a recording."""
+"""Simulate: a study in a flow, a fit, a calibration or a motion model, like a recording."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from driftwalk.conditions import study_for
 from driftwalk.core.errors import InputError
-from driftwalk.notebook.model_of import model_of
+from driftwalk.motion import (
+    BlockModel,
+    MotionModel,
+    ParticleModel,
+    estimated_values,
+    simulate_motion,
+)
+from driftwalk.notebook.model_of import flow_field_of, model_of
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -18,9 +26,11 @@ if TYPE_CHECKING:
 
 
 def simulate(
-    model: Study | xr.Dataset,
+    model: Study | MotionModel | xr.Dataset,
     flow: xr.Dataset | None = None,
     *,
+    parameters: Mapping[str, float] | xr.Dataset | None = None,
+    study: Study | None = None,
     like: xr.Dataset | None = None,
     body: str | None = None,
     sample_time: npt.ArrayLike | None = None,
@@ -30,14 +40,20 @@ def simulate(
     backend: Backend = "cpu",
     threads: int | None = None,
 ) -> xr.Dataset:
-    """Simulate one block in a stirred tank.
+    """Simulate one block in a stirred tank, or a body of any motion model.
 
     Parameters
     ----------
-    model : Study or xarray.Dataset
-        A study, a `fit` or a `calibration`.
+    model : Study, MotionModel or xarray.Dataset
+        A study, a `fit` or a `calibration` of the block; or a `motion_model`.
     flow : xarray.Dataset, optional
-        The water's velocity, a `flow_field`; a fit brings its own.
+        The water's velocity, a `flow_field`; a fit brings its own. A motion model gets one only
+        if it has a use for it.
+    parameters : mapping of str to float or xarray.Dataset, optional
+        Of a motion model: the value of each parameter by name, in its unit; or the calibration
+        that has found them, anything with ``estimate`` along ``parameter``.
+    study : Study, optional
+        Of a motion model: tank, camera, times, seed and replicates; default: the paper's.
     like : xarray.Dataset, optional
         A `trajectory`: simulate what its camera would have recorded, in its tank, with its start,
         time stamps, gaps and noise.
@@ -46,11 +62,12 @@ def simulate(
     sample_time : array_like, shape (n,), optional
         Times of the samples [s]; not with `like`.
     start : Start, optional
-        Pose and motion at time 0; not with `like`.
+        Pose and motion at time 0; not with `like`. Default: as the study says, anywhere in the
+        tank at rest.
     replicates, seed : int, optional
         Over the study's values.
     backend : {"cpu", "reference"}
-        See `driftwalk.simulation.simulate`; "reference" not with `like`.
+        See `driftwalk.simulation.simulate`; "reference" for the block without `like`.
     threads : int, optional
         Default: all processors. The result does not depend on it.
 
@@ -62,8 +79,8 @@ def simulate(
     Raises
     ------
     InputError
-        When there is no flow, or an argument contradicts `like`: it and the study state two tanks
-        or two blocks, say.
+        When there is no flow for the block, a parameter of a motion model has no value, or an
+        argument contradicts `like`: it and the study state two tanks or two blocks, say.
 
     Examples
     --------
@@ -71,19 +88,74 @@ def simulate(
     >>> run = dw.simulate(dw.Study(), dw.uniform_flow(0.0, 0.0), sample_time=[0.0, 0.1], seed=1)
     >>> run.sizes["time"]
     2
+    >>> fish = dw.motion_model("burst_coast", kick_speed_cv=0.4, kick_time_cv=1.0, turn_std=0.5)
+    >>> known = {"kick_speed": 0.1, "kick_time": 0.5, "glide_time": 0.3}
+    >>> run = dw.simulate(fish, parameters=known, sample_time=[0.0, 0.1], replicates=4)
+    >>> run.sizes["replicate"]
+    4
     """
     from driftwalk.conditions import simulate_like
     from driftwalk.simulation import simulate as simulate_study
 
-    study, field, _ = model_of(model, flow, {})
     common: dict[str, Any] = {"replicates": replicates, "seed": seed, "threads": threads}
+    free: dict[str, Any] = {"sample_time": sample_time, "start": start}
+    if isinstance(model, MotionModel):
+        if backend != "cpu":
+            raise InputError("a motion model is simulated by its own code: leave out `backend`")
+        given = {"flow": flow, "like": like, "body": body, **free, **common}
+        return _of_motion_model(model, parameters, study, **given)
+    if parameters is not None or study is not None:
+        raise InputError("`parameters` and `study` are for a motion model: `motion_model(...)`")
+    _refuse_numbers_alone(model)
+    chosen, field, _ = model_of(model, flow, {})
     if like is None:
         if body is not None:
             raise InputError("`body` names a body of the recording `like`, and none is given")
-        return simulate_study(
-            study, field, sample_time=sample_time, start=start, backend=backend, **common
-        )
+        return simulate_study(chosen, field, backend=backend, **free, **common)
     if sample_time is not None or start is not None or backend != "cpu":
         raise InputError("with `like`, the recording gives times and start, in single precision")
-    chosen = study_for([like], study, body=body)
-    return simulate_like(chosen, field, like, body=body, **common)
+    return simulate_like(study_for([like], chosen, body=body), field, like, body=body, **common)
+
+
+def _of_motion_model(
+    model: MotionModel,
+    parameters: Mapping[str, float] | xr.Dataset | None,
+    study: Study | None,
+    *,
+    flow: xr.Dataset | None,
+    like: xr.Dataset | None,
+    body: str | None,
+    **options: Any,
+) -> xr.Dataset:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+    values: Mapping[str, float]
+    if isinstance(parameters, xr.Dataset):
+        values = estimated_values(parameters, model)
+    else:
+        values = parameters or {}
+    chosen = Study() if study is None else study
+    if like is not None:
+        # A model of the user's may know no wall; a body of the family keeps to the tank.
+        keeps = isinstance(model, ParticleModel | BlockModel)
+        chosen = study_for([like], chosen, body=body, needs_tank=keeps)
+    field = None if flow is None else flow_field_of(flow)
+    return simulate_motion(model, values, chosen, flow=field, like=like, body=body, **options)
+
+
+def _refuse_numbers_alone(source: Study | xr.Dataset) -> None:
+    """Refuse a calibration of another model than the block: it holds the numbers of one, no more.
+
+    Raises
+    ------
+    InputError
+        Says how to simulate that model.
+    """
+    name = getattr(source, "attrs", {}).get("model")
+    if name is not None:
+        raise InputError(
+            f"the calibration is about the model {name}, of which it holds the numbers alone: give "
+            "the model, and the calibration as `parameters`"
+        )

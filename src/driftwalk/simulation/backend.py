@@ -143,7 +143,7 @@ def _surroundings(
     accelerating: bool,
 ) -> dict[str, Any]:
     """Return wall, flow, samples and camera in the words of the native core."""
-    _check_sample_time(sample_time)
+    check_sample_time(sample_time)
     return {
         **(_still_water(tank) if flow is None else _water(flow, tank, accelerating=accelerating)),
         "radius": tank.radius_m or 0.0,
@@ -189,7 +189,14 @@ def _still_water(tank: Tank) -> dict[str, Any]:
     }
 
 
-def _check_sample_time(time: Floats) -> None:
+def check_sample_time(time: Floats) -> None:
+    """Refuse times of samples [s] that are not finite or do not increase from 0 on.
+
+    Raises
+    ------
+    InputError
+        When they are not, or there is none.
+    """
     # Without a finite end a run would never come to its last sample.
     sound = time.ndim == 1 and time.size > 0 and np.isfinite(time).all()
     if not sound or time[0] < 0 or (np.diff(time) <= 0).any():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,7 +14,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.streams import Purpose
 
 if TYPE_CHECKING:
-    from driftwalk.model import Study
+    from driftwalk.model import Study, Tank
 
 
 class Start(NamedTuple):
@@ -42,15 +44,54 @@ def random_start(study: Study, keys: npt.NDArray[np.uint64]) -> Start:
     InputError
         When no pose that fits was found in 1000 draws.
     """
-    poses = np.array([_draw_pose(study, int(key)) for key in keys])
-    return Start(poses[:, 0], poses[:, 1], poses[:, 2])
-
-
-def _draw_pose(study: Study, key: int) -> tuple[float, float, float]:
     from driftwalk.model.simulation import Pose
     from driftwalk.model.study import block_corners
 
     tank, side = study.tank, study.block.side_m
+
+    def fits(x: float, y: float, theta: float) -> bool:
+        corners = block_corners(Pose(x_m=x, y_m=y, theta_rad=theta), side_m=side)
+        return all(tank.contains(*corner) for corner in corners)
+
+    return _draw_poses(tank, keys, fits, what=f"a block of {side:g} m")
+
+
+def random_place(tank: Tank, keys: npt.NDArray[np.uint64], *, clearance: float = 0.0) -> Start:
+    """Draw one place per world, at rest: uniform over the tank, with a direction uniform too.
+
+    As `random_start`, for a point that stays a distance from the wall, the clearance [m].
+
+    Raises
+    ------
+    InputError
+        When no place so far from the wall was found in 1000 draws.
+    """
+    from driftwalk.model.tank import edges, inward_distance
+
+    sides = edges(tank.corners_m) if tank.radius_m is None else ()
+
+    def fits(x: float, y: float, _: float) -> bool:
+        if tank.radius_m is not None:
+            return math.hypot(x, y) <= tank.radius_m - clearance
+        return all(inward_distance((x, y), side) >= clearance for side in sides)
+
+    return _draw_poses(tank, keys, fits, what=f"a body {clearance:g} m from the wall")
+
+
+def _draw_poses(
+    tank: Tank,
+    keys: npt.NDArray[np.uint64],
+    fits: Callable[[float, float, float], bool],
+    *,
+    what: str,
+) -> Start:
+    poses = np.array([_draw_pose(tank, int(key), fits, what=what) for key in keys])
+    return Start(poses[:, 0], poses[:, 1], poses[:, 2])
+
+
+def _draw_pose(
+    tank: Tank, key: int, fits: Callable[[float, float, float], bool], *, what: str
+) -> tuple[float, float, float]:
     corners = np.asarray(
         tank.corners_m or [(-tank.extent_m[0] / 2,) * 2, (tank.extent_m[0] / 2,) * 2]
     )
@@ -58,15 +99,15 @@ def _draw_pose(study: Study, key: int) -> tuple[float, float, float]:
     for draw in range(1000):
         words = np.array(_core.philox(key, [0, draw, 0, Purpose.START]), dtype=np.float64)
         across, up, turn = words[:3] * 2.0**-32
-        pose = Pose(
-            x_m=low[0] + across * (high[0] - low[0]),
-            y_m=low[1] + up * (high[1] - low[1]),
-            theta_rad=(2.0 * turn - 1.0) * np.pi,
+        pose = (
+            low[0] + across * (high[0] - low[0]),
+            low[1] + up * (high[1] - low[1]),
+            (2.0 * turn - 1.0) * np.pi,
         )
-        if all(tank.contains(x, y) for x, y in block_corners(pose, side_m=side)):
-            return pose.x_m, pose.y_m, pose.theta_rad
+        if fits(*pose):
+            return pose
     raise InputError(
-        f"no start pose was found for a block of {side:g} m in a {tank.describe()}: "
+        f"no start pose was found for {what} in a {tank.describe()}: "
         "give one ([simulation] start) or a larger tank"
     )
 

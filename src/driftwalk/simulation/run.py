@@ -85,7 +85,7 @@ def simulate(
     if backend not in get_args(Backend):
         raise InputError(f"backend must be one of {', '.join(get_args(Backend))}, got {backend!r}")
     chosen = settings.seed if seed is None else seed
-    times = _default_times(study) if sample_time is None else np.asarray(sample_time, np.float64)
+    times = default_times(study) if sample_time is None else np.asarray(sample_time, np.float64)
     keys = world_keys(chosen, trial=0, replicate=np.arange(count))
     begin = start if start is not None else _study_start(study, keys)
     model = native_model(study, flow, times, plain_camera(study))
@@ -111,7 +111,8 @@ def plain_camera(study: Study) -> Camera:
     return Camera(*(0.0 if isinstance(value, str) else value for value in values))
 
 
-def _default_times(study: Study) -> npt.NDArray[np.float64]:
+def default_times(study: Study) -> npt.NDArray[np.float64]:
+    """Return the times of the samples [s] that a study asks for: its rate and duration."""
     settings = study.simulation
     samples = int(np.floor(settings.duration_s * settings.sample_rate_Hz + 1e-9)) + 1
     return np.arange(samples) / settings.sample_rate_Hz

@@ -5,6 +5,7 @@ FastAPI and uvicorn, the extra ``[view]``, are imported when a server is started
 
 from driftwalk.viewer.hub import Source
 from driftwalk.viewer.live_client import LiveSource
+from driftwalk.viewer.play.model_playground import ModelPlaySource
 from driftwalk.viewer.play.playground import PlaySource
 from driftwalk.viewer.play.stream import hello_line
 from driftwalk.viewer.server import require_server, serve
@@ -12,6 +13,7 @@ from driftwalk.viewer.watch.run import RunSource
 
 __all__ = [
     "LiveSource",
+    "ModelPlaySource",
     "PlaySource",
     "RunSource",
     "Source",

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import here, refusal
+from command_line import FLOW, here, refusal
 from finished_run import write_finished_run
 from page_server import PageServer, received, say, served
 from ports import held_port
@@ -226,6 +226,14 @@ def test_a_port_in_use(finished: Path) -> None:
         (["play", "--study", "nowhere.toml"], "nowhere.toml"),
         (["play", "--flow", "nowhere.nc"], "nowhere.nc"),
         (["play", "--recording", "nowhere.csv"], "nowhere.csv"),
+        (["play", "--parameter", "speed=1"], "belong to a --model"),
+        (["play", "--model", "activ"], "activ"),
+        (["play", "--model", "active", "--parameter", "sped=1"], "did you mean 'speed'"),
+        (["play", "--model", "active", "--parameter", "sped=1,2"], "sped"),
+        (["play", "--model", "active", "--live", "0"], "--live publishes a tank of blocks"),
+        (["play", "--model", "active", "--blocks", "3"], "--blocks: the page of a --model"),
+        (["play", "--model", "active", "--flow", FLOW], "does not feel the water"),
+        (["play", "--model", "active", "--parameters-from", "."], "is not a run directory"),
     ],
 )
 def test_mistakes(
@@ -375,3 +383,32 @@ def test_the_folder_s_name_is_only_text(server: PageServer, finished: Path) -> N
         assert HOSTILE in json.dumps(received(channel, "page")["page"], ensure_ascii=False).replace(
             '\\"', '"'
         )
+
+
+@pytest.mark.slow
+def test_play_a_motion_model() -> None:
+    choices = ("--parameter", "speed=0.02", "--parameter", "turn_rate=-1,1")
+    with served("play", "--model", "active", *choices, "--tank-diameter", "20cm") as started:
+        with started.socket() as channel:
+            page = received(channel, "page")["page"]
+            tank, controls, _ = page["sections"]
+            assert (tank["arena"]["diameter_m"], tank["shape"]) == (0.2, "dot")
+            knobs = {item["name"]: item for item in controls["items"]}
+            assert knobs["parameter:speed"]["value"] == 0.02
+            assert (knobs["parameter:turn_rate"]["min"], knobs["parameter:turn_rate"]["max"]) == (
+                -1.0,
+                1.0,
+            )
+            first = received(channel, "tank")
+            assert len(first["x"]) == 4
+            say(channel, type="set", name="parameter:speed", value=0.1)
+            say(channel, type="set", name="bodies", value=2)
+            for _ in range(200):
+                if len(received(channel, "tank")["x"]) == 2:
+                    break
+            else:
+                raise AssertionError("the number of bodies did not change")
+            say(channel, type="set", name="parameter:speed", value=-1)
+            assert "speed" in received(channel, "note")["words"]
+        code, _ = started.stop()
+    assert code == 0

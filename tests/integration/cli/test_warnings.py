@@ -157,6 +157,7 @@ BAD: dict[str, Callable[[Path, Path], list[Words]]] = {
     "simulate": lambda bad, out: [
         ["simulate", "--flow", bad, "--duration", "1s", "-o", out / "out.nc"],
         ["simulate", "--flow", FLOW, "--like", bad, "-o", out / "out.nc"],
+        ["simulate", "--model", "active", "--parameters-from", bad, "-o", out / "out.nc"],
     ],
     "compare": lambda bad, out: [
         ["compare", bad, out / "good.csv"],

@@ -93,6 +93,12 @@ def test_the_program_names_its_parameters():
     )
 
 
+def test_the_program_names_the_steps_of_the_search():
+    (speed,) = motion_model(address("steps")).parameters
+    assert speed.values == pytest.approx((0.01, 0.04, 0.07, 0.1))
+    assert speed.refined_step == 0.01
+
+
 def test_given_ranges_take_the_place_of_those_of_the_program():
     own = Parameter("tumble_rate", "1/s", 1.0, 2.0, step=0.25)
     speed, rate = motion_model(address(), own, speed=(0.02, 0.05)).parameters
@@ -130,6 +136,34 @@ def test_what_is_no_program_is_refused(command, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ConfigurationError, match=message):
         motion_model(f"command:{command}")
+
+
+@pytest.mark.parametrize("names", ["id", "id, flow_file"])
+def test_a_program_gets_the_flow_as_a_file_where_there_is_one(names, tmp_path):
+    source = (
+        "asked = json.loads(sys.stdin.readline())\n"
+        "shown = {key: asked.get('flow_file') for key in ('id', 'flow_file') if key in asked}\n"
+        "print(json.dumps({'id': 1, 'error': ', '.join(shown) + ': ' + str(shown['id'])}))\n"
+        "sys.stdout.flush()\n"
+    )
+    model = motion_model(address(script=written(tmp_path, source)))
+    flow = dw.tank30_flow() if "flow" in names else None
+    values = {"speed": np.full(4, 0.03)}
+    with pytest.raises(InputError, match=f"it reported: {names}: ") as refused:
+        model.simulate(values, replace(LIKE, flow=flow), KEYS)
+    path = str(refused.value).rpartition(": ")[2]
+    if flow is None:
+        assert path == "None"
+        return
+    with np.load(path) as stored:
+        np.testing.assert_array_equal(stored["x_m"], flow["x"])
+        np.testing.assert_array_equal(stored["y_m"], flow["y"])
+        np.testing.assert_array_equal(stored["u_m_s"], flow["u"])
+        np.testing.assert_array_equal(stored["v_m_s"], flow["v"])
+    folder = Path(path).parent
+    del model, refused
+    gc.collect()
+    assert not folder.exists()
 
 
 def test_a_program_lies_where_the_model_was_made(tmp_path, monkeypatch):
@@ -350,6 +384,8 @@ def test_ctrl_c_ends_the_requests():
         ("no-list", r": its answer has no list of parameters; the answer begins '{}'"),
         ("no-name", r": expected a parameter with a name, got {'low': 0, 'high': 1}"),
         ("no-high", r": its parameter speed has no number high: None"),
+        ("no-step", r": its parameter speed has no step above 0: 0"),
+        ("text-step", r": its parameter speed has no refined_step above 0: 'fine'"),
         ("unknown-key", r": its parameter speed has an unknown key 'units'; did you mean 'unit'"),
         ("twice", r": it has two parameters speed"),
         ("empty-range", r": .* ends at 0, below its beginning"),

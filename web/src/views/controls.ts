@@ -114,7 +114,8 @@ function rangeKnob(item: Item, changed: (name: string, value: unknown) => void):
 
 function written(value: number, item: Item): string {
   if (item.unit === "×") return `${short(value)} ×`;
-  return inUnit(value, displayOf(item.unit, item.max ?? value));
+  // Over many decades one unit would write most values as 0.000…
+  return inUnit(value, displayOf(item.unit, item.log ? value : (item.max ?? value)));
 }
 
 function holdWhilePressed(element: HTMLElement, input: HTMLInputElement): void {

@@ -39,7 +39,7 @@ export class DensityPanel {
     root.append(el("h2", {}, title), this.words, pair);
     if (note !== null && note !== "") root.append(el("p", { class: "note" }, note));
     this.pictures = [
-      this.picture(pair, "Blocks in the tank", "simulated"),
+      this.picture(pair, "In the tank", "simulated"),
       this.picture(pair, "Recording", "recording"),
     ];
     this.words.append(el("p", { class: "nothing" }, "Waiting for steps."));

@@ -6,6 +6,8 @@ import { el } from "../dom";
 import { type ControlsSection, type Page, checkControls, checkPage, checkTank } from "../page";
 import { type Shell, makeShell } from "../shell";
 import { TankCanvas, assemblyColours } from "../tank/canvas";
+import { PALETTE } from "../colours";
+import { Trails } from "../tank/trails";
 import { onThemeChange } from "../theme";
 import { duration, short } from "../units";
 import { connected } from "./connection";
@@ -21,7 +23,7 @@ const tankMessage = object({
   paused: withDefault(flag, false),
   x: list(number),
   y: list(number),
-  theta: list(number),
+  theta: list(nullable(number)),
   assembly: list(number),
   waiting: withDefault(number, 0),
   outcome: nullable(text),
@@ -29,6 +31,10 @@ const tankMessage = object({
 });
 
 type Tank = ReturnType<typeof tankMessage>;
+
+function hue(index: number): string {
+  return PALETTE[index % PALETTE.length] ?? "black";
+}
 
 export function showPlay(first: Page): Promise<void> {
   const shell = makeShell(first);
@@ -60,6 +66,8 @@ class Playground {
   private readonly take: (state: Tank) => void;
   private readonly set: (wish: { name: string; value: unknown }) => void;
   private last: Tank | null = null;
+  private dots = false;
+  private trails: Trails | null = null;
   private frames = { count: 0, since: 0, rate: 0 };
 
   constructor(
@@ -114,6 +122,9 @@ class Playground {
     if (content === undefined) return;
     const section = checkTank(content, "");
     this.tank.setTank(section.arena, section.side);
+    this.dots = section.shape === "dot";
+    if (this.dots) this.tank.element.setAttribute("aria-label", "The tank: bodies and their trails");
+    this.trails = section.trail_s > 0 ? new Trails(section.trail_s) : null;
     if (section.flow === null) this.tank.setArrows(null);
     else {
       const [x, y, u, v] = await Promise.all(
@@ -161,9 +172,14 @@ class Playground {
 
   private draw(state: Tank): void {
     this.last = state;
-    this.tank.draw({
-      blocks: { x: state.x, y: state.y, theta: state.theta, colours: assemblyColours(state.assembly) },
-    });
+    const theta = state.theta.map((angle) => (this.dots || angle === null ? Number.NaN : angle));
+    const colours = this.dots ? state.x.map((_, index) => hue(index)) : assemblyColours(state.assembly);
+    this.trails?.add(
+      state.time_s,
+      state.x.map((x, index) => ({ id: String(index), x_m: x, y_m: state.y[index] ?? null })),
+    );
+    const trails = this.trails?.all().map(({ id, x, y }) => ({ x, y, colour: hue(Number(id)) })) ?? [];
+    this.tank.draw({ blocks: { x: state.x, y: state.y, theta, colours }, trails });
     this.link.send({ type: "ready" });
     this.countFrame();
     this.pause.textContent = state.paused ? "Run" : "Pause";
@@ -194,7 +210,7 @@ class Playground {
     const pairs: [string, string][] = [
       ["time", duration(state.time_s)],
       ["speed", speed],
-      ["blocks", String(state.x.length)],
+      [this.dots ? "bodies" : "blocks", String(state.x.length)],
     ];
     if (this.frames.rate > 0) pairs.push(["pictures", `${Math.round(this.frames.rate)}/s`]);
     if (state.waiting > 0) pairs.push(["waiting for room", String(state.waiting)]);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def load_motion(path: Path, how: RecordingOptions, *, replicate: int = 0) -> xr.Dataset:
+def load_motion(path: Path, how: RecordingOptions) -> xr.Dataset:
     """Load a `trajectory` from a recording, or from a file that `driftwalk simulate` wrote.
 
     Parameters
@@ -23,9 +24,8 @@ def load_motion(path: Path, how: RecordingOptions, *, replicate: int = 0) -> xr.
     path : Path
         The file.
     how : RecordingOptions
-        How to read a recording; a simulation says all of it itself.
-    replicate : int
-        Which replicate of a simulation, counted from 0.
+        How to read a recording, and which replicate of a simulation; a simulation says all else of
+        itself.
 
     Raises
     ------
@@ -34,10 +34,11 @@ def load_motion(path: Path, how: RecordingOptions, *, replicate: int = 0) -> xr.
     """
     from driftwalk.conditions import require_motion
 
-    simulated = load_simulation(path, replicate=replicate)
+    simulated = load_simulation(path, replicate=how.replicate or 0)
     if simulated is not None:
         return simulated
-    recording = how.load(path)
+    # The replicate is that of the other motion.
+    recording = replace(how, replicate=None).load(path)
     require_motion(recording, body=how.body, where=path)
     return recording
 

@@ -1,12 +1,14 @@
-"""The options that choose a motion model, its known values and its ranges."""
+"""The options that choose a motion model, its known values and its ranges, or all its values."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -32,6 +34,134 @@ ParameterChoices = Annotated[
     ),
 ]
 
+ParameterValues = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--parameter",
+        metavar="NAME=VALUE",
+        help="Value of a parameter of --model, in its SI unit; repeat for others.",
+        show_default=False,
+    ),
+]
+PlayedParameters = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--parameter",
+        metavar="NAME=VALUE|LOW,HIGH",
+        help="Value to begin with, or range of the slider, of a parameter of --model; repeat for "
+        "others.",
+        show_default=False,
+    ),
+]
+ParametersFrom = Annotated[
+    Path | None,
+    typer.Option(
+        "--parameters-from",
+        metavar="RUN",
+        help="Run directory of calibrate or compare-models, or its dataset, with the values of "
+        "--model; --parameter goes over it.",
+        show_default=False,
+    ),
+]
+
+
+KnownParameters = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--known",
+        metavar="NAME",
+        help="Parameter of --model, or position_noise, that the calibrations know; repeat for "
+        "others.",
+        show_default=False,
+    ),
+]
+
+
+class KnownModel(NamedTuple):
+    """A motion model with a value for its parameters."""
+
+    model: MotionModel
+    values: dict[str, float]
+    warnings: list[str]
+
+
+def known_model(name: str, choices: Sequence[str] | None, place: Path | None) -> KnownModel:
+    """Return a motion model and the values of its parameters: those of a run, others over them.
+
+    Raises
+    ------
+    ConfigurationError
+        When there is no such model or parameter, or a choice is no number.
+    InputError
+        When the run holds no values of this model.
+    """
+    from driftwalk.motion import is_family_name, motion_model
+    from driftwalk.runs import read_found_values
+
+    given = {one: _value(one, choice) for one, choice in _choices(choices).items()}
+    found = None if place is None else read_found_values(place)
+    known = {} if found is None else found.known
+    options: dict[str, Any] = {}
+    if is_family_name(name):
+        # No parameter of the motion: how far the recorded point stays from the wall.
+        options["clearance"] = given.pop("clearance", known.get("clearance"))
+    model = motion_model(name, **options)
+    if found is None:
+        return KnownModel(model, given, [])
+    warnings = []
+    if found.is_outdated(model):
+        warnings.append(f"the source of {name} has changed since the values of {place} were found")
+    return KnownModel(model, {**found.of(model), **given}, warnings)
+
+
+def playable_model(name: str, choices: Sequence[str] | None, place: Path | None) -> KnownModel:
+    """Return a motion model with values or ranges for some of its parameters.
+
+    As `known_model`; a choice may also be a range, which the model then has.
+    """
+    ranges = [text for text in choices or () if "," in text]
+    values = [text for text in choices or () if "," not in text]
+    known = known_model(name, values, place)
+    if not ranges:
+        return known
+    from driftwalk.motion import is_family_name, motion_model
+
+    clearance = getattr(known.model, "clearance", 0.0)
+    options: dict[str, Any] = {"clearance": clearance} if is_family_name(name) else {}
+    options |= _choices(ranges)
+    return known._replace(model=motion_model(name, **options))
+
+
+def partly_known_model(
+    name: str, choices: Sequence[str] | None, place: Path | None, known: Sequence[str] | None
+) -> KnownModel:
+    """Return a motion model that knows some of its parameters, with the values of the others.
+
+    As `known_model`; the parameters of `known` get their values for good.
+
+    Raises
+    ------
+    ConfigurationError
+        As `known_model`, and when a known parameter is none of the model's or has no value.
+    """
+    from driftwalk.motion import known_values, motion_model
+
+    found = known_model(name, choices, place)
+    if not known:
+        return found
+    values = known_values(found.model, found.values)
+    strangers = [one for one in known if one not in values]
+    if strangers:
+        raise ConfigurationError(
+            f"--known {strangers[0]}: the model {found.model.name} has {', '.join(values)}"
+            f"{did_you_mean(strangers[0], values)}"
+        )
+    clearance = getattr(found.model, "clearance", 0.0)
+    options: dict[str, Any] = {"clearance": clearance} if clearance else {}
+    options |= {one: values[one] for one in known}
+    left = {one: value for one, value in values.items() if one not in known}
+    return KnownModel(motion_model(name, **options), left, found.warnings)
+
 
 def chosen_model(name: str | None, choices: Sequence[str] | None) -> MotionModel | None:
     """Return the chosen motion model; None for the block.
@@ -48,10 +178,25 @@ def chosen_model(name: str | None, choices: Sequence[str] | None) -> MotionModel
         if choices:
             raise ConfigurationError("--parameter belongs to a --model; the block has options")
         return None
-    given: dict[str, Any] = dict(_choice(text) for text in choices or ())
-    if len(given) < len(choices or ()):
-        raise ConfigurationError("--parameter names a parameter twice")
+    given: dict[str, Any] = _choices(choices)
     return motion_model(name, **given)
+
+
+def _choices(texts: Sequence[str] | None) -> dict[str, float | tuple[float, float]]:
+    given = dict(_choice(text) for text in texts or ())
+    if len(given) < len(texts or ()):
+        raise ConfigurationError("--parameter names a parameter twice")
+    return given
+
+
+def _value(name: str, choice: float | tuple[float, float]) -> float:
+    if isinstance(choice, tuple):
+        low, high = choice
+        raise ConfigurationError(
+            f"--parameter {name}={low:g},{high:g} is a range: give the value to simulate, "
+            f"{name}=VALUE"
+        )
+    return choice
 
 
 def _choice(text: str) -> tuple[str, float | tuple[float, float]]:

@@ -108,6 +108,16 @@ class RecordingOptions:
     keypoint: Annotated[
         str | None, _option("--keypoint", "Keypoint of a pose file that is the body.")
     ] = None
+    replicate: Annotated[
+        int | None,
+        typer.Option(
+            "--replicate",
+            min=0,
+            help="Replicate of a simulation, counted from 0 (default: the first).",
+            rich_help_panel=PANEL,
+            show_default=False,
+        ),
+    ] = None
 
     def arguments(self) -> dict[str, Any]:
         """Return the arguments of `driftwalk.load` that are given."""

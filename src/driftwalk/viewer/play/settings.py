@@ -93,9 +93,12 @@ class Knob:
 
     def reaching(self, value: Any) -> Self:
         """Return the setting with a range that holds a value, which a study may have beyond it."""
-        if self.choices or value <= self.most:
+        if self.choices or self.least <= value <= self.most:
             return self
-        return replace(self, most=float(value))
+        if value > self.most:
+            return replace(self, most=float(value))
+        # No logarithmic scale reaches 0.
+        return replace(self, least=float(value), log=self.log and value > 0.0)
 
 
 SPEED: Final = Knob("speed", "speed", "×", SLOWEST, FASTEST, 0.01, log=True)

@@ -44,6 +44,8 @@ NO_CELL: Final[dict[str, Any]] = dict.fromkeys(
 UNDER_WAY: Final = {
     "fit": "A fit under way",
     "recovery": "A recovery study under way",
+    "model_recovery": "A recovery study under way",
+    "model_calibration": "A calibration under way",
     "model_comparison": "A comparison of motion models under way",
 }
 """Titles by the kind of run."""

@@ -1,0 +1,199 @@
+"""The playground of a motion model: bodies that move, with a slider for each parameter."""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from driftwalk.motion import MotionModel, known_values
+from driftwalk.schema import Parameter
+from driftwalk.viewer.play.bodies import MovingBodies
+from driftwalk.viewer.play.motion import INTERVAL_S, MotionWindow, beside
+from driftwalk.viewer.play.moving import Playground
+from driftwalk.viewer.play.playground import ANGLE_DIGITS, POSITION_DIGITS, flow_arrows
+from driftwalk.viewer.play.settings import SPEED, Knob
+from driftwalk.viewer.shell import page_frame
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+BODIES: Final = 4
+MOST_BODIES: Final = 32
+PARAMETER: Final = "parameter:"
+"""In front of the name of a knob for a parameter, which may be called as another knob is."""
+LINEAR_STEPS: Final = 200
+TRAIL_S: Final = 5.0
+"""How far back a trail goes, of simulated time [s]."""
+DOT_SHARE: Final = 1.0 / 50.0
+"""Size of a body as it is drawn, over that of the tank."""
+
+
+class ModelPlaySource(Playground):
+    """Shows bodies of a motion model that move, with a knob for each of its parameters.
+
+    Parameters
+    ----------
+    model : MotionModel
+        The model.
+    values : mapping of str to float
+        Values of its parameters to begin with; the others begin in the middle of their range, on
+        its scale.
+    study : Study
+        Tank, start and observation.
+    flow : xarray.Dataset, optional
+        The water's velocity, for a model that has a use for it.
+    recording : xarray.Dataset, optional
+        A `trajectory` whose steps those of the bodies are compared with.
+    body : str, optional
+        Its body, where it has several.
+    seed : int
+        Of the first worlds; each restart takes the next.
+
+    Raises
+    ------
+    InputError
+        When the model fails, the flow is missing, or the recording gives no steps.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> source = dw.viewer.ModelPlaySource(dw.motion_model("active"), {"speed": 0.02}, dw.Study())
+    >>> [item["label"] for item in source.greeting()[0]["page"]["sections"][1]["items"]]
+    ['speed', 'rotational diffusion', 'turn rate', 'bodies', 'speed of the clock']
+    """
+
+    def __init__(
+        self,
+        model: MotionModel,
+        values: Mapping[str, float],
+        study: Study,
+        *,
+        flow: xr.Dataset | None = None,
+        recording: xr.Dataset | None = None,
+        body: str | None = None,
+        seed: int = 1,
+    ) -> None:
+        self.model, self._study = model, study
+        self._arrows = None if flow is None else flow_arrows(flow)
+        self._recording = None if recording is None else beside(recording, study, body=body)
+        middle = {one.name: float(one.value_at(0.5)) for one in model.parameters}
+        begin = known_values(model, {**middle, **values})
+        knobs = {PARAMETER + one.name: _knob(one, begin[one.name]) for one in model.parameters}
+        knobs["bodies"] = Knob("bodies", "bodies", "1", 1, MOST_BODIES, 1, whole=True)
+        knobs["speed"] = Knob(**{**vars(SPEED), "label": "speed of the clock"})
+        super().__init__(MotionWindow(self._recording, seed=seed), knobs, seed=seed)
+        interval = INTERVAL_S if self._recording is None else self._motion.interval
+        self.bodies = MovingBodies(
+            model, begin, study, flow, bodies=BODIES, interval=interval, seed=seed
+        )
+        self._left = 0.0
+        self._take()
+        self._picture = self._tank_message()
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self.bodies.time + self._left
+
+    def _change(self, name: str, value: Any) -> None:
+        if name == "bodies":
+            self._begin(int(value))
+        else:
+            self.bodies.change(name.removeprefix(PARAMETER), float(value))
+        self._motion.clear()
+
+    def _restart(self) -> None:
+        self._begin(self.bodies.count)
+
+    def _begin(self, bodies: int) -> None:
+        self.bodies.restart(bodies=bodies, seed=self._seed)
+        self._left = 0.0
+
+    def _advance(self, duration: float, *, until: float) -> None:
+        """Go on sample by sample, and take the positions at every step's interval."""
+        step = self.bodies.sample_s
+        self._left += duration
+        while self._left >= step and clock.perf_counter() < until:
+            self.bodies.next()
+            self._left -= step
+            if self.bodies.sample % self.bodies.every == 0:
+                self._take()
+        # What could not be done in time is not caught up with.
+        self._left %= step
+
+    def _take(self) -> None:
+        x, y, _ = self.bodies.place()
+        self._motion.add(x, y, np.arange(x.size, dtype=np.int32))
+
+    def _tank_message(self) -> dict[str, Any]:
+        x, y, theta = self.bodies.place(self._left / self.bodies.sample_s)
+        known = np.round(theta, ANGLE_DIGITS).tolist()
+        return {
+            "type": "tank",
+            "time_s": self.time,
+            "speed": self._pace_now(),
+            "paused": self._paused,
+            "x": np.round(x, POSITION_DIGITS).tolist(),
+            "y": np.round(y, POSITION_DIGITS).tolist(),
+            "theta": [angle if math.isfinite(angle) else None for angle in known],
+            "assembly": list(range(x.size)),
+            "waiting": 0,
+            "outcome": None,
+            "counts": {},
+            "flow_scale": 1.0,
+        }
+
+    def _controls(self) -> dict[str, Any]:
+        values = {PARAMETER + name: one for name, one in self.bodies.values.items()}
+        values |= {"bodies": self.bodies.count, "speed": self._speed}
+        return {
+            "id": "controls",
+            "kind": "controls",
+            "title": "Settings",
+            "note": "After a change the bodies go on from where they are. A bout of the motion, "
+            "such as a rest, begins again then.",
+            "items": [knob.item(values[name]) for name, knob in self._knobs.items()],
+        }
+
+    def _page(self) -> dict[str, Any]:
+        study, recording = self._study, self._recording
+        tank = {
+            "id": "tank",
+            "kind": "tank",
+            "title": "The tank",
+            "note": None,
+            "arena": study.tank.to_arena(),
+            "side": DOT_SHARE * max(study.tank.extent_m),
+            "blocks": self.bodies.count,
+            "flow": self._arrows,
+            "shape": "dot",
+            "trail_s": TRAIL_S,
+        }
+        density = {
+            "id": "density",
+            "kind": "density",
+            "title": "Step length and turning angle",
+            "note": "Under the present settings.",
+            "recording": None if recording is None else recording.steps.name,
+        }
+        return page_frame(
+            self.view,
+            self.title,
+            subtitle=f"{self.model.name} in a {study.tank.describe()}",
+            sections=[tank, self._controls(), density],
+        )
+
+
+def _knob(one: Parameter, value: float) -> Knob:
+    """Return the knob of a parameter, with a range that holds the value it begins with."""
+    step = 0.0 if one.scale == "log" else (one.high - one.low) / LINEAR_STEPS
+    knob = Knob(
+        PARAMETER + one.name, one.label, one.unit, one.low, one.high, step, log=one.scale == "log"
+    )
+    return knob.reaching(value)
