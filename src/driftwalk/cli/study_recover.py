@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple
 
 import typer
 
-from driftwalk.cli.options.shared import Json, Overwrite, RunFolder
-from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.output import print_json
+from driftwalk.cli.options.model import (
+    KnownModel,
+    KnownParameters,
+    ModelName,
+    ParametersFrom,
+    ParameterValues,
+    partly_known_model,
+)
+from driftwalk.cli.options.recording import RecordingOptions
+from driftwalk.cli.options.shared import Json, Overwrite, RunFolder, quantity_option
+from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
+from driftwalk.cli.terminal.output import print_json, print_note
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.study_keys import RECOVER_KEYS
@@ -24,24 +34,68 @@ STATED: Final = ("forces.drag_coefficient", "forces.force_std_N")
 """Parameters with a default that count as the truth only if the file states them."""
 
 
+OF_THE_BLOCK: Final = ("recover.drag_coefficient_precision",)
+OF_A_MODEL: Final = (
+    "tank.diameter_m",
+    "observation.position_noise_m",
+    "steps.step_interval_s",
+    "calibration.bootstrap",
+)
+"""Keys whose options are for one of the two only."""
+RANDOM: Final = "random"
+"""The flow of a study that is drawn for each recording."""
+NOISE: Final = "position_noise"
+"""Known by this name, the noise of the camera is not estimated."""
+Noise = Literal["estimated", "known"]
+
+
 @with_study_options(
-    RECOVER_KEYS, "flow", "recordings", "duration", "precision", "seed", file="none"
+    RECOVER_KEYS,
+    *("flow", "recordings", "duration", "precision", "seed"),
+    *("tank_diameter", "position_noise", "step_interval", "bootstrap"),
+    file="none",
 )
 def recover(
-    truth: Annotated[
-        Path,
-        typer.Option(
-            "--truth", metavar="FILE", help="Study file with the true values and \\[recover]."
-        ),
-    ],
     out: RunFolder,
     given: StudyOptions,
+    truth: Annotated[
+        Path | None,
+        typer.Option(
+            "--truth",
+            metavar="FILE",
+            help="Study file with the true values and \\[recover]; with --model its tank, camera "
+            "and \\[recover].",
+            show_default=False,
+        ),
+    ] = None,
+    model: ModelName = None,
+    parameters: ParameterValues = None,
+    parameters_from: ParametersFrom = None,
+    known: KnownParameters = None,
+    like: Annotated[
+        Path | None,
+        typer.Option(
+            "--like",
+            metavar="RECORDING",
+            help="Recording that gives start, time stamps, gaps and camera, with --model.",
+            show_default=False,
+        ),
+    ] = None,
+    body: Annotated[
+        str | None,
+        typer.Option("--body", metavar="NAME", help="Body of --like.", show_default=False),
+    ] = None,
+    sample_rate: Annotated[
+        Any,
+        quantity_option("--sample-rate", "Hz", "Samples per second, with --model (default: 10)."),
+    ] = None,
     threads: Annotated[
         int | None,
         typer.Option(
             "--threads",
             min=1,
-            help="Recordings to fit at the same time (default: one per core).",
+            help="Recordings to fit at the same time; threads of a calibration with --model "
+            "(default: one per core).",
             show_default=False,
         ),
     ] = None,
@@ -51,18 +105,130 @@ def recover(
     """Simulate recordings of known truth, fit them, and report how well the fit recovers the truth.
 
     Use it to design an experiment: what would recordings of this length, with this camera, in this
-    flow reveal? The directory holds recovery.nc, figures and manifest.json. After a kill, the same
-    command continues.
+    flow reveal? With --model: recordings of that motion model, each calibrated with all parameters
+    open but the --known ones. The directory holds the result, figures and manifest.json. After a
+    kill, the same command continues.
     """
+    from driftwalk.runs import read_found_values
+
+    given = replace(given, file=truth)
+    if model is not None:
+        _refuse(given, OF_THE_BLOCK, "about the block, which --model replaces; leave it out")
+        of_model = [name for name in known or () if name != NOISE]
+        chosen = partly_known_model(model, parameters, parameters_from, of_model)
+        found = None if parameters_from is None else read_found_values(parameters_from).file
+        inputs = {"truth": truth, "parameters": found, "like": like}
+        noise: Noise = "known" if NOISE in (known or ()) else "estimated"
+        set_up = _SetUp(given, sample_rate, like, body, _files(inputs), threads, noise)
+        _of_model(chosen, set_up, out, overwrite=overwrite, json=json)
+        return
+    _refuse(given, OF_A_MODEL, "belongs to a --model; for the block it stands in --truth FILE")
+    beside = {
+        "--parameter": parameters, "--parameters-from": parameters_from, "--known": known,
+        "--like": like, "--body": body, "--sample-rate": sample_rate,
+    }  # fmt: skip
+    for name, value in beside.items():
+        if value:
+            raise ConfigurationError(f"{name} belongs to a --model; the block has --truth FILE")
+    if truth is None:
+        raise ConfigurationError(
+            "the truth is missing: give a study file of the block (--truth FILE), or a motion "
+            "model with its values (--model NAME --parameter NAME=VALUE)"
+        )
+    _of_block(truth, given, out, threads, overwrite=overwrite, json=json)
+
+
+class _SetUp(NamedTuple):
+    """How the recordings of a motion model are made."""
+
+    given: StudyOptions
+    sample_rate: float | None
+    like: Path | None
+    body: str | None
+    inputs: dict[str, Path]
+    threads: int | None
+    noise: Noise
+
+    def study(self, recording: xr.Dataset | None) -> Study:
+        """Return the study, in the tank of a recording where there is one."""
+        from driftwalk.conditions import study_for
+
+        given = self.given
+        if self.sample_rate is not None:
+            if not self.sample_rate > 0.0:
+                raise ConfigurationError(f"--sample-rate {self.sample_rate:g}: give a rate above 0")
+            clock = {"recover.sample_interval_s": 1.0 / self.sample_rate}
+            given = given.and_also(clock, keys={"sample_rate": "recover.sample_interval_s"})
+        study = given.study()
+        return study if recording is None else study_for([recording], study, body=self.body)
+
+
+def _of_model(
+    chosen: KnownModel, set_up: _SetUp, out: Path, *, overwrite: bool, json: bool
+) -> None:
+    from driftwalk.cli.inputs.assembly_source import load_flow_for
+    from driftwalk.cli.terminal.model_recover_answer import print_answer, summary
+    from driftwalk.runs import ModelRecoveryWork, run_model_recovery
+
+    recording = None
+    if set_up.like is not None:
+        recording = RecordingOptions(body=set_up.body).load(set_up.like)
+        _refuse(set_up.given, ("recover.durations_s",), "given by the recording of --like")
+        if set_up.sample_rate is not None:
+            raise ConfigurationError("--sample-rate: given by the recording of --like")
+    elif set_up.body is not None:
+        raise ConfigurationError("--body belongs to --like")
+    study, inputs = set_up.study(recording), set_up.inputs
+    named = study.recover.flow
+    field = None
+    if named == RANDOM:
+        raise ConfigurationError(
+            'the flow "random" is for the block: name the file of a flow field (--flow), or leave '
+            "it out"
+        )
+    if named is not None:
+        path = Path(named)
+        if set_up.given.file is not None and "recover.flow" not in set_up.given.overrides:
+            path = set_up.given.file.parent / named
+        field, inputs = load_flow_for(path, study), {**inputs, "flow": path}
+    work = ModelRecoveryWork(
+        chosen.model,
+        chosen.values,
+        study,
+        field,
+        recording,
+        set_up.body,
+        inputs,
+        set_up.threads,
+        set_up.noise,
+    )
+    for warning in chosen.warnings:
+        print_note(f"warning: {warning}")
+    with reported("recover") as told:
+        found = run_model_recovery(work, out, overwrite=overwrite, **told)
+    if json:
+        print_json(summary(found))
+    else:
+        print_answer(found, out)
+
+
+def _of_block(
+    truth: Path,
+    given: StudyOptions,
+    out: Path,
+    threads: int | None,
+    *,
+    overwrite: bool,
+    json: bool,
+) -> None:
     from driftwalk.cli.terminal.recover_answer import print_answer, summary
     from driftwalk.runs import RecoveryWork, run_recovery
 
-    given = replace(given, file=truth)
     chosen = given.study()
     _require_stated(truth)
     named = given.overrides.get(RECOVER_KEYS["flow"])
     field, flow_file = _flow(chosen, truth, None if named is None else Path(named))
-    inputs = {"truth": truth, **({} if flow_file is None else {"flow": flow_file})}
+    inputs = _files({"truth": truth, "flow": flow_file})
     work = RecoveryWork(chosen, field, inputs, threads)
     with reported("recover") as told:
         found = run_recovery(work, out, overwrite=overwrite, **told)
@@ -70,6 +236,17 @@ def recover(
         print_json(summary(found))
     else:
         print_answer(found, out)
+
+
+def _files(roles: dict[str, Path | None]) -> dict[str, Path]:
+    """Return the files that were given, by their role."""
+    return {role: path for role, path in roles.items() if path is not None}
+
+
+def _refuse(given: StudyOptions, keys: Sequence[str], why: str) -> None:
+    names = [option_name(key, keys=given.keys) for key in keys if key in given.overrides]
+    if names:
+        raise ConfigurationError(f"{', '.join(names)}: {why}")
 
 
 def _require_stated(path: Path) -> None:
