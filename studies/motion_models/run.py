@@ -40,7 +40,8 @@ from driftwalk.schema import body_track
 
 MODELS: Final = (
     "inertial", "active+wall", "run_tumble+wall", "run_tumble+wall+slow", "run_rest+wall",
-    "run_rest+wall+stroke", "burst_coast+wall", "two_state+wall",
+    "run_rest+wall+stroke", "burst_coast+wall", "two_state+wall", "run_rest+wall+reverse",
+    "run_tumble+wall+follow+keep", "run_tumble+wall+slow+follow+keep",
 )  # fmt: skip
 SEED: Final = 1
 JUDGED: Final = 16

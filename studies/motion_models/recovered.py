@@ -1,0 +1,74 @@
+"""Print the tables of recovered parameters: python recovered.py RECOVER.jsonl.
+
+The first has a row for each model, the second for each parameter. An error is |ln(found / true)|,
+of a turn rate the difference over the larger of its value and a tenth of the search's range.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from recordings import read_lines
+from table import rows_of
+
+Line = dict[str, Any]
+SIGNED: Final = ("turn_rate",)
+
+
+def entries_of(lines: list[Line], model: str, name: str) -> list[tuple[float, bool, bool]]:
+    """Return error, whether it is determined, and whether the interval holds the truth."""
+    found = []
+    for line in lines:
+        if line["model"] != model or name not in line["truth"]:
+            continue
+        true, value = line["truth"][name], line["estimate"][name]
+        error = abs(value / true - 1.0) if name in SIGNED else abs(float(np.log(value / true)))
+        low, high = line["interval"][name]
+        found.append((error, bool(line["determined"][name]), low <= true <= high))
+    return found
+
+
+def cells_of(entries: list[tuple[float, bool, bool]]) -> list[str]:
+    """Return the cells of some estimates."""
+    known = [one for one in entries if one[1]]
+    inside = sum(one[2] for one in entries)
+    median = f"{np.median([one[0] for one in known]):.1%}" if known else ""
+    covered = f"{sum(one[2] for one in known)} of {len(known)}" if known else ""
+    return [
+        f"{len(known)} of {len(entries)}",
+        median,
+        covered,
+        f"{inside} of {len(entries)}",
+    ]
+
+
+def main() -> None:
+    """Print both tables."""
+    lines = read_lines(Path(sys.argv[1]))
+    models = list(dict.fromkeys(line["model"] for line in lines))
+    head = ["determined", "median error of these", "in the 90 % interval", "of all"]
+    by_model = [["model", "recordings", "matched", "explained", *head, "processor time [s]"]]
+    by_parameter = [["model", "parameter", *head]]
+    every: list[tuple[float, bool, bool]] = []
+    for model in models:
+        own = [line for line in lines if line["model"] == model]
+        entries: list[tuple[float, bool, bool]] = []
+        for name in own[0]["truth"]:
+            these = entries_of(own, model, name)
+            by_parameter.append([model, name, *cells_of(these)])
+            entries += these
+        matched = sum(line["estimate_from"] == "summaries" for line in own)
+        explained = sum(line["explained"] for line in own)
+        seconds = np.median([line["processor_seconds"] for line in own])
+        counts = [str(len(own)), str(matched), str(explained)]
+        by_model.append([model, *counts, *cells_of(entries), f"{seconds:.0f}"])
+        every += entries
+    by_model.append(["all", str(len(lines)), "", "", *cells_of(every), ""])
+    print(rows_of(by_model), rows_of(by_parameter), sep="\n\n")
+
+
+if __name__ == "__main__":
+    main()
