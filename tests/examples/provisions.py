@@ -6,7 +6,9 @@ files are simulated. An example that would take minutes runs with the options or
 
 from __future__ import annotations
 
+import shlex
 import shutil
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,10 +17,12 @@ from typing import Any
 import numpy as np
 from command_line import FLOW, GRID, RECORDING, here
 from finished_run import write_finished_run
+from self_propelled import moving
 
 import driftwalk as dw
 from driftwalk.record.raw import ReadOptions
 from examples.printed import Numbers
+from examples.reading import ROOT
 
 Names = dict[str, Any]
 
@@ -48,6 +52,8 @@ class Page:
     """The same for single commands, by a pattern."""
     draws: bool = True
     """Whether the commands draw their figures, which take most of a small run."""
+    needs: tuple[str, ...] = ()
+    """Packages without which the examples are skipped."""
     slow: bool = False
     """Whether the page takes about two seconds or more."""
 
@@ -130,6 +136,19 @@ def _simulated(folder: Path) -> Names:
     return {}
 
 
+def _diffusing(folder: Path) -> Names:
+    """Provide ``mine.py`` with a model, ``recording.nc``, and ``run/``, a calibration of it."""
+    (folder / "mine.py").write_text(MODEL_FILE, encoding="utf-8")
+    recording = dw.tank30_recording().isel(time=slice(0, 600))
+    dw.save_trajectory(recording, folder / "recording.nc")
+    (folder / "grid.toml").write_text(GRID, encoding="utf-8")
+    model = ("--model", f"{folder / 'mine.py'}:diffuse")
+    words = ("--study", folder / "grid.toml", *model, "-o", folder / "run")
+    done = here("calibrate", folder / "recording.nc", *words)
+    assert done.code == 0, done.err
+    return {"recording": recording}
+
+
 def _minutes(**names: float) -> Callable[[Path], Names]:
     """Provide Python names of recordings: the bundled one, from 0 on, for some minutes each."""
 
@@ -150,10 +169,28 @@ def _wide_tank(_: Path) -> Names:
     return {"dw": dw, "study": study, "flow": dw.jets_flow(diameter=1.2, swirl_speed=0.03)}
 
 
+def _active_body(folder: Path) -> Names:
+    """Provide ``recording.nc``: three minutes of an active body."""
+    values = {"speed": 0.03, "rotational_diffusion": 0.5, "turn_rate": 2.0}
+    seen = moving(dw.motion_model("active", clearance=0.015), values, 180.0, seed=3, noise=3e-4)
+    dw.save_trajectory(seen, folder / "recording.nc")
+    return {}
+
+
 def _tumble_search(_: Path) -> Names:
     """Provide a study of few simulations, for a calibration that a page leaves to its defaults."""
     small = {"replicates": 1, "refined_replicates": 1, "bootstrap": 4}
     return {"SMALL": dw.apply_overrides(dw.Study(), {f"calibration.{k}": small[k] for k in small})}
+
+
+def _robot_in_mujoco(folder: Path) -> Names:
+    """Provide ``recording.csv``: half a minute of the robot that the page simulates."""
+    program = ROOT / "docs" / "examples" / "mujoco_robot.py"
+    robot = dw.motion_model(f"command:{shlex.quote(sys.executable)} {shlex.quote(str(program))}")
+    values = {"speed": 0.05, "turn_noise": 1.0}
+    seen = moving(robot, values, 30.0, seed=1, noise=3e-4)
+    dw.save_trajectory(seen, folder / "recording.csv")
+    return {}
 
 
 def _truth(_: Path) -> Names:
@@ -222,6 +259,15 @@ def _markers(folder: Path) -> Names:
     return {}
 
 
+MODEL_FILE = """\
+import numpy as np
+
+
+def diffuse(scene, *, diffusivity=(1e-6, 1e-4, "m2/s")):
+    spread = np.sqrt(2 * diffusivity * np.diff(scene.times, prepend=0.0))
+    x, y = (np.cumsum(spread * scene.random.normal(spread.size), axis=1) for _ in "xy")
+    return scene.start.x[:, None] + x, scene.start.y[:, None] + y
+"""
 STUDY = "a study of hours, which the page names to repeat it"
 OTHERS = "needs recordings of others, which are not part of the project"
 LONG = "a calibration of minutes, whose results the page gives; the how-to pages run it smaller"
@@ -291,6 +337,17 @@ PAGES: dict[str, Page] = {
         draws=False,
         slow=True,
     ),
+    "docs/how-to/calibrate-a-moving-body.md": Page(
+        provide=_active_body,
+        instead={
+            "--model active ": "--model active --parameter clearance=0.015 ",
+            "run-tumble+wall --parameter turn_rate=0": "active+diffusion --parameter turn_rate=2 "
+            "--parameter clearance=0.015 --bootstrap 20",
+        },
+        makes=("run/model_calibration.nc", "known/model_calibration.nc", "drawn/posterior.csv"),
+        draws=False,
+        slow=True,
+    ),
     "docs/how-to/calibrate-your-own-model.md": Page(
         provide=_files(_minutes(recording=0.5), _tumble_search),
         instead={"dw.calibrate(recording, model)": "dw.calibrate(recording, model, study=SMALL)"},
@@ -299,6 +356,7 @@ PAGES: dict[str, Page] = {
             "TestTumble().model().name == 'tumble'",
             "own.parameters[0].high == 5e-5",
             "(other.name, other.parameters[1].scale) == ('simulator', 'log')",
+            "sim.attrs['model'] == 'tumble'",
         ),
         draws=False,
         slow=True,
@@ -315,8 +373,15 @@ PAGES: dict[str, Page] = {
         instead={
             "recordings = 30": "recordings = 2",
             '["5min", "10min", "20min", "40min"]': '["1min", "2min"]',
+            "--duration 10min": "--duration 40s --bootstrap 10",
+            "--recordings 10": "--recordings 2",
+            '"recover.recordings": 10': '"recover.recordings": 2, "calibration.bootstrap": 5',
+            '"recover.durations_s": ["10min"]': '"recover.durations_s": ["40s"]',
         },
-        holds=("'duration' in found['coverage'].dims",),
+        holds=(
+            "'duration' in found['coverage'].dims",
+            "recovered.attrs['kind'] == 'model_recovery'",
+        ),
         draws=False,
         slow=True,
     ),
@@ -370,6 +435,13 @@ PAGES: dict[str, Page] = {
         draws=False,
         slow=True,
     ),
+    "docs/how-to/simulate.md": Page(
+        provide=_files(_flow("flow.nc"), _diffusing),
+        holds=("run.sizes['replicate'] == 8", "like.attrs['model'] == 'active'"),
+        makes=("block.nc", "beetle.nc", "own.nc", "like.nc", "found.nc"),
+        draws=False,
+        slow=True,
+    ),
     "docs/how-to/track.md": Page(
         provide=_files(_film(4, 6.0), _one_block, _calibrated),
         instead={
@@ -387,6 +459,18 @@ PAGES: dict[str, Page] = {
         provide=_files(_recording(120.0), _search("study.toml")),
         holds=("result.attrs['kind'] == 'calibration'",),
         makes=("figures/ks_map.png",),
+        slow=True,
+    ),
+    "docs/how-to/use-a-simulator.md": Page(
+        provide=_robot_in_mujoco,
+        instead={
+            "python3 mujoco_robot.py": f"{shlex.quote(sys.executable)} mujoco_robot.py",
+            "-o run": "--replicates 1 --bootstrap 4 -o run",
+        },
+        not_run={"pip install *": INSTALLS, "driftwalk *ode_model.py*": "needs ODE; has a test"},
+        makes=("run/calibration.nc",),
+        needs=("mujoco",),
+        draws=False,
         slow=True,
     ),
     "docs/how-to/view.md": Page(
@@ -419,6 +503,13 @@ PAGES: dict[str, Page] = {
         numbers=Numbers.SAME,
         # Both simulate in a fitted flow; of half an hour in one world chance makes what it likes.
         numbers_of={"driftwalk fit *": Numbers.CLOSE, "driftwalk compare *": Numbers.ANY},
+        draws=False,
+        slow=True,
+    ),
+    "docs/tutorials/your-own-model.md": Page(
+        holds=("len(track) == 2000",),
+        makes=("run/calibration.nc", "compare/comparison.nc"),
+        numbers=Numbers.CLOSE,
         draws=False,
         slow=True,
     ),

@@ -21,6 +21,8 @@ from examples.running import Reader, streaming
     [pytest.param(name, marks=[pytest.mark.slow] * page.slow) for name, page in PAGES.items()],
 )
 def test_examples_of_a_page_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for package in PAGES[name].needs:
+        pytest.importorskip(package, reason=f"{package} is not installed")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "Agg")
     if not PAGES[name].draws:
@@ -73,3 +75,13 @@ def test_what_is_said_about_a_page_is_on_it(name: str) -> None:
         assert fnmatch.filter(commands, pattern), pattern
     for old in PAGES[name].instead:
         assert any(old in block.text for block in blocks), old
+
+
+def test_the_lines_of_the_example_on_its_page_are_the_program_s() -> None:
+    """Blocks of text show parts of the program, in its order."""
+    program = (ROOT / "docs" / "examples" / "mujoco_robot.py").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "how-to" / "use-a-simulator.md").read_text(encoding="utf-8")
+    places = [program.find(part) for part in re.findall(r"^```text\n(.*?)^```$", page, re.M | re.S)]
+    assert len(places) >= 7
+    assert -1 not in places, places
+    assert places == sorted(places)
