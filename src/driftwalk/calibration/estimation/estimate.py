@@ -32,6 +32,9 @@ APART: Final = 0.04
 HOPELESS: Final = 100.0
 """Misfit, in summaries, from which on another start is no use: the model is another one."""
 MISFIT_QUANTILE: Final = 0.95
+UNLIKE: Final = 4.0
+"""Misfit, in usual ones, from which on the recording is that of another model: intervals would have
+to be more than twice as wide."""
 
 
 class Matched(NamedTuple):
@@ -57,6 +60,11 @@ class Matched(NamedTuple):
     def usual(self) -> bool:
         """Whether the summaries are like those of the model's own recordings."""
         return self.misfit <= self.most_misfit
+
+    @property
+    def unlike(self) -> bool:
+        """Whether the summaries are so far from the model's that it can determine nothing."""
+        return not self.usual and self.misfit > UNLIKE * self.usual_misfit
 
 
 def most_simulations(parameters: int, worlds: int) -> int:

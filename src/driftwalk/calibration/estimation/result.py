@@ -145,7 +145,7 @@ def _said(found: Estimation, entry: Contestant, explained: bool) -> list[str]:
             f"the summaries of the motion differ from the model's: a misfit of {matched.misfit:.0f}"
             f" where its own recordings come to {matched.usual_misfit:.0f} (95 % below "
             f"{matched.most_misfit:.0f}); the intervals are {matched.stretch:.1f} times as wide as "
-            "the draws"
+            f"the draws{', and no parameter is determined' if matched.unlike else ''}"
         )
     if not explained:
         said.append(

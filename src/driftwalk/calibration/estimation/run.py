@@ -90,7 +90,8 @@ def estimate(
     matches summaries of the whole recording. Where these are like those of the model's own
     recordings, the search is not needed. Where they are not, both are made, and the answer of the
     summaries counts only if it is as close in the six distances: summaries that a model cannot give
-    at once pull it away from the motion.
+    at once pull it away from the motion. It determines parameters only if the misfit is not more
+    than four times the usual one: values of another model are no measurement.
 
     Parameters
     ----------
@@ -137,6 +138,8 @@ def estimate(
     known = None
     if matched is not None and counts:
         known = determination(matched.draws, entry.ranges, confidence=confidence)
+        if matched.unlike:
+            known = known._replace(determined=np.zeros_like(known.determined))
     # The odd blocks judge the better answer that has not seen them.
     unseen = [name for name in ("searched", "even")[: 1 + counts] if name in answers]
     best = min(unseen, key=scores.__getitem__)

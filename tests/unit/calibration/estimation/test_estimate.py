@@ -85,6 +85,7 @@ def test_a_recording_of_the_model_is_matched_by_its_summaries_alone():
     found = matched(Toy(bent, 1), starts, worlds=200)
     assert starts.calls == 0
     assert found.usual
+    assert not found.unlike
     assert found.stretch == 1.0
     std = deviations()
     assert (np.abs(found.point - TRUTH) < 0.6 * std).all()
@@ -104,8 +105,16 @@ def test_what_the_model_cannot_give_widens_the_draws():
     assert MATCHES * SPREAD.size < found.misfit < HOPELESS * SPREAD.size
     assert found.stretch == pytest.approx(np.sqrt(found.misfit / found.usual_misfit))
     assert found.stretch > 2.0
+    assert found.unlike
     np.testing.assert_allclose(found.draws.std(axis=0), found.stretch * deviations(), rtol=0.35)
     np.testing.assert_allclose(found.point, np.median(found.draws, axis=0), atol=1e-9)
+
+
+def test_a_small_misfit_leaves_parameters_determined():
+    """One summary is three deviations off, 9 of misfit beside the usual 3.4 of 4 degrees."""
+    found = matched(Toy(bent, 2, off=3.0), Starts((0.4, 0.6)), worlds=200)
+    assert 1.0 < found.misfit / found.usual_misfit < 4.0
+    assert not found.unlike
 
 
 def test_another_start_is_no_use_for_another_model():

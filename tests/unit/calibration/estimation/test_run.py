@@ -16,6 +16,7 @@ from self_propelled import moving
 
 import driftwalk as dw
 from driftwalk.calibration.estimation import approach, descend, posterior, run
+from driftwalk.calibration.estimation.estimate import UNLIKE
 from driftwalk.calibration.evolution import Budget
 from driftwalk.calibration.run import calibrate
 from driftwalk.sweep import ShardStore
@@ -178,12 +179,14 @@ def test_another_model_is_not_believed() -> None:
     assert "search" in told
     assert float(found["misfit"]) > 3 * float(found["most_misfit"])
     warnings = " ".join(found["warning"].values.tolist())
+    assert float(found["misfit"]) > UNLIKE * float(found["usual_misfit"])
+    assert not found["determined"].any()
     if found.attrs["estimate_from"] == "search":
-        assert not found["determined"].any()
         assert "the summaries of the motion pull the model away" in warnings
     else:
         assert float(found["matched_score"]) <= run.AS_CLOSE * float(found["searched_score"])
         assert float(found["interval_stretch"]) > 2.0
         assert "the summaries of the motion differ from the model's" in warnings
+        assert "no parameter is determined" in warnings
     assert not bool(found["explained"])
     assert "the model does not explain the recording" in warnings
