@@ -4,7 +4,7 @@ How a recording is read when a study says so, and what is refused; the tank and 
 reconciled with the study; times and gaps, start and camera; the flow.
 """
 
-from driftwalk.conditions.camera import recorded_camera
+from driftwalk.conditions.camera import noise_doubt, recorded_camera
 from driftwalk.conditions.like import simulate_like
 from driftwalk.conditions.own_flow import recording_flow
 from driftwalk.conditions.reading import (
@@ -25,6 +25,7 @@ __all__ = [
     "estimated_study",
     "load_for_run",
     "load_with_study",
+    "noise_doubt",
     "read_recordings",
     "recorded_camera",
     "recorded_conditions",

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 NEGLIGIBLE_QUANTUM: Final = 0.05
 """A file's resolution below this share of the noise is not simulated."""
+ROUGH_NOISE: Final = 0.05
+"""An estimated noise is not better known than to this part: the motion is not quite that of the
+estimate's model. Of bodies with a steady speed and a turning heading it came out 2 % too large."""
 
 
 def recorded_camera(track: Track, study: Study, *, position_quantum: float) -> Camera:
@@ -65,6 +68,37 @@ def recorded_camera(track: Track, study: Study, *, position_quantum: float) -> C
     if seen.position_quantum_m == "recording" and quantum < NEGLIGIBLE_QUANTUM * float(position):
         quantum = 0.0
     return Camera(float(position), angle, float(quantum))
+
+
+def noise_doubt(track: Track, study: Study) -> float:
+    """Return the relative standard deviation of the noise of positions: 0 where it is stated.
+
+    That of an estimate is its standard error, and 5 % at least.
+
+    Parameters
+    ----------
+    track : Track
+        The recorded body.
+    study : Study
+        Its [observation].
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> from driftwalk.schema import body_track
+    >>> track, study = body_track(dw.tank30_recording()), dw.Study()
+    >>> noise_doubt(track, study)
+    0.05
+    >>> noise_doubt(track, dw.apply_overrides(study, {"observation.position_noise_m": 3e-4}))
+    0.0
+    """
+    if study.observation.position_noise_m != "estimate":
+        return 0.0
+    estimate = estimate_tracking_noise(track)
+    if not estimate.position_noise_m > 0.0:
+        return 0.0
+    relative = estimate.position_noise_standard_error_m / estimate.position_noise_m
+    return max(float(relative) if np.isfinite(relative) else 1.0, ROUGH_NOISE)
 
 
 def study_as_seen(study: Study, recording: xr.Dataset, track: Track) -> Study:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -15,6 +16,7 @@ from driftwalk.calibration.evolution import AspectObjective, wall_distance
 from driftwalk.calibration.evolution.search import Tell
 from driftwalk.calibration.models.recorded import RecordedMotion
 from driftwalk.comparison.aspects import block_of
+from driftwalk.motion import Worlds
 from driftwalk.motion.score import broken_worlds
 from driftwalk.sweep import Store, WorkUnit, run_sweep
 
@@ -22,10 +24,19 @@ Floats = npt.NDArray[np.float64]
 
 AT_ONCE: Final = 64
 """Settings of a work unit."""
+ALIKE: Final = 16
+"""Settings in a row that are seen by one camera. So many points of a Sobol' sequence fill a box."""
+DEVIATIONS: Final = (-0.3775, 1.3630, -1.3630, 0.3775)
+"""How far the logarithm of the camera's noise is off in turn, in standard deviations: the middles
+of four equal parts of a normal distribution, with variance 1."""
 
 
 class SummaryObjective:
     """Simulates settings of a model and summarises what the camera saw.
+
+    Where the noise of the camera is not known but estimated, simulated cameras differ by the error
+    of the estimate. What it does to the summaries so becomes part of their covariance, as if the
+    noise were one more parameter, with the estimate for its prior.
 
     Parameters
     ----------
@@ -56,6 +67,7 @@ class SummaryObjective:
         most: int,
     ) -> None:
         self.worlds, self.store, self.tell, self.most = worlds, store, tell, most
+        self._cameras = _cameras(worlds, motion.noise_doubt)
         self.done = 0
 
         def all_of(time: Floats) -> npt.NDArray[np.bool_]:
@@ -100,7 +112,7 @@ class SummaryObjective:
         return np.asarray(found)
 
     def _summaries(self, settings: Floats, first: int, plans: Sequence[SummaryPlan]) -> Floats:
-        seen = self.worlds.simulated(settings, 1, stage="estimation", first=first)
+        seen = self._seen(settings, first)
 
         def one(world: tuple[Floats, Floats]) -> list[Floats]:
             return [summarise(plan, *world) for plan in plans]
@@ -110,3 +122,23 @@ class SummaryObjective:
         # A world that lost its numbers is like none.
         found[broken_worlds(seen.status)] = 0.0
         return found
+
+    def _seen(self, settings: Floats, first: int) -> Worlds:
+        """Return simulated worlds as their cameras saw them."""
+        parts = []
+        for at in range(0, len(settings), ALIKE):
+            camera = self._cameras[(first + at) // ALIKE % len(self._cameras)]
+            here = settings[at : at + ALIKE]
+            parts.append(camera.simulated(here, 1, stage="estimation", first=first + at))
+        return Worlds(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+def _cameras(worlds: AspectObjective, doubt: float) -> list[AspectObjective]:
+    """Return the conditions of simulations in turn: cameras with other noise."""
+    like = worlds.like
+    return [
+        replace(
+            worlds, like=replace(like, camera=replace(like.camera, position_noise=float(noise)))
+        )
+        for noise in like.camera.position_noise * np.exp(doubt * np.array(DEVIATIONS))
+    ]

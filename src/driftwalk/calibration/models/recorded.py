@@ -26,7 +26,7 @@ from driftwalk.comparison.aspects import (
     own_distance,
     plan_aspects,
 )
-from driftwalk.conditions import Conditions, recorded_camera, recorded_conditions
+from driftwalk.conditions import Conditions, noise_doubt, recorded_camera, recorded_conditions
 from driftwalk.core.errors import InputError
 from driftwalk.schema import Track, body_track
 
@@ -73,6 +73,8 @@ class RecordedMotion:
         Largest recorded distance from the wall [m].
     usual_step : float
         Median step [m].
+    noise_doubt : float
+        Relative standard deviation of the noise of positions; 0 where it is known.
     recorded_checks : ndarray, shape (checks,)
         Facts of the recording that are not fitted, see `motion_checks`.
     """
@@ -90,6 +92,7 @@ class RecordedMotion:
     clearance: float
     depth: float
     usual_step: float
+    noise_doubt: float
     recorded_checks: Floats
 
     @cached_property
@@ -223,6 +226,7 @@ def recorded_motion(
         clearance=max(float(np.quantile(from_wall, CONTACT_QUANTILE)), 0.0),
         depth=depth,
         usual_step=usual_step,
+        noise_doubt=noise_doubt(track, study),
         recorded_checks=motion_checks(
             plan, track.x, track.y, wall=wall, depth=depth, usual_step=usual_step
         ),

@@ -9,7 +9,12 @@ import pytest
 from self_propelled import moving
 
 import driftwalk as dw
-from driftwalk.calibration.estimation.objective import AT_ONCE, SummaryObjective
+from driftwalk.calibration.estimation.objective import (
+    ALIKE,
+    AT_ONCE,
+    DEVIATIONS,
+    SummaryObjective,
+)
 from driftwalk.calibration.estimation.series import plan_summaries
 from driftwalk.calibration.estimation.summaries import summarise
 from driftwalk.calibration.evolution import AspectObjective, wall_distance
@@ -100,6 +105,30 @@ def test_the_recording_is_like_its_own_model(worlds, motion):
     other = objective(np.tile(np.clip(truth + 0.15, 0, 1), (100, 1)), parts=2)
     apart = np.abs(objective.recorded - other.mean(axis=0)) / np.maximum(other.std(axis=0), 1e-9)
     assert apart.max() > 10.0
+
+
+def test_cameras_differ_where_their_noise_is_estimated(worlds, motion):
+    """Sixteen settings in a row have one camera, and the cameras' noise has the stated spread."""
+    assert motion.noise_doubt == 0.0
+    unsure = replace(motion, noise_doubt=0.2)
+    settings = np.tile(settings_of(1), (AT_ONCE, 1))
+    found = objective_of(worlds, unsure)(settings)
+    nominal = worlds.like.camera.position_noise
+    noises = []
+    for number in range(0, AT_ONCE, ALIKE):
+        objective = objective_of(worlds, unsure)
+        noise = nominal * np.exp(0.2 * DEVIATIONS[number // ALIKE])
+        camera = replace(worlds.like.camera, position_noise=float(noise))
+        alone = replace(worlds, like=replace(worlds.like, camera=camera))
+        here = slice(number, number + ALIKE)
+        seen = alone.simulated(settings[here], 1, stage="estimation", first=number)
+        wanted = [
+            summarise(objective.plans[0], *world) for world in zip(seen.x, seen.y, strict=True)
+        ]
+        np.testing.assert_array_equal(found[here, 0], wanted)
+        noises.append(np.log(noise / nominal))
+    assert np.mean(noises) == pytest.approx(0.0, abs=1e-12)
+    assert np.std(noises) == pytest.approx(0.2, rel=1e-3)
 
 
 def test_threads_change_nothing(worlds, motion):
