@@ -374,7 +374,7 @@ PAGES: dict[str, Page] = {
             "recordings = 30": "recordings = 2",
             '["5min", "10min", "20min", "40min"]': '["1min", "2min"]',
             "--duration 10min": "--duration 40s --bootstrap 10",
-            "--recordings 10": "--recordings 2",
+            "--recordings 20": "--recordings 2",
             '"recover.recordings": 10': '"recover.recordings": 2, "calibration.bootstrap": 5',
             '"recover.durations_s": ["10min"]': '"recover.durations_s": ["40s"]',
         },
