@@ -35,7 +35,7 @@ class SummaryObjective:
     """Simulates settings of a model and summarises what the camera saw.
 
     Where the noise of the camera is not known but estimated, simulated cameras differ by the error
-    of the estimate. What it does to the summaries so becomes part of their covariance, as if the
+    of the estimate. Its effect on the summaries becomes part of their covariance, as if the
     noise were one more parameter, with the estimate for its prior.
 
     Parameters
