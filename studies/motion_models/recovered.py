@@ -1,7 +1,9 @@
 """Print the tables of recovered parameters: python recovered.py RECOVER.jsonl.
 
 The first has a row for each model, the second for each parameter. An error is |ln(found / true)|,
-of a turn rate the difference over the larger of its value and a tenth of the search's range.
+of a turn rate the difference over the larger of its value and a tenth of the search's range. The
+third counts the places of the truths among the draws, in fifths: even where the draws are a
+posterior (simulation-based calibration; Talts et al., arXiv:1804.06788).
 """
 
 from __future__ import annotations
@@ -45,8 +47,25 @@ def cells_of(entries: list[tuple[float, bool, bool]]) -> list[str]:
     ]
 
 
+def ranks_of(lines: list[Line], model: str | None) -> list[float]:
+    """Return the share of draws below each truth, where the draws are the answer."""
+    return [
+        rank
+        for line in lines
+        if line["model"] == (model or line["model"]) and line["estimate_from"] == "summaries"
+        for rank in line.get("rank", {}).values()
+    ]
+
+
+def rank_cells(ranks: list[float]) -> list[str]:
+    """Return how many ranks are in each fifth, and the share in the outer tenth."""
+    counts, _ = np.histogram(ranks, bins=5, range=(0.0, 1.0))
+    outer = np.mean([min(rank, 1.0 - rank) < 0.05 for rank in ranks]) if ranks else np.nan
+    return [*map(str, counts), f"{outer:.0%}"]
+
+
 def main() -> None:
-    """Print both tables."""
+    """Print the tables."""
     lines = read_lines(Path(sys.argv[1]))
     models = list(dict.fromkeys(line["model"] for line in lines))
     head = ["determined", "median error of these", "in the 90 % interval", "of all"]
@@ -67,7 +86,11 @@ def main() -> None:
         by_model.append([model, *counts, *cells_of(entries), f"{seconds:.0f}"])
         every += entries
     by_model.append(["all", str(len(lines)), "", "", *cells_of(every), ""])
-    print(rows_of(by_model), rows_of(by_parameter), sep="\n\n")
+    fifths = [f"{part} to {part + 20} %" for part in range(0, 100, 20)]
+    by_rank = [["model", *fifths, "outside the middle 90 %"]]
+    by_rank += [[model, *rank_cells(ranks_of(lines, model))] for model in models]
+    by_rank.append(["all", *rank_cells(ranks_of(lines, None))])
+    print(*map(rows_of, (by_model, by_parameter, by_rank)), sep="\n\n")
 
 
 if __name__ == "__main__":
