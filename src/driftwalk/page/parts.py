@@ -15,6 +15,7 @@ from driftwalk.page.arrays import number
 from driftwalk.plot.parts.arena import arena_of
 from driftwalk.plot.parts.labels import interval_of
 from driftwalk.schema.calibration_facts import facts_of
+from driftwalk.schema.facts import sentences
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -109,6 +110,18 @@ def is_simulated(dataset: xr.Dataset) -> bool:
     """Return whether a result comes from a simulated recording."""
     words = (dataset.attrs.get(name) for name in ("simulated_recording", "simulated"))
     return "yes" in [str(word) for word in words]
+
+
+def stated_warnings(found: xr.Dataset) -> list[str]:
+    """Return the warnings of a result, and that its recording was simulated.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        A result with the coordinate `warning`.
+    """
+    said = [SIMULATED] if is_simulated(found) else []
+    return [*said, *sentences(found, "warning")]
 
 
 def arena_part(dataset: xr.Dataset) -> dict[str, Any] | None:

@@ -90,6 +90,24 @@ def with_interval(
     )
 
 
+def cell(value: float, unit: str) -> str:
+    """Return a number and its unit as a cell of a table has it: a dash where there is none.
+
+    Parameters
+    ----------
+    value : float
+        The number, in SI.
+    unit : str
+        Its SI unit, "1" for none.
+
+    Examples
+    --------
+    >>> cell(0.0382, "m"), cell(float("nan"), "m")
+    ('3.82 cm', '–')
+    """
+    return quantity(float(value), unit, digits=3) if math.isfinite(value) else "–"
+
+
 def _digits(value: float, digits: int) -> str:
     """Return a number with so many significant digits, powers of ten written as such."""
     text = f"{value:.{digits}g}"

@@ -8,17 +8,17 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def own_score(comparison: xr.Dataset) -> float:
+def own_score(found: xr.Dataset) -> float:
     """Return the distance of the recording's own parts, as the models' distances are counted.
 
     Parameters
     ----------
-    comparison : xarray.Dataset
-        A `model_comparison`.
+    found : xarray.Dataset
+        A `model_comparison` or a `model_calibration`.
 
     Returns
     -------
     float
         Mean over the aspects of the distance over the floor.
     """
-    return float((comparison["own_distance"] / comparison["floor"]).mean())
+    return float((found["own_distance"] / found["floor"]).mean())

@@ -17,6 +17,7 @@ from driftwalk.cli.terminal.answer import (
     print_warnings,
 )
 from driftwalk.schema.answer import estimate_of
+from driftwalk.schema.compared_models import own_score
 from driftwalk.schema.parameters import unit_suffix
 
 if TYPE_CHECKING:
@@ -58,11 +59,10 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
     for one in _each(found):
         name = str(one["parameter"].values)
         print_row(label_of(name), _value_text(found, one, name))
-    own = float((found["own_distance"] / found["floor"]).mean())
     print_row(
         "distance",
         f"{float(found['score']):.2f} ± {float(found['score_std']):.2f} noise floors from blocks "
-        f"not seen, the recording's own parts {own:.2f}",
+        f"not seen, the recording's own parts {own_score(found):.2f}",
     )
     if "misfit" in found:
         print_row(

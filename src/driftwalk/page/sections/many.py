@@ -9,19 +9,18 @@ import numpy as np
 from driftwalk.page.arrays import number
 from driftwalk.page.chart import chart, label, series
 from driftwalk.page.parts import (
-    SIMULATED,
     Section,
     attempt,
     empty_head,
     figure,
     head_sections,
-    is_simulated,
     require,
     required,
     section,
+    stated_warnings,
 )
 from driftwalk.page.sections.recording import recording_sections
-from driftwalk.page.words import quantity
+from driftwalk.page.words import cell, quantity
 from driftwalk.schema.model_words import ASPECT_WORDS, CHECK_WORDS
 
 if TYPE_CHECKING:
@@ -55,7 +54,7 @@ def many_sections(
     if found is None:
         made = empty_head("The calibration has no result yet.")
     else:
-        made = head_sections(lambda: summary_section(found), lambda: _warnings(found))
+        made = head_sections(lambda: summary_section(found), lambda: stated_warnings(found))
         made += attempt("values", "Values", lambda: values_section(found))
         made += attempt("draws", "How well they are known", lambda: draws_section(found))
         made += attempt("aspects", "Aspects", lambda: aspects_section(found))
@@ -153,7 +152,7 @@ def checks_section(found: xr.Dataset) -> Section:
     rows = []
     for index, name in enumerate(found["check"].values):
         unit = str(found["check_unit"].values[index])
-        cells = [_one(found[part].values[index], unit) for part in ("check_recorded", *parts)]
+        cells = [cell(found[part].values[index], unit) for part in ("check_recorded", *parts)]
         rows.append([CHECK_WORDS.get(str(name), str(name)), *cells])
     return section(
         "checks", "table", "Facts that were not fitted",
@@ -165,13 +164,4 @@ def checks_section(found: xr.Dataset) -> Section:
 def _between(ends: Any, unit: str) -> str:
     if not np.isfinite(ends).all():
         return "–"
-    return " to ".join(_one(end, unit) for end in ends)
-
-
-def _one(value: Any, unit: str) -> str:
-    return quantity(float(value), unit, digits=3) if np.isfinite(value) else "–"
-
-
-def _warnings(found: xr.Dataset) -> list[str]:
-    said = [SIMULATED] if is_simulated(found) else []
-    return [*said, *(str(text) for text in found["warning"].values)]
+    return " to ".join(cell(end, unit) for end in ends)

@@ -9,19 +9,18 @@ import numpy as np
 from driftwalk.page.arrays import number
 from driftwalk.page.chart import chart, label, mark, series
 from driftwalk.page.parts import (
-    SIMULATED,
     Section,
     attempt,
     empty_head,
     figure,
     head_sections,
-    is_simulated,
     require,
     required,
     section,
+    stated_warnings,
 )
 from driftwalk.page.sections.recording import recording_sections
-from driftwalk.page.words import quantity
+from driftwalk.page.words import cell, quantity
 from driftwalk.schema.compared_models import own_score
 from driftwalk.schema.model_words import ASPECT_WORDS, CHECK_WORDS
 
@@ -56,7 +55,9 @@ def model_sections(
     if comparison is None:
         made = empty_head("No model has been compared yet.")
     else:
-        made = head_sections(lambda: models_summary(comparison), lambda: _warnings(comparison))
+        made = head_sections(
+            lambda: models_summary(comparison), lambda: stated_warnings(comparison)
+        )
         made += attempt("ranking", "Ranking", lambda: ranking_section(comparison))
         made += attempt("scores", "Distances", lambda: scores_section(comparison))
         made += attempt("verdicts", "Where they differ", lambda: verdicts_section(comparison))
@@ -170,12 +171,10 @@ def checks_section(comparison: xr.Dataset) -> Section:
     rows = []
     for index, name in enumerate(comparison["check"].values):
         unit = str(comparison["check_unit"].values[index])
-        cells = [_quantity(comparison["check_recorded"].values[index], unit)]
+        cells = [cell(comparison["check_recorded"].values[index], unit)]
         for at in range(len(models)):
             low, middle, high = (comparison[part].values[at, index] for part in parts)
-            cells.append(
-                f"{_quantity(middle, unit)} ({_quantity(low, unit)} to {_quantity(high, unit)})"
-            )
+            cells.append(f"{cell(middle, unit)} ({cell(low, unit)} to {cell(high, unit)})")
         rows.append([CHECK_WORDS.get(str(name), str(name)), *cells])
     return section(
         "checks", "table", "Facts that were not fitted",
@@ -203,12 +202,3 @@ def values_section(comparison: xr.Dataset) -> Section:
         "they mean little.",
         columns=["model", "parameter", "value"], rows=rows,
     )  # fmt: skip
-
-
-def _quantity(value: Any, unit: str) -> str:
-    return quantity(float(value), unit, digits=3) if np.isfinite(value) else "–"
-
-
-def _warnings(comparison: xr.Dataset) -> list[str]:
-    said = [SIMULATED] if is_simulated(comparison) else []
-    return [*said, *(str(text) for text in comparison["warning"].values)]
