@@ -17,7 +17,7 @@ OF_WHAT_IS_GIVEN = {
     *("value", "low", "high", "variance"),
     *("estimate", "interval", "coarse_estimate", "first_half_estimate"),
     *("number_value", "departure_estimate", "departure_std"),
-    *("searched_estimate", "draws", "range", "truth"),
+    *("profile_value", "searched_estimate", "draws", "range", "truth"),
     *("check_recorded", "check_median", "check_low", "check_high"),
 }
 """Numbers whose unit depends on the input, the output or the parameter."""

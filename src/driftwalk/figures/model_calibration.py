@@ -1,4 +1,4 @@
-"""The figures of a calibration of many parameters: draws of each pair, and the quality."""
+"""The figures of a calibration of many parameters: draws of pairs, profiles, and the quality."""
 
 from __future__ import annotations
 
@@ -31,9 +31,13 @@ if TYPE_CHECKING:
 PANEL_MM: Final = 24.0
 LEAST_MM: Final = 90.0
 ABOVE_MM: Final = 14.0
+PROFILE_MM: Final = 42.0
 BINS: Final = 24
 WORDS: Final = 11
 """Letters in a line of a label."""
+PROFILES_ACROSS: Final = 4
+HIGHEST_RISE: Final = 9.0
+"""Top of a profile's panel: three standard deviations."""
 
 
 def write_model_calibration_figures(
@@ -53,7 +57,7 @@ def write_model_calibration_figures(
     Returns
     -------
     list of pathlib.Path
-        ``pairs``, where there are draws, and ``quality`` in every format.
+        ``quality`` and, where they were found, ``pairs`` and ``profiles`` in every format.
 
     Raises
     ------
@@ -72,6 +76,8 @@ def write_model_calibration_figures(
     makers = {"quality": lambda: quality_figure(calibration)}
     if "draws" in calibration:
         makers["pairs"] = lambda: pairs_figure(calibration)
+    if "profile_misfit" in calibration:
+        makers["profiles"] = lambda: profiles_figure(calibration)
     return write_each(makers, folder, formats)
 
 
@@ -97,11 +103,38 @@ def pairs_figure(calibration: xr.Dataset) -> Figure:
                 ax.set_ylabel(_label(calibration, row))
             elif column:
                 ax.tick_params(labelleft=False)
+            ax.tick_params(labelsize="x-small")
+            ax.tick_params(axis="x", labelrotation=45.0)
     axes[0, 0].set_yticks([])
     figure.suptitle(
         f"{calibration.attrs['model']}: values that could have given the recording "
         "(orange: estimate)"
         + ("" if _counts(calibration) else "; they do not count, the estimate is the search's")
+    )
+    return figure
+
+
+def profiles_figure(calibration: xr.Dataset) -> Figure:
+    """Return how the misfit rises along each parameter, the others at their best."""
+    from scipy.stats import chi2
+
+    names = [str(name) for name in calibration["parameter"].values]
+    across = min(PROFILES_ACROSS, len(names))
+    rows = -(-len(names) // across)
+    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=PROFILE_MM * rows + ABOVE_MM)
+    axes = figure.subplots(rows, across, sharey=True, squeeze=False)
+    confidence = float(calibration.attrs["confidence"])
+    level = float(chi2.ppf(confidence, 1))
+    for index, ax in enumerate(axes.flat):
+        if index >= len(names):
+            ax.set_visible(False)
+            continue
+        _plot_profile(calibration, index, level, ax)
+    for ax in axes[:, 0]:
+        ax.set_ylabel("rise of the misfit")
+    figure.suptitle(
+        f"{calibration.attrs['model']}: misfit along each parameter, the others at their best "
+        f"(grey: {confidence:.0%} level; dashed: interval)"
     )
     return figure
 
@@ -126,12 +159,28 @@ def _plot_one(calibration: xr.Dataset, index: int, ax: Axes) -> None:
     one = calibration.isel(parameter=index)
     values = one["draws"].values
     ax.hist(values, bins=BINS, color=MUTED)
+    _plot_answer(one, ax)
+    ax.set_yticks([])
+    ax.xaxis.set_major_locator(_few_ticks())
+
+
+def _plot_profile(calibration: xr.Dataset, index: int, level: float, ax: Axes) -> None:
+    """Draw a parameter's profile, the level of the interval, and the interval of the draws."""
+    one = calibration.isel(parameter=index)
+    ax.plot(one["profile_value"].values, one["profile_misfit"].values, color=BLUE)
+    ax.axhline(level, color=MUTED, lw=0.8)
+    _plot_answer(one, ax)
+    ax.set_ylim(0.0, HIGHEST_RISE)
+    ax.xaxis.set_major_locator(_few_ticks())
+    ax.set_xlabel(_label(calibration, index))
+
+
+def _plot_answer(one: xr.Dataset, ax: Axes) -> None:
+    """Draw a parameter's interval and estimate, and say where it is not determined."""
     for end in one["interval"].values:
         if np.isfinite(end):
             ax.axvline(float(end), color=BLUE, lw=0.8, ls="--")
     ax.axvline(float(one["estimate"]), color=ORANGE, lw=1.2)
-    ax.set_yticks([])
-    ax.xaxis.set_major_locator(_few_ticks())
     if not bool(one["determined"]):
         ax.set_title("not determined", loc="left", fontsize="x-small", color=INK)
 
@@ -145,9 +194,10 @@ def _plot_pair(calibration: xr.Dataset, column: int, row: int, ax: Axes) -> None
 
 
 def _few_ticks() -> Locator:
+    """Return ticks whose labels do not meet in a small panel: two or three."""
     from matplotlib.ticker import MaxNLocator
 
-    return MaxNLocator(nbins=3, steps=[1, 2, 5, 10])
+    return MaxNLocator(nbins=2, steps=[1, 2, 4, 5, 10])
 
 
 def _label(calibration: xr.Dataset, index: int) -> str:

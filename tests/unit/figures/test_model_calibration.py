@@ -10,7 +10,7 @@ from every_kind import every_kind
 
 from driftwalk.core.errors import InputError
 from driftwalk.figures import write_model_calibration_figures
-from driftwalk.figures.model_calibration import pairs_figure, quality_figure
+from driftwalk.figures.model_calibration import pairs_figure, profiles_figure, quality_figure
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +39,15 @@ def test_labels_have_units_and_stay_on_the_page(found: xr.Dataset) -> None:
         assert 0.0 <= box.x0 < box.x1 <= figure.bbox.width
 
 
+def test_a_profile_is_least_at_its_middle_and_has_the_interval(found: xr.Dataset) -> None:
+    panels = [ax for ax in profiles_figure(found).axes if ax.get_visible()]
+    assert len(panels) == found.sizes["parameter"]
+    for ax, interval in zip(panels, found["interval"].values, strict=True):
+        rise = ax.lines[0].get_ydata()
+        assert rise.argmin() == rise.size // 2
+        assert [line.get_xdata()[0] for line in ax.lines[2:4]] == interval.tolist()
+
+
 def test_the_quality_shows_the_distances(found: xr.Dataset) -> None:
     aspects, checks = quality_figure(found).axes
     assert aspects.lines[0].get_xdata().tolist() == found["held_out_distance"].values.tolist()
@@ -46,7 +55,7 @@ def test_the_quality_shows_the_distances(found: xr.Dataset) -> None:
 
 
 def test_without_draws_there_are_no_pairs(found: xr.Dataset, tmp_path: Path) -> None:
-    rest = found.drop_vars("draws")
+    rest = found.drop_vars(["draws", "profile_value", "profile_misfit"])
     written = write_model_calibration_figures(tmp_path, calibration=rest, formats=("png",))
     assert [path.name for path in written] == ["quality.png"]
     with pytest.raises(InputError, match="expected a model_calibration"):

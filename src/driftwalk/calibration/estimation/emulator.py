@@ -22,6 +22,8 @@ SHRUNK: Final = 0.05
 CONSTANT: Final = 1e-9
 """A summary that varies by less than this part of its size says nothing."""
 MOST_STEPS: Final = 40
+HELD: Final = 1e-9
+"""A parameter that is held may move by this part of the box."""
 MOST_CORRECTED: Final = 3
 """Degrees of freedom beyond the summaries from which the errors of a covariance are known."""
 
@@ -99,7 +101,14 @@ class LocalEmulator:
         left = _basis(place, self.products) @ self.coefficients.T - self.whitened(summaries)
         return np.asarray((left**2).sum(axis=1))
 
-    def solve(self, summaries: Floats, *, reach: float, start: Floats | None = None) -> Solved:
+    def solve(
+        self,
+        summaries: Floats,
+        *,
+        reach: float,
+        start: Floats | None = None,
+        held: tuple[int, float] | None = None,
+    ) -> Solved:
         """Return the setting that fits summaries best.
 
         Parameters
@@ -110,6 +119,8 @@ class LocalEmulator:
             How far outside the box it may lie, 1 is the end of the box.
         start : ndarray, optional
             Setting to begin at; default: the centre.
+        held : tuple of int and float, optional
+            A parameter, and the value in the unit cube at which it is held.
         """
         from scipy.optimize import least_squares
 
@@ -127,6 +138,12 @@ class LocalEmulator:
         if start is not None:
             begin = (start - self.centre) / self.width
         inside = 1e-6 * (high - low)
+        if held is not None:
+            # A range that is next to nothing: the solver takes no bounds that are equal.
+            index, value = held
+            place = (value - self.centre[index]) / self.width[index]
+            low[index], high[index] = place - HELD, place + HELD
+            inside[index] = 0.5 * HELD
         found = least_squares(
             left,
             np.clip(begin, low + inside, high - inside),

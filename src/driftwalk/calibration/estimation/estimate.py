@@ -18,6 +18,7 @@ from driftwalk.calibration.estimation.posterior import (
     Posterior,
     sample_posterior,
 )
+from driftwalk.calibration.estimation.profile import Profiles, misfit_profiles
 
 Floats = npt.NDArray[np.float64]
 
@@ -54,6 +55,9 @@ class Matched(NamedTuple):
     """Factor by which the draws are spread for what the model leaves unexplained, from 1 on."""
     even_point: Floats
     """The setting that matches the even blocks of time."""
+    profiles: Profiles | None
+    """How the misfit rises along each parameter, over the square of the factor by which the draws
+    are spread; None where states of the model have changed places."""
     rounds: int
 
     @property
@@ -124,7 +128,7 @@ def match_summaries(
         objective, recorded, best.emulator, best.solved, seed=seed + 10_000
     )
     usual = _usual_misfits(objective, posterior, worlds)
-    return _matched(order, posterior, usual, best.rounds)
+    return _matched(order, posterior, recorded[0], usual, best.rounds)
 
 
 def _matches(found: Descended) -> bool:
@@ -149,7 +153,9 @@ def _usual_misfits(objective: SummaryObjective, posterior: Posterior, worlds: in
     )
 
 
-def _matched(order: Order, posterior: Posterior, usual: Floats, rounds: int) -> Matched:
+def _matched(
+    order: Order, posterior: Posterior, recorded: Floats, usual: Floats, rounds: int
+) -> Matched:
     middle, most = float(np.median(usual)), float(np.quantile(usual, MISFIT_QUANTILE))
     misfit = posterior.solved.misfit
     stretch = float(np.sqrt(misfit / middle)) if misfit > most else 1.0
@@ -164,8 +170,26 @@ def _matched(order: Order, posterior: Posterior, usual: Floats, rounds: int) -> 
         most_misfit=most,
         stretch=stretch,
         even_point=np.clip(posterior.others[0].setting, 0.0, 1.0),
+        profiles=_profiles(order, posterior, recorded, wider),
         rounds=rounds,
     )
+
+
+def _profiles(
+    order: Order, posterior: Posterior, recorded: Floats, wider: float
+) -> Profiles | None:
+    """Return how the misfit rises along each parameter, in the measure of the intervals."""
+    setting = posterior.solved.setting
+    if not np.array_equal(order(setting[None])[0], setting):
+        return None
+    found = misfit_profiles(
+        posterior.emulator,
+        recorded,
+        posterior.solved,
+        wider * posterior.draws.std(axis=0),
+        reach=REACH,
+    )
+    return found._replace(rise=found.rise / wider**2)
 
 
 def _distinct(starts: Floats) -> list[Floats]:

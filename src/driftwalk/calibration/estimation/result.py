@@ -114,6 +114,10 @@ def _stages(found: Estimation, entry: Contestant) -> dict[str, Any]:
             "most_misfit": ((), matched.most_misfit),
             "interval_stretch": ((), matched.stretch),
         }
+        if matched.profiles is not None:
+            values = _values(entry, matched.profiles.place.T).T
+            data["profile_value"] = (("parameter", "profile_point"), values)
+            data["profile_misfit"] = (("parameter", "profile_point"), matched.profiles.rise)
     return data
 
 

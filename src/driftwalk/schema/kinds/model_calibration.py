@@ -8,6 +8,7 @@ from driftwalk.schema.description import ARENA, SIMULATED, SOURCE, Attribute, Ki
 
 _SEARCHED: Final = "the model was searched"
 _MATCHED: Final = "summaries were matched"
+_PROFILED: Final = f"{_MATCHED} and no states changed places"
 
 MODEL_CALIBRATION: Final = Kind(
     name="model_calibration",
@@ -16,6 +17,7 @@ MODEL_CALIBRATION: Final = Kind(
         "parameter": "parameters of the model",
         "bound": "lower and upper end",
         "draw": "settings that could have given the recording",
+        "profile_point": "values along a parameter",
         "aspect": "aspects of the motion, by name",
         "check": "facts of the motion that no model is fitted to",
         "warning": "sentences",
@@ -41,6 +43,15 @@ MODEL_CALIBRATION: Final = Kind(
         Variable("draws", "draw parameter", None, "values that could have given the recording",
             note="a sample of an approximate posterior with even priors on the scales",
             when=_MATCHED,
+        ),
+        Variable(
+            "profile_value", "parameter profile_point", None, "value of the parameter",
+            note="in its unit", when=_PROFILED,
+        ),
+        Variable(
+            "profile_misfit", "parameter profile_point", "1",
+            "rise of the misfit there, the others at their best",
+            note="over the square of the factor by which intervals are widened", when=_PROFILED,
         ),
         Variable("range", "parameter bound", None, "range of the search"),
         Variable("unit", "parameter", None, "unit of the parameter", "text"),
