@@ -1,9 +1,10 @@
-"""Print the tables of recovered parameters: python recovered.py RECOVER.jsonl.
+"""Print the tables of recovered parameters: python recovered.py RECOVER.jsonl [SEARCHED.jsonl].
 
 The first has a row for each model, the second for each parameter. An error is |ln(found / true)|,
-of a turn rate the difference over the larger of its value and a tenth of the search's range. The
-third counts the places of the truths among the draws, in fifths: even where the draws are a
-posterior (simulation-based calibration; Talts et al., arXiv:1804.06788).
+of a turn rate the difference over its value. With the lines of searches alone, the second has the
+median error of these, and of the summaries on the same recordings. The third counts the places of
+the truths among the draws, in fifths: even where the draws are a posterior (simulation-based
+calibration; Talts et al., arXiv:1804.06788).
 """
 
 from __future__ import annotations
@@ -26,10 +27,9 @@ def entries_of(lines: list[Line], model: str, name: str) -> list[tuple[float, bo
     for line in lines:
         if line["model"] != model or name not in line["truth"]:
             continue
-        true, value = line["truth"][name], line["estimate"][name]
-        error = abs(value / true - 1.0) if name in SIGNED else abs(float(np.log(value / true)))
         low, high = line["interval"][name]
-        found.append((error, bool(line["determined"][name]), low <= true <= high))
+        inside = low <= line["truth"][name] <= high
+        found.append((error_of(line, name), bool(line["determined"][name]), inside))
     return found
 
 
@@ -44,6 +44,23 @@ def cells_of(entries: list[tuple[float, bool, bool]]) -> list[str]:
         median,
         covered,
         f"{inside} of {len(entries)}",
+    ]
+
+
+def error_of(line: Line, name: str) -> float:
+    """Return the relative error of an estimate."""
+    ratio = line["estimate"][name] / line["truth"][name]
+    return abs(ratio - 1.0) if name in SIGNED else abs(float(np.log(ratio)))
+
+
+def stage_cells(lines: list[Line], searches: list[Line], model: str, name: str) -> list[str]:
+    """Return the median errors of both stages, on recordings that were searched alone."""
+    alone = [one for one in searches if one["model"] == model]
+    numbers = {one["recording"] for one in alone}
+    both = [one for one in lines if one["model"] == model and one["recording"] in numbers]
+    return [
+        f"{np.median([error_of(one, name) for one in chosen]):.0%}" if chosen else ""
+        for chosen in (alone, both)
     ]
 
 
@@ -67,17 +84,20 @@ def rank_cells(ranks: list[float]) -> list[str]:
 def main() -> None:
     """Print the tables."""
     lines = read_lines(Path(sys.argv[1]))
+    searches = read_lines(Path(sys.argv[2])) if len(sys.argv) > 2 else []
     models = list(dict.fromkeys(line["model"] for line in lines))
     head = ["determined", "median error of these", "in the 90 % interval", "of all"]
     by_model = [["model", "recordings", "matched", "explained", *head, "processor time [s]"]]
-    by_parameter = [["model", "parameter", *head]]
+    stages = ["search alone: median error", "summaries, same recordings"]
+    by_parameter = [["model", "parameter", *head, *(stages if searches else [])]]
     every: list[tuple[float, bool, bool]] = []
     for model in models:
         own = [line for line in lines if line["model"] == model]
         entries: list[tuple[float, bool, bool]] = []
         for name in own[0]["truth"]:
             these = entries_of(own, model, name)
-            by_parameter.append([model, name, *cells_of(these)])
+            both = stage_cells(lines, searches, model, name) if searches else []
+            by_parameter.append([model, name, *cells_of(these), *both])
             entries += these
         matched = sum(line["estimate_from"] == "summaries" for line in own)
         explained = sum(line["explained"] for line in own)

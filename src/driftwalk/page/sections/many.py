@@ -107,7 +107,8 @@ def values_section(found: xr.Dataset) -> Section:
         )
     return section(
         "values", "table", "Values",
-        "A parameter is determined where its 90 % interval ends within a quarter of its value.",
+        "A parameter is determined where its 90 % interval ends within 15 % of its value, "
+        "unless the misfit is above four times the usual.",
         columns=["parameter", "value", "interval", "determined", "range", "meaning"], rows=rows,
     )  # fmt: skip
 

@@ -108,7 +108,7 @@ def errors_section(recovery: xr.Dataset) -> Section:
     return section(
         "errors", "table", "Errors and intervals",
         "Errors are relative to the truth. A parameter is determined where its 90 % interval ends "
-        f"within a quarter of its value. {confidence} of the intervals should hold the truth, give "
+        f"within 15 % of its value. {confidence} of the intervals should hold the truth, give "
         "or take the standard error.",
         columns=[
             "parameter", "truth", "median error", "share determined",

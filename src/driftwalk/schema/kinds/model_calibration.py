@@ -30,7 +30,7 @@ MODEL_CALIBRATION: Final = Kind(
         ),
         Variable(
             "determined", "parameter", None, "whether the recording determines the parameter",
-            "bool", note="within a quarter of its value, with 90 % confidence",
+            "bool", note="within 15 % of its value, with 90 % confidence",
         ),
         Variable(
             "half_width", "parameter", "1", "half the 90 % interval over the value",

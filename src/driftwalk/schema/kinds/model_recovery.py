@@ -29,7 +29,7 @@ MODEL_RECOVERY: Final = Kind(
         ),
         Variable(
             "determined", _EACH, None, "whether the recording determines the parameter", "bool",
-            note="within a quarter of its value, with 90 % confidence",
+            note="within 15 % of its value, with 90 % confidence",
         ),
         Variable(
             "half_width", _EACH, "1", "half the 90 % interval over the value",
@@ -38,7 +38,7 @@ MODEL_RECOVERY: Final = Kind(
         Variable(
             "error", _EACH, "1", "relative error of the estimate",
             note="ln(estimate / truth) on a logarithmic scale; on a linear one over the truth, or "
-            "over a tenth of the range where the truth is smaller",
+            "over a twentieth of the range where the truth is smaller",
         ),
         Variable(
             "error_interval", f"{_EACH} bound", "1", "ends of the interval, as errors",

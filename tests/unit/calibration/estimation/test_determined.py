@@ -34,15 +34,15 @@ def test_the_interval_of_a_linear_scale():
 
 
 @pytest.mark.parametrize("middle", [0.5, 0.52, 0.45])
-def test_a_value_near_zero_counts_as_a_tenth_of_the_range(middle):
+def test_a_value_near_zero_counts_as_a_twentieth_of_the_range(middle):
     found = determination(even(middle - 0.01, middle + 0.01), [LINEAR], confidence=0.9)
-    assert found.half_width[0] == pytest.approx(4 * 0.009 / 0.4)
+    assert found.half_width[0] == pytest.approx(4 * 0.009 / 0.2)
 
 
 @pytest.mark.parametrize("scale", ["log", "linear"])
 @pytest.mark.parametrize("excess", [-0.002, 0.002])
-def test_a_parameter_is_determined_up_to_a_quarter_of_its_value(scale, excess):
-    """Draws whose 90 % interval ends a little less or more than a quarter from the middle."""
+def test_a_parameter_is_determined_up_to_a_part_of_its_value(scale, excess):
+    """Draws whose 90 % interval ends a little less or more than that part from the middle."""
     wanted = DETERMINED + excess
     if scale == "log":
         parameter, half = LOG, wanted / math.log(100.0)
@@ -77,7 +77,7 @@ def test_each_parameter_is_judged_by_its_own_draws():
 
 
 def test_more_confidence_makes_wider_intervals_and_determines_the_same():
-    draws = np.random.default_rng(3).normal([0.5, 0.4], [0.02, 0.08], (512, 2))
+    draws = np.random.default_rng(3).normal([0.5, 0.4], [0.015, 0.08], (512, 2))
     narrow, wide = (determination(draws, [LOG, LOG], confidence=one) for one in (0.5, 0.99))
     assert (wide.interval[:, 0] < narrow.interval[:, 0]).all()
     assert (wide.interval[:, 1] > narrow.interval[:, 1]).all()
