@@ -14,8 +14,8 @@ Floats = npt.NDArray[np.float64]
 
 DETERMINED: Final = 0.15
 """A parameter is determined where its 90 % interval ends no farther than this part of its value
-from its middle: half of the answers are then within 6 % of the truth. With a quarter, the median error
-of some parameters came to more than a tenth in the recovery study."""
+from its middle: half of the answers are then within 6 % of the truth. With a quarter, the median
+error of some parameters came to more than a tenth in the recovery study."""
 QUOTED: Final = 0.9
 """The confidence for which that is said."""
 SMALL_PART: Final = 0.05
