@@ -21,6 +21,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "model": GROUND,
     "comparison": GROUND,
     "sweep": GROUND,
+    "cluster": GROUND | {"sweep"},
     "simulation": GROUND | {"model"},
     # `record` for the tracking noise of a recording, which is what "estimate" stands for.
     "conditions": GROUND | {"record", "model", "flow", "simulation"},
@@ -51,7 +52,17 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     | {"assembly", "track", "plot", "page"},
     "cli": GROUND
     | {"record", "flow", "model", "comparison", "sweep", "simulation", "motion", "conditions"}
-    | {"assembly", "calibration", "likelihood", "track", "datasets", "plot", "figures", "page"}
+    | {
+        "assembly",
+        "calibration",
+        "cluster",
+        "likelihood",
+        "track",
+        "datasets",
+        "plot",
+        "figures",
+        "page",
+    }
     | {"runs", "viewer"},
 }
 HEAVY = frozenset({"xarray", "scipy", "pandas", "cv2", "matplotlib", "dask", "optuna", "h5netcdf"})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -73,6 +74,7 @@ def calibrate(
     flow: xr.Dataset | None = None,
     body: str | None = None,
     threads: int | None = None,
+    executor: Executor | None = None,
     stores: Stores | None = None,
     tell: Tell | None = None,
 ) -> xr.Dataset:
@@ -103,6 +105,10 @@ def calibrate(
         The body, where the recording has several.
     threads : int, optional
         Default: all processors. The result does not depend on it.
+    executor : concurrent.futures.Executor, optional
+        Computes the maps' work units elsewhere, with one thread each; see
+        `driftwalk.sweep.run_sweep`. The other stages run here. For one or two parameters. The
+        result does not depend on it.
     stores : callable, optional
         Where each stage keeps finished work (`driftwalk.core.rundir`); memory when left out.
     tell : callable, optional
@@ -137,6 +143,11 @@ def calibrate(
     """
     chosen, searched = _study_and_model(model, study, recording)
     if len(searched.parameters) > MOST_PARAMETERS:
+        if executor is not None:
+            raise ConfigurationError(
+                f"an executor is for one or two parameters; {searched.name} has "
+                f"{len(searched.parameters)}, which are searched on this machine"
+            )
         if statistic is not None:
             raise ConfigurationError(
                 f"a statistic of its own is for one or two parameters; {searched.name} has "
@@ -168,7 +179,7 @@ def calibrate(
     )
     keep = stores if stores is not None else _in_memory
     say = tell if tell is not None else _silent
-    result = _Calibration(problem, keep, say).run()
+    result = _Calibration(problem, keep, say, executor).run()
     of_wall = wall_warning(track, chosen) if isinstance(searched, BlockModel) else None
     steadiness = steadiness_of(problem)
     of_time = None if steadiness is None else steadiness.warning
@@ -223,13 +234,16 @@ def _flow_source(study: Study, model: MotionModel, flow: xr.Dataset | None) -> F
 class _Calibration:
     """The stages of a calibration in their order, and what each leaves for the next."""
 
-    def __init__(self, problem: Problem, keep: Stores, say: Tell) -> None:
+    def __init__(
+        self, problem: Problem, keep: Stores, say: Tell, executor: Executor | None
+    ) -> None:
         self.problem = problem
         self.warnings: list[str] = []
         self.bootstrap: Bootstrap | None = None
         self.quality: Quality | None = None
         self.region: Region | None = None
         self._keep = keep
+        self._executor = executor
         self._say = say
         self._steps = problem.refined_steps
 
@@ -274,6 +288,7 @@ class _Calibration:
             replicates=replicates,
             details=details,
             store=store,
+            executor=self._executor,
             progress=lambda done, total: self._say(stage, done, total),
         )
 

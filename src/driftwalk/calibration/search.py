@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -69,6 +71,7 @@ def run_map(
     replicates: int,
     details: Details = "none",
     store: Store | None = None,
+    executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Map:
     """Simulate every setting of a grid and compare it with the recording.
@@ -87,28 +90,48 @@ def run_map(
         Whether to keep densities and excerpts.
     store : Store, optional
         Where finished work units are kept.
+    executor : concurrent.futures.Executor, optional
+        Computes the work units elsewhere, with one thread each.
     progress : callable, optional
         Called with the number of finished settings and the total.
     """
     names = [parameter.name for parameter in problem.parameters]
     design: Design = grid(**dict(zip(names, axes, strict=True)))
-
-    def compute(unit: WorkUnit) -> dict[str, npt.NDArray[Any]]:
-        worlds = score_settings(
-            problem,
-            [unit.settings[name] for name in names],
-            stage=stage,
-            first=unit.start,
-            replicates=replicates,
-            details=details,
-        )
-        return _by_setting(worlds, replicates)
-
+    function = _Settings(_for_units(problem, executor), stage, replicates, details)
+    units = design.units(SETTINGS_PER_UNIT)
     arrays = design.unstack(
-        run_sweep(compute, design.units(SETTINGS_PER_UNIT), store=store, progress=progress)
+        run_sweep(function, units, store=store, executor=executor, progress=progress)
     )
     distance = arrays.pop("ks_distance")
     return Map(tuple(design.axes[name] for name in names), distance, arrays)
+
+
+@dataclass(frozen=True)
+class _Settings:
+    """The function of the sweep: the settings of a unit, simulated wherever it is sent."""
+
+    problem: Problem
+    stage: str
+    replicates: int
+    details: Details
+
+    def __call__(self, unit: WorkUnit) -> dict[str, npt.NDArray[Any]]:
+        worlds = score_settings(
+            self.problem,
+            [unit.settings[one.name] for one in self.problem.parameters],
+            stage=self.stage,
+            first=unit.start,
+            replicates=self.replicates,
+            details=self.details,
+        )
+        return _by_setting(worlds, self.replicates)
+
+
+def _for_units(problem: Problem, executor: Executor | None) -> Problem:
+    """Return the problem as units get it: with one thread where an executor has many units."""
+    if executor is None:
+        return problem
+    return replace(problem, like=replace(problem.like, threads=1))
 
 
 def _by_setting(

@@ -14,11 +14,11 @@ from driftwalk.cli.inputs.assembly_source import (
     source_from_calibration,
     source_from_flow,
 )
+from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
 from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.answer import print_figures, print_warnings
 from driftwalk.cli.terminal.output import print_json, print_table
-from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS
 
@@ -47,6 +47,8 @@ def assemble(
         str, typer.Option("--film", metavar="gif|mp4|none", help="Film of the first run.")
     ] = "gif",
     threads: Threads = None,
+    cluster: ClusterAt = None,
+    cluster_options: ClusterOptions = None,
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
@@ -72,7 +74,7 @@ def assemble(
             "found are simulated"
         )
     work = AssemblyWork(source.study, source.flow, source.region, source.inputs, threads)
-    with reported("assemble") as told:
+    with Workers(cluster, cluster_options).reported("assemble") as told:
         result = run_assembly(work, out, film=film, overwrite=overwrite, **told)
     warnings = [*warnings, *_left_out(result)]
     if json:

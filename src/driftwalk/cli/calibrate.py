@@ -7,13 +7,13 @@ from typing import Annotated
 import typer
 
 from driftwalk.cli.inputs.study_recording import read_with_flow, tank_note
+from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
 from driftwalk.cli.options.model import ModelName, ParameterChoices, chosen_model
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal import calibration_answer, model_answer
 from driftwalk.cli.terminal.output import print_json
-from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.study_keys import CALIBRATION_KEYS
 
 
@@ -41,6 +41,8 @@ def calibrate(
         ),
     ] = False,
     threads: Threads = None,
+    cluster: ClusterAt = None,
+    cluster_options: ClusterOptions = None,
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
@@ -59,7 +61,7 @@ def calibrate(
     work = CalibrationWork(
         read.trajectories[0], read.study, field, how.body, inputs, threads, chosen, posterior
     )
-    with reported("calibrate") as told:
+    with Workers(cluster, cluster_options).reported("calibrate") as told:
         found = run_calibration(work, out, overwrite=overwrite, begun=tank_note(read), **told)
     many = found.attrs["kind"] == "model_calibration"
     answer = model_answer if many else calibration_answer

@@ -17,12 +17,12 @@ from driftwalk.cli.inputs.assembly_source import (
     source_from_calibration,
     source_from_flow,
 )
+from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
 from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.options.vary import VARY_KEYS, Vary, vary_overrides
 from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.output import print_json
-from driftwalk.cli.terminal.progress import reported
 from driftwalk.cli.terminal.sensitivity_answer import print_answer, summary
 from driftwalk.core.study_keys import SENSITIVITY_KEYS
 
@@ -54,6 +54,8 @@ def sensitivity(
         ),
     ] = None,
     threads: Threads = None,
+    cluster: ClusterAt = None,
+    cluster_options: ClusterOptions = None,
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
@@ -82,7 +84,7 @@ def sensitivity(
         inputs={**source.inputs, **{f"flow {name}": path for name, path in paths.items()}},
         threads=threads,
     )
-    with reported("sensitivity") as told:
+    with Workers(cluster, cluster_options).reported("sensitivity") as told:
         result = run_sensitivity(work, out, overwrite=overwrite, **told)
     warnings = [*source.warnings, *_warnings(source, result)]
     if json:

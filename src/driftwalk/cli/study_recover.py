@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple
 
 import typer
 
+from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
 from driftwalk.cli.options.model import (
     KnownModel,
     KnownParameters,
@@ -21,7 +22,6 @@ from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.shared import Json, Overwrite, RunFolder, quantity_option
 from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
 from driftwalk.cli.terminal.output import print_json, print_note
-from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.study_keys import RECOVER_KEYS
 
@@ -99,6 +99,8 @@ def recover(
             show_default=False,
         ),
     ] = None,
+    cluster: ClusterAt = None,
+    cluster_options: ClusterOptions = None,
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
@@ -112,6 +114,7 @@ def recover(
     from driftwalk.runs import read_found_values
 
     given = replace(given, file=truth)
+    workers = Workers(cluster, cluster_options)
     if model is not None:
         _refuse(given, OF_THE_BLOCK, "about the block, which --model replaces; leave it out")
         of_model = [name for name in known or () if name != NOISE]
@@ -120,7 +123,7 @@ def recover(
         inputs = {"truth": truth, "parameters": found, "like": like}
         noise: Noise = "known" if NOISE in (known or ()) else "estimated"
         set_up = _SetUp(given, sample_rate, like, body, _files(inputs), threads, noise)
-        _of_model(chosen, set_up, out, overwrite=overwrite, json=json)
+        _of_model(chosen, set_up, out, workers, overwrite=overwrite, json=json)
         return
     _refuse(given, OF_A_MODEL, "belongs to a --model; for the block it stands in --truth FILE")
     beside = {
@@ -135,7 +138,7 @@ def recover(
             "the truth is missing: give a study file of the block (--truth FILE), or a motion "
             "model with its values (--model NAME --parameter NAME=VALUE)"
         )
-    _of_block(truth, given, out, threads, overwrite=overwrite, json=json)
+    _of_block(truth, given, out, threads, workers, overwrite=overwrite, json=json)
 
 
 class _SetUp(NamedTuple):
@@ -164,7 +167,13 @@ class _SetUp(NamedTuple):
 
 
 def _of_model(
-    chosen: KnownModel, set_up: _SetUp, out: Path, *, overwrite: bool, json: bool
+    chosen: KnownModel,
+    set_up: _SetUp,
+    out: Path,
+    workers: Workers,
+    *,
+    overwrite: bool,
+    json: bool,
 ) -> None:
     from driftwalk.cli.inputs.assembly_source import load_flow_for
     from driftwalk.cli.terminal.model_recover_answer import print_answer, summary
@@ -204,7 +213,7 @@ def _of_model(
     )
     for warning in chosen.warnings:
         print_note(f"warning: {warning}")
-    with reported("recover") as told:
+    with workers.reported("recover") as told:
         found = run_model_recovery(work, out, overwrite=overwrite, **told)
     if json:
         print_json(summary(found))
@@ -217,6 +226,7 @@ def _of_block(
     given: StudyOptions,
     out: Path,
     threads: int | None,
+    workers: Workers,
     *,
     overwrite: bool,
     json: bool,
@@ -230,7 +240,7 @@ def _of_block(
     field, flow_file = _flow(chosen, truth, None if named is None else Path(named))
     inputs = _files({"truth": truth, "flow": flow_file})
     work = RecoveryWork(chosen, field, inputs, threads)
-    with reported("recover") as told:
+    with workers.reported("recover") as told:
         found = run_recovery(work, out, overwrite=overwrite, **told)
     if json:
         print_json(summary(found))

@@ -62,3 +62,7 @@ class RunDirectoryError(DriftwalkError, OSError):
     def __str__(self) -> str:
         """Return the message as it was given, without the errno prefix of `OSError`."""
         return str(self.args[0]) if self.args else ""
+
+
+class ClusterError(DriftwalkError, RuntimeError):
+    """Workers on other machines cannot be reached, or must not be used; what is done is kept."""

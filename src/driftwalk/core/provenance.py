@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path, PurePath
 from typing import Any, Final
@@ -265,19 +265,37 @@ def _joined(words: Sequence[str]) -> str:
     return shlex.join(words)
 
 
-def _software() -> dict[str, str]:
-    import platform
+def package_versions(names: Iterable[str]) -> dict[str, str]:
+    """Return the versions of packages that are installed; others are left out.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Their names.
+
+    Examples
+    --------
+    >>> list(package_versions(["numpy", "no-such-package"]))
+    ['numpy']
+    """
     from importlib.metadata import PackageNotFoundError, version
 
     from driftwalk import __version__
 
-    software = {"driftwalk": __version__, "python": platform.python_version()}
-    for package in _PACKAGES:
+    versions = {}
+    for name in names:
         try:
-            software[package] = version(package)
+            versions[name] = __version__ if name == "driftwalk" else version(name)
         except PackageNotFoundError:
             continue
-    return software
+    return versions
+
+
+def _software() -> dict[str, str]:
+    import platform
+
+    first = {**package_versions(["driftwalk"]), "python": platform.python_version()}
+    return first | package_versions(_PACKAGES)
 
 
 def _machine(instruction_set: str | None) -> dict[str, Any]:

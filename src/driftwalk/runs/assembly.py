@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -77,6 +78,7 @@ def run_assembly(
     *,
     film: str = "none",
     overwrite: bool = False,
+    executor: Executor | None = None,
     progress: Progress = silent,
     command: str | Sequence[str] = "driftwalk.runs.run_assembly(...)",
 ) -> AssemblyResult:
@@ -96,6 +98,8 @@ def run_assembly(
         Whether the first run is filmed too.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
+    executor : concurrent.futures.Executor, optional
+        Computes work units elsewhere; the result does not depend on it.
     progress : callable, optional
         Called as ``progress(done, total, text)`` while the work goes on.
     command : str, optional
@@ -129,7 +133,7 @@ def run_assembly(
         overwrite=overwrite,
         command=command,
     ) as run:
-        result = _simulate(work, run, progress)
+        result = _simulate(work, run, executor, progress)
         if film != "none":
             _write_film(run, film, progress)
     return result
@@ -144,7 +148,9 @@ def _check(work: AssemblyWork) -> None:
         check_assembly(work.study, work.flow, trial=trial, threads=work.threads)
 
 
-def _simulate(work: AssemblyWork, run: RunDirectory, progress: Progress) -> AssemblyResult:
+def _simulate(
+    work: AssemblyWork, run: RunDirectory, executor: Executor | None, progress: Progress
+) -> AssemblyResult:
     from driftwalk.assembly import (
         assemble,
         assemble_drawn,
@@ -163,6 +169,7 @@ def _simulate(work: AssemblyWork, run: RunDirectory, progress: Progress) -> Asse
         store=run.store("fixed"),
         progress=lambda done, total: progress(done, total, "runs"),
         threads=work.threads,
+        executor=executor,
     )
     run.write("assembly.nc", netcdf_bytes(assembly))
     distribution = outcome_distribution(assembly, confidence=confidence)
@@ -178,6 +185,7 @@ def _simulate(work: AssemblyWork, run: RunDirectory, progress: Progress) -> Asse
             store=run.store("drawn"),
             progress=lambda done, total: progress(done, total, "runs, drawn parameters"),
             threads=work.threads,
+            executor=executor,
         )
         run.write("assembly_drawn.nc", netcdf_bytes(assembly_drawn))
         drawn = outcome_distribution(assembly_drawn, confidence=confidence)

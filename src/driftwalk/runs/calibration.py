@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -63,6 +64,7 @@ def run_calibration(
     *,
     overwrite: bool = False,
     begun: Callable[[], None] | None = None,
+    executor: Executor | None = None,
     progress: Progress = silent,
     command: str | Sequence[str] = "driftwalk.runs.run_calibration(...)",
 ) -> xr.Dataset:
@@ -82,6 +84,8 @@ def run_calibration(
         Whether a finished run there is moved aside; it is refused otherwise.
     begun : callable, optional
         Called when everything is checked and the work begins.
+    executor : concurrent.futures.Executor, optional
+        Computes work units elsewhere; the result does not depend on it.
     progress : callable, optional
         Called as ``progress(done, total, text)`` while the work goes on.
     command : str, optional
@@ -133,6 +137,7 @@ def run_calibration(
             flow=work.flow,
             body=work.body,
             threads=work.threads,
+            executor=executor,
             stores=_stores(run),
             tell=lambda stage, done, total: progress(*_overall(stage, done, total)),
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -60,6 +61,7 @@ def run_model_recovery(
     folder: Path,
     *,
     overwrite: bool = False,
+    executor: Executor | None = None,
     progress: Progress = silent,
     command: str | Sequence[str] = "driftwalk.runs.run_model_recovery(...)",
 ) -> xr.Dataset:
@@ -76,6 +78,8 @@ def run_model_recovery(
         The run directory.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
+    executor : concurrent.futures.Executor, optional
+        Computes work units elsewhere; the result does not depend on it.
     progress : callable, optional
         Called as ``progress(done, total, text)`` while the work goes on.
     command : str, optional
@@ -124,6 +128,7 @@ def run_model_recovery(
             work.study,
             **conditions,
             threads=work.threads,
+            executor=executor,
             store=run.store("recordings"),
             tell=progress,
         )

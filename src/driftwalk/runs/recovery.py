@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -45,6 +46,7 @@ def run_recovery(
     folder: Path,
     *,
     overwrite: bool = False,
+    executor: Executor | None = None,
     progress: Progress = silent,
     command: str | Sequence[str] = "driftwalk.runs.run_recovery(...)",
 ) -> xr.Dataset:
@@ -61,6 +63,8 @@ def run_recovery(
         The run directory.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
+    executor : concurrent.futures.Executor, optional
+        Computes work units elsewhere; the result does not depend on it.
     progress : callable, optional
         Called as ``progress(done, total, text)`` while the work goes on.
     command : str, optional
@@ -102,6 +106,7 @@ def run_recovery(
             work.flow,
             store=run.store("recordings"),
             threads=work.threads or default_threads(),
+            executor=executor,
             tell=lambda done, total: progress(done, total, "fits"),
         )
         run.write("recovery.nc", netcdf_bytes(found))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -87,6 +88,7 @@ def run_sensitivity(
     folder: Path,
     *,
     overwrite: bool = False,
+    executor: Executor | None = None,
     progress: Progress = silent,
     command: str | Sequence[str] = "driftwalk.runs.run_sensitivity(...)",
 ) -> SensitivityResult:
@@ -104,6 +106,8 @@ def run_sensitivity(
         The run directory.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
+    executor : concurrent.futures.Executor, optional
+        Computes work units elsewhere; the result does not depend on it.
     progress : callable, optional
         Called as ``progress(done, total, text)`` while the work goes on.
     command : str, optional
@@ -137,7 +141,7 @@ def run_sensitivity(
         overwrite=overwrite,
         command=command,
     ) as run:
-        result = _simulate(work, run, _Overall(progress, sizes))
+        result = _simulate(work, run, executor, _Overall(progress, sizes))
         progress(1, 1, "figures")
         _draw(result, run)
     return result
@@ -176,7 +180,9 @@ def _checked_sizes(work: SensitivityWork) -> dict[str, int]:
     return sizes
 
 
-def _simulate(work: SensitivityWork, run: RunDirectory, overall: _Overall) -> SensitivityResult:
+def _simulate(
+    work: SensitivityWork, run: RunDirectory, executor: Executor | None, overall: _Overall
+) -> SensitivityResult:
     from driftwalk.assembly import sensitivity_indices, sensitivity_map, sensitivity_reference
 
     reference = sensitivity_reference(
@@ -185,6 +191,7 @@ def _simulate(work: SensitivityWork, run: RunDirectory, overall: _Overall) -> Se
         store=run.store("reference"),
         progress=overall.stage("reference"),
         threads=work.threads,
+        executor=executor,
     )
     run.write("reference.nc", netcdf_bytes(reference))
     sensitivity = sensitivity_map(
@@ -195,6 +202,7 @@ def _simulate(work: SensitivityWork, run: RunDirectory, overall: _Overall) -> Se
         store=run.store("map"),
         progress=overall.stage("map"),
         threads=work.threads,
+        executor=executor,
     )
     run.write("sensitivity.nc", netcdf_bytes(sensitivity))
     components = _components(sensitivity)
@@ -209,6 +217,7 @@ def _simulate(work: SensitivityWork, run: RunDirectory, overall: _Overall) -> Se
             store=run.store("sobol"),
             progress=overall.stage("Sobol"),
             threads=work.threads,
+            executor=executor,
         )
         run.write("sobol.nc", netcdf_bytes(indices))
     return SensitivityResult(reference, sensitivity, components, indices)

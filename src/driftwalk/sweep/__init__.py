@@ -2,6 +2,8 @@
 
 from driftwalk.core.shards import ShardStore
 from driftwalk.sweep.design import Design, WorkUnit, grid
+from driftwalk.sweep.handout import threads_of_unit
+from driftwalk.sweep.remote import refuse_others
 from driftwalk.sweep.run import SweepError, run_sweep
 from driftwalk.sweep.store import MemoryStore, Store, collect
 
@@ -14,5 +16,7 @@ __all__ = [
     "WorkUnit",
     "collect",
     "grid",
+    "refuse_others",
     "run_sweep",
+    "threads_of_unit",
 ]

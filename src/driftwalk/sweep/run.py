@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import contextlib
+import time
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import Executor, Future, as_completed
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, as_completed, wait
 from functools import partial
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import DriftwalkError, InputError
+from driftwalk.core.errors import ClusterError, DriftwalkError, InputError
 from driftwalk.core.shards import Arrays
 from driftwalk.sweep.design import WorkUnit
+from driftwalk.sweep.handout import Handout, UnitFunction, UnitFuture, handout
 from driftwalk.sweep.store import MemoryStore, Store, collect
 
-UnitFuture = Future[Mapping[str, npt.NDArray[Any]]]
-UnitFunction = Callable[[WorkUnit], Mapping[str, npt.NDArray[Any]]]
 Progress = Callable[[int, int], None]
+
+LOOK_S: Final = 1.0
+"""How often units under way are looked at, where none comes back [s]."""
 
 
 class SweepError(RuntimeError):
@@ -61,8 +65,9 @@ def run_sweep(
         Where results are kept as soon as they are there, by this process alone; memory when left
         out.
     executor : concurrent.futures.Executor, optional
-        Workers: threads, processes (the function and its results must pickle), Dask. One
-        unit after the other in this thread when left out. It is not shut down.
+        Workers: threads, processes (the function and its results must pickle), or
+        ``client.get_executor()`` of Dask, where the function travels once to each worker. One unit
+        after the other in this thread when left out. It is not shut down.
     progress : callable, optional
         Called with the number of settings that are done and of all, at the start and after every
         unit.
@@ -79,6 +84,9 @@ def run_sweep(
         way are completed and kept, those that had not begun are cancelled.
     KeyboardInterrupt
         On Ctrl-C, at once; what had been completed is kept.
+    ClusterError
+        When the scheduler of the workers is gone, or a worker has another version of driftwalk;
+        what had been completed is kept.
     RunDirectoryError
         When a result cannot be stored.
 
@@ -128,21 +136,60 @@ def _run_in(
     store: Store,
     tally: _Tally,
 ) -> None:
-    waiting: dict[UnitFuture, WorkUnit] = {}
+    """Hand out units in a window, keep what comes back, and hand out slow ones again."""
+    hand = handout(executor, function)
+    queue = deque(missing)
+    waiting: dict[UnitFuture, _Handed] = {}
+    left = {unit.id for unit in missing}
+
+    def hand_out(unit: WorkUnit, again: bool = False) -> None:
+        waiting[hand.submit(unit)] = _Handed(unit, time.monotonic(), again)
+
     try:
-        for unit in missing:
-            waiting[executor.submit(function, unit)] = unit
-        for future in as_completed(list(waiting)):
-            _keep(waiting[future], future.result, store, tally)
-            del waiting[future]
+        while left:
+            while queue and len(waiting) < hand.width:
+                hand_out(queue.popleft())
+            done, _ = wait(waiting, timeout=LOOK_S, return_when=FIRST_COMPLETED)
+            for future in done:
+                handed = waiting.pop(future)
+                if handed.unit.id not in left:
+                    continue
+                _keep(handed.unit, future.result, store, tally)
+                left.discard(handed.unit.id)
+                hand.finished(time.monotonic() - handed.since)
+            if not queue:
+                for unit in _slow_ones(hand, list(waiting.values()), left):
+                    hand_out(unit, again=True)
+        _cancel_rest(waiting)
     except SweepError:
         _keep_rest(waiting, as_completed(_cancel_rest(waiting)), store, tally)
         raise
     except BaseException:
         # Ctrl-C and a full disk: nothing is waited for.
-        done = [future for future in _cancel_rest(waiting) if future.done()]
-        _keep_rest(waiting, done, store, tally)
+        done_by_now = [future for future in _cancel_rest(waiting) if future.done()]
+        _keep_rest(waiting, done_by_now, store, tally)
         raise
+
+
+class _Handed(NamedTuple):
+    """A unit that was handed out."""
+
+    unit: WorkUnit
+    since: float
+    """When [s]."""
+    again: bool
+    """Whether it is under way elsewhere, too."""
+
+
+def _slow_ones(hand: Handout, waiting: Sequence[_Handed], left: set[str]) -> list[WorkUnit]:
+    """Return units that take long, and are under way once: workers with nothing to do take them."""
+    now = time.monotonic()
+    twice = {one.unit.id for one in waiting if one.again}
+    return [
+        one.unit
+        for one in waiting
+        if one.unit.id in left and one.unit.id not in twice and hand.slow(now - one.since)
+    ]
 
 
 def _cancel_rest(waiting: Iterable[UnitFuture]) -> list[UnitFuture]:
@@ -151,7 +198,7 @@ def _cancel_rest(waiting: Iterable[UnitFuture]) -> list[UnitFuture]:
 
 
 def _keep_rest(
-    waiting: Mapping[UnitFuture, WorkUnit],
+    waiting: Mapping[UnitFuture, _Handed],
     futures: Iterable[UnitFuture],
     store: Store,
     tally: _Tally,
@@ -159,7 +206,7 @@ def _keep_rest(
     for future in futures:
         # The error that is under way is the one to report.
         with contextlib.suppress(SweepError, DriftwalkError):
-            _keep(waiting[future], future.result, store, tally)
+            _keep(waiting[future].unit, future.result, store, tally)
 
 
 def _keep(
@@ -170,15 +217,33 @@ def _keep(
 ) -> None:
     try:
         arrays = _checked(compute(), unit)
+    except ClusterError:
+        raise
+    except CancelledError as error:
+        raise ClusterError(
+            "the scheduler of the workers is gone; what was finished is kept, and the same command "
+            "continues"
+        ) from error
     except Exception as error:
         settings = ", ".join(f"{name} = {values[0]}" for name, values in unit.settings.items())
         raise SweepError(
-            f"unit {unit.id}, which begins with {settings}, failed: "
-            f"{type(error).__name__}: {error}; finished units are kept",
+            f"unit {unit.id}, which begins with {settings}, {_what_befell(error)}; finished units "
+            "are kept",
             unit_id=unit.id,
         ) from error
     store.write(unit, arrays)
     tally.add(unit)
+
+
+def _what_befell(error: Exception) -> str:
+    """Return what a unit failed by."""
+    if type(error).__name__ == "KilledWorker":
+        deaths = int(getattr(error, "allowed_failures", 0)) + 1
+        return (
+            f"ended all {deaths} workers that it met (too little memory, or a crash): their logs "
+            "say why"
+        )
+    return f"failed: {type(error).__name__}: {error}"
 
 
 def _checked(result: Mapping[str, npt.NDArray[Any]], unit: WorkUnit) -> Arrays:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final, Literal, get_args
 
@@ -16,13 +17,14 @@ from driftwalk.assembly.runs.parameters import draw_parameters
 from driftwalk.assembly.runs.plan import (
     Arrays,
     Backend,
+    Floats,
     Plan,
     make_plan,
     simulate_rows,
     start_poses,
 )
 from driftwalk.core.errors import InputError
-from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
+from driftwalk.sweep import Store, WorkUnit, grid, run_sweep, threads_of_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,6 +55,7 @@ def assemble(
     store: Store | None = None,
     progress: Progress | None = None,
     threads: int | None = None,
+    executor: Executor | None = None,
     backend: Backend = "cpu",
 ) -> xr.Dataset:
     """Simulate the self-assembly of blocks in a stirred tank.
@@ -85,6 +88,9 @@ def assemble(
         Called with the number of finished runs and the total.
     threads : int, optional
         Default: all processors. The result does not depend on it.
+    executor : concurrent.futures.Executor, optional
+        Computes the work units elsewhere, see `driftwalk.sweep.run_sweep`; each then has one
+        thread if `threads` is left out. The result does not depend on it.
     backend : {"cpu", "reference"}
         The batch kernels in single precision, or the same source in double precision.
 
@@ -115,10 +121,10 @@ def assemble(
         drag_coefficient=drag_coefficient,
         force_std=force_std,
         trial=trial,
-        threads=threads,
+        threads=threads_of_unit(threads, executor),
         backend=backend,
     )
-    return _run(plan, start, store=store, progress=progress, drawn="no")
+    return _run(plan, start, store=store, progress=progress, executor=executor, drawn="no")
 
 
 def assemble_drawn(
@@ -136,6 +142,7 @@ def assemble_drawn(
     store: Store | None = None,
     progress: Progress | None = None,
     threads: int | None = None,
+    executor: Executor | None = None,
 ) -> xr.Dataset:
     """Simulate self-assembly with parameters drawn from the uncertainty of a calibration.
 
@@ -145,7 +152,7 @@ def assemble_drawn(
 
     Parameters
     ----------
-    study, flow, blocks, runs, duration, start, seed, store, progress, threads
+    study, flow, blocks, runs, duration, start, seed, store, progress, threads, executor
         As in `assemble`.
     calibration : xarray.Dataset
         A `calibration` with its joint region.
@@ -181,7 +188,7 @@ def assemble_drawn(
         flow,
         settings={"blocks": blocks, "runs": runs, "duration_s": duration, "seed": seed},
         trial=trial,
-        threads=threads,
+        threads=threads_of_unit(threads, executor),
     )
     settings = plan.study.assembly
     drawn = draw_parameters(calibration, runs=settings.runs, seed=settings.seed, trial=trial)
@@ -193,7 +200,7 @@ def assemble_drawn(
         flow_draw=np.arange(settings.runs) // RUNS_PER_FLOW if moves else None,
     )
     what = "drag_coefficient force_std" + (" flow" if moves else "")
-    return _run(plan, start, store=store, progress=progress, drawn=what)
+    return _run(plan, start, store=store, progress=progress, executor=executor, drawn=what)
 
 
 def assembly_path(
@@ -300,21 +307,30 @@ def _run(
     *,
     store: Store | None,
     progress: Progress | None,
+    executor: Executor | None,
     drawn: str,
 ) -> xr.Dataset:
     """Simulate the runs unit by unit, and put them into one dataset."""
-    poses = start_poses(plan, start)
+    units = grid(run=plan.index).units(runs_per_unit(plan.study.assembly.blocks))
+    function = _Runs(plan, start_poses(plan, start))
+    arrays = run_sweep(function, units, store=store, executor=executor, progress=progress)
+    return build_assembly(plan, arrays, attrs={"drawn": drawn})
 
-    def compute(unit: WorkUnit) -> Arrays:
+
+@dataclass(frozen=True, eq=False)
+class _Runs:
+    """The function of the sweep: the runs of a unit, simulated wherever it is sent."""
+
+    plan: Plan
+    poses: Floats
+    """At the start, shape (runs, blocks, 3)."""
+
+    def __call__(self, unit: WorkUnit) -> Arrays:
         parts = [
-            simulate_rows(plan, poses, rows, flow)
-            for rows, flow in _by_flow(plan, unit.start, unit.stop)
+            simulate_rows(self.plan, self.poses, rows, flow)
+            for rows, flow in _by_flow(self.plan, unit.start, unit.stop)
         ]
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-
-    units = grid(run=plan.index).units(runs_per_unit(plan.study.assembly.blocks))
-    arrays = run_sweep(compute, units, store=store, progress=progress)
-    return build_assembly(plan, arrays, attrs={"drawn": drawn})
 
 
 def runs_per_unit(blocks: int) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import Executor
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-    from driftwalk.sweep import Store
+    from driftwalk.sweep import Store, threads_of_unit
 
 SOBOL_TRIAL: Final = 3 << 32
 """First trial, apart from those of the map and of the reference."""
@@ -45,12 +46,13 @@ def sensitivity_indices(
     store: Store | None = None,
     progress: Progress | None = None,
     threads: int | None = None,
+    executor: Executor | None = None,
 ) -> xr.Dataset:
     """Return the Sobol' indices of the outcomes of self-assembly, with the share of noise.
 
     Parameters
     ----------
-    study, flow, store, threads
+    study, flow, store, threads, executor
         As in `sensitivity_map`.
     samples : int
         Base samples, a power of two of at least 8; ``samples * (inputs + 2)`` settings are
@@ -84,8 +86,8 @@ def sensitivity_indices(
     (['complete', '2', '1+1'], ['drag_coefficient', 'force_std'])
     """
     design = _design(study, samples, bounds)
-    settings = _settings(study, flow, design, threads)
-    outcomes = simulate_settings(settings, store=store, progress=progress)
+    settings = _settings(study, flow, design, threads_of_unit(threads, executor))
+    outcomes = simulate_settings(settings, store=store, progress=progress, executor=executor)
     return _indices(study, design, outcomes)
 
 

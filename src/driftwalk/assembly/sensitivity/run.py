@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import Executor
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-    from driftwalk.sweep import Store
+    from driftwalk.sweep import Store, threads_of_unit
 
 MAP_TRIAL: Final = 1 << 32
 REFERENCE_TRIAL: Final = 2 << 32
@@ -37,6 +38,7 @@ def sensitivity_map(
     store: Store | None = None,
     progress: Progress | None = None,
     threads: int | None = None,
+    executor: Executor | None = None,
 ) -> xr.Dataset:
     """Simulate self-assembly at many settings, and measure how far outcomes lie from a reference.
 
@@ -63,6 +65,9 @@ def sensitivity_map(
         Called with the number of finished settings and the total.
     threads : int, optional
         Default: all processors. The result does not depend on it.
+    executor : concurrent.futures.Executor, optional
+        Computes the work units elsewhere, see `driftwalk.sweep.run_sweep`; each then has one
+        thread if `threads` is left out. The result does not depend on it.
 
     Returns
     -------
@@ -97,10 +102,10 @@ def sensitivity_map(
     {'latching': 2, 'class': 2}
     """
     chosen = make_axes(study, axes)
-    settings = _map_settings(chosen, flow, threads)
+    settings = _map_settings(chosen, flow, threads_of_unit(threads, executor))
     if reference is None:
-        reference = sensitivity_reference(chosen.study, flow, threads=threads)
-    outcomes = simulate_settings(settings, store=store, progress=progress)
+        reference = sensitivity_reference(chosen.study, flow, threads=threads, executor=executor)
+    outcomes = simulate_settings(settings, store=store, progress=progress, executor=executor)
     return map_dataset(chosen, settings, outcomes, reference)
 
 
@@ -111,6 +116,7 @@ def sensitivity_reference(
     store: Store | None = None,
     progress: Progress | None = None,
     threads: int | None = None,
+    executor: Executor | None = None,
 ) -> xr.Dataset:
     """Simulate the reference of a sensitivity analysis: several realisations of one setting.
 
@@ -119,7 +125,7 @@ def sensitivity_reference(
     study : Study
         Its [sensitivity] says how many realisations there are, of how many runs each, and the
         seed; parameters and blocks are the study's.
-    flow, store, threads
+    flow, store, threads, executor
         As in `sensitivity_map`.
     progress : callable, optional
         Called with the number of finished realisations and the total.
@@ -149,8 +155,8 @@ def sensitivity_reference(
     >>> found.attrs["runs"], dict(found["realisation_count"].sizes)
     (6, {'realisation': 2, 'class': 2})
     """
-    settings = _reference_settings(study, flow, threads)
-    outcomes = simulate_settings(settings, store=store, progress=progress)
+    settings = _reference_settings(study, flow, threads_of_unit(threads, executor))
+    outcomes = simulate_settings(settings, store=store, progress=progress, executor=executor)
     return reference_dataset(settings.worlds[0], outcomes)
 
 

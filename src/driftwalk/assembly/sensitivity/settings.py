@@ -9,7 +9,9 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -117,7 +119,11 @@ def world_plan(study: Study, flow: xr.Dataset, *, threads: int | None) -> Plan:
 
 
 def simulate_settings(
-    settings: Settings, *, store: Store | None = None, progress: Progress | None = None
+    settings: Settings,
+    *,
+    store: Store | None = None,
+    progress: Progress | None = None,
+    executor: Executor | None = None,
 ) -> Outcomes:
     """Simulate all settings, skipping what a store holds already.
 
@@ -129,9 +135,8 @@ def simulate_settings(
     units = grid(setting=np.arange(settings.size)).units(settings.per_unit())
     kept = _TextStore(MemoryStore() if store is None else store)
     try:
-        found = run_sweep(
-            lambda unit: _compute(settings, unit), units, store=kept, progress=progress
-        )
+        function = partial(_compute, settings)
+        found = run_sweep(function, units, store=kept, progress=progress, executor=executor)
     except SweepError as error:
         # A mistake in the study is the user's, whichever setting shows it.
         if isinstance(error.__cause__, DriftwalkError):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -15,7 +17,7 @@ from driftwalk.calibration.recover.truth import KnownTruth, Noise, known_truth
 from driftwalk.conditions import study_in_arena
 from driftwalk.core.run_stages import CALIBRATION_STAGES
 from driftwalk.motion import MotionModel
-from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
+from driftwalk.sweep import Store, WorkUnit, grid, run_sweep, threads_of_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,6 +39,7 @@ def recover_model(
     body: str | None = None,
     noise: Noise = "estimated",
     threads: int | None = None,
+    executor: Executor | None = None,
     store: Store | None = None,
     tell: Tell | None = None,
 ) -> xr.Dataset:
@@ -66,6 +69,9 @@ def recover_model(
         Whether a calibration estimates the noise of the camera from its recording, or knows it.
     threads : int, optional
         Default: all processors. The result does not depend on it.
+    executor : concurrent.futures.Executor, optional
+        Calibrates recordings elsewhere, see `driftwalk.sweep.run_sweep`; each then has one thread
+        if `threads` is left out. Workers of a Dask cluster need the same numpy and scipy.
     store : Store, optional
         Where finished recordings are kept; memory when left out.
     tell : callable, optional
@@ -99,15 +105,32 @@ def recover_model(
 
     say = tell if tell is not None else _silent
 
-    def compute(unit: WorkUnit) -> dict[str, Any]:
-        of_stage = partial(_tell_stage, say, unit.start, count)
-        return _packed(recover_one(known, unit.start, threads=threads, tell=of_stage))
+    # Only work of this process can say how far it is within a recording.
+    within = partial(_tell_stage, say, count) if executor is None else None
+    function = _Calibrations(known, threads_of_unit(threads, executor), within)
 
     def said(done: int, total: int) -> None:
         say(WHOLE * done, WHOLE * total, "recordings")
 
     units = grid(recording=np.arange(count)).units(1)
-    return build_model_recovery(known, run_sweep(compute, units, store=store, progress=said))
+    found = run_sweep(function, units, store=store, executor=executor, progress=said)
+    return build_model_recovery(known, found)
+
+
+@dataclass(frozen=True)
+class _Calibrations:
+    """The function of the sweep: one recording, simulated and calibrated wherever it is sent."""
+
+    known: KnownTruth
+    threads: int | None
+    within: Callable[[int, str, int, int], None] | None
+    """Called with the recording, the stage, what is done and all of it."""
+    linear_algebra: ClassVar[bool] = True
+    """Its results depend on numpy and scipy."""
+
+    def __call__(self, unit: WorkUnit) -> dict[str, Any]:
+        tell = None if self.within is None else partial(self.within, unit.start)
+        return _packed(recover_one(self.known, unit.start, threads=self.threads, tell=tell))
 
 
 def check_model_recovery(

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 from contextlib import nullcontext
-from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 
+from driftwalk.core.processors import one_blas_thread
 from driftwalk.likelihood.recover.check import angles_of, check_recovery
 from driftwalk.likelihood.recover.one import (
     FACTS,
@@ -45,6 +47,7 @@ def recovery_study(
     *,
     store: Store | None = None,
     threads: int | None = None,
+    executor: Executor | None = None,
     tell: Tell | None = None,
 ) -> xr.Dataset:
     """Simulate recordings of known truth, fit them, and measure how well the fits recover it.
@@ -62,6 +65,10 @@ def recovery_study(
         Processes that fit recordings at the same time; one after the other in this one when left
         out. The numbers are the same to the rounding of the linear algebra library, and the same
         bits for any number of processes.
+    executor : concurrent.futures.Executor, optional
+        Fits recordings elsewhere, see `driftwalk.sweep.run_sweep`, in place of processes of this
+        machine. Workers of a Dask cluster need the same numpy and scipy, and linear algebra of one
+        thread.
     tell : callable, optional
         Called with the number of finished fits and the total.
 
@@ -98,11 +105,29 @@ def recovery_study(
         duration=np.array(settings.durations_s),
         angle=np.arange(len(angles)),
     )
-    function = partial(_compute, Truth(study, flow), angles)
+    function = _Recoveries(Truth(study, flow), angles)
     units = design.units(1)
-    with nullcontext() if threads is None else single_threaded_processes(threads) as executor:
-        found = run_sweep(function, units, store=store, executor=executor, progress=tell)
+    with (
+        nullcontext(executor)
+        if executor or threads is None
+        else single_threaded_processes(threads) as workers
+    ):
+        found = run_sweep(function, units, store=store, executor=workers, progress=tell)
     return _dataset(study, angles, design.unstack(found), flow)
+
+
+@dataclass(frozen=True)
+class _Recoveries:
+    """The function of the sweep: one setting, simulated and fitted wherever it is sent."""
+
+    truth: Truth
+    angles: tuple[str, ...]
+    linear_algebra: ClassVar[bool] = True
+    """Its results depend on numpy and scipy."""
+
+    def __call__(self, unit: WorkUnit) -> dict[str, Any]:
+        with one_blas_thread():
+            return _compute(self.truth, self.angles, unit)
 
 
 def _compute(truth: Truth, angles: tuple[str, ...], unit: WorkUnit) -> dict[str, Any]:

@@ -1,0 +1,118 @@
+"""A function that travels to other machines once, and the check of what runs it there.
+
+A unit is a few numbers; the function of a sweep holds a flow, a recording, a model. On a Dask
+cluster the function is therefore an object of its own, which a worker fetches with its first unit.
+"""
+
+from __future__ import annotations
+
+import pickle
+import sys
+from collections import OrderedDict
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import ClusterError
+from driftwalk.core.provenance import package_versions
+from driftwalk.sweep.design import WorkUnit
+
+KEPT: Final = 4
+"""Functions that a process keeps ready: one for each stage that may be under way."""
+ALIKE: Final = ("driftwalk",)
+ALIKE_LINEAR_ALGEBRA: Final = ("driftwalk", "numpy", "scipy")
+
+USER_MODULE: Final = "_driftwalk_"
+"""How the names of modules begin that are a file of the user's."""
+
+_ready: OrderedDict[str, Any] = OrderedDict()
+
+
+class Parcel(NamedTuple):
+    """The function of a sweep, as it travels."""
+
+    token: str
+    content: bytes
+    """The function, pickled."""
+    versions: dict[str, str]
+    """Of the packages that must be the same where it runs."""
+
+
+def packed(function: Any, token: str) -> Parcel:
+    """Return a function as it travels.
+
+    Parameters
+    ----------
+    function : callable
+        The function of a sweep. Where it has a true attribute ``linear_algebra`` its results
+        depend on numpy and scipy, and these must be the same where it runs.
+    token : str
+        A name that no other function has.
+
+    Raises
+    ------
+    ClusterError
+        When it does not pickle.
+    """
+    import cloudpickle
+
+    for name, module in list(sys.modules.items()):
+        # A model from a file of the user's: no worker has that module.
+        if name.startswith(USER_MODULE):
+            cloudpickle.register_pickle_by_value(module)
+    names = ALIKE_LINEAR_ALGEBRA if getattr(function, "linear_algebra", False) else ALIKE
+    try:
+        content = cloudpickle.dumps(function)
+    except Exception as error:
+        raise ClusterError(
+            f"this work cannot be sent to workers: {error}; run it without a cluster"
+        ) from error
+    return Parcel(token, content, package_versions(names))
+
+
+def run_unit(parcel: Parcel, unit: WorkUnit) -> Mapping[str, npt.NDArray[Any]]:
+    """Run a function that has travelled, on a worker.
+
+    Raises
+    ------
+    ClusterError
+        When the worker has another version of a package that the result depends on.
+    """
+    refuse_others(parcel.versions, package_versions(parcel.versions), "this worker")
+    if parcel.token not in _ready:
+        _ready[parcel.token] = pickle.loads(parcel.content)
+        while len(_ready) > KEPT:
+            _ready.popitem(last=False)
+    _ready.move_to_end(parcel.token)
+    found = _ready[parcel.token](unit)
+    return {name: np.asarray(values) for name, values in found.items()}
+
+
+def refuse_others(wanted: Mapping[str, str], found: Mapping[str, str | None], who: str) -> None:
+    """Raise where versions differ.
+
+    Parameters
+    ----------
+    wanted, found : mapping of str to str
+        Versions by package.
+    who : str
+        Who has found them, for the message.
+
+    Raises
+    ------
+    ClusterError
+        Names the package and both versions.
+
+    Examples
+    --------
+    >>> refuse_others({"driftwalk": "0.1.0"}, {"driftwalk": "0.1.0"}, "this worker")
+    """
+    for name, version in wanted.items():
+        if found.get(name) != version:
+            there = found.get(name) or "none"
+            raise ClusterError(
+                f"{who} has {name} {there}, this machine has {version}: install {name} {version} "
+                "there, so that the numbers are the same"
+            )

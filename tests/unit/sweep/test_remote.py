@@ -1,0 +1,65 @@
+"""The function of a sweep as it travels: made ready once, refused where versions differ."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+
+from driftwalk.core.errors import ClusterError
+from driftwalk.sweep import WorkUnit
+from driftwalk.sweep.remote import packed, refuse_others, run_unit
+
+UNIT = WorkUnit(0, 2, {"a": np.array([2.0, 3.0])})
+
+
+class Squares:
+    """Counts how often it was unpacked."""
+
+    unpacked = 0
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        type(self).unpacked += 1
+        vars(self).update(state)
+
+    def __getstate__(self) -> dict[str, object]:
+        return {"any": 1}
+
+    def __call__(self, unit: WorkUnit) -> dict[str, np.ndarray]:
+        return {"square": unit.settings["a"] ** 2}
+
+
+def test_a_function_is_unpacked_once_for_all_units() -> None:
+    parcel = packed(Squares(), "squares")
+    before = Squares.unpacked
+    found = [run_unit(parcel, UNIT)["square"].tolist() for _ in range(3)]
+    assert found == [[4.0, 9.0]] * 3
+    assert Squares.unpacked == before + 1
+
+
+def test_closures_travel_too() -> None:
+    factor = 3.0
+    parcel = packed(lambda unit: {"scaled": factor * unit.settings["a"]}, "closure")
+    assert run_unit(parcel, UNIT)["scaled"].tolist() == [6.0, 9.0]
+
+
+def test_what_cannot_travel_is_said() -> None:
+    lock = threading.Lock()
+    with pytest.raises(ClusterError, match="cannot be sent to workers"):
+        packed(lambda unit: {"lock": lock}, "lock")
+
+
+def test_another_version_is_refused_with_both_named() -> None:
+    parcel = packed(Squares(), "other")._replace(versions={"driftwalk": "0.0.9"})
+    with pytest.raises(ClusterError, match=r"driftwalk 0\.1\.0.*driftwalk 0\.0\.9"):
+        run_unit(parcel, UNIT)
+    with pytest.raises(ClusterError, match="has scipy none, this machine has 1"):
+        refuse_others({"scipy": "1.17"}, {}, "the worker a")
+
+
+def test_linear_algebra_asks_for_the_same_numpy_and_scipy() -> None:
+    function = Squares()
+    function.linear_algebra = True  # type: ignore[attr-defined]
+    assert sorted(packed(function, "algebra").versions) == ["driftwalk", "numpy", "scipy"]
+    assert sorted(packed(Squares(), "none").versions) == ["driftwalk"]
