@@ -68,7 +68,8 @@ def job_options(address: ClusterAddress) -> dict[str, Any]:
 
     Examples
     --------
-    >>> job_options(ClusterAddress("slurm", 2, "", {"walltime": "01:00:00"}))["worker_extra_args"][1]
+    >>> hour = ClusterAddress("slurm", 2, "", {"walltime": "01:00:00"})
+    >>> job_options(hour)["worker_extra_args"][1]
     '3420s'
     """
     import dask
