@@ -461,6 +461,9 @@ PAGES: dict[str, Page] = {
         makes=("figures/ks_map.png",),
         slow=True,
     ),
+    "docs/how-to/use-a-cluster.md": Page(
+        not_run={"pip install *": INSTALLS, "driftwalk *": "needs workers; has a test"},
+    ),
     "docs/how-to/use-a-simulator.md": Page(
         provide=_robot_in_mujoco,
         instead={
