@@ -24,12 +24,13 @@ from driftwalk.assembly.sensitivity.sobol import sobol_design, sobol_indices
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import described
 from driftwalk.schema.kinds import KINDS
+from driftwalk.sweep import threads_of_unit
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-    from driftwalk.sweep import Store, threads_of_unit
+    from driftwalk.sweep import Store
 
 SOBOL_TRIAL: Final = 3 << 32
 """First trial, apart from those of the map and of the reference."""

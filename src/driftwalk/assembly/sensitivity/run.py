@@ -17,12 +17,13 @@ from driftwalk.assembly.sensitivity.settings import (
     simulate_settings,
     world_plan,
 )
+from driftwalk.sweep import threads_of_unit
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-    from driftwalk.sweep import Store, threads_of_unit
+    from driftwalk.sweep import Store
 
 MAP_TRIAL: Final = 1 << 32
 REFERENCE_TRIAL: Final = 2 << 32
