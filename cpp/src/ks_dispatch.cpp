@@ -31,9 +31,9 @@ constexpr std::int64_t alignment = 64;
 } // namespace
 
 std::int64_t ks_scratch_bytes(std::int64_t n) {
-  // Per point: two orders of five keys and four counters, a label, a block, a row; at most 4, 4, 1,
-  // 4 and 16 bytes each. The rest is padding and the arrays of one block and of one per block.
-  return 96 * n + 128 * 1024;
+  // Per point: its place in a block of x and two weights; at most 2 and 16 bytes. Per block of at
+  // least 128: a counter and three weights. The rest is padding and the arrays of one block.
+  return 18 * n + 36 * (n / 128) + 512 * 1024;
 }
 
 struct KsReference::Data {
@@ -49,21 +49,22 @@ struct KsWorkspace::Data {
   KsTiedWeights tied;
   std::vector<unsigned char> scratch;
 
-  // Run the sweep over the geometry with the given labels (by position in x).
-  void sweep(const std::uint8_t* second, std::int64_t n1, std::int64_t n2, KsTies ties,
-             InstructionSet set, KsBest best[2]) {
+  // Run the sweep over the geometry with its labels.
+  void sweep(std::int64_t n1, std::int64_t n2, KsTies ties, InstructionSet set, KsBest best[2]) {
     const std::int64_t common = std::gcd(n1, n2);
     KsSweep job{};
     job.n = geometry.n;
-    job.y_position = geometry.y_position.data();
-    job.second = second;
+    job.x_position = geometry.x_position.data();
+    job.second_by_x = geometry.second_by_x.data();
+    job.second_by_y = geometry.second_by_y.data();
     job.weight[0] = n2 / common;
     job.weight[1] = -(n1 / common);
     job.total = n1 * job.weight[0];
     job.limits = ties == KsTies::limits;
     if (geometry.tied > 0) {
-      ks_tied_weights(geometry, second, job.weight, tied);
-      job.tied = tied.tied.data();
+      ks_tied_weights(geometry, job.second_by_x, job.weight, tied);
+      job.tied_in_x = tied.in_x.data();
+      job.tied_in_y = tied.in_y.data();
     }
     ks_grow(scratch, ks_scratch_bytes(geometry.n) + alignment);
     const std::uintptr_t begin = reinterpret_cast<std::uintptr_t>(scratch.data());
@@ -132,16 +133,15 @@ KsResult compare_sorted(const KsReference::Data& first, const KsSortedSample& se
   ks_geometry(first.sorted, second, work.geometry);
   result.tied = work.geometry.tied;
   KsBest best[2];
-  work.sweep(work.geometry.second.data(), result.n1, result.n2, ties, chosen_instruction_set(),
-             best);
+  work.sweep(result.n1, result.n2, ties, chosen_instruction_set(), best);
   result.d1 = best[0].value;
   result.d2 = best[1].value;
   if (best[0].position >= 0) {
-    const std::int32_t i = work.geometry.point[best[0].position];
+    const std::int64_t i = ks_row(first.sorted, second, work.geometry, best[0].position);
     result.place1 = {first.x[i], first.y[i], best[0].quadrant, i};
   }
   if (best[1].position >= 0) {
-    const std::int64_t i = work.geometry.point[best[1].position] - result.n1;
+    const std::int64_t i = ks_row(first.sorted, second, work.geometry, best[1].position);
     result.place2 = {x2[i], y2[i], best[1].quadrant, i};
   }
   return result;
@@ -193,16 +193,13 @@ KsPeacock ks_peacock(const KsReference& reference, const double* x2, const doubl
   result.d = cut.value * common;
   result.tied = work.geometry.tied;
   if (cut.position >= 0) {
-    const auto coordinate = [n1](const std::vector<double>& a, const double* b, std::int64_t i) {
-      return i < n1 ? a[i] : b[i - n1];
-    };
     const KsGeometry& g = work.geometry;
-    std::int64_t upper = 0; // the point that sits at the cut's position in y
-    while (g.y_position[upper] != cut.y_position) {
-      ++upper;
-    }
-    result.place = {coordinate(first.x, x2, g.point[cut.position]),
-                    coordinate(first.y, y2, g.point[upper]), cut.quadrant, -1};
+    const auto coordinate = [&](const std::vector<double>& a, const double* b, std::int64_t at) {
+      const std::int64_t row = ks_row(first.sorted, work.sorted, g, at);
+      return g.second_by_x[at] != 0 ? b[row] : a[row];
+    };
+    result.place = {coordinate(first.x, x2, cut.position),
+                    coordinate(first.y, y2, g.x_position[cut.y_position]), cut.quadrant, -1};
   }
   return result;
 }
@@ -214,21 +211,26 @@ void ks_permutations(const double* x, const double* y, std::int64_t n1, std::int
   KsWorkspace workspace;
   KsWorkspace::Data& work = workspace.data();
   ks_sort(x + n1, y + n1, n2, work.sort, work.sorted);
-  ks_geometry(reference.data().sorted, work.sorted, work.geometry);
-  const std::int64_t n = n1 + n2;
-  std::vector<std::int32_t> block_by_x(static_cast<std::size_t>(n));
-  for (std::int64_t k = 0; k < n; ++k) {
-    block_by_x[k] = block_of[work.geometry.point[k]];
+  KsGeometry& g = work.geometry;
+  ks_geometry(reference.data().sorted, work.sorted, g);
+  if (g.tied == 0) {
+    ks_points(reference.data().sorted, work.sorted, g);
+  }
+  std::vector<std::int32_t> block_by_x(static_cast<std::size_t>(g.n));
+  for (std::int64_t k = 0; k < g.n; ++k) {
+    block_by_x[k] = block_of[g.point[k]];
   }
   const InstructionSet set = chosen_instruction_set();
-  std::vector<std::uint8_t> second(static_cast<std::size_t>(n));
   for (std::int64_t p = 0; p < permutations; ++p) {
     const std::uint8_t* const label = labels + p * blocks;
-    for (std::int64_t k = 0; k < n; ++k) {
-      second[k] = label[block_by_x[k]];
+    for (std::int64_t k = 0; k < g.n; ++k) {
+      g.second_by_x[k] = label[block_by_x[k]];
+    }
+    for (std::int64_t k = 0; k < g.n; ++k) {
+      g.second_by_y[k] = g.second_by_x[g.x_position[k]];
     }
     KsBest best[2];
-    work.sweep(second.data(), n1, n2, ties, set, best);
+    work.sweep(n1, n2, ties, set, best);
     statistic[p] = best[0].value + best[1].value;
   }
 }

@@ -50,36 +50,31 @@ private:
 
 // Rank of every point's y among the distinct values, by position in x.
 std::vector<std::int32_t> y_ranks(const KsGeometry& g, std::int64_t& distinct) {
-  std::vector<std::int32_t> rank_at(static_cast<std::size_t>(g.n));
+  std::vector<std::int32_t> ranks(static_cast<std::size_t>(g.n));
   std::int32_t rank = -1;
   for (std::int64_t k = 0; k < g.n; ++k) {
-    rank += g.y_starts[k];
-    rank_at[k] = rank;
+    rank += g.starts_in_y(k);
+    ranks[g.x_position[k]] = rank;
   }
   distinct = rank + 1;
-  std::vector<std::int32_t> ranks(static_cast<std::size_t>(g.n));
-  for (std::int64_t k = 0; k < g.n; ++k) {
-    ranks[k] = rank_at[g.y_position[k]];
-  }
   return ranks;
 }
 
 // Where along y the cut behind `position` reaches the value that the sweep found.
 void find_y(const KsGeometry& g, const std::int64_t weight[2], KsCut& cut) {
-  std::vector<std::int64_t> row(static_cast<std::size_t>(g.n));
   const bool right = (cut.quadrant & 1) != 0;
+  const auto weight_at = [&](std::int64_t k) {
+    return (g.x_position[k] > cut.position) == right ? weight[g.second_by_y[k]] : 0;
+  };
   std::int64_t rest = 0;
   for (std::int64_t k = 0; k < g.n; ++k) {
-    if ((k > cut.position) == right) {
-      row[g.y_position[k]] = weight[g.second[k]];
-      rest += weight[g.second[k]];
-    }
+    rest += weight_at(k);
   }
   const bool above = (cut.quadrant & 2) != 0;
   std::int64_t below = 0;
   for (std::int64_t k = 0; k < g.n; ++k) {
-    below += row[k];
-    const bool ends = k + 1 == g.n || g.y_starts[k + 1] != 0;
+    below += weight_at(k);
+    const bool ends = k + 1 == g.n || g.starts_in_y(k + 1);
     if (ends && std::abs(above ? rest - below : below) == cut.value) {
       cut.y_position = k;
       return;
@@ -106,15 +101,15 @@ KsCut sweep_both_ways(const KsGeometry& g, const std::int64_t weight[2]) {
   KsCut cut;
   PrefixTree<Weight> left(distinct);
   for (std::int64_t k = 0; k < g.n; ++k) {
-    left.add(rank[k], weights[g.second[k]]);
-    if (k + 1 == g.n || g.x_starts[k + 1] != 0) {
+    left.add(rank[k], weights[g.second_by_x[k]]);
+    if (k + 1 == g.n || g.starts_in_x(k + 1)) {
       check(left.all(), k, false, cut);
     }
   }
   PrefixTree<Weight> right(distinct);
   for (std::int64_t k = g.n - 1; k > 0; --k) {
-    right.add(rank[k], weights[g.second[k]]);
-    if (g.x_starts[k] != 0) {
+    right.add(rank[k], weights[g.second_by_x[k]]);
+    if (g.starts_in_x(k)) {
       check(right.all(), k - 1, true, cut);
     }
   }

@@ -4,16 +4,16 @@
 DRIFTWALK_LANES_BEGIN
 
 namespace {
-// Blocks of 128 while a position fits 16 bits; beyond that the cost of a point grows with the size
-// of a block plus the number of blocks over its size, so the block grows with the sample.
+// A point costs what grows with the size of a block, and what grows with the number of blocks over
+// their size: so the block grows with the sample. Up to blocks of 256 a place in one fits 8 bits.
 template <class Weight>
 void sweep_with(const KsSweep& sweep, KsBest best[2]) {
-  if (sweep.n <= 65536) {
-    KsSweeper<std::int16_t, Weight, 7>(sweep).run(best);
-  } else if (sweep.n <= 1 << 20) {
-    KsSweeper<std::int32_t, Weight, 8>(sweep).run(best);
+  if (sweep.n <= 1 << 17) {
+    KsSweeper<std::int8_t, std::int16_t, Weight, 7>(sweep).run(best);
+  } else if (sweep.n <= 1 << 24) {
+    KsSweeper<std::int8_t, std::int16_t, Weight, 8>(sweep).run(best);
   } else {
-    KsSweeper<std::int32_t, Weight, 11>(sweep).run(best);
+    KsSweeper<std::int16_t, std::int32_t, Weight, 11>(sweep).run(best);
   }
 }
 

@@ -1,10 +1,15 @@
 // The sweep of the KS statistic on one instruction set.
 //
-// H(k), the weight of the points before point k in both orders, is a sum of three parts: the points
-// in earlier blocks of both orders (`corner`, cumulative sums over blocks), those in the same block
-// of x before k, and those in the same block of y but an earlier block of x. The last two are the
-// same count, "how many elements of my block stand before me and have a smaller key", done for a
-// vector of queries at a time. With the weights of the half planes, H gives all four quadrants.
+// Both orders are cut into blocks: of y ("rows") and of x ("columns"). H, the weight of the points
+// before a point in both orders, is a sum of three parts: the points in earlier blocks of both
+// orders (`corner`, cumulative sums over columns), those in the same column and not above, and
+// those in the same row but an earlier column. The last two are the same count, "how many elements
+// of my block stand before me and have a smaller key", done for a vector of queries at a time. With
+// the weights of the half planes, H gives all four quadrants.
+//
+// The sweep never jumps about in memory. It deals the points to their columns in the order of y,
+// so that each column fills from its beginning, and collects what it counted there in the same
+// order.
 #pragma once
 
 #include "driftwalk/config.hpp"
@@ -12,6 +17,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 
 DRIFTWALK_LANES_BEGIN
 
@@ -36,6 +42,7 @@ struct KsVector {
     __builtin_memcpy(&value, from, sizeof value);
     return value;
   }
+  static void store(Key* to, Type value) { __builtin_memcpy(to, &value, sizeof value); }
   static Type iota() {
     Type value{};
     for (int lane = 0; lane < lanes; ++lane) {
@@ -45,86 +52,92 @@ struct KsVector {
   }
 };
 
-// The points in one of the two orders, with the keys of the other: all of them as queries, and each
-// sample by itself as elements to be counted.
+// Key of a number: shifted so that the whole range of a signed type is used.
 template <class Key>
-struct KsOrder {
-  Key* query;              // (n + padding)
-  Key* element[2];         // (points of the sample + padding)
-  Key* lane[2];            // the element's place within its vector of queries
+inline Key ks_key(std::int64_t number) {
+  return Key(number + std::int64_t(std::numeric_limits<Key>::min()));
+}
+template <class Key>
+inline std::int64_t ks_number(Key key) {
+  return std::int64_t(key) - std::int64_t(std::numeric_limits<Key>::min());
+}
+
+// The points of one block: each sample by itself as elements to be counted, and the counts.
+template <class Key>
+struct KsBlock {
+  using Count = std::make_unsigned_t<Key>;
+  struct Element {
+    Key key;
+    Key lane; // its place within its vector of queries
+  };
+  Element* element[2];
   std::int32_t* before[2]; // (vectors + 1) elements that stand before each vector of queries
+  Key* count[2];           // for each query
 };
 
-template <class Key>
-inline void ks_append(const KsOrder<Key>& order, std::int64_t position, Key key, int sample,
-                      std::int32_t counts[2]) {
-  constexpr int lanes = KsVector<Key>::lanes;
-  if (position % lanes == 0) {
-    order.before[0][position / lanes] = counts[0];
-    order.before[1][position / lanes] = counts[1];
+// Divide the points between the samples; second_of(i) tells the sample of the i-th.
+template <class Key, class Second>
+inline void ks_divide(const KsBlock<Key>& block, const Key* query, std::int64_t size,
+                      Second second_of) {
+  constexpr std::int64_t lanes = KsVector<Key>::lanes;
+  std::int32_t ends[2] = {0, 0};
+  for (std::int64_t begin = 0; begin < size; begin += lanes) {
+    block.before[0][begin / lanes] = ends[0];
+    block.before[1][begin / lanes] = ends[1];
+    const std::int64_t end = begin + lanes < size ? begin + lanes : size;
+    for (std::int64_t i = begin; i < end; ++i) {
+      // Written to both, kept in one: no branch on what is a coin toss.
+      const std::int32_t second = second_of(i);
+      const typename KsBlock<Key>::Element element{query[i], Key(i - begin)};
+      block.element[0][ends[0]] = element;
+      block.element[1][ends[1]] = element;
+      ends[0] += 1 - second;
+      ends[1] += second;
+    }
   }
-  order.query[position] = key;
-  const std::int32_t at = counts[sample];
-  order.element[sample][at] = key;
-  order.lane[sample][at] = Key(position % lanes);
-  counts[sample] = at + 1;
+  const std::int64_t vectors = (size + lanes - 1) / lanes;
+  block.before[0][vectors] = ends[0];
+  block.before[1][vectors] = ends[1];
 }
 
+// For the queries of one vector: the elements before the vector that have a smaller key, and those
+// inside the vector that also stand to the left of the query.
 template <class Key>
-inline void ks_finish_order(const KsOrder<Key>& order, std::int64_t n,
-                            const std::int32_t counts[2]) {
-  constexpr int lanes = KsVector<Key>::lanes;
-  const std::int64_t vectors = (n + lanes - 1) / lanes;
-  order.before[0][vectors] = counts[0];
-  order.before[1][vectors] = counts[1];
-  constexpr Key below_all = std::numeric_limits<Key>::min();
-  for (int lane = 0; lane < lanes; ++lane) {
-    order.query[n + lane] = below_all; // a query that nothing stands below
-  }
-}
-
-// For the queries of one vector: the elements of the block before the vector that have a smaller
-// key, and those inside the vector that also stand to the left of the query.
-template <class Key>
-inline typename KsVector<Key>::Type ks_count(const KsOrder<Key>& order, int sample,
-                                             std::int64_t block_vector, std::int64_t vector,
+inline typename KsVector<Key>::Type ks_count(const KsBlock<Key>& block, int sample,
+                                             std::int64_t vector,
                                              typename KsVector<Key>::Type query) {
   using Vector = typename KsVector<Key>::Type;
-  const Key* const element = order.element[sample];
-  const Key* const lane = order.lane[sample];
+  const typename KsBlock<Key>::Element* const element = block.element[sample];
   const Vector iota = KsVector<Key>::iota();
   Vector count{};
-  std::int32_t i = order.before[sample][block_vector];
-  for (; i < order.before[sample][vector]; ++i) {
-    count -= (Vector)(Vector{} + element[i] < query);
+  std::int32_t i = 0;
+  for (; i < block.before[sample][vector]; ++i) {
+    count -= (Vector)(Vector{} + element[i].key < query);
   }
-  for (; i < order.before[sample][vector + 1]; ++i) {
-    count -= (Vector)((Vector{} + element[i] < query) & (Vector{} + lane[i] < iota));
+  for (; i < block.before[sample][vector + 1]; ++i) {
+    count -= (Vector)((Vector{} + element[i].key < query) & (Vector{} + element[i].lane < iota));
   }
   return count;
 }
 
-// out[k] = weight of what ks_count counts, for the queries of one block [begin, end).
+// Weight of what ks_count counts, for every query of a block.
 template <class Key, class Weight>
-inline void ks_count_block(const KsOrder<Key>& order, std::int64_t begin, std::int64_t end,
-                           const Weight weight[2], Weight* out) {
-  constexpr int lanes = KsVector<Key>::lanes;
-  for (std::int64_t k = begin; k < end; k += lanes) {
-    const auto query = KsVector<Key>::load(order.query + k);
-    const auto first = ks_count<Key>(order, 0, begin / lanes, k / lanes, query);
-    const auto second = ks_count<Key>(order, 1, begin / lanes, k / lanes, query);
-    for (int lane = 0; lane < lanes; ++lane) {
-      out[k - begin + lane] = weight[0] * Weight(first[lane]) + weight[1] * Weight(second[lane]);
+inline void ks_weigh(const KsBlock<Key>& block, const Key* query, std::int64_t size,
+                     const Weight weight[2], Weight* out) {
+  using Count = typename KsBlock<Key>::Count;
+  constexpr std::int64_t lanes = KsVector<Key>::lanes;
+  for (std::int64_t begin = 0; begin < size; begin += lanes) {
+    const auto queries = KsVector<Key>::load(query + begin);
+    for (int sample = 0; sample < 2; ++sample) {
+      KsVector<Key>::store(block.count[sample] + begin,
+                           ks_count<Key>(block, sample, begin / lanes, queries));
     }
   }
+  for (std::int64_t i = 0; i < size; ++i) {
+    out[i] = weight[0] * Weight(Count(block.count[0][i])) +
+             weight[1] * Weight(Count(block.count[1][i]));
+  }
 }
-
-// What the y order contributes to a point.
-template <class Weight>
-struct KsRow {
-  Weight strip; // points of its block of y before it, in earlier blocks of x
-  Weight below; // weight of the points before it in y
-};
 
 template <class Weight>
 struct KsCorners {
@@ -141,6 +154,11 @@ struct KsCorners {
 template <class Weight>
 inline Weight ks_abs(Weight a) {
   return a < 0 ? -a : a;
+}
+
+template <class Weight>
+inline Weight ks_larger(Weight a, Weight b) {
+  return a > b ? a : b;
 }
 
 // The four quadrants of one origin. The weights of all points add up to zero, so each quadrant is a
@@ -166,18 +184,20 @@ inline void ks_limits(const KsCorners<Weight>& c, Weight quadrant[4]) {
     const Weight below = in_y ? c.below_closed : c.below;
     const Weight values[4] = {inside, below - inside, left - inside, inside - left - below};
     for (int q = 0; q < 4; ++q) {
-      const Weight value = ks_abs(values[q]);
-      quadrant[q] = value > quadrant[q] ? value : quadrant[q];
+      quadrant[q] = ks_larger(ks_abs(values[q]), quadrant[q]);
     }
   }
 }
 
 template <class Weight>
+inline Weight ks_largest(const Weight quadrant[4]) {
+  return ks_larger(ks_larger(quadrant[0], quadrant[1]), ks_larger(quadrant[2], quadrant[3]));
+}
+
+template <class Weight>
 inline void ks_keep_best(const Weight quadrant[4], std::int64_t position, KsBest& best) {
-  const Weight lower = quadrant[0] > quadrant[1] ? quadrant[0] : quadrant[1];
-  const Weight upper = quadrant[2] > quadrant[3] ? quadrant[2] : quadrant[3];
-  const Weight value = lower > upper ? lower : upper;
-  if (value > best.value) {
+  const Weight value = ks_largest(quadrant);
+  if (value > best.value || (value == best.value && value > 0 && position < best.position)) {
     int q = 0;
     while (quadrant[q] != value) {
       ++q;
@@ -186,41 +206,69 @@ inline void ks_keep_best(const Weight quadrant[4], std::int64_t position, KsBest
   }
 }
 
-// One sweep. `Key` holds a position, `Weight` four times the sum of all positive weights.
-template <class Key, class Weight, int block_bits>
+// One sweep. `Place` holds a place within a block, `Column` the number of a column, `Weight` four
+// times the sum of all positive weights.
+template <class Place, class Column, class Weight, int block_bits>
 class KsSweeper {
 public:
   explicit KsSweeper(const KsSweep& sweep)
-      : sweep_(sweep), weight_{Weight(sweep.weight[0]), Weight(sweep.weight[1])} {
+      : sweep_(sweep), weight_{Weight(sweep.weight[0]), Weight(sweep.weight[1])},
+        columns_((sweep.n + block_size - 1) / block_size) {
+    static_assert((std::int64_t(1) << (8 * sizeof(Place))) >= block_size);
     char* at = static_cast<char*>(sweep.scratch);
-    const std::int64_t room = sweep.n + ks_padding;
-    take_order(at, x_order_);
-    take_order(at, y_order_);
-    second_by_y_ = take<std::uint8_t>(at, room);
-    x_block_by_y_ = take<Key>(at, room);
-    rows_ = take<KsRow<Weight>>(at, room);
-    strip_ = take<Weight>(at, block + ks_padding);
-    blocks_ = (sweep.n + block - 1) / block;
-    column_ = take<Weight>(at, blocks_ + 1);
-    corner_ = take<Weight>(at, blocks_ + 1);
+    place_ = take<Place>(at, sweep.n + ks_padding);
+    counted_ = take<Counted>(at, sweep.n);
+    next_ = take<std::int32_t>(at, columns_);
+    while ((std::int64_t(lanes) << run_bits_) < columns_) {
+      ++run_bits_;
+    }
+    slots_ = std::int64_t(lanes) << run_bits_;
+    column_ = take<Weight>(at, slots_);
+    corner_ = take<Weight>(at, slots_);
+    take_block(at, by_place_);
+    take_block(at, by_column_);
+    column_of_ = take<Column>(at, room);
+    slot_ = take<std::int32_t>(at, block_size);
+    left_ = take<Weight>(at, block_size);
+    strip_ = take<Weight>(at, block_size);
+    origins_ = {take<Counted>(at, block_size), take<Weight>(at, block_size),
+                take<Weight>(at, block_size)};
   }
 
   void run(KsBest best[2]) {
     best[0] = best[1] = {0, -1, -1};
-    lay_out_x();
-    lay_out_y();
-    count_rows();
-    for (std::int64_t b = 0; b <= blocks_; ++b) {
-      column_[b] = 0;
-    }
+    deal();
     Weight left = 0;
-    for (std::int64_t b = 0; b < blocks_; ++b) {
-      sweep_block(b * block, left, best);
+    for (std::int64_t begin = 0; begin < sweep_.n; begin += block_size) {
+      count_in_column(begin, left);
+    }
+    rewind();
+    for (std::int64_t slot = 0; slot < slots_; ++slot) {
+      column_[slot] = 0;
+    }
+    Weight below = 0;
+    for (std::int64_t begin = 0; begin < sweep_.n; begin += block_size) {
+      sweep_row(begin, below, best);
     }
   }
 
 private:
-  static constexpr std::int64_t block = std::int64_t(1) << block_bits;
+  static constexpr std::int64_t block_size = std::int64_t(1) << block_bits;
+  static constexpr std::int64_t room = block_size + ks_padding;
+  using Weights = KsVector<Weight>;
+  static constexpr int lanes = Weights::lanes;
+
+  // What a column tells of one of its points.
+  struct Counted {
+    Weight strip; // points of the column before it in both orders
+    Weight left;  // points before it in the order of x
+  };
+  // The origins of one row.
+  struct Origins {
+    Counted* counted;
+    Weight* open;
+    Weight* below;
+  };
 
   template <class T>
   static T* take(char*& at, std::int64_t count) {
@@ -229,103 +277,163 @@ private:
     return begin;
   }
 
-  void take_order(char*& at, KsOrder<Key>& order) const {
-    const std::int64_t room = sweep_.n + ks_padding;
-    order.query = take<Key>(at, room);
+  template <class Key>
+  static void take_block(char*& at, KsBlock<Key>& block) {
     for (int sample = 0; sample < 2; ++sample) {
-      order.element[sample] = take<Key>(at, room);
-      order.lane[sample] = take<Key>(at, room);
-      order.before[sample] = take<std::int32_t>(at, sweep_.n / KsVector<Key>::lanes + 3);
+      block.element[sample] = take<typename KsBlock<Key>::Element>(at, room);
+      block.before[sample] = take<std::int32_t>(at, block_size / KsVector<Key>::lanes + 2);
+      block.count[sample] = take<Key>(at, room);
     }
   }
 
-  // Key of a position: shifted so that the whole range of a signed number is used.
-  static Key key_of(std::int64_t position) {
-    constexpr std::int64_t lowest = std::numeric_limits<Key>::min();
-    return Key(position + lowest);
+  std::int64_t size_from(std::int64_t begin) const {
+    return begin + block_size < sweep_.n ? block_size : sweep_.n - begin;
   }
 
-  void lay_out_x() {
-    std::int32_t counts[2] = {0, 0};
+  void rewind() {
+    for (std::int64_t c = 0; c < columns_; ++c) {
+      next_[c] = std::int32_t(c << block_bits);
+    }
+  }
+
+  // Give every column the places of its points, in the order of y.
+  void deal() {
+    rewind();
     for (std::int64_t k = 0; k < sweep_.n; ++k) {
-      const std::int32_t y = sweep_.y_position[k];
-      const int sample = sweep_.second[k];
-      ks_append(x_order_, k, key_of(y), sample, counts);
-      second_by_y_[y] = std::uint8_t(sample);
-      x_block_by_y_[y] = Key(k >> block_bits);
+      const std::int32_t x = sweep_.x_position[k];
+      place_[next_[x >> block_bits]++] = ks_key<Place>(x & (block_size - 1));
     }
-    ks_finish_order(x_order_, sweep_.n, counts);
   }
 
-  void lay_out_y() {
-    std::int32_t counts[2] = {0, 0};
-    Weight below = 0;
-    for (std::int64_t k = 0; k < sweep_.n; ++k) {
-      const int sample = second_by_y_[k];
-      ks_append(y_order_, k, x_block_by_y_[k], sample, counts);
-      rows_[k].below = below;
-      below += weight_[sample];
+  void count_in_column(std::int64_t begin, Weight& left) {
+    const std::int64_t size = size_from(begin);
+    const std::uint8_t* const second = sweep_.second_by_x + begin;
+    for (std::int64_t i = 0; i < size; ++i) {
+      left_[i] = left;
+      left += weight_[second[i]];
     }
-    ks_finish_order(y_order_, sweep_.n, counts);
+    const Place* const place = place_ + begin;
+    ks_divide(by_place_, place, size,
+              [=](std::int64_t i) { return std::int32_t(second[ks_number(place[i])]); });
+    ks_weigh(by_place_, place, size, weight_, strip_);
+    for (std::int64_t i = 0; i < size; ++i) {
+      counted_[begin + i] = {strip_[i], left_[ks_number(place[i])]};
+    }
   }
 
-  void count_rows() {
-    for (std::int64_t begin = 0; begin < sweep_.n; begin += block) {
-      const std::int64_t end = begin + block < sweep_.n ? begin + block : sweep_.n;
-      ks_count_block<Key, Weight>(y_order_, begin, end, weight_, strip_);
-      for (std::int64_t k = begin; k < end; ++k) {
-        rows_[k].strip = strip_[k - begin];
+  void sweep_row(std::int64_t begin, Weight& below, KsBest best[2]) {
+    const std::int64_t size = size_from(begin);
+    const std::int32_t* const x = sweep_.x_position + begin;
+    const std::uint8_t* const second = sweep_.second_by_y + begin;
+    for (std::int64_t i = 0; i < size; ++i) {
+      const std::int32_t column = x[i] >> block_bits;
+      column_of_[i] = ks_key<Column>(column);
+      slot_[i] = slot_of(column);
+    }
+    ks_divide(by_column_, column_of_, size,
+              [=](std::int64_t i) { return std::int32_t(second[i]); });
+    ks_weigh(by_column_, column_of_, size, weight_, strip_);
+    sum_columns();
+    for (std::int64_t i = 0; i < size; ++i) {
+      const Counted* const next = counted_ + next_[x[i] >> block_bits]++;
+      __builtin_prefetch(next + 64 / sizeof(Counted)); // for a later point of the column
+      origins_.counted[i] = *next;
+      origins_.open[i] = corner_[slot_[i]];
+    }
+    for (std::int64_t i = 0; i < size; ++i) {
+      origins_.below[i] = below;
+      below += weight_[second[i]];
+    }
+    for (std::int64_t i = 0; i < size; ++i) {
+      origins_.open[i] += strip_[i] + origins_.counted[i].strip;
+    }
+    if (sweep_.tied_in_x == nullptr && !sweep_.limits) {
+      finish_untied(begin, size, best);
+    } else {
+      finish_tied(begin, size, best);
+    }
+    for (std::int64_t i = 0; i < size; ++i) {
+      column_[slot_[i]] += weight_[second[i]];
+    }
+  }
+
+  // Where a column stands in column_ and corner_: the columns are cut into as many runs as there
+  // are lanes, and a run is a lane, so that the sums are made for all runs at once.
+  std::int32_t slot_of(std::int32_t column) const {
+    const std::int32_t lane = column >> run_bits_;
+    return (column - (lane << run_bits_)) * lanes + lane;
+  }
+
+  void sum_columns() {
+    typename Weights::Type sums{};
+    for (std::int64_t slot = 0; slot < slots_; slot += lanes) {
+      Weights::store(corner_ + slot, sums);
+      sums += Weights::load(column_ + slot);
+    }
+    typename Weights::Type of_earlier_runs{};
+    for (int lane = 1; lane < lanes; ++lane) {
+      of_earlier_runs[lane] = of_earlier_runs[lane - 1] + sums[lane - 1];
+    }
+    for (std::int64_t slot = 0; slot < slots_; slot += lanes) {
+      Weights::store(corner_ + slot, Weights::load(corner_ + slot) + of_earlier_runs);
+    }
+  }
+
+  void untied_quadrants(std::int64_t i, Weight own, Weight quadrant[4]) const {
+    const Weight open = origins_.open[i];
+    const Weight left = origins_.counted[i].left;
+    const Weight below = origins_.below[i];
+    quadrant[0] = ks_abs(open);
+    quadrant[1] = ks_abs(Weight(below - open));
+    quadrant[2] = ks_abs(Weight(left - open));
+    quadrant[3] = ks_abs(Weight(open - left - below - own));
+  }
+
+  // Most rows hold no new maximum: their largest values are found without branches.
+  void finish_untied(std::int64_t begin, std::int64_t size, KsBest best[2]) const {
+    const std::uint8_t* const second = sweep_.second_by_y + begin;
+    Weight largest[2] = {0, 0};
+    for (std::int64_t i = 0; i < size; ++i) {
+      const Weight is_second = Weight(0) - Weight(second[i]); // all ones or 0
+      Weight quadrant[4];
+      untied_quadrants(i, (weight_[0] & ~is_second) | (weight_[1] & is_second), quadrant);
+      const Weight value = ks_largest(quadrant);
+      largest[0] = ks_larger(largest[0], Weight(value & ~is_second));
+      largest[1] = ks_larger(largest[1], Weight(value & is_second));
+    }
+    for (int sample = 0; sample < 2; ++sample) {
+      if (largest[sample] == 0 || largest[sample] < best[sample].value) {
+        continue;
+      }
+      for (std::int64_t i = 0; i < size; ++i) {
+        if (second[i] == sample) {
+          Weight quadrant[4];
+          untied_quadrants(i, weight_[sample], quadrant);
+          ks_keep_best(quadrant, sweep_.x_position[begin + i], best[sample]);
+        }
       }
     }
   }
 
-  void sweep_block(std::int64_t begin, Weight& left, KsBest best[2]) {
-    const std::int64_t end = begin + block < sweep_.n ? begin + block : sweep_.n;
-    ks_count_block<Key, Weight>(x_order_, begin, end, weight_, strip_);
-    Weight sum = 0;
-    for (std::int64_t b = 0; b < blocks_; ++b) {
-      corner_[b] = sum;
-      sum += column_[b];
-    }
-    if (sweep_.tied == nullptr && !sweep_.limits) {
-      finish_untied(begin, end, left, best);
-    } else {
-      finish_tied(begin, end, left, best);
-    }
-    for (std::int64_t k = begin; k < end; ++k) {
-      column_[sweep_.y_position[k] >> block_bits] += weight_[sweep_.second[k]];
-    }
-  }
-
-  Weight open_quadrant(std::int64_t k, std::int64_t begin, const KsRow<Weight>& row) const {
-    return corner_[sweep_.y_position[k] >> block_bits] + strip_[k - begin] + row.strip;
-  }
-
-  void finish_untied(std::int64_t begin, std::int64_t end, Weight& left, KsBest best[2]) const {
-    for (std::int64_t k = begin; k < end; ++k) {
-      const int sample = sweep_.second[k];
-      const Weight own = weight_[sample];
-      const KsRow<Weight> row = rows_[sweep_.y_position[k]];
-      const Weight open = open_quadrant(k, begin, row);
-      const Weight quadrant[4] = {ks_abs(open), ks_abs(Weight(row.below - open)),
-                                  ks_abs(Weight(left - open)),
-                                  ks_abs(Weight(open - left - row.below - own))};
-      ks_keep_best(quadrant, k, best[sample]);
-      left += own;
-    }
-  }
-
-  void finish_tied(std::int64_t begin, std::int64_t end, Weight& left, KsBest best[2]) const {
-    for (std::int64_t k = begin; k < end; ++k) {
-      const int sample = sweep_.second[k];
-      const Weight own = weight_[sample];
-      const KsRow<Weight> row = rows_[sweep_.y_position[k]];
-      const Weight open = open_quadrant(k, begin, row);
-      KsCorners<Weight> corners{open, 0, 0, own, left, left + own, row.below, row.below + own};
-      if (sweep_.tied != nullptr) {
-        const KsTied& t = sweep_.tied[k];
-        corners = {open,           Weight(t.column),      Weight(t.row),   Weight(t.equal),
-                   Weight(t.left), Weight(t.left_closed), Weight(t.below), Weight(t.below_closed)};
+  void finish_tied(std::int64_t begin, std::int64_t size, KsBest best[2]) const {
+    for (std::int64_t i = 0; i < size; ++i) {
+      const std::int32_t x = sweep_.x_position[begin + i];
+      const Weight open = origins_.open[i];
+      const Weight left = origins_.counted[i].left;
+      const Weight below = origins_.below[i];
+      const Weight own = weight_[sweep_.second_by_y[begin + i]];
+      KsCorners<Weight> corners{open, 0, 0, own, left, left + own, below, below + own};
+      if (sweep_.tied_in_x != nullptr) {
+        const KsTiedInX& in_x = sweep_.tied_in_x[x];
+        const KsTiedInY& in_y = sweep_.tied_in_y[begin + i];
+        corners = {open,
+                   Weight(in_x.column),
+                   Weight(in_y.row),
+                   Weight(in_x.equal),
+                   Weight(in_x.left),
+                   Weight(in_x.left_closed),
+                   Weight(in_y.below),
+                   Weight(in_y.below_closed)};
       }
       Weight quadrant[4];
       if (sweep_.limits) {
@@ -333,22 +441,27 @@ private:
       } else {
         ks_strict(corners, quadrant);
       }
-      ks_keep_best(quadrant, k, best[sample]);
-      left += own;
+      ks_keep_best(quadrant, x, best[sweep_.second_by_y[begin + i]]);
     }
   }
 
   KsSweep sweep_;
   Weight weight_[2];
-  KsOrder<Key> x_order_;
-  KsOrder<Key> y_order_;
-  std::uint8_t* second_by_y_;
-  Key* x_block_by_y_;
-  KsRow<Weight>* rows_;
+  std::int64_t columns_;
+  Place* place_;         // by column, in it by y
+  Counted* counted_;     // in the same order
+  std::int32_t* next_;   // by column: where its next point goes
+  std::int32_t run_bits_ = 0;
+  std::int64_t slots_;
+  Weight* column_;       // by slot: weight of the column's points in earlier rows
+  Weight* corner_;       // by slot: weight of the points of earlier columns and rows
+  KsBlock<Place> by_place_;
+  KsBlock<Column> by_column_;
+  Column* column_of_; // of the points of a row
+  std::int32_t* slot_; // of their columns
+  Weight* left_;
   Weight* strip_;
-  Weight* column_;
-  Weight* corner_;
-  std::int64_t blocks_;
+  Origins origins_;
 };
 
 DRIFTWALK_LANES_END

@@ -10,29 +10,35 @@
 
 namespace driftwalk {
 
-// Weights of a point that shares a coordinate with another, in the order of x.
-struct KsTied {
+// Weights that a point needs when it may share a coordinate with another, by position in x ...
+struct KsTiedInX {
   std::int64_t column;      // weight of {x = X, y < Y}
-  std::int64_t row;         // weight of {y = Y, x < X}
   std::int64_t equal;       // weight of {x = X, y = Y}, the origin among them
   std::int64_t left;        // weight of {x < X}
   std::int64_t left_closed; // weight of {x <= X}
-  std::int64_t below;       // weight of {y < Y}
+};
+// ... and by position in y.
+struct KsTiedInY {
+  std::int64_t row;   // weight of {y = Y, x < X}
+  std::int64_t below; // weight of {y < Y}
   std::int64_t below_closed;
 };
 
 struct KsSweep {
-  std::int64_t n;                 // points of both samples
-  const std::int32_t* y_position; // (n) by position in x
-  const std::uint8_t* second;     // (n) by position in x: 1 for a point of sample 2
-  std::int64_t weight[2];         // of a point of sample 1 (positive) and of sample 2 (negative)
-  std::int64_t total;             // sum of the positive weights
-  const KsTied* tied;             // (n), or null when no two points share a coordinate
-  bool limits;                    // count both open and closed quadrants
-  void* scratch;                  // ks_scratch_bytes(n), aligned to 64
+  std::int64_t n;                  // points of both samples
+  const std::int32_t* x_position;  // (n) by position in y
+  const std::uint8_t* second_by_x; // (n) by position in x: 1 for a point of sample 2
+  const std::uint8_t* second_by_y; // (n) the same by position in y
+  std::int64_t weight[2];          // of a point of sample 1 (positive) and of sample 2 (negative)
+  std::int64_t total;              // sum of the positive weights
+  const KsTiedInX* tied_in_x;      // (n), or null when no two points share a coordinate
+  const KsTiedInY* tied_in_y;      // (n), or null with it
+  bool limits;                     // count both open and closed quadrants
+  void* scratch;                   // ks_scratch_bytes(n), aligned to 64
 };
 
 // The largest |weight| found with an origin of one sample, and where: position in x and quadrant.
+// Of equal ones the first in the order of x, then of the quadrants.
 struct KsBest {
   std::int64_t value;
   std::int64_t position; // -1 when the value is zero
