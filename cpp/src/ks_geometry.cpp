@@ -6,8 +6,8 @@
 namespace driftwalk {
 namespace {
 
-// The first or, where `mask` is all ones, the second: compilers make a branch of a conditional here,
-// and it would be guessed wrong half of the time.
+// The first or, where `mask` is all ones, the second: compilers make a branch of a conditional
+// here, and it would be guessed wrong half of the time.
 std::int32_t choose(std::int32_t first, std::int32_t second, std::int32_t mask) {
   return first ^ ((first ^ second) & mask);
 }
@@ -82,13 +82,14 @@ std::int64_t merge(const KsSortedAxis& first, std::int64_t n1, const KsSortedAxi
 
 std::int64_t merge_x(const KsSortedSample& first, const KsSortedSample& second, KsGeometry& g,
                      std::uint8_t* starts) {
-  return merge(first.x, first.n, second.x, second.n, starts,
-               [position_of = g.position_of.data(), labels = g.second_by_x.data(),
-                n1 = std::int32_t(first.n)](std::int64_t k, bool is_second, std::int64_t i, std::int64_t j) {
-                 const std::int32_t mask = -std::int32_t(is_second);
-                 position_of[choose(std::int32_t(i), n1 + std::int32_t(j), mask)] = std::int32_t(k);
-                 labels[k] = is_second;
-               });
+  return merge(
+      first.x, first.n, second.x, second.n, starts,
+      [position_of = g.position_of.data(), labels = g.second_by_x.data(),
+       n1 = std::int32_t(first.n)](std::int64_t k, bool is_second, std::int64_t i, std::int64_t j) {
+        const std::int32_t mask = -std::int32_t(is_second);
+        position_of[choose(std::int32_t(i), n1 + std::int32_t(j), mask)] = std::int32_t(k);
+        labels[k] = is_second;
+      });
 }
 
 // The positions in x of one sample's points, in the order of y: looked up here and not in the
@@ -102,7 +103,6 @@ void by_y(const KsSortedAxis& y, std::int64_t n, const std::int32_t* position_of
 
 std::int64_t merge_y(const KsSortedSample& first, const KsSortedSample& second, KsGeometry& g,
                      std::uint8_t* starts) {
-  ks_grow(g.position_by_y, g.n);
   by_y(first.y, first.n, g.position_of.data(), g.position_by_y.data());
   by_y(second.y, second.n, g.position_of.data() + first.n, g.position_by_y.data() + first.n);
   return merge(first.y, first.n, second.y, second.n, starts,
@@ -112,6 +112,14 @@ std::int64_t merge_y(const KsSortedSample& first, const KsSortedSample& second, 
                  x_position[k] = choose(of_first[i], of_second[j], -std::int32_t(is_second));
                  labels[k] = is_second;
                });
+}
+
+// Whether all points differ in both coordinates; where new values begin, if that is wanted.
+bool merge_both(const KsSortedSample& first, const KsSortedSample& second, KsGeometry& g,
+                bool starts) {
+  const std::int64_t x_runs = merge_x(first, second, g, starts ? g.x_starts.data() : nullptr);
+  const std::int64_t y_runs = merge_y(first, second, g, starts ? g.y_starts.data() : nullptr);
+  return x_runs == g.n && y_runs == g.n;
 }
 
 // Start of the run of equal values that each position belongs to; `next` gets the same starts, as
@@ -170,14 +178,17 @@ void ks_geometry(const KsSortedSample& first, const KsSortedSample& second, KsGe
   ks_grow(g.second_by_x, g.n);
   ks_grow(g.second_by_y, g.n);
   ks_grow(g.position_of, g.n);
-  const std::int64_t x_runs = merge_x(first, second, g, nullptr);
-  const std::int64_t y_runs = merge_y(first, second, g, nullptr);
+  ks_grow(g.position_by_y, g.n);
+  ks_grow(g.x_starts, g.n);
+  ks_grow(g.y_starts, g.n);
+  // Points of one sample seldom tie with those of the other alone: if they do, merge again.
+  bool tied = first.x.tied || first.y.tied || second.x.tied || second.y.tied;
+  if (!merge_both(first, second, g, tied) && !tied) {
+    tied = true;
+    merge_both(first, second, g, tied);
+  }
   g.tied = 0;
-  if (x_runs != g.n || y_runs != g.n) {
-    ks_grow(g.x_starts, g.n);
-    ks_grow(g.y_starts, g.n);
-    merge_x(first, second, g, g.x_starts.data());
-    merge_y(first, second, g, g.y_starts.data());
+  if (tied) {
     ks_points(first, second, g);
     order_ties(g, first.n);
     g.tied = count_tied(g);
@@ -190,8 +201,7 @@ void ks_points(const KsSortedSample& first, const KsSortedSample& second, KsGeom
   std::int64_t j = 0;
   for (std::int64_t k = 0; k < g.n; ++k) {
     const bool is_second = g.second_by_x[k] != 0;
-    g.point[k] =
-        is_second ? std::int32_t(first.n) + second.x.from[j] : first.x.from[i];
+    g.point[k] = is_second ? std::int32_t(first.n) + second.x.from[j] : first.x.from[i];
     i += !is_second;
     j += is_second;
   }

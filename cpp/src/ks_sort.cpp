@@ -172,10 +172,9 @@ void comparison_sort(std::uint64_t* keys, std::int32_t* from, std::int64_t n,
   for (std::int64_t i = 0; i < n; ++i) {
     items[i] = {keys[i], from[i]};
   }
-  std::sort(items.begin(), items.begin() + n,
-            [](const KsKeyedPlace& a, const KsKeyedPlace& b) {
-              return a.key != b.key ? a.key < b.key : a.from < b.from;
-            });
+  std::sort(items.begin(), items.begin() + n, [](const KsKeyedPlace& a, const KsKeyedPlace& b) {
+    return a.key != b.key ? a.key < b.key : a.from < b.from;
+  });
   for (std::int64_t i = 0; i < n; ++i) {
     keys[i] = items[i].key;
     from[i] = items[i].from;
@@ -289,17 +288,20 @@ private:
     constexpr std::uint32_t mask = digit_count - 1;
     std::uint32_t low[digit_count] = {};
     std::uint32_t high[digit_count] = {};
+    std::uint32_t* const leads = scratch_.leads.data();
     for (std::int64_t i = 0; i < n; ++i) {
-      const std::uint32_t digits = source.lead(lead, i) >> shift;
-      ++low[digits & mask];
-      ++high[digits >> digit_bits & mask];
+      leads[i] = source.lead(lead, i) >> shift;
+    }
+    for (std::int64_t i = 0; i < n; ++i) {
+      ++low[leads[i] & mask];
+      ++high[leads[i] >> digit_bits & mask];
     }
     exclusive_sums(low, digit_count);
     exclusive_sums(high, digit_count);
     std::uint64_t* const order = scratch_.order.data();
     std::uint64_t* const middle = scratch_.middle.data();
     for (std::int64_t i = 0; i < n; ++i) {
-      const std::uint32_t digits = source.lead(lead, i) >> shift;
+      const std::uint32_t digits = leads[i];
       middle[low[digits & mask]++] = std::uint64_t(digits) << 32 | std::uint64_t(i);
     }
     for (std::int64_t i = 0; i < n; ++i) {
@@ -316,6 +318,7 @@ void sort_axis(const double* values, std::int64_t n, KsSortScratch& scratch, KsS
   ks_grow(axis.key, n);
   ks_grow(axis.from, n);
   if (n >= radix_from) {
+    ks_grow(scratch.leads, std::min(n, largest_part));
     ks_grow(scratch.order, std::min(n, largest_part));
     ks_grow(scratch.middle, std::min(n, largest_part));
     if (n > largest_part) {
@@ -323,13 +326,15 @@ void sort_axis(const double* values, std::int64_t n, KsSortScratch& scratch, KsS
       ks_grow(scratch.dealt.from, n);
     }
     AxisSorter(scratch, axis).sort(Numbers{values}, 0, n);
-    return;
+  } else {
+    for (std::int64_t i = 0; i < n; ++i) {
+      axis.key[i] = key_of(values[i]);
+      axis.from[i] = std::int32_t(i);
+    }
+    comparison_sort(axis.key.data(), axis.from.data(), n, scratch.items);
   }
-  for (std::int64_t i = 0; i < n; ++i) {
-    axis.key[i] = key_of(values[i]);
-    axis.from[i] = std::int32_t(i);
-  }
-  comparison_sort(axis.key.data(), axis.from.data(), n, scratch.items);
+  const auto end = axis.key.begin() + n;
+  axis.tied = std::adjacent_find(axis.key.begin(), end) != end;
 }
 
 } // namespace

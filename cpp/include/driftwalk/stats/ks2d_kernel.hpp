@@ -134,8 +134,8 @@ inline void ks_weigh(const KsBlock<Key>& block, const Key* query, std::int64_t s
     }
   }
   for (std::int64_t i = 0; i < size; ++i) {
-    out[i] = weight[0] * Weight(Count(block.count[0][i])) +
-             weight[1] * Weight(Count(block.count[1][i]));
+    out[i] =
+        weight[0] * Weight(Count(block.count[0][i])) + weight[1] * Weight(Count(block.count[1][i]));
   }
 }
 
@@ -347,11 +347,7 @@ private:
     for (std::int64_t i = 0; i < size; ++i) {
       origins_.open[i] += strip_[i] + origins_.counted[i].strip;
     }
-    if (sweep_.tied_in_x == nullptr && !sweep_.limits) {
-      finish_untied(begin, size, best);
-    } else {
-      finish_tied(begin, size, best);
-    }
+    finish_row(begin, size, best);
     for (std::int64_t i = 0; i < size; ++i) {
       column_[slot_[i]] += weight_[second[i]];
     }
@@ -379,6 +375,7 @@ private:
     }
   }
 
+  // The four quadrants of the i-th origin of a row.
   void untied_quadrants(std::int64_t i, Weight own, Weight quadrant[4]) const {
     const Weight open = origins_.open[i];
     const Weight left = origins_.counted[i].left;
@@ -389,14 +386,57 @@ private:
     quadrant[3] = ks_abs(Weight(open - left - below - own));
   }
 
+  template <bool limits>
+  void quadrants(std::int64_t k, std::int64_t i, Weight own, Weight quadrant[4]) const {
+    const Weight open = origins_.open[i];
+    const Weight left = origins_.counted[i].left;
+    const Weight below = origins_.below[i];
+    KsCorners<Weight> corners{open, 0, 0, own, left, left + own, below, below + own};
+    if (sweep_.tied_in_x != nullptr) {
+      const KsTiedInX& in_x = sweep_.tied_in_x[sweep_.x_position[k]];
+      const KsTiedInY& in_y = sweep_.tied_in_y[k];
+      corners = {open,
+                 Weight(in_x.column),
+                 Weight(in_y.row),
+                 Weight(in_x.equal),
+                 Weight(in_x.left),
+                 Weight(in_x.left_closed),
+                 Weight(in_y.below),
+                 Weight(in_y.below_closed)};
+    }
+    if (limits) {
+      ks_limits(corners, quadrant);
+    } else {
+      ks_strict(corners, quadrant);
+    }
+  }
+
+  void finish_row(std::int64_t begin, std::int64_t size, KsBest best[2]) const {
+    if (sweep_.limits) {
+      keep_best(begin, size, best, [=, this](std::int64_t i, Weight own, Weight quadrant[4]) {
+        quadrants<true>(begin + i, i, own, quadrant);
+      });
+    } else if (sweep_.tied_in_x != nullptr) {
+      keep_best(begin, size, best, [=, this](std::int64_t i, Weight own, Weight quadrant[4]) {
+        quadrants<false>(begin + i, i, own, quadrant);
+      });
+    } else {
+      keep_best(begin, size, best, [this](std::int64_t i, Weight own, Weight quadrant[4]) {
+        untied_quadrants(i, own, quadrant);
+      });
+    }
+  }
+
   // Most rows hold no new maximum: their largest values are found without branches.
-  void finish_untied(std::int64_t begin, std::int64_t size, KsBest best[2]) const {
+  template <class Quadrants>
+  void keep_best(std::int64_t begin, std::int64_t size, KsBest best[2],
+                 Quadrants quadrants_of) const {
     const std::uint8_t* const second = sweep_.second_by_y + begin;
     Weight largest[2] = {0, 0};
     for (std::int64_t i = 0; i < size; ++i) {
       const Weight is_second = Weight(0) - Weight(second[i]); // all ones or 0
       Weight quadrant[4];
-      untied_quadrants(i, (weight_[0] & ~is_second) | (weight_[1] & is_second), quadrant);
+      quadrants_of(i, (weight_[0] & ~is_second) | (weight_[1] & is_second), quadrant);
       const Weight value = ks_largest(quadrant);
       largest[0] = ks_larger(largest[0], Weight(value & ~is_second));
       largest[1] = ks_larger(largest[1], Weight(value & is_second));
@@ -408,56 +448,26 @@ private:
       for (std::int64_t i = 0; i < size; ++i) {
         if (second[i] == sample) {
           Weight quadrant[4];
-          untied_quadrants(i, weight_[sample], quadrant);
+          quadrants_of(i, weight_[sample], quadrant);
           ks_keep_best(quadrant, sweep_.x_position[begin + i], best[sample]);
         }
       }
     }
   }
 
-  void finish_tied(std::int64_t begin, std::int64_t size, KsBest best[2]) const {
-    for (std::int64_t i = 0; i < size; ++i) {
-      const std::int32_t x = sweep_.x_position[begin + i];
-      const Weight open = origins_.open[i];
-      const Weight left = origins_.counted[i].left;
-      const Weight below = origins_.below[i];
-      const Weight own = weight_[sweep_.second_by_y[begin + i]];
-      KsCorners<Weight> corners{open, 0, 0, own, left, left + own, below, below + own};
-      if (sweep_.tied_in_x != nullptr) {
-        const KsTiedInX& in_x = sweep_.tied_in_x[x];
-        const KsTiedInY& in_y = sweep_.tied_in_y[begin + i];
-        corners = {open,
-                   Weight(in_x.column),
-                   Weight(in_y.row),
-                   Weight(in_x.equal),
-                   Weight(in_x.left),
-                   Weight(in_x.left_closed),
-                   Weight(in_y.below),
-                   Weight(in_y.below_closed)};
-      }
-      Weight quadrant[4];
-      if (sweep_.limits) {
-        ks_limits(corners, quadrant);
-      } else {
-        ks_strict(corners, quadrant);
-      }
-      ks_keep_best(quadrant, x, best[sweep_.second_by_y[begin + i]]);
-    }
-  }
-
   KsSweep sweep_;
   Weight weight_[2];
   std::int64_t columns_;
-  Place* place_;         // by column, in it by y
-  Counted* counted_;     // in the same order
-  std::int32_t* next_;   // by column: where its next point goes
+  Place* place_;       // by column, in it by y
+  Counted* counted_;   // in the same order
+  std::int32_t* next_; // by column: where its next point goes
   std::int32_t run_bits_ = 0;
   std::int64_t slots_;
-  Weight* column_;       // by slot: weight of the column's points in earlier rows
-  Weight* corner_;       // by slot: weight of the points of earlier columns and rows
+  Weight* column_; // by slot: weight of the column's points in earlier rows
+  Weight* corner_; // by slot: weight of the points of earlier columns and rows
   KsBlock<Place> by_place_;
   KsBlock<Column> by_column_;
-  Column* column_of_; // of the points of a row
+  Column* column_of_;  // of the points of a row
   std::int32_t* slot_; // of their columns
   Weight* left_;
   Weight* strip_;

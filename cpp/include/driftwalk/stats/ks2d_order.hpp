@@ -21,6 +21,7 @@ void ks_grow(std::vector<T>& values, std::int64_t size) {
 struct KsSortedAxis {
   std::vector<std::uint64_t> key;
   std::vector<std::int32_t> from;
+  bool tied = false; // whether two of the numbers are equal
 };
 
 struct KsKeyedPlace {
@@ -30,6 +31,7 @@ struct KsKeyedPlace {
 
 struct KsSortScratch {
   KsSortedAxis dealt;
+  std::vector<std::uint32_t> leads;
   std::vector<std::uint64_t> order;
   std::vector<std::uint64_t> middle;
   std::vector<KsKeyedPlace> items;
