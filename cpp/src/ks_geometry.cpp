@@ -178,7 +178,7 @@ void ks_geometry(const KsSortedSample& first, const KsSortedSample& second, KsGe
   ks_grow(g.second_by_x, g.n);
   ks_grow(g.second_by_y, g.n);
   ks_grow(g.position_of, g.n);
-  ks_grow(g.position_by_y, g.n);
+  ks_grow(g.position_by_y, g.n + 1); // the merge looks beyond the last, and drops it
   ks_grow(g.x_starts, g.n);
   ks_grow(g.y_starts, g.n);
   // Points of one sample seldom tie with those of the other alone: if they do, merge again.

@@ -120,15 +120,15 @@ class FloatLead {
 public:
   explicit FloatLead(const Range& range)
       : smallest_(key_of(range.smallest)),
-        shift_(std::max(0, int(std::bit_width(key_of(range.largest) - smallest_)) - lead_bits)) {}
+        leading_zeros_(std::countl_zero((key_of(range.largest) - smallest_) | 1)) {}
   std::uint32_t of_value(double value) const { return of_key(key_of(value)); }
   std::uint32_t of_key(std::uint64_t key) const {
-    return std::uint32_t((key - smallest_) >> shift_);
+    return std::uint32_t((key - smallest_) << leading_zeros_ >> (64 - lead_bits));
   }
 
 private:
   std::uint64_t smallest_;
-  int shift_;
+  int leading_zeros_;
 };
 
 void exclusive_sums(std::uint32_t* counts, std::uint32_t size) {
@@ -185,38 +185,42 @@ class AxisSorter {
 public:
   AxisSorter(KsSortScratch& scratch, KsSortedAxis& axis) : scratch_(scratch), axis_(axis) {}
 
-  // Sort the numbers of `source` into the axis, from `begin` on.
-  template <class Source>
-  void sort(const Source& source, std::int64_t begin, std::int64_t n) {
-    const Range range = range_of(source, n);
-    const EvenLead even(range);
-    if (even.is_usable() && spreads(source, n, even)) {
-      sort_by(source, begin, n, even);
-    } else {
-      sort_by(source, begin, n, FloatLead(range));
-    }
+  // Sort numbers into the axis.
+  void sort(const double* values, std::int64_t n) {
+    const Numbers numbers{values};
+    with_lead(numbers, n, [&](const auto& lead) {
+      if (n <= largest_part) {
+        sort_part(numbers, 0, n, lead, lead_bits);
+      } else {
+        deal(numbers, 0, n, lead);
+      }
+    });
   }
 
 private:
-  // Whether no part would get most of the numbers, judged by some of them.
-  template <class Source, class Lead>
-  static bool spreads(const Source& source, std::int64_t n, const Lead& lead) {
-    constexpr std::int64_t looks = 512;
-    const std::int64_t step = n / looks + 1;
-    std::uint32_t counts[1 << most_deal_bits] = {};
-    for (std::int64_t i = 0; i < n; i += step) {
-      ++counts[source.lead(lead, i) >> (lead_bits - most_deal_bits)];
+  // Call with the kind of lead that suits the numbers.
+  template <class Source, class Call>
+  static void with_lead(const Source& source, std::int64_t n, Call call) {
+    const Range range = range_of(source, n);
+    const EvenLead even(range);
+    if (even.is_usable() && spreads(source, n, even)) {
+      call(even);
+    } else {
+      call(FloatLead(range));
     }
-    return *std::max_element(std::begin(counts), std::end(counts)) <= n / step / 2;
   }
 
+  // Whether no part would get many times its share of the numbers, judged by some of them.
   template <class Source, class Lead>
-  void sort_by(const Source& source, std::int64_t begin, std::int64_t n, const Lead& lead) {
-    if (n <= largest_part) {
-      sort_part(source, begin, n, lead, lead_bits);
-    } else {
-      deal(source, begin, n, lead);
+  static bool spreads(const Source& source, std::int64_t n, const Lead& lead) {
+    constexpr std::int64_t looks = 128;
+    constexpr int bits = 6;
+    const std::int64_t step = n / looks + 1;
+    std::uint32_t counts[1 << bits] = {};
+    for (std::int64_t i = 0; i < n; i += step) {
+      ++counts[source.lead(lead, i) >> (lead_bits - bits)];
     }
+    return *std::max_element(std::begin(counts), std::end(counts)) <= n / step / 4;
   }
 
   template <class Source, class Lead>
@@ -229,6 +233,8 @@ private:
       ++next[source.lead(lead, i) >> shift];
     }
     exclusive_sums(next, 1u << deal_bits);
+    ks_grow(scratch_.dealt.key, begin + n); // what is dealt again has its room already
+    ks_grow(scratch_.dealt.from, begin + n);
     std::uint64_t* const keys = scratch_.dealt.key.data() + begin;
     std::int32_t* const from = scratch_.dealt.from.data() + begin;
     for (std::int64_t i = 0; i < n; ++i) {
@@ -242,20 +248,21 @@ private:
       if (size <= largest_part) {
         sort_part(Part{keys + done, from + done}, begin + done, size, lead, shift);
       } else {
+        std::copy_n(keys + done, size, axis_.key.data() + begin + done);
+        std::copy_n(from + done, size, axis_.from.data() + begin + done);
         deal_again(begin + done, size);
       }
       done = next[part];
     }
   }
 
-  // A part that is too large is dealt again, on a scale of its own.
+  // Deal what is in the axis already, on a scale of its own: the smallest and the largest number go
+  // to different parts.
   void deal_again(std::int64_t begin, std::int64_t n) {
-    std::uint64_t* const keys = axis_.key.data() + begin;
-    std::int32_t* const from = axis_.from.data() + begin;
-    std::copy_n(scratch_.dealt.key.data() + begin, n, keys);
-    std::copy_n(scratch_.dealt.from.data() + begin, n, from);
-    if (std::any_of(keys, keys + n, [=](std::uint64_t key) { return key != keys[0]; })) {
-      sort(Part{keys, from}, begin, n);
+    const Part part{axis_.key.data() + begin, axis_.from.data() + begin};
+    if (std::any_of(part.keys, part.keys + n,
+                    [=](std::uint64_t key) { return key != part.keys[0]; })) {
+      with_lead(part, n, [&](const auto& lead) { deal(part, begin, n, lead); });
     }
   }
 
@@ -275,7 +282,12 @@ private:
       keys[i] = source.key(place);
       from[i] = source.from(place);
     }
-    if (!repair_order(keys, from, n)) {
+    if (repair_order(keys, from, n)) {
+      return;
+    }
+    if (n > short_digits_to) {
+      deal_again(begin, n);
+    } else {
       comparison_sort(keys, from, n, scratch_.items);
     }
   }
@@ -321,11 +333,7 @@ void sort_axis(const double* values, std::int64_t n, KsSortScratch& scratch, KsS
     ks_grow(scratch.leads, std::min(n, largest_part));
     ks_grow(scratch.order, std::min(n, largest_part));
     ks_grow(scratch.middle, std::min(n, largest_part));
-    if (n > largest_part) {
-      ks_grow(scratch.dealt.key, n);
-      ks_grow(scratch.dealt.from, n);
-    }
-    AxisSorter(scratch, axis).sort(Numbers{values}, 0, n);
+    AxisSorter(scratch, axis).sort(values, n);
   } else {
     for (std::int64_t i = 0; i < n; ++i) {
       axis.key[i] = key_of(values[i]);

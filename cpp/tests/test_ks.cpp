@@ -1,25 +1,10 @@
 // The KS statistic against its definition, on every instruction set, with and without ties.
 #include "check.hpp"
 #include "driftwalk/dispatch.hpp"
-#include "driftwalk/stats/ks2d.hpp"
 #include "driftwalk/stats/ks2d_permutation.hpp"
-
-#include <algorithm>
-#include <cmath>
-#include <cstdlib>
-#include <random>
-#include <vector>
+#include "ks_samples.hpp"
 
 namespace {
-
-using namespace driftwalk;
-using Values = std::vector<double>;
-
-struct Sample {
-  Values x;
-  Values y;
-  std::int64_t size() const { return std::int64_t(x.size()); }
-};
 
 std::int64_t inside(const Sample& s, double x, double y, int quadrant, bool in_x, bool in_y) {
   std::int64_t count = 0;
@@ -66,19 +51,6 @@ std::int64_t every_cut(const Sample& a, const Sample& b) {
     }
   }
   return largest;
-}
-
-// Normal numbers; with `levels` > 0 rounded, so that many are equal.
-Sample random_sample(std::mt19937_64& generator, std::int64_t n, int levels) {
-  std::normal_distribution<double> normal;
-  Sample sample;
-  for (std::int64_t i = 0; i < n; ++i) {
-    const double x = normal(generator);
-    const double y = normal(generator);
-    sample.x.push_back(levels > 0 ? std::round(x * levels) / levels : x);
-    sample.y.push_back(levels > 0 ? std::round(y * levels) / levels : y);
-  }
-  return sample;
 }
 
 void check_place(const KsResult& r, const Sample& a, const Sample& b) {

@@ -65,14 +65,14 @@ inline std::int64_t ks_number(Key key) {
 // The points of one block: each sample by itself as elements to be counted, and the counts.
 template <class Key>
 struct KsBlock {
-  using Count = std::make_unsigned_t<Key>;
+  using Count = std::make_unsigned_t<Key>; // reaches beyond the largest key
   struct Element {
     Key key;
     Key lane; // its place within its vector of queries
   };
   Element* element[2];
   std::int32_t* before[2]; // (vectors + 1) elements that stand before each vector of queries
-  Key* count[2];           // for each query
+  Count* count[2];         // for each query
 };
 
 // Divide the points between the samples; second_of(i) tells the sample of the i-th.
@@ -103,19 +103,20 @@ inline void ks_divide(const KsBlock<Key>& block, const Key* query, std::int64_t 
 // For the queries of one vector: the elements before the vector that have a smaller key, and those
 // inside the vector that also stand to the left of the query.
 template <class Key>
-inline typename KsVector<Key>::Type ks_count(const KsBlock<Key>& block, int sample,
-                                             std::int64_t vector,
-                                             typename KsVector<Key>::Type query) {
+inline typename KsVector<std::make_unsigned_t<Key>>::Type
+ks_count(const KsBlock<Key>& block, int sample, std::int64_t vector,
+         typename KsVector<Key>::Type query) {
   using Vector = typename KsVector<Key>::Type;
   const typename KsBlock<Key>::Element* const element = block.element[sample];
   const Vector iota = KsVector<Key>::iota();
-  Vector count{};
+  using Counts = typename KsVector<typename KsBlock<Key>::Count>::Type;
+  Counts count{};
   std::int32_t i = 0;
   for (; i < block.before[sample][vector]; ++i) {
-    count -= (Vector)(Vector{} + element[i].key < query);
+    count -= (Counts)(Vector{} + element[i].key < query);
   }
   for (; i < block.before[sample][vector + 1]; ++i) {
-    count -= (Vector)((Vector{} + element[i].key < query) & (Vector{} + element[i].lane < iota));
+    count -= (Counts)((Vector{} + element[i].key < query) & (Vector{} + element[i].lane < iota));
   }
   return count;
 }
@@ -129,8 +130,8 @@ inline void ks_weigh(const KsBlock<Key>& block, const Key* query, std::int64_t s
   for (std::int64_t begin = 0; begin < size; begin += lanes) {
     const auto queries = KsVector<Key>::load(query + begin);
     for (int sample = 0; sample < 2; ++sample) {
-      KsVector<Key>::store(block.count[sample] + begin,
-                           ks_count<Key>(block, sample, begin / lanes, queries));
+      KsVector<Count>::store(block.count[sample] + begin,
+                             ks_count<Key>(block, sample, begin / lanes, queries));
     }
   }
   for (std::int64_t i = 0; i < size; ++i) {
@@ -282,7 +283,7 @@ private:
     for (int sample = 0; sample < 2; ++sample) {
       block.element[sample] = take<typename KsBlock<Key>::Element>(at, room);
       block.before[sample] = take<std::int32_t>(at, block_size / KsVector<Key>::lanes + 2);
-      block.count[sample] = take<Key>(at, room);
+      block.count[sample] = take<typename KsBlock<Key>::Count>(at, room);
     }
   }
 
