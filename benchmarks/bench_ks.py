@@ -1,17 +1,19 @@
-"""How fast the two-sample 2-D KS distance is, beside two plain ways to compute it.
+"""How fast the two-sample 2-D KS distance is, beside plain ways to compute it.
 
-    python benchmarks/bench_ks.py [--sizes 1000 5000 18000 50000] [--repeats 30]
+    python benchmarks/bench_ks.py [--sizes 18000 36000 100000 400000 1000000] [--rounds 9]
 
-Timed in one run, on one core, with NumPy arrays in and a float out:
+Both samples have n points. Timed in one run, in turn, on one core, with NumPy arrays in and a float
+out; medians of processor time:
 
-* ours, both samples unsorted; ours with the first sample prepared (`ks_reference`); both again on
-  every instruction set that this processor has;
-* "numpy": the definition vectorised, O(n^2), in chunks of origins;
-* "loop": one origin at a time with boolean masks, O(n^2), as the usual pure-Python packages do.
+* "unsorted": both samples as they come; "prepared": the first one prepared (`ks_reference`), as a
+  calibration does with the recording; both again on every instruction set that this processor has;
+* "ns a point": the unsorted time over the 2 n points of both samples;
+* "merging": an O(n log^2 n) merge of prefix sums, vectorised in NumPy; once;
+* "loop": one origin at a time with boolean masks, O(n^2), as the usual pure-Python packages do. It
+  is extrapolated from some origins and marked "~" (its cost per origin is the same for all).
 
-Every answer is checked: all agree to the last integer, else the script fails. The slow ways run
-once where they take longer than a second; "loop" is extrapolated from a part of the origins beyond
-5,000 points and then marked "~" (its cost per origin is the same for all origins).
+Every answer is checked against "merging", and that against the loop up to 5,000 points: all agree
+to the last integer, else the script fails.
 """
 
 from __future__ import annotations
@@ -25,12 +27,13 @@ from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
+from timing import interleaved, machine
 
 from driftwalk import _core
 from driftwalk.comparison import KsComparison, block_permutation_test, ks_compare, ks_reference
 
 Points = npt.NDArray[np.float64]
-LOOP_ORIGINS = 2000
+LOOP_CELLS = 40_000_000
 INSTRUCTION_SET = "DRIFTWALK_INSTRUCTION_SET"
 
 
@@ -44,25 +47,32 @@ def samples(n: int) -> tuple[Points, Points]:
     return a, b
 
 
-def by_numpy(a: Points, b: Points, *, chunk_cells: int = 2_000_000) -> tuple[int, int]:
-    """D1 and D2 in units of 1 / (n m), by the definition, a chunk of origins at a time."""
+def by_merging(a: Points, b: Points) -> tuple[int, int]:
+    """D1 and D2 in units of 1 / (n m), for points without ties, by merging sorted runs."""
     pooled = np.concatenate([a, b])
-    found = []
-    for origins in (a, b):
-        largest = 0
-        chunk = max(1, chunk_cells // len(pooled))
-        for begin in range(0, len(origins), chunk):
-            some = origins[begin : begin + chunk]
-            left = pooled[:, 0] < some[:, :1]
-            right = pooled[:, 0] > some[:, :1]
-            below = pooled[:, 1] < some[:, 1:]
-            above = pooled[:, 1] > some[:, 1:]
-            for quadrant in (left & below, right & below, left & above, right & above):
-                in_a = np.count_nonzero(quadrant[:, : len(a)], axis=1)
-                in_b = np.count_nonzero(quadrant[:, len(a) :], axis=1)
-                largest = max(largest, int(np.abs(len(b) * in_a - len(a) * in_b).max()))
-        found.append(largest)
-    return found[0], found[1]
+    by_x = np.argsort(pooled[:, 0])
+    pooled, second = pooled[by_x], by_x >= len(a)
+    weight = np.where(second, -len(a), len(b)).astype(np.int64)
+    rank = np.empty(len(pooled), np.int64)
+    rank[np.argsort(pooled[:, 1])] = np.arange(len(pooled))
+    inside = np.zeros(len(pooled), np.int64)  # weight of {x < X, y < Y}, by position in x
+    position = np.arange(len(pooled))
+    width = 1
+    while width < len(pooled):
+        run = position // (2 * width)
+        order = np.argsort(run * len(pooled) + rank)
+        is_left = (order // width) % 2 == 0
+        sums = np.cumsum(np.where(is_left, weight[order], 0))
+        before = np.where(run[order] > 0, sums[run[order] * 2 * width - 1], 0)
+        inside[order] += np.where(is_left, 0, sums - before)
+        width *= 2
+    left = np.cumsum(weight) - weight
+    by_y = np.argsort(rank)
+    below = np.empty_like(left)
+    below[by_y] = np.cumsum(weight[by_y]) - weight[by_y]
+    quadrants = (inside, below - inside, left - inside, inside - left - below - weight)
+    largest = np.abs(quadrants).max(axis=0)
+    return int(largest[~second].max()), int(largest[second].max())
 
 
 def by_loop(a: Points, b: Points, *, origins: int | None = None) -> tuple[int, int]:
@@ -80,20 +90,15 @@ def by_loop(a: Points, b: Points, *, origins: int | None = None) -> tuple[int, i
     return found[0], found[1]
 
 
-def median_ms(call: Callable[[], object], repeats: int) -> float:
-    call()
-    times = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - begin)
-    return 1e3 * statistics.median(times)
-
-
 def once_ms(call: Callable[[], tuple[int, int]]) -> tuple[tuple[int, int], float]:
-    begin = time.perf_counter()
+    begin = time.process_time()
     answer = call()
-    return answer, 1e3 * (time.perf_counter() - begin)
+    return answer, 1e3 * (time.process_time() - begin)
+
+
+def median_ms(ways: dict[str, Callable[[], object]], rounds: int) -> dict[str, float]:
+    times = interleaved(ways, rounds=rounds)
+    return {name: 1e3 * statistics.median(taken.processor) for name, taken in times.items()}
 
 
 def integers(result: KsComparison) -> tuple[int, int]:
@@ -105,57 +110,80 @@ def check(name: str, found: tuple[int, int], expected: tuple[int, int]) -> None:
         sys.exit(f"wrong answer: {name} gives {found}, expected {expected}")
 
 
-def bench(n: int, repeats: int) -> None:
+def on(instruction_set: str, call: Callable[[], KsComparison]) -> Callable[[], KsComparison]:
+    """Return the call, made on an instruction set; "" is the one that the core chooses."""
+
+    def made() -> KsComparison:
+        os.environ[INSTRUCTION_SET] = instruction_set
+        return call()
+
+    return made
+
+
+def bench(n: int, rounds: int) -> None:
     a, b = samples(n)
-    expected, numpy_ms = once_ms(lambda: by_numpy(a, b))
+    expected, merging_ms = once_ms(lambda: by_merging(a, b))
     if n <= 5000:
         answer, loop_ms = once_ms(lambda: by_loop(a, b))
         check("loop", answer, expected)
         mark = " "
     else:
-        _, part_ms = once_ms(lambda: by_loop(a, b, origins=LOOP_ORIGINS))
-        loop_ms, mark = part_ms * n / LOOP_ORIGINS, "~"
+        origins = max(20, LOOP_CELLS // n)
+        _, part_ms = once_ms(lambda: by_loop(a, b, origins=origins))
+        loop_ms, mark = part_ms * n / origins, "~"
     reference = ks_reference(a)
-    rows: list[tuple[str, float, float]] = []
-    chosen = _core.instruction_set()
+    ways: dict[str, Callable[[], object]] = {}
     for name in ("", *_core.available_instruction_sets()):
-        os.environ[INSTRUCTION_SET] = name
-        check(name, integers(ks_compare(a, b)), expected)
-        check(name, integers(reference.compare(b)), expected)
-        rows.append(
-            (
-                name or f"chosen ({chosen})",
-                median_ms(lambda: ks_compare(a, b), repeats),
-                median_ms(lambda: reference.compare(b), repeats),
-            )
-        )
+        for kind, call in (
+            ("unsorted", on(name, lambda: ks_compare(a, b))),
+            ("prepared", on(name, lambda: reference.compare(b))),
+        ):
+            check(f"{name} {kind}", integers(call()), expected)
+            ways[f"{name} {kind}"] = call
+    times = median_ms(ways, rounds)
     os.environ[INSTRUCTION_SET] = ""
-    for name, unsorted_ms, presorted_ms in rows:
+    for name in ("", *_core.available_instruction_sets()):
+        ours_ms = times[f"{name} unsorted"]
         print(
-            f"{n:>7} {name:<16} {unsorted_ms:>10.3f} {presorted_ms:>10.3f} {numpy_ms:>11.0f} "
-            f"{mark}{loop_ms:>9.0f} {numpy_ms / unsorted_ms:>9.0f} {loop_ms / unsorted_ms:>9.0f}"
+            f"{n:>7} {name or f'chosen ({_core.instruction_set()})':<16} {ours_ms:>10.3f} "
+            f"{times[f'{name} prepared']:>10.3f} {1e6 * ours_ms / (2 * n):>11.1f} "
+            f"{merging_ms:>9.0f} {mark}{loop_ms:>10.0f} {merging_ms / ours_ms:>12.0f} "
+            f"{loop_ms / ours_ms:>9.0f}"
         )
-    permutations_ms = median_ms(
-        lambda: block_permutation_test(a, b, block_length=10, permutations=100, seed=1), 3
+    others = median_ms(
+        {
+            "permutations": lambda: block_permutation_test(
+                a, b, block_length=10, permutations=20, seed=1
+            ),
+            "peacock": lambda: ks_compare(a, b, method="peacock"),
+        },
+        3,
     )
-    peacock_ms = median_ms(lambda: ks_compare(a, b, method="peacock"), 5)
     print(
-        f"{'':>7} a permutation {permutations_ms / 100:.3f}, Peacock's statistic {peacock_ms:.3f}"
+        f"{'':>7} a permutation {others['permutations'] / 20:.3f}, "
+        f"Peacock's statistic {others['peacock']:.3f}",
+        flush=True,
     )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--sizes", type=int, nargs="+", default=[1000, 5000, 18_000, 50_000])
-    parser.add_argument("--repeats", type=int, default=30)
+    parser.add_argument(
+        "--sizes",
+        type=int,
+        nargs="+",
+        default=[1000, 5000, 18_000, 36_000, 100_000, 400_000, 1_000_000],
+    )
+    parser.add_argument("--rounds", type=int, default=9)
     options = parser.parse_args()
-    print("Medians in ms; ratios to ours unsorted. Both samples have n points.")
+    print(machine())
+    print("Medians in ms of processor time; ratios to ours unsorted. Both samples have n points.")
     print(
-        f"{'n':>7} {'ours on':<16} {'unsorted':>10} {'prepared':>10} {'numpy':>11} {'loop':>10} "
-        f"{'numpy/ours':>9} {'loop/ours':>9}"
+        f"{'n':>7} {'ours on':<16} {'unsorted':>10} {'prepared':>10} {'ns a point':>11} "
+        f"{'merging':>9} {'loop':>11} {'merging/ours':>12} {'loop/ours':>9}"
     )
     for n in options.sizes:
-        bench(n, options.repeats)
+        bench(n, options.rounds)
 
 
 if __name__ == "__main__":

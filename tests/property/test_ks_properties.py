@@ -46,6 +46,44 @@ def test_order_does_not_matter(a: np.ndarray, b: np.ndarray, seed: int) -> None:
     assert ks_distance(rng.permutation(a), rng.permutation(b)) == ks_distance(a, b)
 
 
+# Sizes at which another way to sort or to count begins: 128 and 4,096 points of a sample, blocks of
+# 128, 65,536 and 131,072 points of both.
+THRESHOLDS = (128, 256, 4096, 65_536)
+
+
+@settings(deadline=None, max_examples=12)
+@given(
+    threshold=st.sampled_from(THRESHOLDS),
+    more=st.tuples(st.integers(-2, 2), st.integers(-2, 2)),
+    levels=st.sampled_from([0, 3, 1000]),
+    ties=ties,
+    seed=st.integers(0, 99),
+)
+def test_order_and_monotone_maps_do_not_matter_at_a_threshold(
+    threshold: int, more: tuple[int, int], levels: int, ties: str, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    a, b = (rng.normal(size=(threshold + extra, 2)) for extra in more)
+    if levels:
+        a, b = np.round(levels * a), np.round(levels * b)
+    expected = ks_compare(a, b, ties=ties)  # type: ignore[arg-type]
+    ranks = [np.unique(column, return_inverse=True)[1] for column in np.concatenate([a, b]).T]
+    # On the third power of the ranks most points crowd at one end of the scale.
+    crooked = np.column_stack(ranks).astype(float) ** 3
+    shuffled = [rng.permutation(part) for part in (crooked[: len(a)], crooked[len(a) :])]
+    found = ks_compare(*shuffled, ties=ties)  # type: ignore[arg-type]
+    assert (found.difference_a, found.difference_b, found.tied_fraction) == (
+        expected.difference_a,
+        expected.difference_b,
+        expected.tied_fraction,
+    )
+    turned = ks_compare(b[:, ::-1], a[:, ::-1], ties=ties)  # type: ignore[arg-type]
+    assert (turned.difference_b, turned.difference_a) == (
+        expected.difference_a,
+        expected.difference_b,
+    )
+
+
 # Strictly increasing and far from linear. Coordinates are numbers of 24 bits, so their images in
 # 53 bits neither meet nor swap, and no map takes a small number beside a large one, where it would
 # be lost.

@@ -57,6 +57,23 @@ def test_larger_samples_equal_the_definition() -> None:
     assert (result.difference_a, result.difference_b) == differences(a, b)
 
 
+# A comparison or a radix sort, blocks of 128 points, numbers that crowd on an even scale.
+@pytest.mark.parametrize(("n", "m"), [(127, 128), (128, 129), (255, 1), (384, 257)])
+@pytest.mark.parametrize("shape", ["even", "over all sizes", "one far point", "tied"])
+def test_sizes_around_a_threshold_equal_the_definition(n: int, m: int, shape: str) -> None:
+    rng = np.random.default_rng(n + m)
+    a, b = rng.normal(size=(n, 2)), rng.normal(size=(m, 2)) + 0.1
+    if shape == "over all sizes":
+        a, b = np.sinh(200 * a), np.sinh(200 * b)
+    elif shape == "one far point":
+        a[n // 2] = 1e300, -1e300
+    elif shape == "tied":
+        a, b = np.round(6 * a), np.round(6 * b)
+    for ties in ("strict", "limits"):
+        result = ks_compare(a, b, ties=ties)  # type: ignore[arg-type]
+        assert (result.difference_a, result.difference_b) == differences(a, b, ties=ties)
+
+
 def test_the_place_holds_the_maximum() -> None:
     rng = np.random.default_rng(9)
     a, b = rng.normal(size=(80, 2)), rng.normal(size=(60, 2)) + 0.4
