@@ -64,7 +64,7 @@ def test_sizes_around_a_threshold_equal_the_definition(n: int, m: int, shape: st
     rng = np.random.default_rng(n + m)
     a, b = rng.normal(size=(n, 2)), rng.normal(size=(m, 2)) + 0.1
     if shape == "over all sizes":
-        a, b = np.sinh(200 * a), np.sinh(200 * b)
+        a, b = np.sinh(100 * a), np.sinh(100 * b)
     elif shape == "one far point":
         a[n // 2] = 1e300, -1e300
     elif shape == "tied":
