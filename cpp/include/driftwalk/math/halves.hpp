@@ -28,6 +28,30 @@ inline IntPack<N> halve_halves(IntPack<N> a) {
   return (typename IntPack<N>::Vector)((Halves)a.v >> 1);
 }
 
+// The low half of every lane, in both its halves.
+template <int N>
+inline IntPack<N> repeat_low_half(IntPack<N> a) {
+#if defined(DRIFTWALK_USE_X86)
+  using Vector = typename IntPack<N>::Vector;
+  constexpr int low = 0xa0; // of two lanes: the first half twice, the third half twice
+#if defined(__AVX512BW__)
+  if constexpr (N == 16) {
+    return (Vector)_mm512_shufflehi_epi16(_mm512_shufflelo_epi16((__m512i)a.v, low), low);
+  }
+#endif
+#if defined(__AVX2__)
+  if constexpr (N == 8) {
+    return (Vector)_mm256_shufflehi_epi16(_mm256_shufflelo_epi16((__m256i)a.v, low), low);
+  }
+#endif
+  if constexpr (N == 4) {
+    return (Vector)_mm_shufflehi_epi16(_mm_shufflelo_epi16((__m128i)a.v, low), low);
+  }
+#endif
+  const IntPack<N> half = a & IntPack<N>(0xffff);
+  return half | (half << 16);
+}
+
 // The high 16 bits of the product of unsigned halves.
 template <int N>
 inline IntPack<N> multiply_high_halves(IntPack<N> a, IntPack<N> b) {

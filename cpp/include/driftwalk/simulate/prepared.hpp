@@ -122,9 +122,20 @@ struct SampleSink {
   std::int64_t lane_stride;
   // Scratch for one frame of the flow table, used when there are several.
   typename FlowNumber<T>::type* blended_flow;
+
+  // The same for the worlds from lane `lane` on.
+  SampleSink at_world(std::int64_t lane) const {
+    const std::int64_t offset = lane * lane_stride;
+    return {x + offset, y + offset, theta == nullptr ? nullptr : theta + offset, lane_stride,
+            blended_flow};
+  }
 };
 
-// Runs worlds first .. first + count - 1 (count <= lanes) and writes their samples and status.
+// Packs of worlds that one call of a kernel takes together.
+inline constexpr int most_packs = 4;
+
+// Runs worlds first .. first + count - 1 (count <= most_packs * lanes) and writes their samples and
+// status.
 using SimulateLanes = void (*)(const Prepared<float>&, const BatchWorlds&, std::int64_t first,
                                int count, const SampleSink<float>&, std::uint32_t* status);
 

@@ -193,6 +193,7 @@ struct Motionless {
   std::int64_t from;
   T threshold;
 
+  Motionless() = default;
   template <class Run>
   explicit Motionless(const Run& run) : x(T(0)), y(T(0)), path(T(0)), from(run.samples / 2) {
     constexpr double slowest = 1e-6; // [m/s]
@@ -233,62 +234,135 @@ inline void write_status(const Prepared<T>& run, const Body<Real>& body,
   }
 }
 
+// Packs that one call takes through their runs together.
 template <class Real, class T, class Law>
-void run_worlds(const Prepared<T>& run, const BatchWorlds& worlds, std::int64_t first, int count,
-                const SampleSink<T>& sink, std::uint32_t* status) {
-  using UInt = typename Numbers<Real>::UInt;
-  Body<Real> body;
-  Real drag_coefficient, force_std;
-  Philox<UInt> stream;
-  load_worlds(worlds, first, count, body, drag_coefficient, force_std, stream);
-  const Law law = Law::of(drag_coefficient, run.drag);
-  Physics<Real, T, Law> physics{law,
-                                run.block,
-                                run.flow,
-                                run.water,
-                                run.wall,
-                                run.step,
-                                world_constants(law, run, drag_coefficient, force_std)};
-  meet_wall(run.wall, run.block.half_side, Real(run.step.per_inertia), body.pose, body.motion);
+class WorldGroup {
+public:
+  WorldGroup(const Prepared<T>& run, const BatchWorlds& worlds, std::int64_t first, int count,
+             const SampleSink<T>& sink)
+      : run_(run), sink_(sink), packs_((count + lanes - 1) / lanes) {
+    for (int p = 0; p < packs_; ++p) {
+      const int offset = p * lanes, left = count - offset;
+      load(p, worlds, first + offset, left < lanes ? left : lanes);
+    }
+  }
 
-  Motionless<Real> rest(run);
-  Real normals[4], last[2] = {Real(T(0)), Real(T(0))};
-  std::int64_t step_index = 0, sample = 0;
-  for (std::int64_t interval = 0; sample < run.samples; ++interval) {
-    // One Philox block serves two force intervals.
-    const int half = static_cast<int>(interval & 1) * 2;
-    if (half == 0) {
-      draw_normals(stream, Purpose::force, interval >> 1, normals);
-    }
-    if (run.force_kept > T(0)) {
-      const T kept = interval == 0 ? T(0) : run.force_kept;
-      const T fresh = interval == 0 ? run.force_first : T(1) - run.force_kept;
-      remember(Real(kept), Real(fresh), last, normals + half);
-      last[0] = normals[half];
-      last[1] = normals[half + 1];
-    }
-    const Motion<Real> noise{normals[half] * physics.world.noise_scale,
-                             normals[half + 1] * physics.world.noise_scale, Real(T(0))};
-    for (int sub = 0; sub < run.steps_per_interval && sample < run.samples; ++sub, ++step_index) {
-      if (run.frames > 1) {
-        const double middle =
-            (static_cast<double>(step_index) + 0.5) * static_cast<double>(run.step.dt);
-        physics.flow.table = flow_table_at(run, middle, sink.blended_flow);
-        look_at_water(run, middle, physics.water);
+  void run() {
+    for (std::int64_t interval = 0; sample_ < run_.samples; ++interval) {
+      for (int p = 0; p < packs_; ++p) {
+        draw_force(interval, pack_[p].noise, record_[p], pack_[p].physics.world.noise_scale);
       }
-      const Pose<Real> before = body.pose;
-      const Real turned = step_block(physics, noise, body);
-      for (; sample < run.samples && run.sample_step[sample] == step_index; ++sample) {
-        const T weight = run.sample_weight[sample];
-        const Real x = before.x + (body.pose.x - before.x) * weight;
-        const Real y = before.y + (body.pose.y - before.y) * weight;
-        rest.add(sample, x, y);
-        write_sample(run, sink, sample, count, stream, x, y,
-                     wrap_angle(before.theta + turned * weight));
+      for (int sub = 0; sub < run_.steps_per_interval && sample_ < run_.samples; ++sub) {
+        step();
       }
     }
   }
-  write_status(run, body, rest, count, status);
+
+  void write_status(std::uint32_t* status) const {
+    for (int p = 0; p < packs_; ++p) {
+      driftwalk::write_status(run_, pack_[p].body, record_[p].rest, record_[p].count,
+                              status + p * lanes);
+    }
+  }
+
+private:
+  static constexpr int lanes = Numbers<Real>::lanes;
+  using UInt = typename Numbers<Real>::UInt;
+
+  // What a pack has beside its blocks.
+  struct Record {
+    int count; // of its worlds
+    Philox<UInt> stream;
+    Real normals[4], last[2];
+    Motionless<Real> rest;
+  };
+
+  void load(int p, const BatchWorlds& worlds, std::int64_t first, int count) {
+    BlockPack<Real, T, Law>& pack = pack_[p];
+    Record& record = record_[p];
+    Real drag_coefficient, force_std;
+    load_worlds(worlds, first, count, pack.body, drag_coefficient, force_std, record.stream);
+    record.count = count;
+    record.last[0] = record.last[1] = Real(T(0));
+    record.rest = Motionless<Real>(run_);
+    const Law law = Law::of(drag_coefficient, run_.drag);
+    pack.physics = {law,
+                    run_.block,
+                    run_.flow,
+                    run_.water,
+                    run_.wall,
+                    run_.step,
+                    world_constants(law, run_, drag_coefficient, force_std)};
+    meet_wall(run_.wall, run_.block.half_side, Real(run_.step.per_inertia), pack.body.pose,
+              pack.body.motion);
+  }
+
+  void draw_force(std::int64_t interval, Motion<Real>& noise, Record& record, Real scale) const {
+    // One Philox block serves two force intervals.
+    const int half = static_cast<int>(interval & 1) * 2;
+    if (half == 0) {
+      draw_normals(record.stream, Purpose::force, interval >> 1, record.normals);
+    }
+    Real* const normals = record.normals + half;
+    if (run_.force_kept > T(0)) {
+      const T kept = interval == 0 ? T(0) : run_.force_kept;
+      const T fresh = interval == 0 ? run_.force_first : T(1) - run_.force_kept;
+      remember(Real(kept), Real(fresh), record.last, normals);
+      record.last[0] = normals[0];
+      record.last[1] = normals[1];
+    }
+    noise = {normals[0] * scale, normals[1] * scale, Real(T(0))};
+  }
+
+  void step() {
+    if (run_.frames > 1) {
+      blend_flow();
+    }
+    step_packs(pack_, packs_);
+    for (; sample_ < run_.samples && run_.sample_step[sample_] == step_index_; ++sample_) {
+      for (int p = 0; p < packs_; ++p) {
+        write(p, run_.sample_weight[sample_]);
+      }
+    }
+    ++step_index_;
+  }
+
+  void blend_flow() {
+    const double middle =
+        (static_cast<double>(step_index_) + 0.5) * static_cast<double>(run_.step.dt);
+    const auto* const table = flow_table_at(run_, middle, sink_.blended_flow);
+    for (int p = 0; p < packs_; ++p) {
+      pack_[p].physics.flow.table = table;
+      look_at_water(run_, middle, pack_[p].physics.water);
+    }
+  }
+
+  void write(int p, T weight) {
+    const Pose<Real>& before = pack_[p].before;
+    const Pose<Real>& pose = pack_[p].body.pose;
+    Record& record = record_[p];
+    const Real x = before.x + (pose.x - before.x) * weight;
+    const Real y = before.y + (pose.y - before.y) * weight;
+    record.rest.add(sample_, x, y);
+    write_sample(run_, sink_.at_world(p * lanes), sample_, record.count, record.stream, x, y,
+                 wrap_angle(before.theta + pack_[p].turned * weight));
+  }
+
+  const Prepared<T>& run_;
+  const SampleSink<T>& sink_;
+  const int packs_;
+  BlockPack<Real, T, Law> pack_[most_packs];
+  Record record_[most_packs];
+  std::int64_t step_index_ = 0, sample_ = 0;
+};
+
+// Up to most_packs packs of worlds.
+template <class Real, class T, class Law>
+void run_worlds(const Prepared<T>& run, const BatchWorlds& worlds, std::int64_t first, int count,
+                const SampleSink<T>& sink, std::uint32_t* status) {
+  WorldGroup<Real, T, Law> group(run, worlds, first, count, sink);
+  group.run();
+  group.write_status(status);
 }
 
 DRIFTWALK_LANES_END

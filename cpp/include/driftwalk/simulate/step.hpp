@@ -1,4 +1,7 @@
-// One time step of a block alone: through the water, then off the wall.
+// One time step of several packs of blocks, each block alone: through the water, then off the wall.
+//
+// A step is a long chain of operations that wait for each other. So each part of it is done for all
+// packs before the next: while one pack waits, the processor works on another.
 #pragma once
 
 #include "driftwalk/physics/drag.hpp"
@@ -9,30 +12,70 @@
 
 DRIFTWALK_LANES_BEGIN
 
-// Returns the angle by which the water has turned the block [rad].
+// A pack of blocks, one per lane, and the step that is under way.
 template <class Real, class T, class Law>
-inline Real step_block(const Physics<Real, T, Law>& physics, const Motion<Real>& noise,
-                       Body<Real>& body) {
-  const T half = T(0.5) * physics.step.dt;
-  const Ahead<Real> ahead = look_ahead(physics.step, body, noise);
-  const DragSums<Real> sums = drag_sums(physics.law, physics.block, physics.flow, ahead.pose.x,
-                                        ahead.pose.y, axes_at(ahead.pose.theta), ahead.motion);
-  const Real per_mass = physics.world.drag_per_mass, per_inertia = physics.world.drag_per_inertia;
+struct BlockPack {
+  Physics<Real, T, Law> physics;
+  Body<Real> body;
+  Motion<Real> noise; // acceleration by the stochastic force
+  Pose<Real> before;  // at the start of the step
+  Ahead<Real> ahead;
+  Axes<Real> axes; // of ahead
   WaterPush<Real> push;
+  Real turned; // by the water [rad]
+};
+
+template <class Real, class T, class Law>
+inline void begin_step(BlockPack<Real, T, Law>& pack) {
+  pack.before = pack.body.pose;
+  pack.ahead = look_ahead(pack.physics.step, pack.body, pack.noise);
+  pack.axes = axes_at(pack.ahead.pose.theta);
+}
+
+template <class Real, class T, class Law>
+inline void feel_water(BlockPack<Real, T, Law>& pack) {
+  const Physics<Real, T, Law>& physics = pack.physics;
+  const Pose<Real>& pose = pack.ahead.pose;
+  const T half = T(0.5) * physics.step.dt;
+  const DragSums<Real> sums = drag_sums(physics.law, physics.block, physics.flow, pose.x, pose.y,
+                                        pack.axes, pack.ahead.motion);
+  const Real per_mass = physics.world.drag_per_mass, per_inertia = physics.world.drag_per_inertia;
+  WaterPush<Real>& push = pack.push;
   push.acceleration = {sums.force_x * per_mass, sums.force_y * per_mass, sums.torque * per_inertia};
   if (physics.water.count > 0) {
-    push.acceleration = push.acceleration + water_acceleration(physics.water, physics.block,
-                                                               ahead.pose.x, ahead.pose.y);
+    push.acceleration =
+        push.acceleration + water_acceleration(physics.water, physics.block, pose.x, pose.y);
   }
   push.stiffness = sums.conductance * per_mass * half;
   push.spin_stiffness = sums.conductance * per_inertia * (turning_share(physics.block) * half);
-  const Real turned = finish_step(physics.step, noise, ahead.motion, push, body);
+}
+
+template <class Real, class T, class Law>
+inline void leave_wall(BlockPack<Real, T, Law>& pack) {
+  const Physics<Real, T, Law>& physics = pack.physics;
   const auto touched = meet_wall(physics.wall, physics.block.half_side,
-                                 Real(physics.step.per_inertia), body.pose, body.motion);
+                                 Real(physics.step.per_inertia), pack.body.pose, pack.body.motion);
   if (any(touched)) {
-    forget_drag(touched, body);
+    forget_drag(touched, pack.body);
   }
-  return turned;
+}
+
+template <class Real, class T, class Law>
+inline void step_packs(BlockPack<Real, T, Law>* packs, int count) {
+  for (int p = 0; p < count; ++p) {
+    begin_step(packs[p]);
+  }
+  for (int p = 0; p < count; ++p) {
+    feel_water(packs[p]);
+  }
+  for (int p = 0; p < count; ++p) {
+    BlockPack<Real, T, Law>& pack = packs[p];
+    pack.turned =
+        finish_step(pack.physics.step, pack.noise, pack.ahead.motion, pack.push, pack.body);
+  }
+  for (int p = 0; p < count; ++p) {
+    leave_wall(packs[p]);
+  }
 }
 
 DRIFTWALK_LANES_END
