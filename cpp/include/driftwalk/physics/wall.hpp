@@ -15,6 +15,8 @@
 
 DRIFTWALK_LANES_BEGIN
 
+inline constexpr double root_two = 1.41421356237309515;
+
 template <class Real>
 struct Contact {
   Real rx, ry; // corner from the centre of mass [m]
@@ -215,39 +217,53 @@ inline auto push_inside_circle(const WallView<T>& wall, T h, const Axes<Real>& a
   return outside;
 }
 
-// Returns where a wall touched the block. `pose` and `motion` are those of the body that the block
-// is part of, `per_inertia` its mass / moment of inertia; `axes_of(angle)` gives the block's axes.
+// The corners of a block that can touch a circle, and where the first does.
+template <class Real>
+struct CircleContacts {
+  Contact<Real> first, second;
+  typename Numbers<Real>::Bool touched;
+};
+
+// The second corner is measured later, where the first touches. `axes_of(angle)` gives the block's
+// axes.
 template <class Real, class T, class Lever, class AxesOf>
-inline auto meet_wall(const WallView<T>& wall, T h, Real per_inertia, const Lever& arm,
-                      const AxesOf& axes_of, Pose<Real>& pose, Motion<Real>& motion) ->
+inline void find_circle(const WallView<T>& wall, T h, const Lever& arm, const AxesOf& axes_of,
+                        const Pose<Real>& pose, CircleContacts<Real>& found) {
+  const T inner = max(wall.radius - h * T(root_two), T(0));
+  const Real x = arm_x(pose.x, arm), y = arm_y(pose.y, arm);
+  found.touched = x * x + y * y > Real(inner * inner);
+  if (any(found.touched)) {
+    leading_corners(x, y, h, axes_of(pose.theta), arm, found.first, found.second);
+    measure_circle(found.first, wall.radius, pose.x, pose.y);
+    found.touched = found.first.depth > Real(T(0));
+  }
+}
+
+// Bounces off the circle, where it touches.
+template <class Real, class T>
+inline void leave_circle(const WallView<T>& wall, Real per_inertia, CircleContacts<Real>& found,
+                         Pose<Real>& pose, Motion<Real>& motion) {
+  if (!any(found.touched)) {
+    return;
+  }
+  measure_circle(found.second, wall.radius, pose.x, pose.y);
+  resolve_contacts(found.first, found.second, wall, per_inertia, motion);
+  push_out<Real, T>(found.first, pose);
+  // The first corner's way out leads the second one inwards too.
+  if (any(found.second.depth > Real(T(0)))) {
+    measure_circle(found.second, wall.radius, pose.x, pose.y);
+    push_out<Real, T>(found.second, pose);
+  }
+}
+
+// Returns where an edge of a polygon touched the block.
+template <class Real, class T, class Lever, class AxesOf>
+inline auto meet_edges(const WallView<T>& wall, T h, Real per_inertia, const Lever& arm,
+                       const AxesOf& axes_of, Pose<Real>& pose, Motion<Real>& motion) ->
     typename Numbers<Real>::Bool {
   const Real zero{T(0)};
+  const T reach = h * T(root_two);
   Contact<Real> first, second;
-  const T reach = h * T(1.41421356237309515);
-  if (wall.radius > T(0)) {
-    const T inner = max(wall.radius - reach, T(0));
-    const Real x = arm_x(pose.x, arm), y = arm_y(pose.y, arm);
-    const auto near = x * x + y * y > Real(inner * inner);
-    if (!any(near)) {
-      return near;
-    }
-    const Axes<Real> axes = axes_of(pose.theta);
-    leading_corners(x, y, h, axes, arm, first, second);
-    measure_circle(first, wall.radius, pose.x, pose.y);
-    const auto touched = first.depth > zero;
-    if (!any(touched)) {
-      return touched;
-    }
-    measure_circle(second, wall.radius, pose.x, pose.y);
-    resolve_contacts(first, second, wall, per_inertia, motion);
-    push_out<Real, T>(first, pose);
-    // The first corner's way out leads the second one inwards too.
-    if (any(second.depth > zero)) {
-      measure_circle(second, wall.radius, pose.x, pose.y);
-      push_out<Real, T>(second, pose);
-    }
-    return touched;
-  }
   auto touched = zero > zero;
   for (int e = 0; e < wall.edge_count; ++e) {
     const PreparedEdge<T>& edge = wall.edges[e];
@@ -272,12 +288,26 @@ inline auto meet_wall(const WallView<T>& wall, T h, Real per_inertia, const Leve
   return touched;
 }
 
+// Returns where a wall touched the block. `pose` and `motion` are those of the body that the block
+// is part of, `per_inertia` its mass / moment of inertia; `axes_of(angle)` gives the block's axes.
+template <class Real, class T, class Lever, class AxesOf>
+inline auto meet_wall(const WallView<T>& wall, T h, Real per_inertia, const Lever& arm,
+                      const AxesOf& axes_of, Pose<Real>& pose, Motion<Real>& motion) ->
+    typename Numbers<Real>::Bool {
+  if (wall.radius > T(0)) {
+    CircleContacts<Real> found;
+    find_circle(wall, h, arm, axes_of, pose, found);
+    leave_circle(wall, per_inertia, found, pose, motion);
+    return found.touched;
+  }
+  return meet_edges(wall, h, per_inertia, arm, axes_of, pose, motion);
+}
+
 // The same for a block alone.
 template <class Real, class T>
 inline auto meet_wall(const WallView<T>& wall, T h, Real per_inertia, Pose<Real>& pose,
                       Motion<Real>& motion) -> typename Numbers<Real>::Bool {
-  return meet_wall(
-      wall, h, per_inertia, NoArm{}, [](Real theta) { return axes_at(theta); }, pose, motion);
+  return meet_wall(wall, h, per_inertia, NoArm{}, axes_at<Real>, pose, motion);
 }
 
 DRIFTWALK_LANES_END

@@ -50,13 +50,27 @@ inline void feel_water(BlockPack<Real, T, Law>& pack) {
   push.spin_stiffness = sums.conductance * per_inertia * (turning_share(physics.block) * half);
 }
 
+// Of a tank that is no circle, in one go.
 template <class Real, class T, class Law>
-inline void leave_wall(BlockPack<Real, T, Law>& pack) {
-  const Physics<Real, T, Law>& physics = pack.physics;
-  const auto touched = meet_wall(physics.wall, physics.block.half_side,
-                                 Real(physics.step.per_inertia), pack.body.pose, pack.body.motion);
-  if (any(touched)) {
-    forget_drag(touched, pack.body);
+inline void leave_walls(BlockPack<Real, T, Law>* packs, int count) {
+  const WallView<T>& wall = packs[0].physics.wall;
+  const T h = packs[0].physics.block.half_side;
+  const Real per_inertia{packs[0].physics.step.per_inertia};
+  const bool round = wall.radius > T(0);
+  CircleContacts<Real> found[most_packs];
+  for (int p = 0; p < count && round; ++p) {
+    find_circle(wall, h, NoArm{}, axes_at<Real>, packs[p].body.pose, found[p]);
+  }
+  for (int p = 0; p < count; ++p) {
+    Body<Real>& body = packs[p].body;
+    if (round) {
+      leave_circle(wall, per_inertia, found[p], body.pose, body.motion);
+    } else {
+      found[p].touched = meet_wall(wall, h, per_inertia, body.pose, body.motion);
+    }
+    if (any(found[p].touched)) {
+      forget_drag(found[p].touched, body);
+    }
   }
 }
 
@@ -73,9 +87,7 @@ inline void step_packs(BlockPack<Real, T, Law>* packs, int count) {
     pack.turned =
         finish_step(pack.physics.step, pack.noise, pack.ahead.motion, pack.push, pack.body);
   }
-  for (int p = 0; p < count; ++p) {
-    leave_wall(packs[p]);
-  }
+  leave_walls(packs, count);
 }
 
 DRIFTWALK_LANES_END
