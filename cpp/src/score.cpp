@@ -25,22 +25,21 @@ void bin_steps(const Scoring& scoring, const double* length, const double* angle
   }
 }
 
-// One thread's scratch and what it does with a pack of worlds.
+// One thread's scratch and what it does with the worlds of a call, at most `most`.
 class Scorer {
 public:
   Scorer(const PreparedRun<float>& run, const BatchWorlds& worlds, const Scoring& scoring,
-         const Scores& out)
-      : run_(run), worlds_(worlds), scoring_(scoring), out_(out), kernel_(chosen_kernel()),
+         const Scores& out, const SimulateKernel& kernel, int most)
+      : run_(run), worlds_(worlds), scoring_(scoring), out_(out), kernel_(kernel), most_(most),
         // A whole number of cache lines plus one, so that lanes do not share cache sets.
         stride_((run.view().samples / 16 + 2) * 16),
-        x_(static_cast<std::size_t>(stride_ * kernel_.lanes)), y_(x_.size()),
+        x_(static_cast<std::size_t>(stride_ * most_)), y_(x_.size()),
         blended_(static_cast<std::size_t>(run.blended_flow_size())),
         length_(static_cast<std::size_t>(scoring.plan.pairs)), angle_(length_.size()) {}
 
-  void operator()(std::int64_t pack) {
-    const std::int64_t first = pack * kernel_.lanes;
-    const int count =
-        static_cast<int>(std::min<std::int64_t>(kernel_.lanes, worlds_.count - first));
+  void operator()(std::int64_t task) {
+    const std::int64_t first = task * most_;
+    const int count = static_cast<int>(std::min<std::int64_t>(most_, worlds_.count - first));
     const SampleSink<float> sink{x_.data(), y_.data(), nullptr, stride_, blended_.data()};
     kernel_.run(run_.view(), worlds_, first, count, sink, out_.status + first);
     for (int lane = 0; lane < count; ++lane) {
@@ -91,7 +90,8 @@ private:
   const BatchWorlds& worlds_;
   const Scoring& scoring_;
   const Scores& out_;
-  SimulateKernel kernel_;
+  const SimulateKernel kernel_;
+  const int most_;
   std::int64_t stride_;
   std::vector<float> x_, y_;
   std::vector<std::int16_t> blended_;
@@ -117,9 +117,10 @@ std::vector<KsReference> prepare_rows(const StepTable& table, std::int64_t first
 
 void score_batch(const PreparedRun<float>& run, const BatchWorlds& worlds, const Scoring& scoring,
                  int threads, const Scores& out) {
-  const int lanes = chosen_kernel().lanes;
-  run_tasks((worlds.count + lanes - 1) / lanes, threads,
-            [&] { return Scorer(run, worlds, scoring, out); });
+  const SimulateKernel kernel = chosen_kernel();
+  const int most = worlds_per_call(kernel, worlds.count, threads);
+  run_tasks((worlds.count + most - 1) / most, threads,
+            [&] { return Scorer(run, worlds, scoring, out, kernel, most); });
 }
 
 void ks_matrix(const StepTable& references, const StepTable& samples, int threads, double* out) {

@@ -24,13 +24,12 @@ void simulate_batch(const PreparedRun<float>& run, const BatchWorlds& worlds, in
                     const Trajectories<float>& out) {
   const SimulateKernel kernel = chosen_kernel();
   const std::int64_t samples = run.view().samples;
-  const std::int64_t packs = (worlds.count + kernel.lanes - 1) / kernel.lanes;
-  run_tasks(packs, threads, [&] {
+  const int most = worlds_per_call(kernel, worlds.count, threads);
+  run_tasks((worlds.count + most - 1) / most, threads, [&] {
     return [&, blended = std::vector<std::int16_t>(
-                   static_cast<std::size_t>(run.blended_flow_size()))](std::int64_t pack) mutable {
-      const std::int64_t first = pack * kernel.lanes;
-      const int count =
-          static_cast<int>(std::min<std::int64_t>(kernel.lanes, worlds.count - first));
+                   static_cast<std::size_t>(run.blended_flow_size()))](std::int64_t task) mutable {
+      const std::int64_t first = task * most;
+      const int count = static_cast<int>(std::min<std::int64_t>(most, worlds.count - first));
       const std::int64_t at = first * samples;
       const SampleSink<float> sink{out.x + at, out.y + at,
                                    out.theta == nullptr ? nullptr : out.theta + at, samples,

@@ -15,11 +15,22 @@ constexpr int float_lanes = 8;
 constexpr int float_lanes = 4;
 #endif
 
+using Real = FloatPack<float_lanes>;
+
+// Particles go pack by pack.
+void simulate_particles(const Prepared<float>& run, const BatchWorlds& worlds, std::int64_t first,
+                        int count, const SampleSink<float>& sink, std::uint32_t* status) {
+  for (int done = 0; done < count; done += float_lanes) {
+    const int left = count - done;
+    run_particle_kind<Real>(run, worlds, first + done, left < float_lanes ? left : float_lanes,
+                            sink.at_world(done), status + done);
+  }
+}
+
 void simulate(const Prepared<float>& run, const BatchWorlds& worlds, std::int64_t first, int count,
               const SampleSink<float>& sink, std::uint32_t* status) {
-  using Real = FloatPack<float_lanes>;
   if (worlds.particle.kind != ParticleKind::none) {
-    run_particle_kind<Real>(run, worlds, first, count, sink, status);
+    simulate_particles(run, worlds, first, count, sink, status);
   } else if (!run.drag.is_quadratic) {
     run_worlds<Real, float, MixedDrag<Real>>(run, worlds, first, count, sink, status);
   } else {

@@ -14,6 +14,8 @@
 
 DRIFTWALK_LANES_BEGIN
 
+inline constexpr int most_rows = 4; // that are read at once
+
 // The numbers of cells to be looked up, one per lane, as the scalar loads that follow read them.
 template <int N>
 inline void store_cells(IntPack<N> cell, Int32* at) {
@@ -103,11 +105,10 @@ inline void load_cells(const std::int16_t* table, const Int32* at, IntPack<N>* o
 
 // Keeps the compiler from extracting numbers lane by lane that it has just seen stored: slower.
 template <int Count>
-inline void keep_stored(Int32 (&numbers)[Count]) {
+inline void keep_stored([[maybe_unused]] Int32 (&numbers)[Count]) {
 #if defined(DRIFTWALK_USE_X86)
   __asm__("" : "+m"(numbers));
 #endif
-  static_cast<void>(numbers);
 }
 
 template <int N>
@@ -115,80 +116,72 @@ inline IntPack<N> to_fixed_point(FloatPack<N> spacings) {
   return nearest(spacings * 65536.0f);
 }
 
-// Rows of places are read in pieces of so many: what a piece keeps stays in the first cache.
-inline constexpr int most_rows = 4, most_read_at_once = 8;
-
-// Walks along the strips of a face, `step` apart, and reads the flow at each; positions are in node
-// spacings from node (0, 0). Velocities come out divided by `unit()`.
+// A row of places, `step` apart: the first and the step, in node spacings from node (0, 0).
 template <class Real>
-class FlowCursor;
+struct FlowRow {
+  Real x, y, step_x, step_y;
 
+  FlowRow() = default;
+  FlowRow(Real first_x, Real first_y, Real by_x, Real by_y)
+      : x(first_x), y(first_y), step_x(by_x), step_y(by_y) {}
+
+  // Another one with the opposite step.
+  FlowRow backwards_from(Real first_x, Real first_y) const {
+    return {first_x, first_y, -step_x, -step_y};
+  }
+  void advance() {
+    x += step_x;
+    y += step_y;
+  }
+};
+
+// In fixed point.
 template <int N>
-class FlowCursor<FloatPack<N>> {
-public:
+struct FlowRow<FloatPack<N>> {
   using Real = FloatPack<N>;
   using Int = IntPack<N>;
+  Int x, y, step_x, step_y;
 
-  FlowCursor() = default;
-  FlowCursor(const FlowView<float>& flow, Real x, Real y, Real step_x, Real step_y)
-      : table_(flow.table), row_bits_(16 - flow.stride_bits), row_mask_(-(1 << flow.stride_bits)),
-        x_(to_fixed_point(x)), y_(to_fixed_point(y)), dx_(to_fixed_point(step_x)),
-        dy_(to_fixed_point(step_y)) {
-    // (fraction, fraction) and (1 - fraction, fraction), kept by wrapping 16-bit additions.
-    const Int flip = Int(0xffff);
-    along_x_ = repeat_low_half(x_);
-    along_dx_ = repeat_low_half(dx_);
-    along_y_ = repeat_low_half(y_) ^ flip;
-    along_dy_ = subtract_halves(repeat_low_half(dy_) ^ flip, flip);
+  FlowRow() = default;
+  FlowRow(Real first_x, Real first_y, Real by_x, Real by_y)
+      : x(to_fixed_point(first_x)), y(to_fixed_point(first_y)), step_x(to_fixed_point(by_x)),
+        step_y(to_fixed_point(by_y)) {}
+  FlowRow(Int first_x, Int first_y, Int by_x, Int by_y)
+      : x(first_x), y(first_y), step_x(by_x), step_y(by_y) {}
+
+  FlowRow backwards_from(Real first_x, Real first_y) const {
+    return {to_fixed_point(first_x), to_fixed_point(first_y), Int(0) - step_x, Int(0) - step_y};
   }
-
-  void read(Real& u, Real& v) const {
-    alignas(64) Int32 at[N];
-    store_cells(cell(), at);
-    keep_stored(at);
-    weigh(table_, at, along_x_, along_y_, u, v);
-  }
-
-  // The cells of the next `count` places, N numbers each; goes beyond them.
-  void locate(int count, Int32* at) {
-    // In registers: the compiler cannot know that `at` is not this cursor.
-    Int x = x_, y = y_;
-    const Int dx = dx_, dy = dy_, row_mask = row_mask_;
-    const int row_bits = row_bits_;
-    for (int k = 0; k < count; ++k) {
-      store_cells(((y >> row_bits) & row_mask) | (x >> 16), at + k * N);
-      x += dx;
-      y += dy;
-    }
-    x_ = x;
-    y_ = y;
-  }
-
-  // The flow at `count` places whose cells `locate` has found.
-  void look_up(int count, const Int32* at, Real* u, Real* v) {
-    Int along_x = along_x_, along_y = along_y_;
-    const Int along_dx = along_dx_, along_dy = along_dy_;
-    const std::int16_t* const table = table_;
-    for (int k = 0; k < count; ++k) {
-      weigh(table, at + k * N, along_x, along_y, u[k], v[k]);
-      along_x = add_halves(along_x, along_dx);
-      along_y = add_halves(along_y, along_dy);
-    }
-    along_x_ = along_x;
-    along_y_ = along_y;
-  }
-
   void advance() {
-    x_ += dx_;
-    y_ += dy_;
-    advance_weights();
+    x += step_x;
+    y += step_y;
   }
+  // The number of the cell.
+  Int cell(int stride_bits) const {
+    return ((y >> (16 - stride_bits)) & Int(-(1 << stride_bits))) | (x >> 16);
+  }
+};
 
-private:
-  Int cell() const { return ((y_ >> row_bits_) & row_mask_) | (x_ >> 16); }
+// What the corners of a cell count at a place, and the velocities there in units of the table.
+template <int N>
+struct FlowWeights {
+  using Real = FloatPack<N>;
+  using Int = IntPack<N>;
+  // (fraction, fraction) and (1 - fraction, fraction), kept by wrapping 16-bit additions.
+  Int along_x, along_y, step_x, step_y;
 
-  static void weigh(const std::int16_t* table, const Int32* at, Int along_x, Int along_y, Real& u,
-                    Real& v) {
+  explicit FlowWeights(const FlowRow<Real>& row) {
+    const Int flip = Int(0xffff);
+    along_x = repeat_low_half(row.x);
+    along_y = repeat_low_half(row.y) ^ flip;
+    step_x = repeat_low_half(row.step_x);
+    step_y = subtract_halves(repeat_low_half(row.step_y) ^ flip, flip);
+  }
+  void advance() {
+    along_x = add_halves(along_x, step_x);
+    along_y = add_halves(along_y, step_y);
+  }
+  void weigh(const std::int16_t* table, const Int32* at, Real& u, Real& v) const {
     Int cell[4];
     load_cells(table, at, cell);
     const Int vertical = halve_halves(along_y);
@@ -197,73 +190,101 @@ private:
     u = to_real(u, multiply_add_halves(cell[0], left) + multiply_add_halves(cell[2], right));
     v = to_real(v, multiply_add_halves(cell[1], left) + multiply_add_halves(cell[3], right));
   }
+};
 
-  void advance_weights() {
-    along_x_ = add_halves(along_x_, along_dx_);
-    along_y_ = add_halves(along_y_, along_dy_);
+inline void look_up(const FlowView<double>& flow, double x, double y, double& u, double& v) {
+  const Int32 column = truncate(x), row = truncate(y);
+  const double fx = x - column, fy = y - row;
+  const double* record =
+      flow.table + flow_record * ((std::int64_t(row) << flow.stride_bits) + column);
+  const double* next = record + flow_record;
+  u = (record[0] * (1 - fx) + next[0] * fx) * (1 - fy) +
+      (record[1] * (1 - fx) + next[1] * fx) * fy;
+  v = (record[2] * (1 - fx) + next[2] * fx) * (1 - fy) +
+      (record[3] * (1 - fx) + next[3] * fx) * fy;
+}
+
+// Walks along a row and reads the flow at each place. Velocities come out divided by the table's
+// unit.
+template <class Real>
+class FlowCursor;
+
+template <int N>
+class FlowCursor<FloatPack<N>> {
+public:
+  using Real = FloatPack<N>;
+
+  FlowCursor(const FlowView<float>& flow, Real x, Real y, Real step_x, Real step_y)
+      : flow_(flow), row_(x, y, step_x, step_y), weights_(row_) {}
+
+  void read(Real& u, Real& v) const {
+    alignas(64) Int32 at[N];
+    store_cells(row_.cell(flow_.stride_bits), at);
+    keep_stored(at);
+    weights_.weigh(flow_.table, at, u, v);
+  }
+  void advance() {
+    row_.advance();
+    weights_.advance();
   }
 
-  const std::int16_t* table_;
-  int row_bits_;
-  Int row_mask_;
-  Int x_, y_, dx_, dy_;
-  Int along_x_, along_y_, along_dx_, along_dy_;
+private:
+  const FlowView<float>& flow_;
+  FlowRow<Real> row_;
+  FlowWeights<N> weights_;
 };
 
 template <>
 class FlowCursor<double> {
 public:
-  FlowCursor() = default;
   FlowCursor(const FlowView<double>& flow, double x, double y, double step_x, double step_y)
-      : flow_(&flow), x_(x), y_(y), dx_(step_x), dy_(step_y) {}
+      : flow_(flow), row_(x, y, step_x, step_y) {}
 
-  void read(double& u, double& v) const {
-    const Int32 column = truncate(x_), row = truncate(y_);
-    const double fx = x_ - column, fy = y_ - row;
-    const double* record =
-        flow_->table + flow_record * ((std::int64_t(row) << flow_->stride_bits) + column);
-    const double* next = record + flow_record;
-    u = (record[0] * (1 - fx) + next[0] * fx) * (1 - fy) +
-        (record[1] * (1 - fx) + next[1] * fx) * fy;
-    v = (record[2] * (1 - fx) + next[2] * fx) * (1 - fy) +
-        (record[3] * (1 - fx) + next[3] * fx) * fy;
-  }
-
-  void advance() {
-    x_ += dx_;
-    y_ += dy_;
-  }
+  void read(double& u, double& v) const { look_up(flow_, row_.x, row_.y, u, v); }
+  void advance() { row_.advance(); }
 
 private:
-  const FlowView<double>* flow_;
-  double x_, y_, dx_, dy_;
+  const FlowView<double>& flow_;
+  FlowRow<double> row_;
 };
 
-// The flow at the next `count` places of several rows, at most most_read_at_once; those of row r
-// stand from r * most_read_at_once on.
+// The flow along `rows` rows of `count` places, row after row, in units of the table.
 //
 // Each pass does one thing for all places. Together they would need more registers than there are,
 // and every look-up would wait for its cell's number to come back from memory. Not inlined, because
 // the caller's numbers would take registers that the passes need.
 template <int N>
-[[gnu::noinline]] void read_rows(FlowCursor<FloatPack<N>>* rows, int row_count, int count,
-                                 FloatPack<N>* u, FloatPack<N>* v) {
-  alignas(64) Int32 at[most_rows * most_read_at_once * N];
-  constexpr int stride = most_read_at_once * N;
+[[gnu::noinline]] void read_rows(const FlowView<float>& flow, const FlowRow<FloatPack<N>>* rows,
+                                 int row_count, int count, FloatPack<N>* u, FloatPack<N>* v) {
+  alignas(64) Int32 at[most_rows * most_strips * N];
+  const int stride_bits = flow.stride_bits;
+  Int32* cell = at;
   for (int r = 0; r < row_count; ++r) {
-    rows[r].locate(count, at + r * stride);
+    FlowRow<FloatPack<N>> row = rows[r];
+    for (int k = 0; k < count; ++k, cell += N) {
+      store_cells(row.cell(stride_bits), cell);
+      row.advance();
+    }
   }
   keep_stored(at);
+  const std::int16_t* const table = flow.table;
+  const Int32* found = at;
   for (int r = 0; r < row_count; ++r) {
-    rows[r].look_up(count, at + r * stride, u + r * most_read_at_once, v + r * most_read_at_once);
+    FlowWeights<N> weights(rows[r]);
+    for (int k = 0; k < count; ++k, found += N) {
+      weights.weigh(table, found, *u++, *v++);
+      weights.advance();
+    }
   }
 }
 
-inline void read_rows(FlowCursor<double>* rows, int row_count, int count, double* u, double* v) {
+inline void read_rows(const FlowView<double>& flow, const FlowRow<double>* rows, int row_count,
+                      int count, double* u, double* v) {
   for (int r = 0; r < row_count; ++r) {
+    FlowRow<double> row = rows[r];
     for (int k = 0; k < count; ++k) {
-      rows[r].read(u[r * most_read_at_once + k], v[r * most_read_at_once + k]);
-      rows[r].advance();
+      look_up(flow, row.x, row.y, *u++, *v++);
+      row.advance();
     }
   }
 }

@@ -32,54 +32,51 @@ struct AllFacesOpen {
   }
 };
 
-// A face and its sums over the strips so far.
-template <class Real>
-struct DragFace {
-  Real nx, ny;       // normal n; the tangent t is (-ny, nx)
-  Real closing;      // -n.w of the next strip in still water [m/s]
-  Real past;         // speed of the face along t [m/s]
-  Real push;         // sum of f
-  Real running;      // M
-  Real sum_u, sum_v; // sum of g u, in units of the flow table
-  Real sum_g;
-};
-
-// Adds the next `count` strips of a face, in a flow (u, v) in units of the flow table.
+// The sums over all strips, in a flow (u, v) in units of the flow table, face after face. `closing`
+// is the closing speed of each face's first strip in still water. Not inlined, because the caller's
+// numbers would take registers that the loop needs.
 template <class Real, class T, class Law>
-inline void add_strips(const Law& law, T unit, Real spin_step, int count, const Real* u,
-                       const Real* v, DragFace<Real>& face) {
-  const Real raw_nx = face.nx * unit, raw_ny = face.ny * unit;
-  const Real past = face.past;
-  // In registers: the compiler cannot know that u and v are not this face.
-  Real closing = face.closing, push = face.push, running = face.running;
-  Real sum_u = face.sum_u, sum_v = face.sum_v, sum_g = face.sum_g;
-  for (int k = 0; k < count; ++k) {
-    const Real s = closing - (raw_nx * u[k] + raw_ny * v[k]);
-    Real g;
-    if constexpr (DragLawBySpeed<Law, Real>) {
-      g = law.conductance(s, (raw_nx * v[k] - raw_ny * u[k]) - past);
-      push = push + g * s;
-    } else {
-      g = law.conductance(s);
-      push = push + law.force(s);
-    }
-    running = running + push;
-    sum_u = sum_u + g * u[k];
-    sum_v = sum_v + g * v[k];
-    sum_g = sum_g + g;
-    closing = closing - spin_step;
-  }
-  face = {face.nx, face.ny, closing, past, push, running, sum_u, sum_v, sum_g};
-}
-
-// The same for the four faces; not inlined for the registers, as read_rows.
-template <class Real, class T, class Law>
-[[gnu::noinline]] void add_strips_of_faces(const Law& law, T unit, Real spin_step, int count,
-                                           const Real* u, const Real* v, DragFace<Real>* faces) {
+[[gnu::noinline]] DragSums<Real> sum_strips(const Law& law, const BlockShape<T>& block, T unit,
+                                            const Axes<Real>& axes, const Motion<Real>& motion,
+                                            const Real* closing, const Real* u, const Real* v) {
+  const T h = block.half_side, w = block.strip_width;
+  const int strips = block.strips;
+  const Real zero{T(0)};
+  const Real spin_step = motion.omega * w;
+  DragSums<Real> sums{zero, zero, zero, zero};
+  Real nx = axes.cosine, ny = axes.sine;
   for (int face = 0; face < 4; ++face) {
-    const int first = face * most_read_at_once;
-    add_strips(law, unit, spin_step, count, u + first, v + first, faces[face]);
+    const Real tx = -ny, ty = nx;
+    const Real raw_nx = nx * unit, raw_ny = ny * unit;
+    const Real past = (tx * motion.vx + ty * motion.vy) + motion.omega * h; // along the face
+    Real closes = closing[face];
+    Real push = zero, running = zero, sum_u = zero, sum_v = zero, sum_g = zero;
+    for (int k = 0; k < strips; ++k, ++u, ++v) {
+      const Real s = closes - (raw_nx * *u + raw_ny * *v);
+      Real g;
+      if constexpr (DragLawBySpeed<Law, Real>) {
+        g = law.conductance(s, (tx * unit * *u + ty * unit * *v) - past);
+        push = push + g * s;
+      } else {
+        g = law.conductance(s);
+        push = push + law.force(s);
+      }
+      running = running + push;
+      sum_u = sum_u + g * *u;
+      sum_v = sum_v + g * *v;
+      sum_g = sum_g + g;
+      closes = closes - spin_step;
+    }
+    const Real tangential = (tx * sum_u + ty * sum_v) * unit - past * sum_g;
+    sums.force_x = sums.force_x + (tx * tangential - nx * push);
+    sums.force_y = sums.force_y + (ty * tangential - ny * push);
+    const Real lever = push * (T(0.5) * T(strips + 1)) - running;
+    sums.torque = sums.torque + (tangential * h + lever * w);
+    sums.conductance = sums.conductance + sum_g;
+    nx = tx;
+    ny = ty;
   }
+  return sums;
 }
 
 // The sums at a place on the table, or at its edge: a NaN or a runaway reads no memory beyond it.
@@ -91,46 +88,32 @@ inline DragSums<Real> drag_sums(const Law& law, const BlockShape<T>& block, cons
                                 const Cover& cover = {}) {
   const T h = block.half_side;
   const T w = block.strip_width;
-  const int strips = block.strips;
   const T first_offset = w * T(0.5) - h;
   const Real on_table_x = clamp_to(x, flow.low_x, flow.high_x);
   const Real on_table_y = clamp_to(y, flow.low_y, flow.high_y);
   const Real centre_x = (on_table_x - flow.origin_x) * flow.per_spacing_x;
   const Real centre_y = (on_table_y - flow.origin_y) * flow.per_spacing_y;
-  const Real zero{T(0)};
-  DragFace<Real> faces[4];
-  FlowCursor<Real> rows[4];
+  const Real first_turns = motion.omega * first_offset;
+  FlowRow<Real> rows[4];
+  Real closing[4];
   Real nx = axes.cosine, ny = axes.sine;
-  for (int face = 0; face < 4; ++face) {
+  // Two neighbouring faces; those opposite are their mirror images.
+  for (int face = 0; face < 2; ++face) {
     const Real tx = -ny, ty = nx;
-    rows[face] =
-        FlowCursor<Real>(flow, centre_x + (nx * h + tx * first_offset) * flow.per_spacing_x,
-                         centre_y + (ny * h + ty * first_offset) * flow.per_spacing_y,
-                         tx * (w * flow.per_spacing_x), ty * (w * flow.per_spacing_y));
-    const Real closing = (nx * motion.vx + ny * motion.vy) - motion.omega * first_offset;
-    const Real past = (tx * motion.vx + ty * motion.vy) + motion.omega * h;
-    faces[face] = {nx, ny, cover(face, closing), past, zero, zero, zero, zero, zero};
+    const Real out_x = (nx * h + tx * first_offset) * flow.per_spacing_x;
+    const Real out_y = (ny * h + ty * first_offset) * flow.per_spacing_y;
+    rows[face] = FlowRow<Real>(centre_x + out_x, centre_y + out_y, tx * (w * flow.per_spacing_x),
+                               ty * (w * flow.per_spacing_y));
+    rows[face + 2] = rows[face].backwards_from(centre_x - out_x, centre_y - out_y);
+    const Real ahead = nx * motion.vx + ny * motion.vy;
+    closing[face] = cover(face, ahead - first_turns);
+    closing[face + 2] = cover(face + 2, -ahead - first_turns);
     nx = tx;
     ny = ty;
   }
-  for (int first = 0; first < strips; first += most_read_at_once) {
-    const int left = strips - first;
-    const int count = left < most_read_at_once ? left : most_read_at_once;
-    Real u[4 * most_read_at_once], v[4 * most_read_at_once];
-    read_rows(rows, 4, count, u, v);
-    add_strips_of_faces(law, flow.unit, motion.omega * w, count, u, v, faces);
-  }
-  DragSums<Real> sums{zero, zero, zero, zero};
-  for (const DragFace<Real>& face : faces) {
-    const Real tx = -face.ny, ty = face.nx;
-    const Real tangential = (tx * face.sum_u + ty * face.sum_v) * flow.unit - face.past * face.sum_g;
-    sums.force_x = sums.force_x + (tx * tangential - face.nx * face.push);
-    sums.force_y = sums.force_y + (ty * tangential - face.ny * face.push);
-    const Real lever = face.push * (T(0.5) * T(strips + 1)) - face.running;
-    sums.torque = sums.torque + (tangential * h + lever * w);
-    sums.conductance = sums.conductance + face.sum_g;
-  }
-  return sums;
+  Real u[4 * most_strips], v[4 * most_strips];
+  read_rows(flow, rows, 4, block.strips, u, v);
+  return sum_strips(law, block, flow.unit, axes, motion, closing, u, v);
 }
 
 DRIFTWALK_LANES_END

@@ -63,24 +63,58 @@ inline Response<Real> response(const Contact<Real>& c, Real per_inertia) {
 template <class Real, class T>
 inline void apply_friction(const Contact<Real>& c, const Response<Real>& r, Real push, T friction,
                            Real per_inertia, Motion<Real>& m) {
+  if (friction == T(0)) {
+    return;
+  }
   const Real sliding = (m.vy + m.omega * c.rx) * c.nx - (m.vx - m.omega * c.ry) * c.ny;
   const Real stop = -sliding * r.tangent;
   const Real limit = push * friction;
   apply_impulse(c, Real(T(0)), max(min(stop, limit), -limit), per_inertia, m);
 }
 
+// The change of the closing speed that a bounce asks for: none where the corner does not hit.
+template <class Real, class T>
+inline Real bounce_of(const Contact<Real>& c, const WallView<T>& wall, const Motion<Real>& m) {
+  const Real zero{T(0)}, one{T(1)};
+  const Real speed = closing_speed(c, m);
+  const auto hit = (c.depth > zero) & (speed > zero);
+  const Real restitution = select(speed > Real(wall.bounce_speed), Real(wall.restitution), zero);
+  return select(hit, speed * (one + restitution), zero);
+}
+
+// What the first pass left closing is stopped, without restitution.
+template <class Real, class T>
+inline void stop_closing(const Contact<Real>& c, const Response<Real>& r, const WallView<T>& wall,
+                         Real per_inertia, Motion<Real>& m) {
+  const Real zero{T(0)};
+  const Real left = select(c.depth > zero, max(closing_speed(c, m), zero), zero);
+  if (any(left > zero)) {
+    const Real push = left * r.normal;
+    apply_impulse(c, push, zero, per_inertia, m);
+    apply_friction(c, r, push, wall.friction, per_inertia, m);
+  }
+}
+
+template <class Real, class T>
+inline void resolve_contact(const Contact<Real>& c, const WallView<T>& wall, Real per_inertia,
+                            Motion<Real>& m) {
+  const Response<Real> r = response(c, per_inertia);
+  const Real push = bounce_of(c, wall, m) * r.normal;
+  apply_impulse(c, push, Real(T(0)), per_inertia, m);
+  apply_friction(c, r, push, wall.friction, per_inertia, m);
+  stop_closing(c, r, wall, per_inertia, m);
+}
+
+// With one corner only it is what resolve_contact does, bit for bit.
 template <class Real, class T>
 inline void resolve_contacts(const Contact<Real>& a, const Contact<Real>& b,
                              const WallView<T>& wall, Real per_inertia, Motion<Real>& m) {
   const Real zero{T(0)}, one{T(1)};
-  const Real speed_a = closing_speed(a, m), speed_b = closing_speed(b, m);
-  const auto hit_a = (a.depth > zero) & (speed_a > zero);
-  const auto hit_b = (b.depth > zero) & (speed_b > zero);
-  const Real bounce{wall.bounce_speed}, restitution{wall.restitution};
-  const Real want_a =
-      select(hit_a, speed_a * (one + select(speed_a > bounce, restitution, zero)), zero);
-  const Real want_b =
-      select(hit_b, speed_b * (one + select(speed_b > bounce, restitution, zero)), zero);
+  if (!any(b.depth > zero)) {
+    resolve_contact(a, wall, per_inertia, m);
+    return;
+  }
+  const Real want_a = bounce_of(a, wall, m), want_b = bounce_of(b, wall, m);
   const Real lever_a = normal_lever(a), lever_b = normal_lever(b);
   const Real aa = one + lever_a * lever_a * per_inertia;
   const Real bb = one + lever_b * lever_b * per_inertia;
@@ -90,7 +124,7 @@ inline void resolve_contacts(const Contact<Real>& a, const Contact<Real>& b,
   const Real joint_b = (aa * want_b - ab * want_a) * scale;
   const Response<Real> response_a = response(a, per_inertia);
   const Response<Real> response_b = response(b, per_inertia);
-  const auto joint = hit_a & hit_b & (joint_a > zero) & (joint_b > zero);
+  const auto joint = (want_a > zero) & (want_b > zero) & (joint_a > zero) & (joint_b > zero);
   // With one corner only, or where both together would pull: the faster corner alone.
   const auto a_alone = want_a * bb >= want_b * aa;
   const Real push_a = select(joint, joint_a, select(a_alone, want_a * response_a.normal, zero));
@@ -99,18 +133,8 @@ inline void resolve_contacts(const Contact<Real>& a, const Contact<Real>& b,
   apply_impulse(b, push_b, zero, per_inertia, m);
   apply_friction(a, response_a, push_a, wall.friction, per_inertia, m);
   apply_friction(b, response_b, push_b, wall.friction, per_inertia, m);
-  // What the first pass left closing is stopped, without restitution.
-  for (int corner = 0; corner < 2; ++corner) {
-    const Contact<Real>& c = corner == 0 ? a : b;
-    const Response<Real>& r = corner == 0 ? response_a : response_b;
-    const Real left = select(c.depth > zero, max(closing_speed(c, m), zero), zero);
-    if (!any(left > zero)) {
-      continue;
-    }
-    const Real push = left * r.normal;
-    apply_impulse(c, push, zero, per_inertia, m);
-    apply_friction(c, r, push, wall.friction, per_inertia, m);
-  }
+  stop_closing(a, response_a, wall, per_inertia, m);
+  stop_closing(b, response_b, wall, per_inertia, m);
 }
 
 // A block's centre from the centre of mass of the body that it is part of [m].
