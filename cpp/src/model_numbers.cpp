@@ -3,6 +3,7 @@
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
+#include <string>
 
 namespace driftwalk {
 
@@ -17,11 +18,13 @@ bool lies_in(Range range, double value) {
     return std::isfinite(value) && value > 0;
   case Range::share:
     return value >= 0 && value <= 1;
+  case Range::strip_count:
+    return value >= 1 && value <= most_strips;
   }
   return false;
 }
 
-const char* words_of(Range range) {
+std::string words_of(Range range) {
   switch (range) {
   case Range::any:
     return "finite";
@@ -31,6 +34,8 @@ const char* words_of(Range range) {
     return "finite and positive";
   case Range::share:
     return "from 0 to 1";
+  case Range::strip_count:
+    return "from 1 to " + std::to_string(most_strips);
   }
   return "";
 }

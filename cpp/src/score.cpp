@@ -32,9 +32,8 @@ public:
          const Scores& out, const SimulateKernel& kernel, int most)
       : run_(run), worlds_(worlds), scoring_(scoring), out_(out), kernel_(kernel), most_(most),
         // A whole number of cache lines plus one, so that lanes do not share cache sets.
-        stride_((run.view().samples / 16 + 2) * 16),
-        x_(static_cast<std::size_t>(stride_ * most_)), y_(x_.size()),
-        blended_(static_cast<std::size_t>(run.blended_flow_size())),
+        stride_((run.view().samples / 16 + 2) * 16), x_(static_cast<std::size_t>(stride_ * most_)),
+        y_(x_.size()), blended_(static_cast<std::size_t>(run.blended_flow_size())),
         length_(static_cast<std::size_t>(scoring.plan.pairs)), angle_(length_.size()) {}
 
   void operator()(std::int64_t task) {

@@ -83,6 +83,8 @@ def test_no_number_may_be_something_else(name: str):
         ({"force_memory": -0.01}, r"force_memory \[s\] must be finite and not negative"),
         ({"strips": 0}, r"strips \[1\] must be finite and positive, not 0"),
         ({"friction": -0.1}, r"friction \[1\] must be finite and not negative, not -0.1"),
+        ({"strips": 0}, r"strips \[1\] must be from 1 to 64, not 0"),
+        ({"strips": 65}, r"strips \[1\] must be from 1 to 64, not 65"),
         ({"restitution": 1.01}, r"restitution \[1\] must be from 0 to 1, not 1.01"),
         ({"edges": np.zeros((4, 2))}, "edges and view_edges must have shape"),
         ({"u": np.zeros((2, 3, 3))}, "u and v must have the same shape"),

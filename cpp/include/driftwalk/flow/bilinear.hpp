@@ -198,10 +198,8 @@ inline void look_up(const FlowView<double>& flow, double x, double y, double& u,
   const double* record =
       flow.table + flow_record * ((std::int64_t(row) << flow.stride_bits) + column);
   const double* next = record + flow_record;
-  u = (record[0] * (1 - fx) + next[0] * fx) * (1 - fy) +
-      (record[1] * (1 - fx) + next[1] * fx) * fy;
-  v = (record[2] * (1 - fx) + next[2] * fx) * (1 - fy) +
-      (record[3] * (1 - fx) + next[3] * fx) * fy;
+  u = (record[0] * (1 - fx) + next[0] * fx) * (1 - fy) + (record[1] * (1 - fx) + next[1] * fx) * fy;
+  v = (record[2] * (1 - fx) + next[2] * fx) * (1 - fy) + (record[3] * (1 - fx) + next[3] * fx) * fy;
 }
 
 // Walks along a row and reads the flow at each place. Velocities come out divided by the table's

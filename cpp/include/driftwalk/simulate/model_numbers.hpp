@@ -5,8 +5,11 @@
 
 namespace driftwalk {
 
+// The kernels keep the flow at every strip of a block on the stack.
+inline constexpr int most_strips = 64; // on a face
+
 // What a number may be; no number may be a NaN or infinite.
-enum class Range { any, not_negative, positive, share };
+enum class Range { any, not_negative, positive, share, strip_count };
 
 // NUMBER(type, name, unit, range). A radius of 0 says that the outline is a polygon, or for the
 // view that there is none.
@@ -16,7 +19,7 @@ enum class Range { any, not_negative, positive, share };
   NUMBER(double, mass, "kg", positive)                                                             \
   NUMBER(double, inertia, "kg m^2", positive)                                                      \
   NUMBER(double, depth, "m", positive)                /* of the wetted sides */                    \
-  NUMBER(int, strips, "1", positive)                  /* a side */                                 \
+  NUMBER(int, strips, "1", strip_count)               /* a side */                                 \
   NUMBER(double, added_mass_share, "1", not_negative) /* of the mass, and of the inertia */        \
   /* water */                                                                                      \
   NUMBER(double, water_density, "kg/m^3", positive)                                                \

@@ -15,8 +15,6 @@ struct PreparedEdge {
   T distance;           // of the edge from the origin along the normal [m]
 };
 
-inline constexpr int most_strips = 64; // on a face
-
 template <class T>
 struct BlockShape {
   T half_side;   // h = a/2 [m]

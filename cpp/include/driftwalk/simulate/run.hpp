@@ -94,6 +94,15 @@ inline bool is_seen(const Prepared<T>& run, T x, T y) {
   return true;
 }
 
+template <class T>
+inline void write_missing(const SampleSink<T>& sink, std::int64_t at) {
+  const T missing = static_cast<T>(__builtin_nan(""));
+  sink.x[at] = sink.y[at] = missing;
+  if (sink.theta != nullptr) {
+    sink.theta[at] = missing;
+  }
+}
+
 // The pose as the camera reports it, written to every lane's own column.
 template <class Real, class T>
 inline void write_sample(const Prepared<T>& run, const SampleSink<T>& sink, std::int64_t sample,
@@ -113,15 +122,16 @@ inline void write_sample(const Prepared<T>& run, const SampleSink<T>& sink, std:
     y = quantise(y, run.position_quantum);
   }
   theta = wrap_angle(theta);
+  const bool sees_all = run.view_radius <= T(0) && run.view_edge_count == 0;
   for (int lane = 0; lane < count; ++lane) {
     const std::int64_t at = lane * sink.lane_stride + sample;
-    const T sample_x = lane_of(x, lane), sample_y = lane_of(y, lane);
-    const bool seen = is_seen(run, sample_x, sample_y);
-    const T missing = static_cast<T>(__builtin_nan(""));
-    sink.x[at] = seen ? sample_x : missing;
-    sink.y[at] = seen ? sample_y : missing;
+    sink.x[at] = lane_of(x, lane);
+    sink.y[at] = lane_of(y, lane);
     if (sink.theta != nullptr) {
-      sink.theta[at] = seen ? lane_of(theta, lane) : missing;
+      sink.theta[at] = lane_of(theta, lane);
+    }
+    if (!sees_all && !is_seen(run, sink.x[at], sink.y[at])) {
+      write_missing(sink, at);
     }
   }
 }
