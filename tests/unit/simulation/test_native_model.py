@@ -81,7 +81,6 @@ def test_no_number_may_be_something_else(name: str):
         ({"linear_drag": -1e-9}, r"linear_drag \[kg/s\] must be finite and not negative"),
         ({"displaced_mass": -0.01}, r"displaced_mass \[kg\] must be finite and not negative"),
         ({"force_memory": -0.01}, r"force_memory \[s\] must be finite and not negative"),
-        ({"strips": 0}, r"strips \[1\] must be finite and positive, not 0"),
         ({"friction": -0.1}, r"friction \[1\] must be finite and not negative, not -0.1"),
         ({"strips": 0}, r"strips \[1\] must be from 1 to 64, not 0"),
         ({"strips": 65}, r"strips \[1\] must be from 1 to 64, not 65"),
