@@ -36,7 +36,7 @@ from driftwalk import _core
 Floats = npt.NDArray[np.float64]
 
 INSTRUCTION_SET = "DRIFTWALK_INSTRUCTION_SET"
-TARGETS = {"avx512": 25e6, "avx2": 18e6, "baseline": 9e6}
+TARGETS = {"avx512": 35e6, "avx2": 26e6, "baseline": 14e6}
 TWIN_WORLDS = 16
 SECOND = round(1 / STEP_S)  # in steps
 # A path is some 3 cm in 1 s; rounding moves a block by a fraction of a micrometre, and a bounce
