@@ -21,7 +21,8 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "model": GROUND,
     "comparison": GROUND,
     "sweep": GROUND,
-    "cluster": GROUND | {"sweep"},
+    # `simulation`, with what it takes, for the probe: the same bits on every worker.
+    "cluster": GROUND | {"sweep", "simulation", "model", "flow"},
     "simulation": GROUND | {"model"},
     # `record` for the tracking noise of a recording, which is what "estimate" stands for.
     "conditions": GROUND | {"record", "model", "flow", "simulation"},

@@ -220,7 +220,7 @@ def test_a_running_analysis_shows_the_settings_that_are_there(
         store = opened.store("map")
         reference = dw.sensitivity_reference(study, flow, store=opened.store("reference"))
         monkeypatch.setattr(
-            "driftwalk.assembly.sensitivity.settings.BLOCK_STEPS_PER_UNIT", 40 * 3 * 6000 * 4
+            "driftwalk.assembly.sensitivity.settings.settings_per_unit", lambda *_: 4
         )
         with pytest.raises(KeyboardInterrupt):
             dw.sensitivity_map(study, flow, reference=reference, store=store, progress=stop_at(8))

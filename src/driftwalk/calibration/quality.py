@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from typing import NamedTuple
 
 import numpy as np
@@ -70,7 +71,9 @@ class Halves(NamedTuple):
     """Noise floor of recordings as long as the second half."""
 
 
-def validate_on_halves(first: Problem, second: Problem) -> Halves:
+def validate_on_halves(
+    first: Problem, second: Problem, *, executor: Executor | None = None
+) -> Halves:
     """Calibrate on the first half of a recording and measure the distance on the second.
 
     The search is the usual one with a single replicate per setting, then two on a refined grid
@@ -80,16 +83,21 @@ def validate_on_halves(first: Problem, second: Problem) -> Halves:
     ----------
     first, second : Problem
         The halves; `second` has the flow of `first`.
+    executor : concurrent.futures.Executor, optional
+        Computes the maps' work units elsewhere, with one thread each.
     """
     coarse = run_map(
         first,
         [parameter.coordinates for parameter in first.parameters],
         stage="first_half",
         replicates=1,
+        executor=executor,
     )
     doubled = [2 * step for step in first.refined_steps]
     window = refined_window(coarse, doubled, 0.0)
-    optimum = refine(first, window, doubled, stage="first_half_refined", replicates=2)[1]
+    optimum = refine(
+        first, window, doubled, stage="first_half_refined", replicates=2, executor=executor
+    )[1]
     recordings, distances = recordings_at(
         second, optimum, stage="second_half", count=VALIDATION_REPLICATES
     )
@@ -99,8 +107,14 @@ def validate_on_halves(first: Problem, second: Problem) -> Halves:
 
 
 def refine(
-    problem: Problem, window: Axes, steps: Sequence[float], *, stage: str, replicates: int
+    problem: Problem,
+    window: Axes,
+    steps: Sequence[float],
+    *,
+    stage: str,
+    replicates: int,
+    executor: Executor | None = None,
 ) -> tuple[Map, Optimum]:
     """Run a refined grid and return it with the optimum of its smooth surface."""
-    found = run_map(problem, window, stage=stage, replicates=replicates)
+    found = run_map(problem, window, stage=stage, replicates=replicates, executor=executor)
     return found, window_smoother(window, steps).optimum(found.mean)

@@ -17,8 +17,9 @@ raised by their ratio, as a reduced chi-square above one widens the errors of a 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -169,6 +170,7 @@ def run_bootstrap(
     *,
     count: int,
     store: Store | None = None,
+    executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Bootstrap:
     """Simulate recordings at the optimum and estimate each again.
@@ -185,24 +187,17 @@ def run_bootstrap(
         Number of recordings, at least 2.
     store : Store, optional
         Where finished work units are kept.
+    executor : concurrent.futures.Executor, optional
+        Computes the work units elsewhere, with one thread each.
     progress : callable, optional
         Called with the number of finished recordings and the total.
     """
     recordings, to_recording = recordings_at(problem, optimum, stage="bootstrap", count=count)
-    names = [parameter.name for parameter in problem.parameters]
-
-    def compute(unit: WorkUnit) -> dict[str, npt.NDArray[Any]]:
-        rows = recordings.rows(slice(unit.start, unit.stop))
-        distances = surface.distances(rows, unit.start // RECORDINGS_PER_UNIT)
-        estimates = [surface.smoother.optimum(row).point for row in distances]
-        columns = np.array(estimates).reshape(-1, len(names)).T
-        return {
-            **dict(zip(names, columns, strict=True)),
-            "excess": np.array([_excess(surface.smoother, row, optimum) for row in distances]),
-        }
-
+    names = tuple(parameter.name for parameter in problem.parameters)
+    alone = surface if executor is None else replace(surface, threads=1)
+    function = _Estimates(recordings, alone, optimum, names)
     units = grid(recording=np.arange(count)).units(RECORDINGS_PER_UNIT)
-    estimates = run_sweep(compute, units, store=store, progress=progress)
+    estimates = run_sweep(function, units, store=store, executor=executor, progress=progress)
     few = min(FLOOR_REFERENCES, count // 2)
     among = problem.statistic.matrix(
         recordings.rows(slice(0, few)),
@@ -215,6 +210,29 @@ def run_bootstrap(
         to_recording,
         among,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Estimates:
+    """The function of the sweep: recordings of a unit, estimated wherever it is sent."""
+
+    recordings: StepTable
+    surface: StoredSurface
+    optimum: Optimum
+    names: tuple[str, ...]
+    linear_algebra: ClassVar[bool] = True
+    """Its results depend on numpy and scipy."""
+
+    def __call__(self, unit: WorkUnit) -> dict[str, npt.NDArray[Any]]:
+        smoother = self.surface.smoother
+        rows = self.recordings.rows(slice(unit.start, unit.stop))
+        distances = self.surface.distances(rows, unit.start // RECORDINGS_PER_UNIT)
+        estimates = [smoother.optimum(row).point for row in distances]
+        columns = np.array(estimates).reshape(-1, len(self.names)).T
+        return {
+            **dict(zip(self.names, columns, strict=True)),
+            "excess": np.array([_excess(smoother, row, self.optimum) for row in distances]),
+        }
 
 
 def _excess(smoother: Smoother, distance: Floats, truth: Optimum) -> tuple[float, ...]:

@@ -106,9 +106,8 @@ def calibrate(
     threads : int, optional
         Default: all processors. The result does not depend on it.
     executor : concurrent.futures.Executor, optional
-        Computes the maps' work units elsewhere, with one thread each; see
-        `driftwalk.sweep.run_sweep`. The other stages run here. For one or two parameters. The
-        result does not depend on it.
+        Computes the work units of maps, bootstrap and summaries elsewhere, with one thread each;
+        see `driftwalk.sweep.run_sweep`. The rest runs here. The result does not depend on it.
     stores : callable, optional
         Where each stage keeps finished work (`driftwalk.core.rundir`); memory when left out.
     tell : callable, optional
@@ -143,11 +142,6 @@ def calibrate(
     """
     chosen, searched = _study_and_model(model, study, recording)
     if len(searched.parameters) > MOST_PARAMETERS:
-        if executor is not None:
-            raise ConfigurationError(
-                f"an executor is for one or two parameters; {searched.name} has "
-                f"{len(searched.parameters)}, which are searched on this machine"
-            )
         if statistic is not None:
             raise ConfigurationError(
                 f"a statistic of its own is for one or two parameters; {searched.name} has "
@@ -160,6 +154,7 @@ def calibrate(
             flow=flow,
             body=body,
             threads=threads,
+            executor=executor,
             stores=stores if stores is not None else _in_memory,
             tell=tell if tell is not None else _silent,
         )
@@ -184,7 +179,7 @@ def calibrate(
     steadiness = steadiness_of(problem)
     of_time = None if steadiness is None else steadiness.warning
     result.warnings += [text for text in (of_wall, of_time) if text is not None]
-    halves = _halves(track, problem, flow_of, say)
+    halves = _halves(track, problem, flow_of, executor, say)
     return _finish(result, halves, steadiness, recording, problem)
 
 
@@ -333,6 +328,7 @@ class _Calibration:
             surface,
             count=count,
             store=self._keep(f"bootstrap-{_window_id(self.window)}", fingerprint),
+            executor=self._executor,
             progress=lambda done, total: self._say("bootstrap", done, total),
         )
         self.quality = quality_of_fit(self.bootstrap)
@@ -386,7 +382,9 @@ def _window_id(window: Axes) -> str:
     return "x".join(ends).replace(".", "p").replace("+", "")
 
 
-def _halves(track: Track, problem: Problem, flow_of: FlowSource, say: Tell) -> Halves | None:
+def _halves(
+    track: Track, problem: Problem, flow_of: FlowSource, executor: Executor | None, say: Tell
+) -> Halves | None:
     """Calibrate on the first half, judge on the second; None where a half is too short."""
     if problem.study.calibration.refine == "none":
         return None
@@ -410,7 +408,7 @@ def _halves(track: Track, problem: Problem, flow_of: FlowSource, say: Tell) -> H
         )
     except InputError:
         return None
-    halves = validate_on_halves(first, second)
+    halves = validate_on_halves(first, second, executor=executor)
     say("validation", 1, 1)
     return halves
 

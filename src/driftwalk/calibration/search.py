@@ -15,12 +15,10 @@ from driftwalk.calibration.problem import Axes, Floats, Problem, score_settings
 from driftwalk.calibration.surface import Optimum, Smoother, make_smoother
 from driftwalk.motion import Details
 from driftwalk.motion.score import broken_worlds
-from driftwalk.sweep import Design, Store, WorkUnit, grid, run_sweep
+from driftwalk.sweep import Design, Store, WorkUnit, grid, run_sweep, settings_per_unit
 
 Progress = Callable[[int, int], None]
 
-SETTINGS_PER_UNIT = 64
-"""Settings of a work unit: about a second's work, so that a kill or Ctrl-C loses no more."""
 WINDOW_STEPS = 10
 """Refined steps on each side of the coarse minimum, at least."""
 MOST_REFINED_WORLDS = 7056
@@ -98,7 +96,7 @@ def run_map(
     names = [parameter.name for parameter in problem.parameters]
     design: Design = grid(**dict(zip(names, axes, strict=True)))
     function = _Settings(_for_units(problem, executor), stage, replicates, details)
-    units = design.units(SETTINGS_PER_UNIT)
+    units = design.units(settings_per_unit(design.size, replicates * _time_steps(problem)))
     arrays = design.unstack(
         run_sweep(function, units, store=store, executor=executor, progress=progress)
     )
@@ -125,6 +123,11 @@ class _Settings:
             details=self.details,
         )
         return _by_setting(worlds, self.replicates)
+
+
+def _time_steps(problem: Problem) -> float:
+    """Return the time steps of a world as long as the recording."""
+    return problem.duration / problem.study.time_step_s
 
 
 def _for_units(problem: Problem, executor: Executor | None) -> Problem:

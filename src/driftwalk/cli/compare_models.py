@@ -7,12 +7,12 @@ from typing import Annotated
 import typer
 
 from driftwalk.cli.inputs.study_recording import read_with_flow, tank_note
+from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.models_answer import print_answer, summary
 from driftwalk.cli.terminal.output import print_json
-from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.study_keys import CALIBRATION_KEYS
 
 
@@ -40,6 +40,8 @@ def compare_models(
     ] = None,
     flow: FlowFile = None,
     threads: Threads = None,
+    cluster: ClusterAt = None,
+    cluster_options: ClusterOptions = None,
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
@@ -62,7 +64,7 @@ def compare_models(
     work = ModelComparisonWork(
         read.trajectories[0], chosen, read.study, field, how.body, inputs, threads
     )
-    with reported("compare models") as told:
+    with Workers(cluster, cluster_options).reported("compare models") as told:
         found = run_model_comparison(work, out, overwrite=overwrite, begun=tank_note(read), **told)
     if json:
         print_json(summary(found))

@@ -5,20 +5,21 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from importlib import import_module
 from typing import Any, Final
 
 from driftwalk.cluster.address import ClusterAddress
 from driftwalk.cluster.jobs import begin_jobs
+from driftwalk.cluster.probe import SameBits
 from driftwalk.cluster.versions import refuse_other_workers
 from driftwalk.core.errors import ClusterError, InputError
+from driftwalk.sweep import WorkerExecutor
 
 ANSWER_S: Final = 10.0
 """How long a scheduler may take to answer [s]."""
-LOOK_S: Final = 1.0
-"""How often workers are counted [s]."""
+EVENTS: Final = "all"
+"""What the scheduler tells of its workers."""
 REMARK_S: Final = 10.0
 """How often it is said that no worker has come yet [s]."""
 
@@ -30,46 +31,66 @@ class Cluster:
 
     Attributes
     ----------
-    executor : concurrent.futures.Executor
+    executor : WorkerExecutor
         Runs the units of a sweep on them.
     dashboard : str
         Address of the page that shows what they do.
     """
 
-    def __init__(self, client: Any, address: ClusterAddress) -> None:
-        self.executor: Executor = client.get_executor(pure=False)
+    def __init__(self, client: Any, guard: SameBits) -> None:
+        self.executor = WorkerExecutor(client, guard)
         self.dashboard = str(client.dashboard_link)
-        self._client, self._address = client, address
-        self._lost = 0
-        self._counted = (-float("inf"), 0)
-        client.subscribe_topic("all", self._heard)
+        self._lost = self._ended = 0
+        self._client = client
+        client.subscribe_topic(EVENTS, self._heard)
 
     @property
     def workers(self) -> int:
         """How many there are now; counted at most once a second."""
-        when, count = self._counted
-        if time.monotonic() - when > LOOK_S:
-            count = len(self._client.scheduler_info(n_workers=-1)["workers"])
-            self._counted = (time.monotonic(), count)
-        return count
+        return self.executor.workers
 
     @property
     def words(self) -> str:
-        """Their number, for a line of progress."""
-        return f"{self.workers} worker{'' if self.workers == 1 else 's'}"
+        """The units of the present stage and the workers, for a line of progress."""
+        units = self.executor.units
+        now = _number(self.workers, "worker")
+        return f"{units.done} of {_number(units.total, 'unit')}, {now}" if units.total else now
 
     def report(self) -> str:
         """Return what happened to the workers, in a sentence; nothing where all went well."""
-        if not self._lost:
-            return ""
-        lost = "1 worker was" if self._lost == 1 else f"{self._lost} workers were"
-        return f"{lost} lost; the units there were computed again, and the result is the same"
+        again = self.executor.units.again
+        said = []
+        if self._lost:
+            said.append(
+                f"{_number(self._lost, 'worker')} {_was(self._lost)} lost; the units there were "
+                "computed again"
+            )
+        if self._ended:
+            said.append(
+                f"{_number(self._ended, 'worker')} ended before the run did, such as jobs whose "
+                "time was over; the units there were computed again"
+            )
+        if again:
+            said.append(
+                f"{_number(again, 'unit')} took long and {_was(again)} computed by a second "
+                "worker, too"
+            )
+        return "; ".join([*said, "the result is the same"]) if said else ""
+
+    def let_go(self) -> None:
+        """Hear no more of the workers: a scheduler that ends has nobody to tell, and complains."""
+        # Where it is gone already nothing is to be said.
+        with suppress(Exception):
+            self._client.unsubscribe_topic(EVENTS)
 
     def _heard(self, event: tuple[float, Any]) -> None:
-        """Note a worker that went without being asked to."""
+        """Note a worker that went."""
         what = event[1]
-        if what.get("action") == "remove-worker" and not what.get("expected"):
-            self._lost += 1
+        if what.get("action") == "remove-worker":
+            if what.get("expected"):
+                self._ended += 1
+            else:
+                self._lost += 1
 
 
 @contextmanager
@@ -88,8 +109,8 @@ def connect(address: ClusterAddress, *, say: Say | None = None) -> Iterator[Clus
     InputError
         When the extra ``driftwalk[cluster]`` is not installed.
     ClusterError
-        When no scheduler answers, jobs cannot be submitted, or workers have another version of
-        driftwalk.
+        When no scheduler answers, jobs cannot be submitted, or a worker has another version of
+        driftwalk or gives other bits.
 
     Examples
     --------
@@ -104,9 +125,9 @@ def connect(address: ClusterAddress, *, say: Say | None = None) -> Iterator[Clus
         stack.enter_context(_quiet())
         client = stack.enter_context(_client(address, stack))
         _await_workers(client, address, say)
-        refuse_other_workers(client)
-        cluster = Cluster(client, address)
+        cluster = Cluster(client, refuse_other_workers(client))
         say(f"{cluster.words} at {address.words}, dashboard {cluster.dashboard}")
+        stack.callback(cluster.let_go)
         yield cluster
 
 
@@ -168,6 +189,14 @@ def _quiet() -> Iterator[None]:
     finally:
         for one, level in zip(loggers, before, strict=True):
             one.setLevel(level)
+
+
+def _number(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+def _was(count: int) -> str:
+    return "was" if count == 1 else "were"
 
 
 def _reason(error: BaseException) -> str:

@@ -12,6 +12,8 @@ from driftwalk.core.errors import ClusterError, ConfigurationError, InputError
 MEMORY: Final = "2GB"
 LIFETIME: Final = "-" * 2 + "lifetime"
 """The worker's own option for the time after which it ends by itself."""
+OAR_MEMORY: Final = "memory_per_core_property_name"
+"""Under which name a site of OAR counts memory."""
 EARLY: Final = 0.05
 """A worker ends by itself before its walltime is over, by this part of it,"""
 EARLY_S: Final = 60
@@ -33,13 +35,7 @@ def begin_jobs(address: ClusterAddress) -> Any:
     ClusterError
         When a job cannot be submitted.
     """
-    try:
-        import dask_jobqueue
-    except ImportError as error:
-        raise InputError(
-            "jobs need dask-jobqueue, which is not installed: pip install 'driftwalk[cluster]'"
-        ) from error
-    kind = getattr(dask_jobqueue, JOB_SYSTEMS[address.kind])
+    kind = job_class(address.kind)
     command = str(kind.job_cls.submit_command).split()[0]
     if shutil.which(command) is None:
         raise ClusterError(
@@ -63,6 +59,28 @@ def begin_jobs(address: ClusterAddress) -> Any:
     return begun
 
 
+def job_class(system: str) -> Any:
+    """Return dask-jobqueue's class of clusters of a job system.
+
+    Raises
+    ------
+    InputError
+        When dask-jobqueue is not installed.
+
+    Examples
+    --------
+    >>> job_class("slurm").__name__
+    'SLURMCluster'
+    """
+    try:
+        import dask_jobqueue
+    except ImportError as error:
+        raise InputError(
+            "jobs need dask-jobqueue, which is not installed: pip install 'driftwalk[cluster]'"
+        ) from error
+    return getattr(dask_jobqueue, JOB_SYSTEMS[system])
+
+
 def job_options(address: ClusterAddress) -> dict[str, Any]:
     """Return the keywords of dask-jobqueue: one thread for each worker, an end before the walltime.
 
@@ -83,6 +101,9 @@ def job_options(address: ClusterAddress) -> dict[str, Any]:
     options.setdefault("processes", cores)
     options.setdefault("memory", site("memory") or MEMORY)
     options.setdefault("job_name", "driftwalk")
+    if address.kind == "oar" and site(OAR_MEMORY) is None:
+        # Sites name it as they like; where nobody says how, memory is not asked for.
+        options.setdefault(OAR_MEMORY, "not_applicable")
     walltime = options.get("walltime") or site("walltime")
     seconds = _seconds(str(walltime)) if walltime else None
     if seconds is not None and "worker_extra_args" not in options:

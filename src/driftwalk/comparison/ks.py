@@ -87,7 +87,13 @@ class KsReference:
     """
 
     def __init__(self, sample: npt.ArrayLike) -> None:
-        self.native = _core.KsReference(checked_points(sample, "sample"))
+        # A copy: the caller may change the array, and this one travels.
+        self._points = checked_points(sample, "sample").copy()
+        self.native = _core.KsReference(self._points)
+
+    def __reduce__(self) -> tuple[type[KsReference], tuple[Points]]:
+        """Travel to another process as the points; they are sorted again there."""
+        return KsReference, (self._points,)
 
     def __len__(self) -> int:
         """Return the number of points."""

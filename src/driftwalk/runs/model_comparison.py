@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -56,6 +57,7 @@ def run_model_comparison(
     *,
     overwrite: bool = False,
     begun: Callable[[], None] | None = None,
+    executor: Executor | None = None,
     progress: Progress = silent,
     command: str | Sequence[str] = "driftwalk.runs.run_model_comparison(...)",
 ) -> xr.Dataset:
@@ -74,6 +76,8 @@ def run_model_comparison(
         Whether a finished run there is moved aside; it is refused otherwise.
     begun : callable, optional
         Called when everything is checked and the work begins.
+    executor : concurrent.futures.Executor, optional
+        Computes work units elsewhere; the result does not depend on it.
     progress : callable, optional
         Called as ``progress(done, total, text)`` while the work goes on.
     command : str, optional
@@ -128,6 +132,7 @@ def run_model_comparison(
             flow=work.flow,
             body=work.body,
             threads=work.threads,
+            executor=executor,
             store=store,
             tell=progress,
         )

@@ -1,11 +1,13 @@
 """Any function over many settings: order, work units, resume, executors."""
 
 from driftwalk.core.shards import ShardStore
+from driftwalk.sweep.cut import settings_per_unit
 from driftwalk.sweep.design import Design, WorkUnit, grid
 from driftwalk.sweep.handout import threads_of_unit
-from driftwalk.sweep.remote import refuse_others
+from driftwalk.sweep.remote import refuse_others, this_worker
 from driftwalk.sweep.run import SweepError, run_sweep
 from driftwalk.sweep.store import MemoryStore, Store, collect
+from driftwalk.sweep.workers import WorkerExecutor
 
 __all__ = [
     "Design",
@@ -14,9 +16,12 @@ __all__ = [
     "Store",
     "SweepError",
     "WorkUnit",
+    "WorkerExecutor",
     "collect",
     "grid",
     "refuse_others",
     "run_sweep",
+    "settings_per_unit",
+    "this_worker",
     "threads_of_unit",
 ]

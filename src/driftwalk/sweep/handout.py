@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import time
-import uuid
-import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Executor, Future
 from statistics import median
 from typing import Any, Final, Protocol
@@ -13,10 +10,10 @@ from typing import Any, Final, Protocol
 import numpy.typing as npt
 
 from driftwalk.sweep.design import WorkUnit
-from driftwalk.sweep.remote import packed, run_unit
+from driftwalk.sweep.workers import UnitFunction, WorkerExecutor
 
-UnitFuture = Future[Mapping[str, "npt.NDArray[Any]"]]
-UnitFunction = Callable[[WorkUnit], Mapping[str, "npt.NDArray[Any]"]]
+UnitFuture = Future[Any]
+Found = Mapping[str, "npt.NDArray[Any]"]
 
 FOR_EACH_WORKER: Final = 3
 """Units handed out for each worker: one to compute, others so that it need not wait."""
@@ -34,15 +31,21 @@ class Handout(Protocol):
     def submit(self, unit: WorkUnit) -> UnitFuture:
         """Have a unit computed."""
 
+    def result(self, future: UnitFuture, /) -> Found:
+        """Return what a unit gave, or raise what it failed by."""
+
     @property
     def width(self) -> int:
         """How many units are handed out at a time."""
 
     def slow(self, age_s: float, /) -> bool:
-        """Return whether a unit of this age should be handed out again."""
+        """Return whether a unit that was handed out so long ago should be handed out again."""
 
-    def finished(self, age_s: float, /) -> None:
-        """Hear that a unit has come back, and how long it took."""
+    def again(self) -> None:
+        """Hear that a unit was."""
+
+    def tell(self, done: int, total: int, /) -> None:
+        """Hear how many units of the sweep are done, and how many there are."""
 
 
 def threads_of_unit(threads: int | None, executor: Executor | None) -> int | None:
@@ -74,9 +77,11 @@ def handout(executor: Executor, function: UnitFunction) -> Handout:
     function : callable
         The function of the sweep.
     """
+    if isinstance(executor, WorkerExecutor):
+        return _OnWorkers(executor, function)
     client = getattr(executor, "_client", None)
     if client is not None and type(executor).__module__.startswith("distributed"):
-        return _OnDask(executor, client, function)
+        return _OnWorkers(WorkerExecutor(client), function)
     return _OnExecutor(executor, function)
 
 
@@ -91,59 +96,49 @@ class _OnExecutor:
     def submit(self, unit: WorkUnit) -> UnitFuture:
         return self._executor.submit(self._function, unit)
 
+    def result(self, future: UnitFuture, /) -> Found:
+        found: Found = future.result()
+        return found
+
     def slow(self, _age_s: float, /) -> bool:
         return False
 
-    def finished(self, _age_s: float, /) -> None:
+    def again(self) -> None:
+        """Do nothing."""
+
+    def tell(self, _done: int, _total: int, /) -> None:
         """Do nothing."""
 
 
-class _OnDask:
-    """Workers of a Dask cluster: the function travels once to each, the units as they come."""
+class _OnWorkers:
+    """Workers elsewhere: they may be slow, go and come."""
 
-    def __init__(self, executor: Any, client: Any, function: UnitFunction) -> None:
-        self._executor, self._client = executor, client
-        self._token = uuid.uuid4().hex
-        # A task, unlike data that is scattered, is made again when all who held it have died.
-        with warnings.catch_warnings():
-            # A recording and a flow are some MB: sent once, they are no large graph.
-            warnings.filterwarnings("ignore", message="Sending large graph")
-            self._parcel = client.submit(
-                _as_it_is,
-                packed(function, self._token),
-                key=f"driftwalk-function-{self._token}",
-                pure=False,
-            )
-        self._again = 0
-        self._ages: list[float] = []
-        self._seen = (-float("inf"), 0)
+    def __init__(self, executor: WorkerExecutor, function: UnitFunction) -> None:
+        self._executor = executor
+        self._parcel = executor.sent(function)
+        self._seconds: list[float] = []
 
     @property
     def width(self) -> int:
-        return max(FOR_EACH_WORKER * self._workers(), FOR_EACH_WORKER)
+        return max(FOR_EACH_WORKER * self._executor.workers, FOR_EACH_WORKER)
 
     def submit(self, unit: WorkUnit) -> UnitFuture:
-        self._again += 1
-        key = f"driftwalk-unit-{unit.id}-{self._token[:8]}-{self._again}"
-        future: UnitFuture = self._executor.submit(
-            run_unit, self._parcel, unit, key=key, pure=False
-        )
-        return future
+        return self._executor.run(self._parcel, unit)
+
+    def result(self, future: UnitFuture, /) -> Found:
+        answer = future.result()
+        self._seconds.append(answer.seconds)
+        found: Found = answer.arrays
+        return found
 
     def slow(self, age_s: float, /) -> bool:
-        return bool(self._ages) and age_s > max(SLOW * median(self._ages), SLOW_S)
+        if not self._seconds:
+            return False
+        # It may have waited for those that its worker got before.
+        return age_s > max((FOR_EACH_WORKER - 1 + SLOW) * median(self._seconds), SLOW_S)
 
-    def finished(self, age_s: float, /) -> None:
-        self._ages.append(age_s)
+    def again(self) -> None:
+        self._executor.units.again += 1
 
-    def _workers(self) -> int:
-        """Return how many workers there are; asked for at most once a second."""
-        when, count = self._seen
-        if time.monotonic() - when > 1.0:
-            count = len(self._client.scheduler_info(n_workers=-1)["workers"])
-            self._seen = (time.monotonic(), count)
-        return count
-
-
-def _as_it_is(parcel: Any) -> Any:
-    return parcel
+    def tell(self, done: int, total: int, /) -> None:
+        self._executor.units.done, self._executor.units.total = done, total

@@ -6,10 +6,13 @@ cluster the function is therefore an object of its own, which a worker fetches w
 
 from __future__ import annotations
 
+import hashlib
 import pickle
+import platform
 import sys
+import time
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -27,20 +30,35 @@ ALIKE_LINEAR_ALGEBRA: Final = ("driftwalk", "numpy", "scipy")
 USER_MODULE: Final = "_driftwalk_"
 """How the names of modules begin that are a file of the user's."""
 
+Guard = Callable[[], None]
+"""Raises `ClusterError` in a process that must not compute."""
+
 _ready: OrderedDict[str, Any] = OrderedDict()
+_passed: set[Guard] = set()
 
 
 class Parcel(NamedTuple):
     """The function of a sweep, as it travels."""
 
     token: str
+    """Hash of the content: the same function twice is one."""
     content: bytes
     """The function, pickled."""
     versions: dict[str, str]
     """Of the packages that must be the same where it runs."""
+    guard: Guard | None
+    """Has to pass where it runs."""
 
 
-def packed(function: Any, token: str) -> Parcel:
+class Answer(NamedTuple):
+    """What a unit gave on a worker."""
+
+    arrays: dict[str, npt.NDArray[Any]]
+    seconds: float
+    """By the worker's clock."""
+
+
+def packed(function: Any, guard: Guard | None = None) -> Parcel:
     """Return a function as it travels.
 
     Parameters
@@ -48,8 +66,8 @@ def packed(function: Any, token: str) -> Parcel:
     function : callable
         The function of a sweep. Where it has a true attribute ``linear_algebra`` its results
         depend on numpy and scipy, and these must be the same where it runs.
-    token : str
-        A name that no other function has.
+    guard : callable, optional
+        Called once in each process, before the function.
 
     Raises
     ------
@@ -69,25 +87,37 @@ def packed(function: Any, token: str) -> Parcel:
         raise ClusterError(
             f"this work cannot be sent to workers: {error}; run it without a cluster"
         ) from error
-    return Parcel(token, content, package_versions(names))
+    token = hashlib.sha256(content).hexdigest()
+    return Parcel(token, content, package_versions(names), guard)
 
 
-def run_unit(parcel: Parcel, unit: WorkUnit) -> Mapping[str, npt.NDArray[Any]]:
+def run_unit(parcel: Parcel, unit: WorkUnit) -> Answer:
     """Run a function that has travelled, on a worker.
 
     Raises
     ------
     ClusterError
-        When the worker has another version of a package that the result depends on.
+        When the worker has another version of a package that the result depends on, or does not
+        pass the guard.
     """
-    refuse_others(parcel.versions, package_versions(parcel.versions), "this worker")
+    refuse_others(parcel.versions, package_versions(parcel.versions), this_worker())
+    if parcel.guard is not None and parcel.guard not in _passed:
+        parcel.guard()
+        _passed.add(parcel.guard)
     if parcel.token not in _ready:
         _ready[parcel.token] = pickle.loads(parcel.content)
         while len(_ready) > KEPT:
             _ready.popitem(last=False)
     _ready.move_to_end(parcel.token)
+    began = time.perf_counter()
     found = _ready[parcel.token](unit)
-    return {name: np.asarray(values) for name, values in found.items()}
+    arrays = {name: np.asarray(values) for name, values in found.items()}
+    return Answer(arrays, time.perf_counter() - began)
+
+
+def this_worker() -> str:
+    """Return how a worker calls itself in a message."""
+    return f"a worker on {platform.node()}"
 
 
 def refuse_others(wanted: Mapping[str, str], found: Mapping[str, str | None], who: str) -> None:
@@ -107,7 +137,7 @@ def refuse_others(wanted: Mapping[str, str], found: Mapping[str, str | None], wh
 
     Examples
     --------
-    >>> refuse_others({"driftwalk": "0.1.0"}, {"driftwalk": "0.1.0"}, "this worker")
+    >>> refuse_others({"driftwalk": "0.1.0"}, {"driftwalk": "0.1.0"}, "a worker on node7")
     """
     for name, version in wanted.items():
         if found.get(name) != version:

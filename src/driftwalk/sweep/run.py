@@ -16,8 +16,9 @@ import numpy.typing as npt
 from driftwalk.core.errors import ClusterError, DriftwalkError, InputError
 from driftwalk.core.shards import Arrays
 from driftwalk.sweep.design import WorkUnit
-from driftwalk.sweep.handout import Handout, UnitFunction, UnitFuture, handout
+from driftwalk.sweep.handout import Handout, UnitFuture, handout
 from driftwalk.sweep.store import MemoryStore, Store, collect
+from driftwalk.sweep.workers import UnitFunction
 
 Progress = Callable[[int, int], None]
 
@@ -65,9 +66,10 @@ def run_sweep(
         Where results are kept as soon as they are there, by this process alone; memory when left
         out.
     executor : concurrent.futures.Executor, optional
-        Workers: threads, processes (the function and its results must pickle), or
-        ``client.get_executor()`` of Dask, where the function travels once to each worker. One unit
-        after the other in this thread when left out. It is not shut down.
+        Workers: threads, processes (the function and its results must pickle), that of
+        `driftwalk.cluster.connect`, or ``client.get_executor()`` of Dask, where the function
+        travels once to each worker. One unit after the other in this thread when left out. It is
+        not shut down.
     progress : callable, optional
         Called with the number of settings that are done and of all, at the start and after every
         unit.
@@ -115,12 +117,15 @@ class _Tally:
     def __init__(
         self, units: Sequence[WorkUnit], missing: Sequence[WorkUnit], progress: Progress | None
     ) -> None:
+        self.units = len(units)
+        self.units_done = len(units) - len(missing)
         self._total = sum(unit.size for unit in units)
         self._done = self._total - sum(unit.size for unit in missing)
         self._progress = progress
         self._tell()
 
     def add(self, unit: WorkUnit) -> None:
+        self.units_done += 1
         self._done += unit.size
         self._tell()
 
@@ -145,29 +150,35 @@ def _run_in(
     def hand_out(unit: WorkUnit, again: bool = False) -> None:
         waiting[hand.submit(unit)] = _Handed(unit, time.monotonic(), again)
 
+    def keep(unit: WorkUnit, future: UnitFuture) -> None:
+        if unit.id not in left:
+            # It was handed out twice, and the other answer came first.
+            return
+        # Before: what is told of progress names the units.
+        hand.tell(tally.units_done + 1, tally.units)
+        _keep(unit, partial(hand.result, future), store, tally)
+        left.discard(unit.id)
+
+    hand.tell(tally.units_done, tally.units)
     try:
         while left:
             while queue and len(waiting) < hand.width:
                 hand_out(queue.popleft())
             done, _ = wait(waiting, timeout=LOOK_S, return_when=FIRST_COMPLETED)
             for future in done:
-                handed = waiting.pop(future)
-                if handed.unit.id not in left:
-                    continue
-                _keep(handed.unit, future.result, store, tally)
-                left.discard(handed.unit.id)
-                hand.finished(time.monotonic() - handed.since)
+                keep(waiting.pop(future).unit, future)
             if not queue:
                 for unit in _slow_ones(hand, list(waiting.values()), left):
                     hand_out(unit, again=True)
+                    hand.again()
         _cancel_rest(waiting)
     except SweepError:
-        _keep_rest(waiting, as_completed(_cancel_rest(waiting)), store, tally)
+        _keep_rest(waiting, as_completed(_cancel_rest(waiting)), keep)
         raise
     except BaseException:
         # Ctrl-C and a full disk: nothing is waited for.
         done_by_now = [future for future in _cancel_rest(waiting) if future.done()]
-        _keep_rest(waiting, done_by_now, store, tally)
+        _keep_rest(waiting, done_by_now, keep)
         raise
 
 
@@ -200,13 +211,12 @@ def _cancel_rest(waiting: Iterable[UnitFuture]) -> list[UnitFuture]:
 def _keep_rest(
     waiting: Mapping[UnitFuture, _Handed],
     futures: Iterable[UnitFuture],
-    store: Store,
-    tally: _Tally,
+    keep: Callable[[WorkUnit, UnitFuture], None],
 ) -> None:
     for future in futures:
         # The error that is under way is the one to report.
         with contextlib.suppress(SweepError, DriftwalkError):
-            _keep(waiting[future].unit, future.result, store, tally)
+            keep(waiting[future].unit, future)
 
 
 def _keep(

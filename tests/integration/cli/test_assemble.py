@@ -296,8 +296,7 @@ SMALL = """
 import driftwalk.figures
 import driftwalk.assembly.runs.run
 driftwalk.figures.write_assembly_figures = lambda *folders, **datasets: []
-driftwalk.assembly.runs.run.BLOCKS_PER_UNIT = 100
-driftwalk.assembly.runs.run.FEWEST_RUNS_PER_UNIT = 1
+driftwalk.assembly.runs.run.runs_per_unit = lambda _: 25
 """
 
 

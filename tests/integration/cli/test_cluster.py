@@ -92,7 +92,7 @@ def main(mode, folder):
     store = ShardStore(Path(folder), fingerprint={"sweep": "squares"})
     units = grid(a=np.arange(16.0)).units(1)
     with connect(parse_address("local:2")) as cluster:
-        client = cluster.executor._client
+        client = cluster.executor.client
         if mode == "killed":
             pids = list(client.run(os.getpid).values())
             threading.Thread(target=kill_one, args=(pids,)).start()

@@ -271,7 +271,7 @@ def test_an_unfinished_run_whose_units_keep_less_is_refused(
 # One setting per unit, without figures.
 SMALL = f"""{NO_FIGURES}
 from driftwalk.assembly.sensitivity import settings
-settings.BLOCK_STEPS_PER_UNIT = 1
+settings.settings_per_unit = lambda *_: 1
 """
 
 

@@ -13,6 +13,7 @@ from quadratic_calibration import quadratic
 import driftwalk as dw
 from driftwalk.assembly.runs.drawn_flow import RUNS_PER_FLOW, draw_flow
 from driftwalk.assembly.runs.parameters import draw_parameters
+from driftwalk.assembly.runs.plan import make_plan
 from driftwalk.assembly.runs.run import (
     assemble,
     assemble_drawn,
@@ -120,9 +121,6 @@ def test_a_path_is_the_run_again(flow: xr.Dataset, found: xr.Dataset) -> None:
 def test_finished_units_are_not_computed_again(
     flow: xr.Dataset, found: xr.Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("driftwalk.assembly.runs.run.BLOCKS_PER_UNIT", 75)
-    monkeypatch.setattr("driftwalk.assembly.runs.run.FEWEST_RUNS_PER_UNIT", 1)
-    assert runs_per_unit(3) == 25
     store, told = MemoryStore(), []
     options: dict[str, Any] = {"store": store, "progress": lambda *done: told.append(done)}
     assert_same_bits(assemble(Study(), flow, **SHORT, **options), found)
@@ -131,10 +129,11 @@ def test_finished_units_are_not_computed_again(
     assert_same_bits(assemble(Study(), flow, **SHORT, **options), found)
 
 
-@pytest.mark.parametrize(("blocks", "runs"), [(1, 2000), (4, 500), (5, 400), (30, 100), (200, 100)])
-def test_runs_of_a_unit_share_whole_flows(blocks: int, runs: int) -> None:
-    assert runs_per_unit(blocks) == runs
-    assert runs % RUNS_PER_FLOW == 0
+@pytest.mark.parametrize(("blocks", "runs"), [(1, 26), (4, 1000), (4, 90_000), (9, 5000)])
+def test_runs_of_a_unit_share_whole_flows(flow: xr.Dataset, blocks: int, runs: int) -> None:
+    found = runs_per_unit(make_plan(Study(), flow, settings={"blocks": blocks, "runs": runs}))
+    assert found % RUNS_PER_FLOW == 0
+    assert 0 < found < runs
 
 
 def test_drawn_parameters_reach_their_runs(flow: xr.Dataset) -> None:

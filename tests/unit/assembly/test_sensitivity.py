@@ -136,7 +136,7 @@ def test_bits_depend_on_nothing_else(
     study: dw.Study, found: xr.Dataset, reference: xr.Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One setting per unit, a run or two per call of the core, and another number of threads."""
-    monkeypatch.setattr(engine, "BLOCK_STEPS_PER_UNIT", 1)
+    monkeypatch.setattr(engine, "settings_per_unit", lambda *_: 1)
     for at_once in (3, 15):
         monkeypatch.setattr(engine, "BLOCKS_AT_ONCE", at_once)
         again = dw.sensitivity_map(study, FLOW, axes=AXES, reference=reference, threads=1)
@@ -154,7 +154,7 @@ def test_continues_after_a_kill(
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Any,
 ) -> None:
-    monkeypatch.setattr(engine, "BLOCK_STEPS_PER_UNIT", 2 * RUNS * 3 * 1000)
+    monkeypatch.setattr(engine, "settings_per_unit", lambda *_: 2)
     told: list[tuple[int, int]] = []
 
     def stop(done: int, total: int) -> None:

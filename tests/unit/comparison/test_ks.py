@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import subprocess
 import sys
 import threading
@@ -72,6 +73,15 @@ def test_more_than_a_twentieth_of_ties_warns() -> None:
             call()
         assert caught[0].filename == __file__
     assert ks_compare(a, b, ties="limits").tied_fraction == pytest.approx(0.06)
+
+
+def test_a_reference_travels_to_another_process() -> None:
+    rng = np.random.default_rng(3)
+    a, b = rng.normal(size=(2, 500, 2))
+    reference = ks_reference(a)
+    there = pickle.loads(pickle.dumps(reference))
+    assert len(there) == 500
+    assert there.compare(b) == reference.compare(b)
 
 
 def test_combine_takes_the_larger() -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final, Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +24,14 @@ from driftwalk.assembly.runs.plan import (
     start_poses,
 )
 from driftwalk.core.errors import InputError
-from driftwalk.sweep import Store, WorkUnit, grid, run_sweep, threads_of_unit
+from driftwalk.sweep import (
+    Store,
+    WorkUnit,
+    grid,
+    run_sweep,
+    settings_per_unit,
+    threads_of_unit,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,11 +40,6 @@ if TYPE_CHECKING:
 
 FlowDraws = Literal["standard_error", "none"]
 Progress = Callable[[int, int], None]
-
-BLOCKS_PER_UNIT: Final = 2000
-"""Blocks of a work unit: a few seconds' work, so that a kill or Ctrl-C loses no more."""
-FEWEST_RUNS_PER_UNIT: Final = 100
-"""With fewer the lanes of two threads would be empty for much of a unit's time."""
 
 
 def assemble(
@@ -311,7 +313,7 @@ def _run(
     drawn: str,
 ) -> xr.Dataset:
     """Simulate the runs unit by unit, and put them into one dataset."""
-    units = grid(run=plan.index).units(runs_per_unit(plan.study.assembly.blocks))
+    units = grid(run=plan.index).units(runs_per_unit(plan))
     function = _Runs(plan, start_poses(plan, start))
     arrays = run_sweep(function, units, store=store, executor=executor, progress=progress)
     return build_assembly(plan, arrays, attrs={"drawn": drawn})
@@ -333,10 +335,10 @@ class _Runs:
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def runs_per_unit(blocks: int) -> int:
+def runs_per_unit(plan: Plan) -> int:
     """Return the runs of a work unit: a whole number of drawn flows."""
-    runs = max(BLOCKS_PER_UNIT // blocks, FEWEST_RUNS_PER_UNIT)
-    return max(runs // RUNS_PER_FLOW, 1) * RUNS_PER_FLOW
+    block_steps = plan.steps * plan.study.assembly.blocks
+    return settings_per_unit(plan.index.size, block_steps, multiple=RUNS_PER_FLOW)
 
 
 def _by_flow(plan: Plan, first: int, last: int) -> Sequence[tuple[slice, xr.Dataset]]:

@@ -26,7 +26,15 @@ from driftwalk.assembly.sensitivity.times import Courses, added, courses_of, cou
 from driftwalk.core.errors import DriftwalkError
 from driftwalk.core.shards import Unit, UnitT
 from driftwalk.simulation.backend import BROKEN
-from driftwalk.sweep import MemoryStore, Store, SweepError, WorkUnit, grid, run_sweep
+from driftwalk.sweep import (
+    MemoryStore,
+    Store,
+    SweepError,
+    WorkUnit,
+    grid,
+    run_sweep,
+    settings_per_unit,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,9 +45,6 @@ Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 Progress = Callable[[int, int], None]
 
-BLOCK_STEPS_PER_UNIT: Final = 2_000_000_000
-"""Steps of single blocks in a work unit, if no run ends early: about half a minute on two
-processors, so that a kill loses no more, and enough runs at once to keep all lanes busy."""
 NUMBERS: Final = ("left_out", "first_contact_median", "completion_median")
 """Variables with one number per setting."""
 BLOCKS_AT_ONCE: Final = 1_000_000
@@ -76,7 +81,7 @@ class Settings:
     def per_unit(self) -> int:
         """Return the settings of a work unit."""
         longest = max(w.index.size * w.steps * w.study.assembly.blocks for w in self.worlds)
-        return max(BLOCK_STEPS_PER_UNIT // longest, 1)
+        return settings_per_unit(self.size, longest)
 
 
 @dataclass(frozen=True, eq=False)

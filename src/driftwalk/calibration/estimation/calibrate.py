@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from typing import TYPE_CHECKING
 
 from driftwalk.calibration.estimation.contact import contact_distance
@@ -26,6 +27,7 @@ def calibrate_many(
     flow: xr.Dataset | None,
     body: str | None,
     threads: int | None,
+    executor: Executor | None,
     stores: Stores,
     tell: Tell,
 ) -> xr.Dataset:
@@ -46,6 +48,8 @@ def calibrate_many(
         The body, where the recording has several.
     threads : int or None
         None: all processors. The result does not depend on it.
+    executor : concurrent.futures.Executor or None
+        Computes the summaries' work units elsewhere; the search runs here.
     stores : callable
         Where each stage keeps finished work.
     tell : callable
@@ -65,6 +69,7 @@ def calibrate_many(
         seed=search.seed,
         worlds=search.bootstrap if search.refine == "auto" else 0,
         confidence=search.confidence,
+        executor=executor,
         stores=stores,
         tell=tell,
     )

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
-from typing import Final
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import ClassVar, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -16,16 +16,19 @@ from driftwalk.calibration.evolution import AspectObjective, wall_distance
 from driftwalk.calibration.evolution.search import Tell
 from driftwalk.calibration.models.recorded import RecordedMotion
 from driftwalk.comparison.aspects import block_of
+from driftwalk.core.processors import one_blas_thread
 from driftwalk.motion import Worlds
 from driftwalk.motion.score import broken_worlds
 from driftwalk.sweep import Store, WorkUnit, run_sweep
 
 Floats = npt.NDArray[np.float64]
 
-AT_ONCE: Final = 64
-"""Settings of a work unit."""
 ALIKE: Final = 16
 """Settings in a row that are seen by one camera. So many points of a Sobol' sequence fill a box."""
+AT_ONCE: Final = ALIKE
+"""Settings of a work unit: a round of 256 then has units for 16 workers."""
+POINT: Final = "point"
+"""Settings of a unit, in the unit cube; they travel with it."""
 DEVIATIONS: Final = (-0.3775, 1.3630, -1.3630, 0.3775)
 """How far the logarithm of the camera's noise is off in turn, in standard deviations: the middles
 of four equal parts of a normal distribution, with variance 1."""
@@ -46,6 +49,8 @@ class SummaryObjective:
         The recording.
     store : Store or None
         Where finished work is kept; None keeps nothing.
+    executor : concurrent.futures.Executor, optional
+        Computes the work units elsewhere, with one thread each.
     tell : callable
         Called with the settings done and the largest number of them.
     most : int
@@ -63,10 +68,12 @@ class SummaryObjective:
         motion: RecordedMotion,
         *,
         store: Store | None,
+        executor: Executor | None = None,
         tell: Tell,
         most: int,
     ) -> None:
         self.worlds, self.store, self.tell, self.most = worlds, store, tell, most
+        self._executor = executor
         self._cameras = _cameras(worlds, motion.noise_doubt)
         self.done = 0
 
@@ -96,38 +103,58 @@ class SummaryObjective:
         """
         first = self.done
         units = [
-            WorkUnit(first + at, first + min(at + AT_ONCE, len(settings)), {})
+            WorkUnit(
+                first + at,
+                first + min(at + AT_ONCE, len(settings)),
+                {POINT: settings[at : at + AT_ONCE]},
+            )
             for at in range(0, len(settings), AT_ONCE)
         ]
-
-        def compute(unit: WorkUnit) -> dict[str, Floats]:
-            here = settings[unit.start - first : unit.stop - first]
-            return {"summaries": self._summaries(here, unit.start, self.plans[:parts])}
+        function = _Summaries(self._cameras_of_units(), self.plans[:parts])
 
         def say(done: int, _: int) -> None:
             self.tell(first + done, self.most)
 
-        found = run_sweep(compute, units, store=self.store, progress=say)["summaries"]
+        found = run_sweep(function, units, store=self.store, executor=self._executor, progress=say)[
+            "summaries"
+        ]
         self.done += len(settings)
         return np.asarray(found)
 
-    def _summaries(self, settings: Floats, first: int, plans: Sequence[SummaryPlan]) -> Floats:
-        seen = self._seen(settings, first)
+    def _cameras_of_units(self) -> list[AspectObjective]:
+        """Return the cameras, with one thread where an executor has many units."""
+        if self._executor is None:
+            return self._cameras
+        return [replace(one, like=replace(one.like, threads=1)) for one in self._cameras]
+
+
+@dataclass(frozen=True)
+class _Summaries:
+    """The function of the sweep: the settings of a unit, summarised wherever it is sent."""
+
+    cameras: Sequence[AspectObjective]
+    plans: Sequence[SummaryPlan]
+    linear_algebra: ClassVar[bool] = True
+    """Its results depend on numpy and scipy."""
+
+    def __call__(self, unit: WorkUnit) -> dict[str, Floats]:
+        seen = self._seen(unit.settings[POINT], unit.start)
 
         def one(world: tuple[Floats, Floats]) -> list[Floats]:
-            return [summarise(plan, *world) for plan in plans]
+            return [summarise(plan, *world) for plan in self.plans]
 
-        with ThreadPoolExecutor(max(self.worlds.like.threads, 1)) as pool:
+        threads = max(self.cameras[0].like.threads, 1)
+        with one_blas_thread(), ThreadPoolExecutor(threads) as pool:
             found = np.array(list(pool.map(one, zip(seen.x, seen.y, strict=True))))
         # A world that lost its numbers is like none.
         found[broken_worlds(seen.status)] = 0.0
-        return found
+        return {"summaries": found}
 
     def _seen(self, settings: Floats, first: int) -> Worlds:
         """Return simulated worlds as their cameras saw them."""
         parts = []
         for at in range(0, len(settings), ALIKE):
-            camera = self._cameras[(first + at) // ALIKE % len(self._cameras)]
+            camera = self.cameras[(first + at) // ALIKE % len(self.cameras)]
             here = settings[at : at + ALIKE]
             parts.append(camera.simulated(here, 1, stage="estimation", first=first + at))
         return Worlds(*map(np.concatenate, zip(*parts, strict=True)))

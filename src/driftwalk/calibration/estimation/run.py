@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
@@ -81,6 +82,7 @@ def estimate(
     seed: int,
     worlds: int,
     confidence: float,
+    executor: Executor | None = None,
     stores: Stores,
     tell: Tell,
 ) -> Estimation:
@@ -106,6 +108,8 @@ def estimate(
         summaries out.
     confidence : float
         Of the intervals.
+    executor : concurrent.futures.Executor, optional
+        Computes the work units of the second stage elsewhere.
     stores : callable
         Where each stage keeps finished work.
     tell : callable
@@ -120,7 +124,11 @@ def estimate(
     require_numbers(even)
     order = order_of(entry)
     search = _Search(even, stores, tell)
-    matched = _matched(even, motion, search, order, worlds, stores, tell) if worlds > 1 else None
+    matched = (
+        _matched(even, motion, search, order, worlds, executor, stores, tell)
+        if worlds > 1
+        else None
+    )
     if matched is None or not matched.usual:
         search.ends()
     answers = {
@@ -199,6 +207,7 @@ def _matched(
     search: _Search,
     order: Order,
     worlds: int,
+    executor: Executor | None,
     stores: Stores,
     tell: Tell,
 ) -> Matched:
@@ -207,6 +216,7 @@ def _matched(
         even,
         motion,
         store=stores("summaries", {"worlds": worlds}),
+        executor=executor,
         tell=lambda done, most: tell("summaries", done, most),
         most=most_simulations(count, worlds),
     )

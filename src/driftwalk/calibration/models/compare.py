@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 
@@ -21,8 +23,9 @@ from driftwalk.calibration.models.judge import Judged, judge
 from driftwalk.calibration.models.recorded import RecordedMotion, body_motion
 from driftwalk.calibration.models.result import build_comparison
 from driftwalk.conditions import study_in_arena
+from driftwalk.core.processors import one_blas_thread
 from driftwalk.motion import MotionModel
-from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
+from driftwalk.sweep import Store, WorkUnit, grid, run_sweep, threads_of_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,6 +51,7 @@ def compare_models(
     flow: xr.Dataset | None = None,
     body: str | None = None,
     threads: int | None = None,
+    executor: Executor | None = None,
     budget: Budget | None = None,
     store: Callable[[Mapping[str, Any]], Store] | None = None,
     tell: Tell | None = None,
@@ -79,6 +83,10 @@ def compare_models(
         The body, where the recording has several.
     threads : int, optional
         Default: all processors. The result does not depend on it.
+    executor : concurrent.futures.Executor, optional
+        Searches and judges models elsewhere, see `driftwalk.sweep.run_sweep`: a work unit is one
+        model. Each then has one thread if `threads` is left out. Workers of a Dask cluster need the
+        same numpy and scipy.
     budget : Budget, optional
         How much each search may simulate.
     store : callable, optional
@@ -107,11 +115,13 @@ def compare_models(
     >>> found = dw.compare_models(recording, ["block", "inertial"])  # doctest: +SKIP
     """
     chosen = _study(recording, study)
-    motion = body_motion(recording, chosen, flow=flow, body=body, threads=threads)
+    motion = body_motion(
+        recording, chosen, flow=flow, body=body, threads=threads_of_unit(threads, executor)
+    )
     entries, warnings = contestants(made_models(models, motion, chosen), motion, chosen)
     entries += walks(motion)
-    seed = chosen.calibration.seed
-    judged = _judged_all(entries, motion, seed, budget or Budget(), store, tell)
+    work = _Comparison(entries, motion, chosen.calibration.seed, budget or Budget())
+    judged = _judged_all(work, store, executor, tell)
     return build_comparison(entries, judged, motion, chosen, recording, warnings)
 
 
@@ -166,53 +176,83 @@ def _study(recording: xr.Dataset, study: Study | None) -> Study:
     return study_in_arena(Study(), recording) if study is None else study
 
 
+@dataclass(frozen=True, eq=False)
+class _Comparison:
+    """The function of the sweep: one model, searched and judged wherever it is sent."""
+
+    entries: Sequence[Contestant]
+    motion: RecordedMotion
+    seed: int
+    budget: Budget
+    within: Callable[[int, int], None] | None = None
+    """Called with the model and the settings done."""
+    linear_algebra: ClassVar[bool] = True
+    """Its results depend on numpy and scipy."""
+
+    def __call__(self, unit: WorkUnit) -> dict[str, np.ndarray]:
+        index = unit.start
+
+        def say(done: int, _: int) -> None:
+            if self.within is not None:
+                self.within(index, done)
+
+        say(0, 0)
+        with one_blas_thread():
+            found = judge(
+                self.entries[index], self.motion, budget=self.budget, seed=self.seed, tell=say
+            )
+        most = max(len(entry.ranges) for entry in self.entries)
+        return _packed(found, most, self.budget.starts + 1)
+
+    def costs(self) -> list[int]:
+        """Return the settings that each model's search simulates at most."""
+        numbers = [len(entry.ranges) for entry in self.entries]
+        return [self.budget.evaluations(one) if one else 0 for one in numbers]
+
+    def fingerprint(self) -> dict[str, Any]:
+        """Return what determines the numbers of all models, for the store of a run."""
+        return {
+            "models": [entry.model.describe() for entry in self.entries],
+            "ranges": [[one.describe() for one in entry.ranges] for entry in self.entries],
+            "seed": self.seed,
+            "budget": vars(self.budget),
+            "aspects": list(self.motion.held.names),
+        }
+
+
 def _judged_all(
-    entries: Sequence[Contestant],
-    motion: RecordedMotion,
-    seed: int,
-    budget: Budget,
+    work: _Comparison,
     store: Callable[[Mapping[str, Any]], Store] | None,
+    executor: Executor | None,
     tell: Tell | None,
 ) -> list[Judged]:
     """Judge every model, one work unit each."""
-    most = max(len(entry.ranges) for entry in entries)
-    costs = [budget.evaluations(len(one.ranges)) if one.ranges else 0 for one in entries]
-    before = [0, *itertools.accumulate(costs)]
+    before = [0, *itertools.accumulate(work.costs())]
+    say = tell if tell is not None else _silent
 
-    def compute(unit: WorkUnit) -> dict[str, np.ndarray]:
-        index = unit.start
-        entry = entries[index]
+    def within(index: int, done: int) -> None:
+        say(before[index] + done, before[-1], work.entries[index].model.name)
 
-        def say(done: int, _: int) -> None:
-            if tell is not None:
-                tell(before[index] + done, before[-1], entry.model.name)
+    def finished(done: int, total: int) -> None:
+        say(done, total, "models")
 
-        say(0, 0)
-        found = judge(entry, motion, budget=budget, seed=seed, tell=say)
-        return _packed(found, most, budget.starts + 1)
-
-    units = grid(model=np.arange(len(entries))).units(1)
-    kept = None if store is None else store(_fingerprint(entries, motion, seed, budget))
-    arrays = run_sweep(compute, units, store=kept)
-    if tell is not None:
-        tell(before[-1], before[-1], "figures")
+    units = grid(model=np.arange(len(work.entries))).units(1)
+    kept = None if store is None else store(work.fingerprint())
+    # Only work of this process can say how far it is within a model.
+    arrays = (
+        run_sweep(replace(work, within=within), units, store=kept)
+        if executor is None
+        else run_sweep(work, units, store=kept, executor=executor, progress=finished)
+    )
+    say(before[-1], before[-1], "figures")
     return [
         _unpacked({name: values[index] for name, values in arrays.items()}, entry)
-        for index, entry in enumerate(entries)
+        for index, entry in enumerate(work.entries)
     ]
 
 
-def _fingerprint(
-    entries: Sequence[Contestant], motion: RecordedMotion, seed: int, budget: Budget
-) -> dict[str, Any]:
-    """Return what determines the numbers of all models, for the store of a run."""
-    return {
-        "models": [entry.model.describe() for entry in entries],
-        "ranges": [[one.describe() for one in entry.ranges] for entry in entries],
-        "seed": seed,
-        "budget": vars(budget),
-        "aspects": list(motion.held.names),
-    }
+def _silent(done: int, total: int, text: str) -> None:
+    """Tell nobody."""
 
 
 def _packed(judged: Judged, most: int, searches: int) -> dict[str, np.ndarray]:

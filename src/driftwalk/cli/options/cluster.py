@@ -62,18 +62,20 @@ class Workers(NamedTuple):
         from driftwalk.cluster import connect, parse_address
 
         with connect(parse_address(self.at, self.options or ()), say=print_note) as cluster:
-            with reported(title) as told:
-                progress = _with_workers(told["progress"], lambda: cluster.words)
-                yield {**told, "progress": progress, "executor": cluster.executor}
-            befell = cluster.report()
-            if befell:
-                print_note(befell)
+            try:
+                with reported(title) as told:
+                    progress = _with_workers(told["progress"], lambda: cluster.words)
+                    yield {**told, "progress": progress, "executor": cluster.executor}
+            finally:
+                befell = cluster.report()
+                if befell:
+                    print_note(befell)
 
 
 def _with_workers(
     progress: Callable[[int, int, str], None], words: Callable[[], str]
 ) -> Callable[[int, int, str], None]:
-    """Return a progress that says how many workers there are."""
+    """Return a progress that says how many units are done, and how many workers there are."""
 
     def tell(done: int, total: int, text: str = "") -> None:
         progress(done, total, f"{text}, {words()}" if text else words())
