@@ -64,8 +64,7 @@ def slurm(folder: Path) -> Iterator[dict[str, str]]:
         _await_idle(environment, folder)
         yield environment
     finally:
-        for name in ("slurmd.pid", "ctld.pid"):
-            pid = folder / name
+        for pid in (folder / "slurmd.pid", folder / "ctld.pid", munge / "munged.pid"):
             if pid.is_file():
                 os.kill(int(pid.read_text()), 15)
 

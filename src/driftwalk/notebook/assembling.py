@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
@@ -24,6 +25,7 @@ def assemble(
     folder: str | PathLike[str] | None = None,
     overwrite: bool = False,
     threads: int | None = None,
+    executor: Executor | None = None,
     progress: Progress | None = None,
     **settings: Unpack[AssemblySettings],
 ) -> xr.Dataset:
@@ -42,6 +44,9 @@ def assemble(
         Whether a finished run there is moved aside; it is refused otherwise.
     threads : int, optional
         Default: all processors. The result does not depend on it.
+    executor : concurrent.futures.Executor, optional
+        Computes work units elsewhere, such as that of `driftwalk.cluster.connect`. The result does
+        not depend on it.
     progress : callable, optional
         Called as ``progress(done, total, text)`` while the work goes on.
     **settings
@@ -80,6 +85,7 @@ def assemble(
             found.study,
             found.flow,
             threads=threads,
+            executor=executor,
             progress=lambda done, total: say(done, total, "runs"),
         )
     place = Path(folder)
@@ -90,6 +96,7 @@ def assemble(
         AssemblyWork(found.study, found.flow, region, {}, threads),
         place,
         overwrite=overwrite,
+        executor=executor,
         progress=say,
         command=f"driftwalk.assemble(..., folder={str(folder)!r})",
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
@@ -30,6 +31,7 @@ def calibrate(
     folder: str | PathLike[str] | None = None,
     overwrite: bool = False,
     threads: int | None = None,
+    executor: Executor | None = None,
     progress: Progress | None = None,
     **settings: Unpack[CalibrationSettings],
 ) -> xr.Dataset:
@@ -55,6 +57,9 @@ def calibrate(
         Whether a finished run there is moved aside; it is refused otherwise.
     threads : int, optional
         Default: all processors. The result does not depend on it.
+    executor : concurrent.futures.Executor, optional
+        Computes work units elsewhere, such as that of `driftwalk.cluster.connect`. The result does
+        not depend on it.
     progress : callable, optional
         Called as ``progress(done, total, text)`` while the work goes on.
     **settings
@@ -106,6 +111,7 @@ def calibrate(
             flow=field,
             body=body,
             threads=threads,
+            executor=executor,
             tell=lambda stage, done, total: say(done, total, stage),
         )
         return as_result(found)
@@ -115,6 +121,7 @@ def calibrate(
         work,
         place,
         overwrite=overwrite,
+        executor=executor,
         progress=say,
         command=f"driftwalk.calibrate(..., folder={str(folder)!r})",
     )

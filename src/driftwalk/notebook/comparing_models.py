@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Unpack
@@ -30,6 +31,7 @@ def compare_models(
     folder: str | PathLike[str] | None = None,
     overwrite: bool = False,
     threads: int | None = None,
+    executor: Executor | None = None,
     progress: Progress | None = None,
     **settings: Unpack[StudySettings],
 ) -> xr.Dataset:
@@ -55,6 +57,9 @@ def compare_models(
         Whether a finished run there is moved aside; it is refused otherwise.
     threads : int, optional
         Default: all processors. The result does not depend on it.
+    executor : concurrent.futures.Executor, optional
+        Computes work units elsewhere, such as that of `driftwalk.cluster.connect`. The result does
+        not depend on it.
     progress : callable, optional
         Called as ``progress(done, total, text)`` while the work goes on.
     **settings
@@ -101,7 +106,14 @@ def compare_models(
     say = progress or silent
     if folder is None:
         found = compare(
-            recording, chosen, study=conditions, flow=field, body=body, threads=threads, tell=say
+            recording,
+            chosen,
+            study=conditions,
+            flow=field,
+            body=body,
+            threads=threads,
+            executor=executor,
+            tell=say,
         )
         return as_result(found)
     place = Path(folder)
@@ -110,6 +122,7 @@ def compare_models(
         work,
         place,
         overwrite=overwrite,
+        executor=executor,
         progress=say,
         command=f"driftwalk.compare_models(..., folder={str(folder)!r})",
     )

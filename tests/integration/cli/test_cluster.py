@@ -2,34 +2,40 @@
 
 from __future__ import annotations
 
+import json
+import os
+import re
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 import slurm
-from command_line import FLOW, GRID, RECORDING
+from command_line import FLOW, NO_FIGURES, Done, apart, end, refusal, start
+
+from driftwalk.viewer.watch.run import RunSource
 
 pytestmark = pytest.mark.slow
 pytest.importorskip("distributed", reason="workers need driftwalk[cluster]")
 
-ASSEMBLE = ("assemble", "--flow", FLOW, "--runs", 400, "--duration", 120, "--film", "none")
+# Some seconds of computing in 20 or so units, without figures and film.
+ASSEMBLE = ("assemble", "--flow", FLOW, "--runs", 1600, "--film", "none")
 
 
-def driftwalk(
-    *arguments: object, environment: dict[str, str] | None = None
-) -> subprocess.CompletedProcess[str]:
+def driftwalk(*arguments: object, **options: object) -> Done:
     """Run the command line in a process of its own, as a user does."""
-    line = [sys.executable, "-m", "driftwalk", *map(str, arguments)]
-    return subprocess.run(line, capture_output=True, text=True, env=environment, timeout=300)
+    return apart(*arguments, before=NO_FIGURES, **options)
 
 
-def done(finished: subprocess.CompletedProcess[str]) -> str:
-    assert finished.returncode == 0, finished.stderr
-    assert "Traceback" not in finished.stderr
-    return finished.stderr
+def done(finished: Done) -> str:
+    assert finished.code == 0, finished.err
+    assert "Traceback" not in finished.err
+    return finished.err
 
 
 @pytest.fixture(scope="module")
@@ -51,19 +57,10 @@ def same_results(one: Path, other: Path) -> None:
     assert shards_of(one) == shards_of(other)
 
 
-@pytest.mark.parametrize("workers", [1, 3])
-def test_assembly_has_the_same_bytes(at_home: Path, tmp_path: Path, workers: int) -> None:
-    said = done(driftwalk(*ASSEMBLE, "--cluster", f"local:{workers}", "-o", tmp_path / "run"))
-    assert f"{workers} worker" in said
+def test_assembly_has_the_same_bytes(at_home: Path, tmp_path: Path) -> None:
+    said = done(driftwalk(*ASSEMBLE, "--cluster", "local:3", "-o", tmp_path / "run"))
+    assert "3 workers at local:3, dashboard http://" in said
     same_results(at_home, tmp_path / "run")
-
-
-def test_a_calibration_has_the_same_bytes(tmp_path: Path) -> None:
-    (tmp_path / "study.toml").write_text(GRID)
-    line = ("calibrate", RECORDING, "--flow", FLOW, "--study", tmp_path / "study.toml")
-    done(driftwalk(*line, "-o", tmp_path / "home"))
-    done(driftwalk(*line, "--cluster", "local:2", "-o", tmp_path / "there"))
-    same_results(tmp_path / "home", tmp_path / "there")
 
 
 # Sweeps of plain Python, in a process of its own: workers are told apart by their numbers.
@@ -75,11 +72,13 @@ from driftwalk.cluster import connect, parse_address
 from driftwalk.core.errors import ClusterError
 from driftwalk.sweep import ShardStore, SweepError, grid, run_sweep
 
+SECONDS = float(os.environ.get("UNIT_SECONDS", "0.3"))
+
 class Squares:
     def __init__(self, fatal):
-        self.fatal = fatal
+        self.fatal, self.seconds = fatal, SECONDS
     def __call__(self, unit):
-        time.sleep(0.3)
+        time.sleep(self.seconds)
         if unit.start == self.fatal:
             os.kill(os.getpid(), signal.SIGKILL)
         return {"square": unit.settings["a"] ** 2}
@@ -88,10 +87,10 @@ def kill_one(pids):
     time.sleep(1.0)
     os.kill(pids[0], signal.SIGKILL)
 
-def main(mode, folder):
+def main(mode, folder, address="local:2", *options):
     store = ShardStore(Path(folder), fingerprint={"sweep": "squares"})
     units = grid(a=np.arange(16.0)).units(1)
-    with connect(parse_address("local:2")) as cluster:
+    with connect(parse_address(address, options)) as cluster:
         client = cluster.executor.client
         if mode == "killed":
             pids = list(client.run(os.getpid).values())
@@ -110,14 +109,17 @@ if __name__ == "__main__":
 """
 
 
-def sweep(mode: str, folder: Path) -> str:
+def sweep(
+    mode: str, folder: Path, *address: object, environment: Mapping[str, str] | None = None
+) -> str:
     script = folder.parent / f"{folder.name}.py"
     script.write_text(SWEEP)
     found = subprocess.run(
-        [sys.executable, str(script), mode, str(folder)],
+        [sys.executable, str(script), mode, str(folder), *map(str, address)],
+        env=None if environment is None else dict(environment),
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=300,
     )
     assert found.returncode == 0, found.stderr
     return found.stdout
@@ -148,43 +150,135 @@ def test_without_a_scheduler_the_run_ends_and_goes_on_later(tmp_path: Path) -> N
 
 
 def test_a_client_that_is_killed_goes_on_at_home(at_home: Path, tmp_path: Path) -> None:
+    """The live page follows it until then."""
     folder = tmp_path / "run"
-    line = [sys.executable, "-m", "driftwalk", *map(str, ASSEMBLE), "-o", str(folder)]
-    with subprocess.Popen(
-        [*line, "--cluster", "local:2"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    ) as client:
-        end = time.monotonic() + 60.0
-        while not shards_of(folder) and time.monotonic() < end and client.poll() is None:
-            time.sleep(0.02)
+    with start(
+        *(*ASSEMBLE, "--cluster", "local:2", "-o", folder),
+        before=NO_FIGURES, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    ) as client:  # fmt: skip
+        wait_for_shards(folder, client)
+        page = RunSource(folder).greeting()[0]["page"]
         client.send_signal(signal.SIGKILL)
+    kept = len(shards_of(folder))
+    assert 0 < kept < 16
+    assert page["title"] == "Self-assembly under way"
+    assert 0.0 < page["state"]["progress"] < 0.95
+    (bars,) = page["sections"]
+    assert 0 < bars["runs"] < 1600
+    assert bars["series"][0]["items"]
     done(driftwalk(*ASSEMBLE, "-o", folder))
     same_results(at_home, folder)
 
 
-@pytest.mark.skipif(bool(slurm.why_not()), reason=slurm.why_not() or "Slurm is there")
-def test_jobs_of_a_real_slurm_give_the_same_bytes(at_home: Path, tmp_path: Path) -> None:
-    """Two jobs, one of them cancelled in the middle."""
-    with slurm.slurm(tmp_path / "slurm") as environment:
-        options = {"queue": "debug", "memory": "1GB", "interface": "lo", "walltime": "00:10:00"}
-        given = [f"--cluster-option={name}={value}" for name, value in options.items()]
-        logs = f"--cluster-option=log_directory={tmp_path / 'logs'}"
-        line = [*ASSEMBLE, "--cluster", "slurm:2", *given, logs, "-o", tmp_path / "run"]
-        with subprocess.Popen(
-            [sys.executable, "-m", "driftwalk", *map(str, line)],
-            env=environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        ) as client:
-            end = time.monotonic() + 90.0
-            while not shards_of(tmp_path / "run") and time.monotonic() < end:
-                assert client.poll() is None, client.communicate()
-                time.sleep(0.02)
-            jobs = subprocess.run(
-                ["squeue", "-h", "-o", "%i"], env=environment, capture_output=True, text=True
-            ).stdout.split()
-            subprocess.run(["scancel", jobs[0]], env=environment, check=True)
-            _, said = client.communicate(timeout=180)
-        assert client.returncode == 0, said
-        assert "Traceback" not in said
+def wait_for_shards(folder: Path, client: subprocess.Popen[str]) -> None:
+    end = time.monotonic() + 120.0
+    while not shards_of(folder):
+        assert client.poll() is None, client.communicate()
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+@contextmanager
+def dask(part: str, *words: object, **environment: str) -> Iterator[subprocess.Popen[bytes]]:
+    """Run ``dask scheduler`` or ``dask worker``."""
+    line = [sys.executable, "-m", f"distributed.cli.dask_{part}", *map(str, words)]
+    with subprocess.Popen(
+        line,
+        env={**os.environ, **environment},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.terminate()
+
+
+# Loaded by a worker before it begins: its simulations end a last bit away from those of others.
+OTHER_BITS = """
+import driftwalk.simulation.run as run
+import driftwalk.cluster.probe as probe
+
+def off(*study, **options):
+    found = run.simulate(*study, **options)
+    found["x"].values[-1, -1] *= 1.0 + 2.0**-23
+    return found
+
+probe.simulate = off
+"""
+
+
+def test_workers_with_other_numbers_are_refused(at_home: Path, tmp_path: Path) -> None:
+    """Of another version, with both named; with other bits; those of the same are taken."""
+    older = tmp_path / "older" / "driftwalk-0.0.9.dist-info"
+    older.mkdir(parents=True)
+    (older / "METADATA").write_text("Metadata-Version: 2.1\nName: driftwalk\nVersion: 0.0.9\n")
+    (tmp_path / "other_bits.py").write_text(OTHER_BITS)
+    file = tmp_path / "scheduler.json"
+    worker = ("--scheduler-file", file, "--nthreads", 1, "--no-dashboard", "--no-nanny")
+    with dask("scheduler", "--scheduler-file", file, "--port", 0, "--no-dashboard"):
+        end = time.monotonic() + 60.0
+        while not file.exists():
+            assert time.monotonic() < end
+            time.sleep(0.1)
+        address = json.loads(file.read_text())["address"]
+        run = (*ASSEMBLE, "--cluster", address, "-o", tmp_path / "run")
+        with dask("worker", *worker, PYTHONPATH=str(older.parent)):
+            said = refusal(driftwalk(*run))
+            assert re.search(r"the worker tcp://\S+ has driftwalk 0\.0\.9", said)
+            assert f"this machine has {version('driftwalk')}" in said
+        with dask("worker", *worker, "--preload", tmp_path / "other_bits.py"):
+            said = refusal(driftwalk(*run))
+            assert re.search(r"the worker tcp://\S+ computes other numbers", said)
+        assert not (tmp_path / "run").exists()
+        with dask("worker", *worker):
+            done(driftwalk(*run))
     same_results(at_home, tmp_path / "run")
+
+
+@pytest.fixture(scope="module")
+def real_slurm(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mapping[str, str]]:
+    """Return the environment of a Slurm of one node."""
+    why = slurm.why_not()
+    if why:
+        pytest.skip(why)
+    with slurm.slurm(tmp_path_factory.mktemp("slurm")) as environment:
+        yield environment
+
+
+def of_jobs(folder: Path, **more: str) -> list[str]:
+    options = {
+        "queue": "debug", "memory": "1GB", "interface": "lo", "walltime": "00:10:00",
+        "log_directory": str(folder / "logs"), **more,
+    }  # fmt: skip
+    return [f"{name}={value}" for name, value in options.items()]
+
+
+def test_jobs_of_a_real_slurm_give_the_same_bytes(
+    real_slurm: Mapping[str, str], at_home: Path, tmp_path: Path
+) -> None:
+    """Two jobs, one of them cancelled in the middle."""
+    given = [f"--cluster-option={one}" for one in of_jobs(tmp_path)]
+    line = (*ASSEMBLE, "--cluster", "slurm:2", *given, "-o", tmp_path / "run")
+    with start(*line, before=NO_FIGURES, env=real_slurm) as client:
+        wait_for_shards(tmp_path / "run", client)
+        jobs = subprocess.run(
+            ["squeue", "-h", "-o", "%i"], env=real_slurm, capture_output=True, text=True
+        ).stdout.split()
+        subprocess.run(["scancel", jobs[0]], env=real_slurm, check=True)
+        found = end(client)
+    done(found)
+    same_results(at_home, tmp_path / "run")
+
+
+def test_jobs_whose_time_is_over_are_asked_for_again(
+    real_slurm: Mapping[str, str], tmp_path: Path
+) -> None:
+    """Workers end after 10 s by themselves, as before a walltime; the sweep takes longer."""
+    ends = of_jobs(tmp_path, worker_extra_args='["--lifetime", "10s"]')
+    said = sweep(
+        "quiet", tmp_path / "run", "slurm:2", *ends,
+        environment={**real_slurm, "UNIT_SECONDS": "1.6"},
+    )  # fmt: skip
+    assert re.match(r"SUM 1240\.0 .*\d workers? (ended|was lost|were lost)", said), said
+    assert len(shards_of(tmp_path / "run")) == 16

@@ -1,0 +1,114 @@
+"""Every stage that sweeps gives the same bits on two worker processes as in this one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import GRID, assert_same_bits
+from recovery_worlds import small_study
+from self_propelled import moving
+
+import driftwalk as dw
+from driftwalk.calibration import compare_models, recover_model
+from driftwalk.calibration.evolution import Budget
+from driftwalk.cluster import Cluster, connect, parse_address
+from driftwalk.model import parse_study
+
+pytestmark = pytest.mark.slow
+pytest.importorskip("distributed", reason="workers need driftwalk[cluster]")
+
+ACTIVE = {"speed": 0.03, "rotational_diffusion": 0.5, "turn_rate": 0.3}
+
+
+@pytest.fixture(scope="module")
+def workers() -> Iterator[Cluster]:
+    with connect(parse_address("local:2")) as cluster:
+        yield cluster
+
+
+@pytest.fixture(scope="module")
+def short() -> xr.Dataset:
+    """Return five minutes of the bundled recording."""
+    return dw.tank30_recording().sel(time=slice(0.0, 300.0))
+
+
+@pytest.fixture(scope="module")
+def active() -> xr.Dataset:
+    """Return a minute of an active body (synthetic)."""
+    return moving(dw.motion_model("active", clearance=0.015), ACTIVE, 60.0, seed=2, noise=3e-4)
+
+
+def noisy(**calibration: object) -> dw.Study:
+    return dw.Study(observation={"position_noise_m": 3e-4}, calibration=calibration)
+
+
+def test_a_calibration_with_its_bootstrap_and_halves(workers: Cluster, short: xr.Dataset) -> None:
+    told: set[str] = set()
+    options = {"study": parse_study(GRID), "flow": dw.tank30_flow()}
+    calibrate = dw.calibration.calibrate
+    there = calibrate(
+        short, executor=workers.executor, tell=lambda stage, *_: told.add(stage), **options
+    )
+    assert {"coarse", "refined", "bootstrap", "validation"} <= told
+    assert_same_bits(there, calibrate(short, **options))
+
+
+def test_a_calibration_of_three_parameters(workers: Cluster, active: xr.Dataset) -> None:
+    model, study = dw.motion_model("active", clearance=0.015), noisy(bootstrap=10)
+    there = dw.calibrate(active, model, study=study, executor=workers.executor)
+    assert_same_bits(there, dw.calibrate(active, model, study=study))
+
+
+def test_a_comparison_of_models(workers: Cluster, active: xr.Dataset) -> None:
+    budget = Budget(design=16, starts=1, short=2, long=3)
+    told: list[tuple[int, int]] = []
+    options = {"models": ["inertial", "active"], "study": noisy(), "budget": budget}
+    there = compare_models(
+        active,
+        executor=workers.executor,
+        tell=lambda done, total, _: told.append((done, total)),
+        **options,
+    )
+    # Two models and two walks: one unit each.
+    assert (1, 4) in told
+    assert_same_bits(there, compare_models(active, **options))
+
+
+def test_recovery_studies(workers: Cluster) -> None:
+    study = small_study()
+    there, here = (
+        # How long a fit takes is measured.
+        dw.recovery_study(study, dw.tank30_flow(), **how).drop_vars("fit_time")
+        for how in ({"executor": workers.executor}, {"threads": 1})
+    )
+    assert_same_bits(there, here)
+    chosen = dw.apply_overrides(
+        noisy(refine="none", bootstrap=0, replicates=1),
+        {"recover.recordings": 2, "recover.durations_s": [40.0]},
+    )
+    model = dw.motion_model("active", turn_rate=0.3)
+    truth = {name: ACTIVE[name] for name in ("speed", "rotational_diffusion")}
+    found = recover_model(model, truth, chosen, executor=workers.executor)
+    assert_same_bits(found, recover_model(model, truth, chosen))
+
+
+def test_self_assembly_and_its_sensitivity(workers: Cluster) -> None:
+    flow = dw.tank30_flow()
+    study = dw.Study(
+        assembly={"blocks": 4, "runs": 200, "duration_s": 20.0},
+        sensitivity={"runs": 20, "reference_realisations": 4},
+    )
+    axes = {"drag_coefficient": np.array([0.2, 0.4]), "force_std": np.array([2e-4, 6e-4, 1e-3])}
+    for made in (
+        lambda executor: dw.assemble(study, flow, executor=executor),
+        lambda executor: dw.sensitivity_map(study, flow, axes=axes, executor=executor),
+    ):
+        xr.testing.assert_identical(made(workers.executor), made(None))
+
+
+def test_nothing_befell_them(workers: Cluster) -> None:
+    assert workers.report() == ""
+    assert workers.words.endswith("units, 2 workers")
