@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Final, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -40,6 +40,9 @@ if TYPE_CHECKING:
 
 FlowDraws = Literal["standard_error", "none"]
 Progress = Callable[[int, int], None]
+
+RUNS_TOGETHER: Final = 2 * RUNS_PER_FLOW
+"""Runs of a work unit at least: with half as many, a run takes twice the time, for want of lanes."""
 
 
 def assemble(
@@ -336,9 +339,9 @@ class _Runs:
 
 
 def runs_per_unit(plan: Plan) -> int:
-    """Return the runs of a work unit: a whole number of drawn flows."""
+    """Return the runs of a work unit: a whole number of drawn flows, enough for the lanes."""
     block_steps = plan.steps * plan.study.assembly.blocks
-    return settings_per_unit(plan.index.size, block_steps, multiple=RUNS_PER_FLOW)
+    return settings_per_unit(plan.index.size, block_steps, multiple=RUNS_TOGETHER)
 
 
 def _by_flow(plan: Plan, first: int, last: int) -> Sequence[tuple[slice, xr.Dataset]]:
