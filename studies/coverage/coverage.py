@@ -20,8 +20,9 @@ from typing import Any
 import numpy as np
 
 import driftwalk as dw
-from driftwalk.calibration.problem import prepare_problem
-from driftwalk.calibration.quality import noise_floor_at, quality_of_fit
+from driftwalk.calibration.problem import Problem, limits_of, prepare_problem
+from driftwalk.calibration.quality import quality_of_fit
+from driftwalk.calibration.refine import Refined, refined
 from driftwalk.calibration.region import (
     build_surface,
     confidence_region,
@@ -29,13 +30,14 @@ from driftwalk.calibration.region import (
     run_bootstrap,
     simulated_steps,
 )
-from driftwalk.calibration.search import Map, window_smoother
+from driftwalk.calibration.search import full_map
+from driftwalk.comparison import StepTable
 from driftwalk.conditions import recorded_camera
 from driftwalk.schema import body_track
 
 TRUTHS = ((0.45, 0.55e-3), (0.80, 0.90e-3))
-STEPS = (0.01, 2e-5)
-REPLICATES = 8
+STEPS = (0.005, 3e-5)
+REPLICATES = 4
 RESULTS = Path(__file__).with_name("coverage.jsonl")
 
 
@@ -57,17 +59,20 @@ def main() -> None:
 
 def calibrate_truth(problem: Any, index: int, truth: tuple[float, float], wanted: Any) -> None:
     """Calibrate recordings of one truth, appending a line for each."""
-    done = {(line["truth"], line["recording"]) for line in read()}
+    done = {(line["truth"], line["recording"]) for line in read(RESULTS)}
     missing = [k for k in range(wanted.recordings) if (index, k) not in done]
     if not missing:
         return
     # The truth lies between the nodes of the grid, as it would in life.
-    window = (
-        np.round(truth[0] + STEPS[0] * (np.arange(-10, 11) + 0.37), 12),
-        np.round(truth[1] + STEPS[1] * (np.arange(-10, 11) - 0.29), 12),
+    window = tuple(
+        np.round(value + step * (np.arange(-8, 9) + shift), 12)
+        for value, step, shift in zip(truth, STEPS, (0.37, -0.29), strict=True)
     )
     settings = [axis.ravel() for axis in np.meshgrid(*window, indexing="ij")]
     shared = simulated_steps(problem, settings, stage="refined", replicates=REPLICATES)
+    apart = np.array(
+        [own_floor(problem, shared.rows(slice(k, k + REPLICATES))) for k in starts(shared)]
+    )
     recordings = simulated_steps(
         problem,
         truth,
@@ -75,60 +80,87 @@ def calibrate_truth(problem: Any, index: int, truth: tuple[float, float], wanted
         replicates=wanted.recordings,
         first=index,
     )
+    limits = limits_of(problem)
+    box = tuple((float(axis[0]), float(axis[-1])) for axis in window)
+    shape = tuple(axis.size for axis in window)
     for k in missing:
         row = recordings.rows(slice(k, k + 1))
         steps = np.column_stack([row.length[0], row.angle[0]]).astype(np.float64)[: row.pairs[0]]
         matrix = problem.statistic.matrix(row, shared, threads=problem.like.threads)
-        distance = matrix.reshape(*(axis.size for axis in window), REPLICATES)
+        distance = matrix.reshape(*shape, REPLICATES)
         reference = replace(problem.reference, steps=np.ascontiguousarray(steps))
-        own = replace(problem, reference=reference)
-        line = calibrate_one(own, Map(window, distance, {}), truth, 1000 * index + k, wanted)
-        with RESULTS.open("a") as file:
-            file.write(json.dumps({"truth": index, "recording": k, **line}) + "\n")
-        print(index, k, line, flush=True)
+        search = problem.study.calibration.model_copy(update={"seed": 100 + 1000 * index + k})
+        study = problem.study.model_copy(update={"calibration": search})
+        own = replace(problem, reference=reference, study=study)
+        found = refined(full_map(window, distance, {"apart": apart.reshape(shape)}), box, limits)
+        line = answer_of(own, found, truth, wanted.bootstrap)
+        write(RESULTS, {"truth": index, "recording": k, **line})
 
 
-def calibrate_one(
-    problem: Any, refined: Map, truth: tuple[float, float], seed: int, wanted: Any
+def starts(shared: StepTable) -> range:
+    """Return the number of the first replicate of each setting."""
+    return range(0, shared.pairs.size, REPLICATES)
+
+
+def own_floor(problem: Problem, replicates: StepTable) -> float:
+    """Return the mean distance between the replicates of a setting."""
+    matrix = problem.statistic.matrix(replicates, replicates, threads=problem.like.threads)
+    return float(matrix[np.triu_indices(len(matrix), 1)].mean())
+
+
+def answer_of(
+    problem: Problem, found: Refined, truth: tuple[float, float], bootstrap: int
 ) -> dict[str, Any]:
-    """Calibrate one recording and say what holds the truth."""
-    search = problem.study.calibration.model_copy(update={"seed": 100 + seed})
-    problem = replace(problem, study=problem.study.model_copy(update={"calibration": search}))
-    smoother = window_smoother(refined.axes, STEPS)
-    optimum = smoother.optimum(refined.mean)
-    surface = smoother.surface(refined.mean.ravel())
-    floor = noise_floor_at(problem, optimum.point)
-    stored = build_surface(problem, refined, optimum, margin=floor)
-    bootstrap = run_bootstrap(problem, optimum, stored, count=wanted.bootstrap)
-    quality = quality_of_fit(bootstrap)
+    """Return what a calibration says from its refined map, and what holds the truth."""
+    landscape = found.landscape
+    stored = build_surface(problem, found)
+    simulated = run_bootstrap(
+        problem,
+        landscape.optimum,
+        stored,
+        floor=landscape.floor_at_optimum,
+        count=bootstrap,
+    )
+    quality = quality_of_fit(simulated)
     region = confidence_region(
-        smoother, surface, bootstrap, confidence=0.9, stretch=quality.stretch
+        landscape.smoother,
+        landscape.surface,
+        simulated,
+        confidence=0.9,
+        stretch=quality.stretch,
     )
     drag, force = region.intervals
     return {
-        "drag_coefficient": optimum.point[0],
-        "force_std_N": optimum.point[1],
-        "region_holds": region_contains(smoother, surface, region, truth),
+        "drag_coefficient": landscape.optimum.point[0],
+        "force_std_N": landscape.optimum.point[1],
+        "region_holds": region_contains(landscape.smoother, landscape.surface, region, truth),
         "drag_coefficient_holds": drag[0] <= truth[0] <= drag[1],
         "force_std_holds": force[0] <= truth[1] <= force[1],
-        "drag_coefficient_extent": drag[1] - drag[0],
-        "force_std_extent_N": force[1] - force[0],
+        "drag_coefficient_interval": drag,
+        "force_std_interval_N": force,
         "ks_distance": quality.distance,
         "noise_floor": quality.floor,
         "stretch": quality.stretch,
     }
 
 
-def read() -> list[dict[str, Any]]:
+def write(path: Path, line: dict[str, Any]) -> None:
+    """Append a line to the results."""
+    with path.open("a") as file:
+        file.write(json.dumps(line) + "\n")
+    print(line, flush=True)
+
+
+def read(path: Path) -> list[dict[str, Any]]:
     """Return the results so far."""
-    if not RESULTS.exists():
+    if not path.exists():
         return []
-    return [json.loads(line) for line in RESULTS.read_text().splitlines()]
+    return [json.loads(line) for line in path.read_text().splitlines()]
 
 
 def report() -> None:
     """Print the coverage for each truth and in all."""
-    lines = read()
+    lines = read(RESULTS)
     for index in (*range(len(TRUTHS)), None):
         chosen = [line for line in lines if index is None or line["truth"] == index]
         shares = {

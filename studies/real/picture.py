@@ -74,7 +74,7 @@ def simulate_optimum(run: Path, body: str | None) -> tuple[Fit, Problem]:
     problem = prepare_problem(track, study, flow, camera=camera)
     optimum = fitted_value(found, "drag_coefficient"), fitted_value(found, "force_std")
     scored = score_settings(
-        problem, optimum, stage="floor", first=1, replicates=REPLICATES, details="steps"
+        problem, optimum, stage="floor", numbers=[1], replicates=range(REPLICATES), details="steps"
     )
     middle = int(np.argsort(scored["ks_distance"])[REPLICATES // 2])
     steps = [

@@ -186,6 +186,7 @@ def _map(
         f"{prefix}ks_distance": (plane, noisy.mean(axis=-1)),
         f"{prefix}ks_distance_standard_error": (plane, error),
         f"{prefix}ks_distance_replicate": ((*plane, f"{prefix}replicate"), noisy),
+        f"{prefix}replicate_count": (plane, np.full(exact.shape, replicates, np.int32)),
     }
 
 

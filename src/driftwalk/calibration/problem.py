@@ -119,16 +119,24 @@ def prepare_problem(
     return Problem(BlockModel(study) if model is None else model, study, like, chosen, reference)
 
 
+def limits_of(problem: Problem) -> tuple[tuple[float, float], ...]:
+    """Return the ends of the search along every parameter, in its coordinate."""
+    return tuple(
+        (float(parameter.coordinates[0]), float(parameter.coordinates[-1]))
+        for parameter in problem.parameters
+    )
+
+
 def score_settings(
     problem: Problem,
     settings: Sequence[npt.ArrayLike],
     *,
     stage: str,
-    first: int,
-    replicates: int,
+    numbers: npt.ArrayLike,
+    replicates: range,
     details: Details = "none",
 ) -> Scores:
-    """Simulate consecutive settings and compare each world with the recording.
+    """Simulate settings and compare each world with the recording.
 
     Parameters
     ----------
@@ -138,10 +146,10 @@ def score_settings(
         The coordinates of every setting, one array per parameter.
     stage : str
         Name of the stage; its random streams are its own.
-    first : int
-        Index of the first setting within its stage: it is part of the address.
-    replicates : int
-        Worlds per setting.
+    numbers : array_like of int, shape (settings,)
+        Number of each setting within its stage: it is part of the address.
+    replicates : range
+        Which replicates of each setting.
     details : {"none", "steps", "all"}
         What is kept of a world; see `driftwalk.motion.score_worlds`.
 
@@ -151,14 +159,14 @@ def score_settings(
         One entry per world each, replicates fastest.
     """
     columns = [np.atleast_1d(np.asarray(column, dtype=np.float64)) for column in settings]
-    trial = trial_in(stage, np.arange(first, first + columns[0].size))
+    trial = trial_in(stage, np.asarray(numbers))
     keys = world_keys(
         problem.study.calibration.seed,
         trial=trial[:, None],
-        replicate=np.arange(replicates)[None, :],
+        replicate=np.asarray(replicates)[None, :],
     )
     values = {
-        parameter.name: np.repeat(parameter.to_value(column), replicates)
+        parameter.name: np.repeat(parameter.to_value(column), len(replicates))
         for parameter, column in zip(problem.parameters, columns, strict=True)
     }
     return score_worlds(

@@ -7,11 +7,13 @@ from concurrent.futures import Executor
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from driftwalk.calibration.problem import Axes, Problem
+from driftwalk.calibration.maps import Mapper
+from driftwalk.calibration.problem import Problem, limits_of
+from driftwalk.calibration.refine import first_window, locate
 from driftwalk.calibration.region import Bootstrap, recordings_at, simulated_steps
-from driftwalk.calibration.search import Map, refined_window, run_map, window_smoother
-from driftwalk.calibration.surface import Optimum
+from driftwalk.calibration.search import Map, run_map
 from driftwalk.schema.calibration_facts import is_explained
 
 FAR_ABOVE_FLOOR = 2.0
@@ -72,32 +74,43 @@ class Halves(NamedTuple):
 
 
 def validate_on_halves(
-    first: Problem, second: Problem, *, executor: Executor | None = None
+    whole: Problem,
+    coarse: Map,
+    first: Problem,
+    second: Problem,
+    *,
+    executor: Executor | None = None,
 ) -> Halves:
     """Calibrate on the first half of a recording and measure the distance on the second.
 
-    The search is the usual one with a single replicate per setting, then two on a refined grid
-    of double steps: enough for an optimum, and a small part of the main calibration's time.
+    The search is the usual one with a single replicate per setting on the coarse map, and ends
+    with the window that locates the valley: enough for an optimum, and a small part of the main
+    calibration's time. Settings of the coarse map that the triangle inequality excludes are not
+    simulated again: see `could_be_best`.
 
     Parameters
     ----------
+    whole : Problem
+        The recording.
+    coarse : Map
+        Its coarse map.
     first, second : Problem
         The halves; `second` has the flow of `first`.
     executor : concurrent.futures.Executor, optional
         Computes the maps' work units elsewhere, with one thread each.
     """
-    coarse = run_map(
+    map_of_half = run_map(
         first,
-        [parameter.coordinates for parameter in first.parameters],
+        coarse.axes,
         stage="first_half",
         replicates=1,
+        only=could_be_best(whole, coarse, first),
         executor=executor,
     )
-    doubled = [2 * step for step in first.refined_steps]
-    window = refined_window(coarse, doubled, 0.0)
-    optimum = refine(
-        first, window, doubled, stage="first_half_refined", replicates=2, executor=executor
-    )[1]
+    lowest = map_of_half.point(map_of_half.cell_of_minimum())
+    window = first_window(map_of_half, noise_floor_at(first, lowest))
+    maps = Mapper(first, "first_half_refined", executor=executor)
+    optimum = locate(maps, window, limits_of(first)).landscape.optimum
     recordings, distances = recordings_at(
         second, optimum, stage="second_half", count=VALIDATION_REPLICATES
     )
@@ -106,15 +119,16 @@ def validate_on_halves(
     return Halves(optimum.point, float(distances.mean()), float(floor))
 
 
-def refine(
-    problem: Problem,
-    window: Axes,
-    steps: Sequence[float],
-    *,
-    stage: str,
-    replicates: int,
-    executor: Executor | None = None,
-) -> tuple[Map, Optimum]:
-    """Run a refined grid and return it with the optimum of its smooth surface."""
-    found = run_map(problem, window, stage=stage, replicates=replicates, executor=executor)
-    return found, window_smoother(window, steps).optimum(found.mean)
+def could_be_best(whole: Problem, coarse: Map, part: Problem) -> npt.NDArray[np.bool_]:
+    """Return which settings of a coarse map could be nearest to a part of the recording.
+
+    With d for the distance of the part from the whole, D of the part to a setting is within d of
+    that of the whole. So a setting that is more than 2 d farther from the whole than the best one
+    is farther from the part, too. Chance adds to that: a floor of the part for each of the two.
+    """
+    between = whole.statistic.matrix(
+        part.reference.table, whole.reference.table, threads=whole.like.threads
+    )
+    lowest = coarse.point(coarse.cell_of_minimum())
+    margin = 2.0 * float(between[0, 0]) + 2.0 * noise_floor_at(part, lowest)
+    return np.asarray(coarse.mean <= coarse.mean.min() + margin)

@@ -2,7 +2,7 @@
 
 Recordings are simulated at the optimum, with the length, gaps and camera noise of the real one, and
 each is estimated again with the same smooth surface, against steps that were simulated once around
-the optimum. (It meets two of their four replicates, in turn, so that the noise of the surface is
+the optimum. (It meets one of their four replicates, in turn, so that the noise of the surface is
 part of what chance does.) For each, the truth is known: it is the optimum. How far D at the truth
 lies above the smallest D of its own surface, the excess, is what chance does; its 90 % quantile is
 the level up to which the real recording's surface is plausible. So the region follows the valley,
@@ -17,7 +17,7 @@ raised by their ratio, as a reduced chi-square above one widens the errors of a 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Final, NamedTuple
 
@@ -25,18 +25,29 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.calibration.problem import Axes, Floats, Problem, score_settings
-from driftwalk.calibration.search import BANDWIDTH_STEPS, Map, Progress, window_smoother
-from driftwalk.calibration.surface import FINENESS, Optimum, Smoother, make_smoother
+from driftwalk.calibration.refine import Refined
+from driftwalk.calibration.search import Progress
+from driftwalk.calibration.surface import (
+    Optimum,
+    Smoother,
+    at_settings,
+    lattice_of,
+    lowest_point,
+    make_smoother,
+    nearest_point,
+)
 from driftwalk.comparison import Statistic, StepTable
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
 
-SURFACE_POINTS: Final[dict[int, tuple[int, ...]]] = {1: (101,), 2: (13, 15)}
-"""Most settings along each axis of the stored surface, by the number of parameters."""
-SURFACE_MARGIN = 3
-"""Refined steps around the settings that could be the optimum."""
+SURFACE_INTERVALS: Final[dict[int, int]] = {1: 32, 2: 10}
+"""Intervals along each axis of the stored surface, by the number of parameters."""
+LEAST_BANDWIDTH_STEPS: Final = 1.5
+KEPT: Final = 1.0
+"""Places less than this many floors above the minimum are kept of the stored surface."""
+SIMULATED: Final = 2.0
+"""Settings less than this many floors above the minimum are simulated for it."""
 SURFACE_REPLICATES = 4
-MET_BY_EACH = 2
-"""Replicates of the surface that one recording is compared with."""
+"""Simulations of every setting of the stored surface; a recording meets one of them."""
 RECORDINGS_PER_UNIT = 10
 FLOOR_REFERENCES = 8
 
@@ -45,82 +56,121 @@ FLOOR_REFERENCES = 8
 class StoredSurface:
     """Simulated steps of the settings around an optimum, to estimate any recording against."""
 
-    smoother: Smoother
-    parts: tuple[StepTable, ...]
-    """Each holds `MET_BY_EACH` replicates of every setting, replicates fastest."""
+    axes: Axes
+    """Axes of its lattice."""
+    kept: npt.NDArray[np.bool_]
+    """Points of the lattice where a recording's estimate may lie."""
+    matrix: Floats
+    """Weights of the settings in the value at each of them, (points, settings)."""
+    replicates: StepTable
+    """Simulations of the settings, replicates slowest."""
+    apart: Floats
+    """Distance between replicates of each setting."""
+    floor: Floats
+    """Floor at each of the points."""
     statistic: Statistic
     threads: int
 
-    def distances(self, recordings: StepTable, part: int) -> Floats:
-        """Return the mean distance of each recording to each setting, (recording, setting)."""
-        chosen = self.parts[part % len(self.parts)]
-        matrix = self.statistic.matrix(recordings, chosen, threads=self.threads)
-        return np.asarray(matrix.reshape(len(matrix), -1, MET_BY_EACH).mean(axis=2))
+    def reliefs(self, recordings: StepTable, replicate: int) -> Floats:
+        """Return each recording's surface above its minimum, in floors, (recording, *lattice).
+
+        It is infinite where nothing is kept.
+        """
+        met = _replicate(self.replicates, self.apart.size, replicate % SURFACE_REPLICATES)
+        distance = self.statistic.matrix(recordings, met, threads=self.threads)
+        score = (distance - 0.5 * self.apart) @ self.matrix.T
+        surface = np.full((len(distance), *self.kept.shape), np.inf)
+        surface[:, self.kept] = (score - score.min(axis=1, keepdims=True)) / self.floor
+        return surface
 
 
-def build_surface(
-    problem: Problem, refined: Map, optimum: Optimum, *, margin: float
-) -> StoredSurface:
-    """Simulate the settings that could be a recording's optimum.
+def build_surface(problem: Problem, refined: Refined) -> StoredSurface:
+    """Simulate settings of the refined window again, to estimate recordings against them.
 
     Parameters
     ----------
     problem : Problem
         The recording and the model.
-    refined : Map
+    refined : Refined
         The second pass of the search.
-    optimum : Optimum
-        Its minimum.
-    margin : float
-        Settings whose smooth distance is within `margin` of the minimum are covered: the noise
-        floor.
 
     Returns
     -------
     StoredSurface
-        On the refined grid, or on every k-th value of it where that has too many settings.
+        On a grid over the window, where the optimum could be.
     """
-    axes, bandwidth = [], []
-    steps = problem.refined_steps
-    ranges = _plausible_ranges(refined, optimum, steps, margin)
-    for axis, (low, high), step, most in zip(
-        refined.axes, ranges, steps, SURFACE_POINTS[len(steps)], strict=True
-    ):
-        stride = max(int(np.ceil((high - low) / (most - 1))), 1)
-        axes.append(axis[low : high + 1 : stride])
-        bandwidth.append((BANDWIDTH_STEPS if stride == 1 else 1.5 * stride) * step)
-    settings = [values.ravel() for values in np.meshgrid(*axes, indexing="ij")]
-    parts = tuple(
-        simulated_steps(
-            problem,
-            settings,
-            stage="surface",
-            replicates=MET_BY_EACH,
-            first=part * settings[0].size,
-        )
-        for part in range(SURFACE_REPLICATES // MET_BY_EACH)
+    intervals = SURFACE_INTERVALS[len(refined.map.axes)]
+    axes = tuple(
+        np.linspace(axis[0], axis[-1], min(intervals + 1, axis.size)) for axis in refined.map.axes
     )
-    smoother = make_smoother(axes, bandwidth=bandwidth)
-    return StoredSurface(smoother, parts, problem.statistic, problem.like.threads)
-
-
-def _plausible_ranges(
-    refined: Map, optimum: Optimum, steps: Sequence[float], margin: float
-) -> list[tuple[int, int]]:
-    """Return the index ranges of the refined grid that hold what could be the optimum."""
-    surface = window_smoother(refined.axes, steps).surface(refined.mean.ravel())
-    inside = np.argwhere(at_settings(surface) <= optimum.distance + margin)
-    return [
-        (max(int(low) - SURFACE_MARGIN, 0), min(int(high) + SURFACE_MARGIN, axis.size - 1))
-        for axis, low, high in zip(
-            refined.axes, inside.min(axis=0), inside.max(axis=0), strict=True
-        )
+    bandwidth = [
+        max(width, LEAST_BANDWIDTH_STEPS * float(np.ptp(axis)) / max(axis.size - 1, 1))
+        for axis, width in zip(axes, refined.bandwidth, strict=True)
     ]
+    lattice = lattice_of(axes)
+    height, floor = (
+        _between(refined.landscape.smoother.axes, values, lattice)
+        for values in (refined.landscape.height, refined.landscape.floor)
+    )
+    simulated = at_settings(height) <= SIMULATED
+    smoother = make_smoother(axes, bandwidth=bandwidth, weights=simulated.astype(float))
+    # Weights add up to 1 wherever there are settings to say what the surface is.
+    supported = smoother.matrix.sum(axis=1).reshape(height.shape) > 0.99
+    kept = (height <= KEPT) & supported
+    cells = np.flatnonzero(simulated)
+    settings = [values.ravel()[cells] for values in np.meshgrid(*axes, indexing="ij")]
+    replicates = simulated_steps(
+        problem,
+        [np.tile(values, SURFACE_REPLICATES) for values in settings],
+        stage="surface",
+        replicates=1,
+    )
+    return StoredSurface(
+        lattice,
+        kept,
+        smoother.matrix[kept.ravel()][:, cells],
+        replicates,
+        _apart(problem, replicates, cells.size),
+        floor[kept],
+        problem.statistic,
+        problem.like.threads,
+    )
 
 
-def at_settings(surface: Floats) -> Floats:
-    """Return a surface at the settings of its grid: every `FINENESS`-th point of the lattice."""
-    return np.asarray(surface[(slice(None, None, FINENESS),) * surface.ndim])
+def _between(axes: Axes, values: Floats, lattice: Axes) -> Floats:
+    """Return values on one lattice at the points of another within it."""
+    from scipy.interpolate import RegularGridInterpolator
+
+    # An axis of one point has nothing to be between.
+    wide = [axis.size > 1 for axis in axes]
+    if not any(wide):
+        return values
+    chosen = [axis for axis, has in zip(axes, wide, strict=True) if has]
+    wanted = [
+        np.clip(axis, own[0], own[-1])
+        for axis, own, has in zip(lattice, axes, wide, strict=True)
+        if has
+    ]
+    points = np.stack(np.meshgrid(*wanted, indexing="ij"), axis=-1)
+    found = RegularGridInterpolator(chosen, values.squeeze())(points)
+    return np.asarray(found.reshape([axis.size for axis in lattice]))
+
+
+def _replicate(table: StepTable, settings: int, replicate: int) -> StepTable:
+    """Return one replicate of every setting."""
+    return table.rows(slice(replicate * settings, (replicate + 1) * settings))
+
+
+def _apart(problem: Problem, table: StepTable, settings: int) -> Floats:
+    """Return the mean distance between the replicates of each setting."""
+
+    def of(setting: int) -> float:
+        own = table.rows(slice(setting, None, settings))
+        matrix = problem.statistic.matrix(own, own, threads=1)
+        return float(matrix[np.triu_indices(SURFACE_REPLICATES, 1)].mean())
+
+    with ThreadPoolExecutor(problem.like.threads) as pool:
+        return np.array(list(pool.map(of, range(settings))))
 
 
 def simulated_steps(
@@ -133,7 +183,12 @@ def simulated_steps(
 ) -> StepTable:
     """Simulate settings and return the steps of every world, replicates fastest."""
     found = score_settings(
-        problem, settings, stage=stage, first=first, replicates=replicates, details="steps"
+        problem,
+        settings,
+        stage=stage,
+        numbers=first + np.arange(np.size(settings[0])),
+        replicates=range(replicates),
+        details="steps",
     )
     return StepTable(found["step_length"], found["turning_angle"], found["pairs"])
 
@@ -143,7 +198,12 @@ def recordings_at(
 ) -> tuple[StepTable, Floats]:
     """Simulate recordings at an optimum; return their steps and distances to the real one."""
     found = score_settings(
-        problem, optimum.point, stage=stage, first=0, replicates=count, details="steps"
+        problem,
+        optimum.point,
+        stage=stage,
+        numbers=[0],
+        replicates=range(count),
+        details="steps",
     )
     steps = StepTable(found["step_length"], found["turning_angle"], found["pairs"])
     return steps, np.asarray(found["ks_distance"])
@@ -168,6 +228,7 @@ def run_bootstrap(
     optimum: Optimum,
     surface: StoredSurface,
     *,
+    floor: float,
     count: int,
     store: Store | None = None,
     executor: Executor | None = None,
@@ -183,6 +244,8 @@ def run_bootstrap(
         Where to simulate.
     surface : StoredSurface
         Surface to estimate against.
+    floor : float
+        Floor of the optimum.
     count : int
         Number of recordings, at least 2.
     store : Store, optional
@@ -195,7 +258,8 @@ def run_bootstrap(
     recordings, to_recording = recordings_at(problem, optimum, stage="bootstrap", count=count)
     names = tuple(parameter.name for parameter in problem.parameters)
     alone = surface if executor is None else replace(surface, threads=1)
-    function = _Estimates(recordings, alone, optimum, names)
+    truth = nearest_point(surface.axes, optimum.point)
+    function = _Estimates(recordings, alone, names, truth, floor)
     units = grid(recording=np.arange(count)).units(RECORDINGS_PER_UNIT)
     estimates = run_sweep(function, units, store=store, executor=executor, progress=progress)
     few = min(FLOOR_REFERENCES, count // 2)
@@ -218,30 +282,28 @@ class _Estimates:
 
     recordings: StepTable
     surface: StoredSurface
-    optimum: Optimum
     names: tuple[str, ...]
+    truth: tuple[int, ...]
+    """Place of the optimum on the surface's lattice."""
+    floor: float
+    """Of the optimum."""
     linear_algebra: ClassVar[bool] = True
     """Its results depend on numpy and scipy."""
 
     def __call__(self, unit: WorkUnit) -> dict[str, npt.NDArray[Any]]:
-        smoother = self.surface.smoother
         rows = self.recordings.rows(slice(unit.start, unit.stop))
-        distances = self.surface.distances(rows, unit.start // RECORDINGS_PER_UNIT)
-        estimates = [smoother.optimum(row).point for row in distances]
-        columns = np.array(estimates).reshape(-1, len(self.names)).T
+        found = self.surface.reliefs(rows, unit.start // RECORDINGS_PER_UNIT)
+        columns = np.array([lowest_point(self.surface.axes, one) for one in found]).T
         return {
             **dict(zip(self.names, columns, strict=True)),
-            "excess": np.array([_excess(smoother, row, self.optimum) for row in distances]),
+            "excess": self.floor * np.array([_excess(one, self.truth) for one in found]),
         }
 
 
-def _excess(smoother: Smoother, distance: Floats, truth: Optimum) -> tuple[float, ...]:
-    """Return how far D at the truth lies above the minimum: jointly, and along each profile."""
-    surface = smoother.surface(distance)
-    at = smoother.nearest(truth.point)
-    low = surface.min()
-    profiles = [surface.take(index, axis=axis).min() for axis, index in enumerate(at)]
-    return tuple(float(value - low) for value in (surface[at], *profiles))
+def _excess(relief: Floats, truth: tuple[int, ...]) -> tuple[float, ...]:
+    """Return how far the truth lies above the minimum: jointly, and along each profile."""
+    profiles = [relief.take(index, axis=axis).min() for axis, index in enumerate(truth)]
+    return tuple(float(value) for value in (relief[truth], *profiles))
 
 
 class Region(NamedTuple):

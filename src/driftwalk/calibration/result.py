@@ -154,13 +154,15 @@ def _map_variables(
 ) -> dict[str, _Variable]:
     status = found.arrays["status"]
     cause = np.zeros(status.shape[:-1], dtype=np.int8)
-    cause[(status & STATUS["no_motion"]).all(axis=-1) > 0] |= CELL_STATUS["no_motion"]
+    still = ((status & STATUS["no_motion"]) > 0) | ~found.simulated
+    cause[still.all(axis=-1)] |= CELL_STATUS["no_motion"]
     cause[broken_worlds(status).any(axis=-1)] |= CELL_STATUS["non_finite"]
     cause[found.arrays["pairs"] == 0] |= CELL_STATUS["too_few_steps"]
     return {
         f"{prefix}ks_distance": (dims, found.mean),
         f"{prefix}ks_distance_standard_error": (dims, found.standard_error),
         f"{prefix}ks_distance_replicate": ((*dims, replicate), found.distance),
+        f"{prefix}replicate_count": (dims, found.replicates.astype(np.int32)),
         f"{prefix}status": (dims, cause),
     }
 

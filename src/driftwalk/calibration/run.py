@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from driftwalk.calibration.estimation import Stores, Tell, calibrate_many
-from driftwalk.calibration.problem import Axes, Problem, prepare_problem
+from driftwalk.calibration.maps import Mapper, window_id
+from driftwalk.calibration.problem import Axes, Problem, limits_of, prepare_problem
 from driftwalk.calibration.quality import (
     FAR_ABOVE_FLOOR,
     Halves,
@@ -18,11 +19,11 @@ from driftwalk.calibration.quality import (
     quality_of_fit,
     validate_on_halves,
 )
+from driftwalk.calibration.refine import Refined, beating_cell, first_window, locate, refine
 from driftwalk.calibration.refuse import MOST_PARAMETERS, require_searchable
 from driftwalk.calibration.region import (
     Bootstrap,
     Region,
-    at_settings,
     build_surface,
     confidence_region,
     run_bootstrap,
@@ -34,16 +35,9 @@ from driftwalk.calibration.result import (
     estimate_facts,
     interval_facts,
 )
-from driftwalk.calibration.search import (
-    Map,
-    recentre,
-    refined_replicates,
-    refined_window,
-    run_map,
-    window_smoother,
-)
+from driftwalk.calibration.search import Map
 from driftwalk.calibration.steadiness import Steadiness, steadiness_of
-from driftwalk.calibration.surface import Optimum
+from driftwalk.calibration.surface import Optimum, at_settings
 from driftwalk.calibration.wall import wall_warning
 from driftwalk.comparison import Statistic
 from driftwalk.conditions import recorded_camera, study_in_arena
@@ -59,7 +53,6 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
     from driftwalk.sweep import Store
 
-MOST_RECENTRINGS = 3
 WIDE_SHARE = 0.05
 
 FlowSource = Callable[[Track], "xr.Dataset | None"]
@@ -179,7 +172,7 @@ def calibrate(
     steadiness = steadiness_of(problem)
     of_time = None if steadiness is None else steadiness.warning
     result.warnings += [text for text in (of_wall, of_time) if text is not None]
-    halves = _halves(track, problem, flow_of, executor, say)
+    halves = _halves(track, problem, result.coarse, flow_of, executor, say)
     return _finish(result, halves, steadiness, recording, problem)
 
 
@@ -245,24 +238,29 @@ class _Calibration:
     def run(self) -> _Calibration:
         """Run every stage that the study asks for."""
         search = self.problem.study.calibration
-        axes = tuple(np.array(one.coordinates) for one in self.problem.parameters)
-        self.coarse = self._map("coarse", axes, search.replicates, "all")
+        self.coarse = self._coarse_map(search.replicates)
         self._require_numbers()
         cell = self.coarse.cell_of_minimum()
         self.optimum = Optimum(self.coarse.point(cell), float(self.coarse.mean[cell]))
-        self.floor = noise_floor_at(self.problem, self.optimum.point)
-        self.refined: Map | None = None
-        self.surface: Any = None
+        self.refined: Refined | None = None
         if search.refine == "auto":
             self._refine(search.refined_replicates)
         self._check_edges()
         if search.bootstrap >= 2 and self.refined is not None:
-            self._bootstrap(search.bootstrap)
+            self._bootstrap(self.refined, search.bootstrap)
         return self
+
+    def _coarse_map(self, replicates: int) -> Map:
+        """Return the coarse map: one replicate of every setting, all where the optimum could be."""
+        axes = tuple(np.array(one.coordinates) for one in self.problem.parameters)
+        maps = self._maps("coarse", "all", apart=False)
+        once = maps.full(axes, 1)
+        self.floor = noise_floor_at(self.problem, once.point(once.cell_of_minimum()))
+        return maps.more(once, once.mean <= once.mean.min() + self.floor, replicates)
 
     def _require_numbers(self) -> None:
         """Refuse a model that has lost its numbers in every world."""
-        if not broken_worlds(self.coarse.arrays["status"]).all():
+        if not broken_worlds(self.coarse.arrays["status"])[self.coarse.simulated].all():
             return
         first = self.coarse.point((0,) * len(self.coarse.axes))
         setting = {
@@ -271,34 +269,38 @@ class _Calibration:
         }
         raise InputError(no_numbers(self.problem.model.name, setting))
 
-    def _map(self, stage: str, window: Axes, replicates: int, details: Details) -> Map:
-        store = self._keep(
-            f"{stage}-{_window_id(window)}",
-            {"axes": [axis.tolist() for axis in window], "replicates": replicates},
-        )
-        return run_map(
+    def _maps(self, stage: str, details: Details, *, apart: bool) -> Mapper:
+        return Mapper(
             self.problem,
-            window,
-            stage=stage,
-            replicates=replicates,
+            stage,
             details=details,
-            store=store,
+            apart=apart,
+            stores=self._keep,
             executor=self._executor,
             progress=lambda done, total: self._say(stage, done, total),
         )
 
     def _refine(self, wanted: int) -> None:
-        window = refined_window(self.coarse, self._steps, self.floor)
-        for _ in range(MOST_RECENTRINGS):
-            self.refined = self._map("refined", window, refined_replicates(window, wanted), "none")
-            self.smoother = window_smoother(window, self._steps)
-            self.optimum = self.smoother.optimum(self.refined.mean)
-            self.surface = self.smoother.surface(self.refined.mean.ravel())
-            moved = recentre(window, self.optimum, self.coarse, self._steps)
-            if all(np.array_equal(a, b) for a, b in zip(moved, window, strict=True)):
-                break
-            window = moved
-        self.window = window
+        limits = limits_of(self.problem)
+        maps = self._maps("refined", "none", apart=True)
+        located = locate(maps, first_window(self.coarse, self.floor), limits)
+        self.refined = refine(maps, located, limits, self._steps, wanted)
+        self.optimum = self.refined.landscape.optimum
+        cell = beating_cell(self.refined.map, self.refined.landscape)
+        if cell is not None:
+            self.warnings.append(self._unresolved(self.refined.map.point(cell)))
+
+    def _unresolved(self, point: Sequence[float]) -> str:
+        """Return the warning of a setting that is nearer to the recording than the optimum."""
+        place = ", ".join(
+            f"{one.label} = {float(one.to_value(value)):.4g}"
+            for one, value in zip(self.problem.parameters, point, strict=True)
+        )
+        return (
+            f"the setting {place} is closer to the recording than the optimum, by more than "
+            "chance: the valley is narrower than the refined grid resolves, and the intervals are "
+            "wider than stated"
+        )
 
     def _check_edges(self) -> None:
         for parameter, axis, value in zip(
@@ -313,34 +315,35 @@ class _Calibration:
                         f"with the grid ending at {end:g}; extend the grid, or doubt the model"
                     )
 
-    def _bootstrap(self, count: int) -> None:
-        assert self.refined is not None
-        surface = build_surface(self.problem, self.refined, self.optimum, margin=self.floor)
-        axes = surface.smoother.axes
+    def _bootstrap(self, refined: Refined, count: int) -> None:
+        surface = build_surface(self.problem, refined)
+        landscape = refined.landscape
         fingerprint = {
             "optimum": [*self.optimum.point, self.optimum.distance],
-            "axes": [axis.tolist() for axis in axes],
+            "axes": [axis.tolist() for axis in surface.axes],
+            "settings": len(surface.apart),
             "count": count,
         }
         self.bootstrap = run_bootstrap(
             self.problem,
             self.optimum,
             surface,
+            floor=landscape.floor_at_optimum,
             count=count,
-            store=self._keep(f"bootstrap-{_window_id(self.window)}", fingerprint),
+            store=self._keep(f"bootstrap-{window_id(refined.map.axes)}", fingerprint),
             executor=self._executor,
             progress=lambda done, total: self._say("bootstrap", done, total),
         )
         self.quality = quality_of_fit(self.bootstrap)
         self.floor = self.quality.floor
         self.region = confidence_region(
-            self.smoother,
-            self.surface,
+            landscape.smoother,
+            landscape.surface,
             self.bootstrap,
             confidence=self.problem.study.calibration.confidence,
             stretch=self.quality.stretch,
         )
-        self._check_window(axes)
+        self._check_window(refined.map.axes, surface.axes)
         if not self.quality.explained:
             self.warnings.append(
                 f"the model does not explain the recording: D = {self.quality.distance:.3f} at the "
@@ -348,7 +351,7 @@ class _Calibration:
                 f"floor {self.quality.floor:.3f}; the parameters are the best of bad fits"
             )
 
-    def _check_window(self, axes: Axes) -> None:
+    def _check_window(self, refined: Axes, axes: Axes) -> None:
         """Warn where what could be the truth goes on beyond the settings that were simulated.
 
         `axes` are those on which the bootstrap's recordings were estimated.
@@ -357,8 +360,8 @@ class _Calibration:
         assert found is not None
         assert region is not None
         for index, parameter in enumerate(self.problem.parameters):
-            axis, window, limits = axes[index], self.window[index], self.coarse.axes[index]
-            step = self._steps[index]
+            axis, window, limits = axes[index], refined[index], self.coarse.axes[index]
+            step = float(np.diff(window).min()) if window.size > 1 else self._steps[index]
             for side in (0, -1):
                 estimated_there = _close(found.estimates[:, index], axis[side], step)
                 crowded = np.mean(estimated_there) > WIDE_SHARE
@@ -376,14 +379,13 @@ def _close(values: Any, end: float, step: float) -> Any:
     return np.abs(values - end) <= min(1e-8 + 1e-5 * abs(end), 1e-3 * step)
 
 
-def _window_id(window: Axes) -> str:
-    """Name a grid by its ends and sizes, so that a moved window has a store of its own."""
-    ends = [f"{axis[0]:.6g}-{axis[-1]:.6g}-{axis.size}" for axis in window]
-    return "x".join(ends).replace(".", "p").replace("+", "")
-
-
 def _halves(
-    track: Track, problem: Problem, flow_of: FlowSource, executor: Executor | None, say: Tell
+    track: Track,
+    problem: Problem,
+    coarse: Map,
+    flow_of: FlowSource,
+    executor: Executor | None,
+    say: Tell,
 ) -> Halves | None:
     """Calibrate on the first half, judge on the second; None where a half is too short."""
     if problem.study.calibration.refine == "none":
@@ -408,7 +410,7 @@ def _halves(
         )
     except InputError:
         return None
-    halves = validate_on_halves(first, second, executor=executor)
+    halves = validate_on_halves(problem, coarse, first, second, executor=executor)
     say("validation", 1, 1)
     return halves
 
@@ -442,8 +444,10 @@ def _finish(
         facts["halves_ks_distance"] = steadiness.distance
         facts["halves_ks_distance_expected"] = steadiness.expected
         facts["halves_p_value"] = steadiness.p_value
-    surface = None if found.surface is None else at_settings(found.surface)
-    pieces = Found(found.coarse, found.refined, surface, found.bootstrap, found.region)
+    refined, surface = None, None
+    if found.refined is not None:
+        refined, surface = found.refined.map, at_settings(found.refined.landscape.surface)
+    pieces = Found(found.coarse, refined, surface, found.bootstrap, found.region)
     return build_calibration(problem, pieces, facts)
 
 

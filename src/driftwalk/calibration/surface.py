@@ -22,6 +22,8 @@ Floats = npt.NDArray[np.float64]
 FINENESS = 4
 """Lattice points per cell of a grid along each axis."""
 _RIDGE = 1e-9
+_NOTHING = 1e-12
+"""Added to every normal matrix: far from any cell the surface is 0, and not an error."""
 
 
 class Optimum(NamedTuple):
@@ -58,22 +60,28 @@ class Smoother:
         values = np.asarray(distance) @ self.matrix.T
         return np.asarray(values.reshape(*values.shape[:-1], *self.shape))
 
-    def optimum(self, distance: Floats) -> Optimum:
-        """Return the minimum of the surface through distances on the grid, shape (cells,)."""
-        surface = self.surface(np.ravel(distance))
-        lowest = np.unravel_index(int(np.argmin(surface)), surface.shape)
-        point = tuple(float(axis[at]) for axis, at in zip(self.axes, lowest, strict=True))
-        return Optimum(point, float(surface[lowest]))
 
-    def nearest(self, point: Sequence[float]) -> tuple[int, ...]:
-        """Return the indices of the lattice point next to a point."""
-        return tuple(
-            int(np.argmin(np.abs(axis - value)))
-            for axis, value in zip(self.axes, point, strict=True)
-        )
+def nearest_point(axes: Sequence[Floats], point: Sequence[float]) -> tuple[int, ...]:
+    """Return the indices of the point of a lattice next to a point."""
+    return tuple(
+        int(np.argmin(np.abs(axis - value))) for axis, value in zip(axes, point, strict=True)
+    )
 
 
-def make_smoother(axes: Sequence[Floats], *, bandwidth: Sequence[float]) -> Smoother:
+def lowest_point(axes: Sequence[Floats], surface: Floats) -> tuple[float, ...]:
+    """Return the point of a lattice at which a surface is lowest."""
+    lowest = np.unravel_index(int(np.argmin(surface)), surface.shape)
+    return tuple(float(axis[at]) for axis, at in zip(axes, lowest, strict=True))
+
+
+def at_settings(surface: Floats) -> Floats:
+    """Return a surface at the settings of its grid: every `FINENESS`-th point of the lattice."""
+    return np.asarray(surface[(slice(None, None, FINENESS),) * surface.ndim])
+
+
+def make_smoother(
+    axes: Sequence[Floats], *, bandwidth: Sequence[float], weights: Floats | None = None
+) -> Smoother:
     """Prepare the surface for a grid.
 
     Parameters
@@ -82,6 +90,8 @@ def make_smoother(axes: Sequence[Floats], *, bandwidth: Sequence[float]) -> Smoo
         Axes of the grid, one per parameter, increasing, evenly spaced.
     bandwidth : sequence of float
         Bandwidth of the fit along each axis, in the axis's unit; at least one grid step is used.
+    weights : ndarray, shape of the grid, optional
+        Weight of each cell, such as its number of replicates; default: the same for all.
 
     Returns
     -------
@@ -92,10 +102,11 @@ def make_smoother(axes: Sequence[Floats], *, bandwidth: Sequence[float]) -> Smoo
     --------
     >>> axis = np.linspace(-1.0, 1.0, 9)
     >>> bowl = (axis[:, None] - 0.3) ** 2 + axis[None, :] ** 2
-    >>> make_smoother([axis, axis], bandwidth=(0.5, 0.5)).optimum(bowl).point
+    >>> smoother = make_smoother([axis, axis], bandwidth=(0.5, 0.5))
+    >>> lowest_point(smoother.axes, smoother.surface(bowl.ravel()))
     (0.3125, 0.0)
     """
-    lattice = tuple(_lattice(axis) for axis in axes)
+    lattice = lattice_of(axes)
     widths = [
         max(width, 1.01 * _spacing(axis)) for axis, width in zip(axes, bandwidth, strict=True)
     ]
@@ -106,11 +117,12 @@ def make_smoother(axes: Sequence[Floats], *, bandwidth: Sequence[float]) -> Smoo
     scaled = [axis / width for axis, width in zip(lattice, widths, strict=True)]
     # One row of the lattice at a time: all its points but those of the first axis.
     rest = [grid.ravel() for grid in np.meshgrid(*scaled[1:], indexing="ij")]
-    rows = [_fit_row(x, rest, cells) for x in scaled[0]]
+    each = np.ones(cells[0].size) if weights is None else np.ravel(weights)
+    rows = [_fit_row(x, rest, cells, each) for x in scaled[0]]
     return Smoother(lattice, np.concatenate(rows))
 
 
-def _fit_row(x: float, rest: Sequence[Floats], cells: Sequence[Floats]) -> Floats:
+def _fit_row(x: float, rest: Sequence[Floats], cells: Sequence[Floats], weights: Floats) -> Floats:
     """Return the weights of the cells at the lattice points (x, rest[0]), (x, rest[1]), ..."""
     points = rest[0].size if rest else 1
     away = [np.broadcast_to(cells[0] - x, (points, cells[0].size))]
@@ -118,14 +130,14 @@ def _fit_row(x: float, rest: Sequence[Floats], cells: Sequence[Floats]) -> Float
     squares = away[0] ** 2
     for one in away[1:]:
         squares = squares + one**2
-    weight = np.clip(1.0 - squares / 4.0, 0.0, None) ** 3
+    weight = weights * np.clip(1.0 - squares / 4.0, 0.0, None) ** 3
     products = [a * b for a, b in combinations_with_replacement(away, 2)]
     terms = np.stack([np.ones_like(away[0]), *away, *products], axis=-1)
     weighted = terms * weight[..., None]
     normal = np.einsum("lca,lcb->lab", weighted, terms)
     # Where a narrow grid cannot tell two terms apart the ridge decides, and the value stays sound.
     count = terms.shape[-1]
-    normal += _RIDGE * np.eye(count) * weight.sum(axis=1)[:, None, None]
+    normal += np.eye(count) * (_RIDGE * weight.sum(axis=1) + _NOTHING)[:, None, None]
     value = np.zeros((points, count, 1))
     value[:, 0] = 1.0
     solution = np.linalg.solve(normal, value)[..., 0]
@@ -137,5 +149,6 @@ def _spacing(axis: Floats) -> float:
     return float((axis[-1] - axis[0]) / (axis.size - 1)) if axis.size > 1 else 1.0
 
 
-def _lattice(axis: Floats) -> Floats:
-    return np.linspace(axis[0], axis[-1], (axis.size - 1) * FINENESS + 1)
+def lattice_of(axes: Sequence[Floats]) -> tuple[Floats, ...]:
+    """Return the axes of the lattice of a grid, `FINENESS` points per cell."""
+    return tuple(np.linspace(axis[0], axis[-1], (axis.size - 1) * FINENESS + 1) for axis in axes)

@@ -105,6 +105,19 @@ def _calibration_of_attributes(calibration: xr.Dataset) -> xr.Dataset:
     parts = calibration_parts(facts, stored_parameters(calibration))
     found = calibration.assign(parts.data).assign_coords(parts.coords)
     found.attrs = parts.attrs
+    return _calibration_without_counts(found)
+
+
+def _calibration_without_counts(calibration: xr.Dataset) -> xr.Dataset:
+    """State the replicates of every setting: until version 2 all settings had as many."""
+    counts = {}
+    for prefix in ("", "refined_"):
+        each = calibration.get(f"{prefix}ks_distance_replicate")
+        if each is not None:
+            shape = each.shape[:-1]
+            full = np.full(shape, each.shape[-1], dtype=np.int32)
+            counts[f"{prefix}replicate_count"] = (each.dims[:-1], full)
+    found = calibration.assign(counts)
     return with_descriptions(found.assign_attrs(schema_version=KINDS["calibration"].version))
 
 
@@ -112,5 +125,6 @@ _CONVERTERS: Final[dict[tuple[str, int], Callable[[xr.Dataset], xr.Dataset]]] = 
     ("fit", 1): _fit_of_attributes,
     ("model_check", 1): _check_of_attributes,
     ("calibration", 1): _calibration_of_attributes,
+    ("calibration", 2): _calibration_without_counts,
 }
 """By kind and the version that is read."""

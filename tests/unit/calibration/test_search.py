@@ -1,4 +1,4 @@
-"""Maps against the public functions, windows against hand-made maps."""
+"""Maps against the public functions."""
 
 from __future__ import annotations
 
@@ -9,16 +9,8 @@ import pytest
 
 import driftwalk as dw
 from driftwalk.calibration.problem import prepare_problem
-from driftwalk.calibration.search import (
-    MOST_REFINED_WORLDS,
-    WINDOW_STEPS,
-    Map,
-    recentre,
-    refined_replicates,
-    refined_window,
-    run_map,
-)
-from driftwalk.calibration.surface import Optimum
+from driftwalk.calibration.region import simulated_steps
+from driftwalk.calibration.search import add_replicates, run_map
 from driftwalk.comparison import apply_steps
 from driftwalk.conditions import recorded_camera
 from driftwalk.core.errors import InputError
@@ -26,8 +18,6 @@ from driftwalk.core.seeds import world_keys
 from driftwalk.schema import Track, body_track
 from driftwalk.simulation import Start
 from driftwalk.simulation.backend import Camera
-
-STEPS = (0.01, 2e-5)
 
 
 @pytest.fixture(scope="module")
@@ -40,14 +30,6 @@ def track():
 def problem(track):
     camera = Camera(3e-4, 0.0, 0.0)
     return prepare_problem(track, dw.Study(), dw.tank30_flow(), camera=camera, threads=1)
-
-
-def hand_made(minimum=(0.4, 6e-4), floor=0.02, slope=0.3):
-    drag, force = np.arange(41) * 0.05, np.arange(41) * 5e-5
-    distance = floor + slope * np.hypot(
-        (drag[:, None] - minimum[0]) / 0.2, (force[None, :] - minimum[1]) / 4e-4
-    )
-    return Map((drag, force), np.clip(distance, 0, 1)[..., None], {})
 
 
 def test_a_map_is_what_simulating_and_comparing_each_setting_gives(problem):
@@ -102,46 +84,59 @@ def test_a_setting_in_which_nothing_moves_is_as_far_as_can_be(track):
     assert (found.distance[0, 1] < 1.0).all()
 
 
-def test_the_window_holds_the_minimum_and_ten_steps_around_it():
-    window = refined_window(hand_made(), STEPS, margin=0.0)
-    assert window[0][0] <= 0.4 - WINDOW_STEPS * STEPS[0] + 1e-12
-    assert window[0][-1] >= 0.4 + WINDOW_STEPS * STEPS[0] - 1e-12
-    assert np.diff(window[0]) == pytest.approx(STEPS[0])
-    assert np.diff(window[1]) == pytest.approx(STEPS[1])
-    assert np.isclose(window[1], 6e-4).any()
+def test_more_replicates_are_those_of_a_map_that_has_them_everywhere(problem):
+    axes = ([0.3, 0.5], [4e-4, 8e-4])
+    each = {"stage": "coarse", "details": "all"}
+    every = run_map(problem, axes, replicates=3, **each)
+    once = run_map(problem, axes, replicates=1, **each)
+    chosen = np.array([[False, True], [True, False]])
+    found = add_replicates(problem, once, chosen, replicates=3, **each)
+    assert found.replicates.tolist() == [[1, 3], [3, 1]]
+    np.testing.assert_array_equal(found.simulated.sum(axis=-1), found.replicates)
+    np.testing.assert_array_equal(found.distance[chosen], every.distance[chosen])
+    np.testing.assert_array_equal(found.distance[~chosen][:, 0], every.distance[~chosen][:, 0])
+    assert np.isnan(found.distance[~chosen][:, 1:]).all()
+    assert (found.arrays["ks_quadrant"][~chosen][:, 1:] == -1).all()
+    for name in ("step_density", "pairs", "ks_step_length", "excerpt_x"):
+        np.testing.assert_allclose(
+            found.arrays[name][chosen], every.arrays[name][chosen], atol=1e-7, err_msg=name
+        )
+    np.testing.assert_allclose(found.mean[chosen], every.mean[chosen])
+    np.testing.assert_allclose(found.standard_error[chosen], every.standard_error[chosen])
+    assert np.isnan(found.standard_error[~chosen]).all()
 
 
-def test_a_wide_valley_gets_a_wide_window():
-    narrow = refined_window(hand_made(slope=0.3), STEPS, margin=0.02)
-    wide = refined_window(hand_made(slope=0.03), STEPS, margin=0.02)
-    assert np.ptp(wide[0]) > np.ptp(narrow[0])
-    cells = wide[0].size * wide[1].size
-    assert refined_replicates(wide, 8) * cells <= max(MOST_REFINED_WORLDS, 2 * cells)
+def test_none_chosen_or_none_wanted_leaves_a_map_as_it_is(problem):
+    once = run_map(problem, ([0.3], [4e-4]), stage="coarse", replicates=1)
+    none, all_of_it = np.zeros((1, 1), dtype=bool), np.ones((1, 1), dtype=bool)
+    assert add_replicates(problem, once, none, stage="coarse", replicates=4) is once
+    assert add_replicates(problem, once, all_of_it, stage="coarse", replicates=1) is once
 
 
-def test_the_window_stays_within_the_coarse_grid():
-    window = refined_window(hand_made(minimum=(0.0, 2e-3)), STEPS, margin=0.02)
-    assert window[0][0] == 0.0
-    assert window[1][-1] == pytest.approx(2e-3)
+def test_replicates_of_a_setting_are_apart_as_two_recordings_are(problem):
+    """Measured again from the steps of the same worlds."""
+    found = run_map(problem, ([0.3], [4e-4, 8e-4]), stage="refined", replicates=4, apart=True)
+    steps = simulated_steps(problem, ([0.3, 0.3], [4e-4, 8e-4]), stage="refined", replicates=4)
+    matrix = problem.statistic.matrix(steps, steps)
+    expected = [matrix[:2, 2:4].mean(), matrix[4:6, 6:8].mean()]
+    np.testing.assert_allclose(found.apart[0], expected)
 
 
-def test_an_optimum_near_the_edge_of_the_window_recentres_it():
-    coarse = hand_made()
-    window = refined_window(coarse, STEPS, margin=0.0)
-    middle = Optimum((0.4, 6e-4), 0.02)
-    same = recentre(window, middle, coarse, STEPS)
-    assert all(np.array_equal(a, b) for a, b in zip(window, same, strict=True))
-    edge = Optimum((float(window[0][-1]), 6e-4), 0.02)
-    moved = recentre(window, edge, coarse, STEPS)
-    assert np.median(moved[0]) == pytest.approx(edge.point[0])
-    np.testing.assert_array_equal(moved[1], window[1])
+def test_a_setting_that_does_not_move_gets_no_allowance(problem):
+    still = dw.uniform_flow(0.0, 0.0, arena=dw.Study().tank.to_arena())
+    like = dataclasses.replace(problem.like, flow=still, start=Start(0.0, 0.0, 0.0))
+    resting = dataclasses.replace(problem, like=like)
+    found = run_map(resting, ([1.0], [0.0]), stage="refined", replicates=2, apart=True)
+    assert (found.mean[0, 0], found.apart[0, 0]) == (1.0, 0.0)
 
 
-def test_an_optimum_at_the_end_of_the_coarse_grid_does_not_move_the_window():
-    coarse = hand_made(minimum=(0.0, 6e-4))
-    window = refined_window(coarse, STEPS, margin=0.0)
-    same = recentre(window, Optimum((0.0, 6e-4), 0.02), coarse, STEPS)
-    np.testing.assert_array_equal(same[0], window[0])
+def test_settings_that_are_left_out_are_as_far_as_can_be(problem):
+    axes = ([0.3, 0.5], [4e-4, 8e-4])
+    only = np.array([[False, True], [True, False]])
+    every = run_map(problem, axes, stage="first_half", replicates=1)
+    found = run_map(problem, axes, stage="first_half", replicates=1, only=only)
+    np.testing.assert_array_equal(found.mean[only], every.mean[only])
+    assert (found.mean[~only] == 1.0).all()
 
 
 def test_the_camera_takes_what_rounding_adds_off_the_estimate():

@@ -100,13 +100,24 @@ def test_a_model_of_the_user_answers_under_its_own_names(form: str) -> None:
 @pytest.mark.parametrize("name", FILES)
 def test_version_1_is_read_as_a_current_one(name: str) -> None:
     old, found = as_stored(OLD / name), open_netcdf(OLD / name)
-    assert (old.attrs["schema_version"], found.attrs["schema_version"]) == (1, 2)
+    assert (old.attrs["schema_version"], found.attrs["schema_version"]) == (1, 3)
     assert check_dataset(found, "calibration") is found
     assert unknown_names(found) == []
     assert Path(found.encoding["source"]) == OLD / name
     for variable in old.variables:
         np.testing.assert_array_equal(found[variable].values, old[variable].values)
     xr.testing.assert_identical(current_form(old), found)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_version_2_had_as_many_replicates_of_every_setting(form: str) -> None:
+    counts = ["replicate_count", "refined_replicate_count"]
+    old = every_kind(form).drop_vars(counts).assign_attrs(schema_version=2)
+    found = current_form(old)
+    assert check_dataset(found, "calibration") is found
+    for prefix in ("", "refined_"):
+        most = found[f"{prefix}ks_distance_replicate"].shape[-1]
+        assert (found[f"{prefix}replicate_count"] == most).all()
 
 
 @pytest.mark.parametrize("name", FILES)

@@ -52,7 +52,9 @@ def test_steps_that_the_camera_did_not_see_are_left_out_of_the_score():
         if name is not None:
             study = apply_overrides(study, {"observation.field_of_view": VIEWS[name]})
         problem = prepare_problem(track, study, dw.tank30_flow(), camera=Camera(), threads=1)
-        found = score_settings(problem, (0.45, 6e-4), stage="coarse", first=0, replicates=3)
+        found = score_settings(
+            problem, (0.45, 6e-4), stage="coarse", numbers=[0], replicates=range(3)
+        )
         pairs[name] = found["pairs"]
     assert (pairs[None] == 998).all()
     assert (pairs["circle"] < 998).all()

@@ -53,6 +53,10 @@ def _map(prefix: str, dims: str, replicate: str, when: str) -> tuple[Variable, .
         Variable(
             f"{prefix}ks_distance_replicate", f"{dims} {replicate}", "1",
             "KS distance of each replicate", when=when,
+            note="NaN beyond the replicates that the setting has",
+        ),
+        Variable(
+            f"{prefix}replicate_count", dims, "1", "replicates of a setting", "int", when=when,
         ),
         Variable(
             f"{prefix}status", dims, None, "reason why a setting has no ordinary distance", "int",
@@ -201,7 +205,7 @@ def _calibration(
     fine = " ".join(f"refined_{name}" for name in names)
     return Kind(
         name="calibration",
-        version=2,
+        version=3,
         dimensions={
             "parameter": "parameters of the model, by name",
             "bound": "lower, upper",

@@ -1,0 +1,87 @@
+"""Refined maps of a problem, each kept in a store of its own."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.calibration.estimation import Stores
+from driftwalk.calibration.problem import Axes, Problem
+from driftwalk.calibration.search import Map, Progress, add_replicates, run_map
+from driftwalk.motion import Details
+from driftwalk.sweep import Store
+
+
+@dataclass(frozen=True)
+class Mapper:
+    """Simulates the maps of one stage.
+
+    Attributes
+    ----------
+    problem : Problem
+        The recording and the model.
+    stage : str
+        Name of the stage; its random streams are its own.
+    details : {"none", "all"}
+        Whether densities and excerpts are kept.
+    apart : bool
+        Whether the distance between replicates of a setting is measured.
+    stores : callable, optional
+        Where finished work units are kept; memory when left out.
+    executor : concurrent.futures.Executor, optional
+        Computes the work units elsewhere.
+    progress : callable, optional
+        Called with the number of finished settings and the total.
+    """
+
+    problem: Problem
+    stage: str
+    details: Details = "none"
+    apart: bool = True
+    stores: Stores | None = None
+    executor: Executor | None = None
+    progress: Progress | None = None
+
+    def full(self, axes: Axes, replicates: int) -> Map:
+        """Simulate every setting of a grid."""
+        return run_map(
+            self.problem,
+            axes,
+            stage=self.stage,
+            replicates=replicates,
+            details=self.details,
+            apart=self.apart,
+            store=self._store(self.stage, axes, {"replicates": replicates}),
+            executor=self.executor,
+            progress=self.progress,
+        )
+
+    def more(self, found: Map, chosen: npt.NDArray[np.bool_], replicates: int) -> Map:
+        """Give some settings of a map more replicates."""
+        facts = {"replicates": replicates, "chosen": np.flatnonzero(chosen).tolist()}
+        return add_replicates(
+            self.problem,
+            found,
+            chosen,
+            stage=self.stage,
+            replicates=replicates,
+            details=self.details,
+            apart=self.apart,
+            store=self._store(f"more-{self.stage}", found.axes, facts),
+            executor=self.executor,
+        )
+
+    def _store(self, name: str, axes: Axes, facts: dict[str, object]) -> Store | None:
+        if self.stores is None:
+            return None
+        fingerprint = {"axes": [axis.tolist() for axis in axes], **facts}
+        return self.stores(f"{name}-{window_id(axes)}", fingerprint)
+
+
+def window_id(window: Axes) -> str:
+    """Name a grid by its ends and sizes, so that a moved window has a store of its own."""
+    ends = [f"{axis[0]:.6g}-{axis[-1]:.6g}-{axis.size}" for axis in window]
+    return "x".join(ends).replace(".", "p").replace("+", "")
