@@ -1,7 +1,7 @@
 """The refined map: windows that close in on the valley until they resolve it.
 
 A window is a grid of the same few nodes, whatever its extent. The settings that the recording does
-not exclude, those less than half a floor above the minimum, say where the next window lies: smaller
+not exclude, those less than `PLAUSIBLE` floors above the minimum, say where the next window lies: smaller
 where they fill a small part of this one, wider or moved where they reach its end. So the last one
 has steps that suit the valley along each axis, and a bandwidth narrow against it.
 """
@@ -25,18 +25,18 @@ Box = tuple[tuple[float, float], ...]
 
 LOCATING: Final[dict[int, int]] = {1: 24, 2: 12}
 """Intervals along an axis of a window that locates the valley, by the number of parameters."""
-MOST: Final[dict[int, int]] = {1: 96, 2: 24}
+MOST: Final[dict[int, int]] = {1: 96, 2: 18}
 """Intervals along an axis of the refined map, at most."""
 ABOUT: Final = 1.3
 """A step may be larger than it should be by this factor."""
-MOST_WINDOWS: Final = 8
+MOST_WINDOWS: Final = 6
 """Windows that locate the valley, at most."""
 LOCATING_REPLICATES: Final = 2
 BANDWIDTH_STEPS: Final = 2.0
 """Bandwidth of the surface in steps, at least."""
 BANDWIDTH_SHARE: Final = 0.125
 """Bandwidth of the surface as a share of the window."""
-PLAUSIBLE: Final = 1.0
+PLAUSIBLE: Final = 1.25
 """Settings less than this many floors above the minimum are plausible."""
 PADDING: Final = 0.2
 """What is added to the plausible settings on each side, as a share of their extent."""

@@ -42,7 +42,7 @@ from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
 SURFACE_INTERVALS: Final[dict[int, int]] = {1: 32, 2: 10}
 """Intervals along each axis of the stored surface, by the number of parameters."""
 LEAST_BANDWIDTH_STEPS: Final = 1.5
-KEPT: Final = 1.0
+KEPT: Final = 1.5
 """Places less than this many floors above the minimum are kept of the stored surface."""
 SIMULATED: Final = 2.0
 """Settings less than this many floors above the minimum are simulated for it."""

@@ -24,20 +24,22 @@ class Calibration(ForceGrid):
     section_name: ClassVar[str] = "calibration"
 
     replicates: Annotated[int, Quantity("1", ge=1, le=100_000, whole=True)] = Field(
-        default=4, description="Simulations per setting of the coarse grid."
+        default=4, description="Simulations per setting of the coarse grid near its minimum."
     )
     refine: Literal["auto", "none"] = Field(
         default="auto",
         description='"auto" searches again, finer, around the minimum of the coarse grid.',
     )
     refined_drag_coefficient_step: DragCoefficientStep = Field(
-        default=0.01, description="Largest step of the refined grid in the drag coefficient."
+        default=0.01,
+        description="Largest step of the refined grid in the drag coefficient, about; "
+        "a wide valley gets larger ones.",
     )
     refined_force_std_step_N: ForceStdStep = Field(
-        default=2e-5, description="Largest step of the refined grid in force_std."
+        default=2e-5, description="The same in force_std."
     )
     refined_replicates: Annotated[int, Quantity("1", ge=1, le=100_000, whole=True)] = Field(
-        default=8, description="Simulations per setting of the refined grid."
+        default=8, description="Simulations per setting of the refined grid near the optimum."
     )
     bootstrap: Annotated[int, Quantity("1", ge=0, le=1_000_000, whole=True)] = Field(
         default=200, description="Bootstrap samples for the intervals; 0 gives no intervals."
