@@ -92,6 +92,7 @@ def synthetic_calibration(*, simulated: str = "yes", points: int = 17) -> xr.Dat
     status[1, 0] = 1
     status[-1, -1] = 2
     status[-1, -2] = 4
+    _only_one_replicate(coarse, far=coarse["ks_distance"][1] > 0.5)
     coarse["ks_distance"][1][status == 1] = 1.0
     coarse["ks_distance_replicate"][1][status == 1] = 1.0
     coarse["ks_distance"][1][status == 2] = np.nan
@@ -188,6 +189,15 @@ def _map(
         f"{prefix}ks_distance_replicate": ((*plane, f"{prefix}replicate"), noisy),
         f"{prefix}replicate_count": (plane, np.full(exact.shape, replicates, np.int32)),
     }
+
+
+def _only_one_replicate(coarse: dict[str, Any], *, far: np.ndarray) -> None:
+    """Leave settings far from the minimum a single replicate, as a calibration does."""
+    replicates = coarse["ks_distance_replicate"][1]
+    replicates[far, 1:] = np.nan
+    coarse["ks_distance"][1][far] = replicates[far, 0]
+    coarse["ks_distance_standard_error"][1][far] = np.nan
+    coarse["replicate_count"][1][far] = 1
 
 
 def _cell_density(

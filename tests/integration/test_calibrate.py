@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from slow_orbits import TRUTH as SLOW, slow_flow, slow_recording
 
 import driftwalk as dw
 from driftwalk.model import apply_overrides
@@ -147,8 +148,11 @@ def test_place_and_quadrant_are_where_the_world_and_the_recording_differ(found):
         cells = np.ix_(*map(inside, bins, place, sides))
         world = found["step_density"].values[index[:2]][cells].sum()
         off.append(abs(world - own) - found["ks_distance_replicate"].values[index])
-    assert np.median(np.abs(off)) < 0.03
-    assert np.max(np.abs(off)) < 0.2
+    # Far from the minimum a setting has one replicate.
+    simulated = np.isfinite(off)
+    assert simulated.sum() == found["replicate_count"].sum()
+    assert np.median(np.abs(off)[simulated]) < 0.03
+    assert np.max(np.abs(off)[simulated]) < 0.2
 
 
 @pytest.mark.slow
@@ -197,8 +201,11 @@ def test_without_a_given_flow_it_is_extracted_from_the_recording():
 
 
 @pytest.mark.slow
-def test_an_interval_that_reaches_the_end_of_the_refined_grid_is_warned_of():
-    # Steps of the force so small that its refined grid is narrower than what a minute can tell.
+def test_a_minute_says_how_little_it_tells():
+    """The window grows until the settings that a minute does not exclude end within it.
+
+    Its steps would have been a tenth of those that suit such a recording.
+    """
     study = apply_overrides(
         dw.Study(),
         {
@@ -208,6 +215,31 @@ def test_an_interval_that_reaches_the_end_of_the_refined_grid_is_warned_of():
     )
     found = dw.calibrate(synthetic_recording(60.0), study, flow=dw.tank30_flow())
     window = found["refined_force_std"].values
-    interval = found["interval"].sel(parameter="force_std").values
-    assert np.isclose(interval[0], window[0]) or np.isclose(interval[1], window[-1])
-    assert "force_std reaches the end of the refined grid" in " ".join(found["warning"].values)
+    low, high = found["interval"].sel(parameter="force_std").values
+    assert window.size <= 30
+    assert high - low > 10 * 0.004e-3
+    assert window[0] <= low < TRUTH["force_std_N"] < high <= window[-1]
+
+
+@pytest.mark.slow
+def test_the_truth_of_a_slow_orbit_is_in_the_intervals():
+    """Simulations of a smaller force scatter less there, and are nearer on average.
+
+    The seed is fixed, because each 90 % interval misses in a tenth of recordings.
+    """
+    study = apply_overrides(
+        dw.Study(),
+        {
+            "calibration.drag_coefficient_min": 0.3,
+            "calibration.drag_coefficient_max": 1.2,
+            "calibration.drag_coefficient_step": 0.1,
+            "calibration.force_std_max_N": 0.5e-3,
+            "calibration.bootstrap": 60,
+        },
+    )
+    recording = slow_recording(seed=11)
+    found = dw.calibrate(recording, study, flow=slow_flow(), threads=2)
+    for name, truth in SLOW.items():
+        low, high = calibration_facts(found)[f"{name}_interval"]
+        assert low <= truth <= high, name
+    assert bool(found["explained"])

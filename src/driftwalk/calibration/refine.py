@@ -1,9 +1,9 @@
 """The refined map: windows that close in on the valley until they resolve it.
 
 A window is a grid of the same few nodes, whatever its extent. The settings that the recording does
-not exclude, those less than `PLAUSIBLE` floors above the minimum, say where the next window lies: smaller
-where they fill a small part of this one, wider or moved where they reach its end. So the last one
-has steps that suit the valley along each axis, and a bandwidth narrow against it.
+not exclude, those less than `PLAUSIBLE` floors above the minimum, say where the next window lies:
+smaller where they fill a small part of this one, wider or moved where they reach its end. So the
+last one has steps that suit the valley along each axis, and a bandwidth narrow against it.
 """
 
 from __future__ import annotations

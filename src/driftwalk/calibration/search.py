@@ -167,12 +167,16 @@ def add_replicates(
         return found
     design = _design(problem, found.axes)
     shared = _for_units(problem, executor)
-    function = _Cells(shared, stage, cells, before, replicates - before, details, apart)
+    # A single new replicate has none to be apart from.
+    among = apart and replicates - before > 1
+    function = _Cells(shared, stage, cells, before, replicates - before, details, among)
     units = _units(design, cells, _per_unit(problem, cells, replicates - before))
     new = run_sweep(function, units, store=store, executor=executor)
     old = {**found.arrays, "ks_distance": found.distance}
     joined = {
         name: _joined(name, values, new[name], cells, before / replicates, replicates)
+        if name in new
+        else values
         for name, values in old.items()
     }
     distance = joined.pop("ks_distance")

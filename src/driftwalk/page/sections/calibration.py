@@ -249,11 +249,19 @@ def _what_was_done(calibration: xr.Dataset) -> str:
     searched = " and ".join(one.short for one in page_parameters(calibration))
     words += f" with simulations of {settings} settings of {searched}"
     if "replicate" in calibration.sizes:
-        words += f", {count(calibration.sizes['replicate'], 'run')} each"
+        words += f", {_runs_each(calibration)} each"
     if "refined_ks_distance" in calibration:
         words += f", then of {calibration['refined_ks_distance'].size} around the best"
     measure = "the Kolmogorov–Smirnov distance D of step lengths and turning angles"
     return f"{words}. The measure is {measure}."
+
+
+def _runs_each(calibration: xr.Dataset) -> str:
+    """Return how many simulations the settings of the coarse map have."""
+    most = calibration.sizes["replicate"]
+    counts = calibration.get("replicate_count")
+    fewest = most if counts is None else int(counts.min())
+    return count(most, "run") if fewest == most else f"{fewest} to {count(most, 'run')}"
 
 
 def _what_was_found(calibration: xr.Dataset) -> str:
