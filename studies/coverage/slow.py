@@ -4,11 +4,11 @@ On slow, regular orbits a recording visits few independent states, so two record
 parameters differ much, and by more the stronger the force. The worlds are drawn by a rule and never
 chosen again: the regular flows of `studies/likelihood/worlds.py`, at 1, 0.6 and 0.4 times their
 speed in turn, C_d uniform in 0.3 to 1 and sigma_F uniform in 0.1 to 0.35 mN. In each, driftwalk
-simulates recordings of 10 minutes at 10 Hz with 0.3 mm and 0.5 degrees of noise. A further one finds
-the window of the world, from half to one and a half times the true C_d and 0 to two and a half
-times the true sigma_F on; the simulated steps of that window, two of each setting, are shared by
-the recordings of a world. Flow and window are right, so this is about the statistics. Results go
-to ``slow.jsonl``, one line a recording; run again, it continues.
+simulates recordings of 10 minutes at 10 Hz with 0.3 mm and 0.5 degrees of noise. A further one
+finds the window of the world, from half to one and a half times the true C_d and 0 to two and a
+half times the true sigma_F on; the simulated steps of that window, two of each setting, are shared
+by the recordings of a world. Flow and window are right, so this is about the statistics. Results
+go to ``slow.jsonl``, one line a recording; run again, it continues.
 
     python studies/coverage/slow.py --worlds 8 --recordings 5 --bootstrap 60
 """
