@@ -21,8 +21,13 @@ using namespace nb::literals;
 namespace {
 
 // A self-propelled particle instead of the block: what all worlds of a batch have in common.
-driftwalk::ParticleModel particle(const std::string& kind, int states, const std::string& contact,
-                                  bool carried) {
+struct Particle {
+  driftwalk::ParticleModel model;
+  std::optional<In<double, 3>> neighbours; // keeps what the model points to
+};
+
+driftwalk::ParticleModel particle_model(const std::string& kind, int states,
+                                        const std::string& contact, bool carried) {
   using driftwalk::ParticleKind;
   using driftwalk::WallContact;
   driftwalk::ParticleModel model;
@@ -38,6 +43,20 @@ driftwalk::ParticleModel particle(const std::string& kind, int states, const std
     throw std::invalid_argument("no such particle");
   }
   return model;
+}
+
+Particle particle(const std::string& kind, int states, const std::string& contact, bool carried,
+                  std::optional<In<double, 3>> neighbours) {
+  Particle made{particle_model(kind, states, contact, carried), std::move(neighbours)};
+  if (made.neighbours) {
+    const In<double, 3>& place = *made.neighbours;
+    if (place.shape(0) == 0 || place.shape(2) != 2) {
+      throw std::invalid_argument("neighbours must have shape (steps, neighbours, 2)");
+    }
+    made.model.neighbours = {static_cast<std::int64_t>(place.shape(0)),
+                             static_cast<int>(place.shape(1)), place.data()};
+  }
+  return made;
 }
 
 int columns_of(const driftwalk::ParticleModel& model) {
@@ -56,10 +75,9 @@ int columns_of(const driftwalk::ParticleModel& model) {
 // force std, or a particle's numbers; and their random keys.
 class Worlds {
 public:
-  Worlds(const In<double, 2>& table, const In<std::uint64_t, 1>& key,
-         const std::optional<driftwalk::ParticleModel>& model)
+  Worlds(const In<double, 2>& table, const In<std::uint64_t, 1>& key, const Particle* particle)
       : count_(table.shape(0)), columns_(table.size()),
-        particle_(model.value_or(driftwalk::ParticleModel())) {
+        particle_(particle == nullptr ? driftwalk::ParticleModel() : particle->model) {
     const std::size_t width = 6 + static_cast<std::size_t>(columns_of(particle_));
     if (table.shape(1) != width || key.size() != count_) {
       throw std::invalid_argument("worlds must have shape (n, " + std::to_string(width) +
@@ -119,7 +137,7 @@ nb::tuple simulate_as(const driftwalk::PreparedRun<T>& run, const Worlds& worlds
 }
 
 nb::tuple simulate(const Model& model, In<double, 2> table, In<std::uint64_t, 1> key, int threads,
-                   const std::string& precision, std::optional<driftwalk::ParticleModel> particle) {
+                   const std::string& precision, const Particle* particle) {
   const Worlds worlds(table, key, particle);
   if (precision == "double") {
     return simulate_as(model.twice(), worlds, model.samples(), threads);
@@ -131,7 +149,7 @@ nb::dict score(const Model& model, In<double, 2> table, In<std::uint64_t, 1> key
                In<std::int32_t, 1> left, In<double, 1> weight, In<std::int32_t, 1> triple,
                std::optional<In<double, 2>> reference, int bins, double length_limit,
                double angle_limit, std::int64_t excerpt, bool keep_steps, int threads,
-               std::optional<driftwalk::ParticleModel> particle) {
+               const Particle* particle) {
   const Worlds worlds(table, key, particle);
   const std::size_t count = worlds.count();
   driftwalk::Scoring scoring;
@@ -267,15 +285,16 @@ void register_simulate(nb::module_& module) {
   driftwalk::each_model_number([&](const char* name, const char*, driftwalk::Range, auto field) {
     model.def_prop_ro(name, [field](const Model& self) { return self.numbers().*field; });
   });
-  nb::class_<driftwalk::ParticleModel>(module, "Particle")
+  nb::class_<Particle>(module, "Particle")
       .def(
           "__init__",
-          [](driftwalk::ParticleModel* self, const std::string& kind, int states,
-             const std::string& contact, bool carried) {
-            new (self) driftwalk::ParticleModel(particle(kind, states, contact, carried));
+          [](Particle* self, const std::string& kind, int states, const std::string& contact,
+             bool carried, std::optional<In<double, 3>> neighbours) {
+            new (self) Particle(particle(kind, states, contact, carried, std::move(neighbours)));
           },
-          nb::kw_only(), "kind"_a, "states"_a, "contact"_a, "carried"_a)
-      .def_prop_ro("columns", &columns_of);
+          nb::kw_only(), "kind"_a, "states"_a, "contact"_a, "carried"_a,
+          "neighbours"_a = nb::none())
+      .def_prop_ro("columns", [](const Particle& self) { return columns_of(self.model); });
   module.def("simulate", &simulate, "model"_a, "worlds"_a, "key"_a, nb::kw_only(), "threads"_a,
              "precision"_a, "particle"_a = nb::none());
   module.def("score", &score, "model"_a, "worlds"_a, "key"_a, nb::kw_only(), "left"_a, "weight"_a,

@@ -38,9 +38,12 @@ struct Particles {
     }
   }
 
+  // At two steps: one that moves, and one that is not there any more.
+  static constexpr double others[8] = {0.05, 0.0, 0.0, -0.06, 0.051, 0.001, NAN, NAN};
+
   static std::vector<double> two_states() {
-    return {// clearance, diffusion, slow, stroke, wall
-            0.01, 1e-7, 0.3, 3.0, 0.5, 1.3, 3.0, 2.0, 0.5, 0.02, 0.03,
+    return {// clearance, diffusion, slow, stroke, wall, neighbours
+            0.01, 1e-7, 0.3, 3.0, 0.5, 1.3, 3.0, 2.0, 0.5, 0.02, 0.03, 0.7, 0.03,
             // a run: dwell, share, speed, relaxation, turns, the state that follows
             0.8, 0.6, 0.5, 0.04, 0.4, 0.0, 0.0, 0.4, 0.3, 0.5, 1.0, 0.2, 0.3, 0.7,
             // a glide
@@ -51,6 +54,7 @@ struct Particles {
     driftwalk::BatchWorlds worlds = batch.view();
     worlds.particle = model;
     worlds.particle.values = values.data();
+    worlds.particle.neighbours = {2, 2, others};
     return worlds;
   }
 };

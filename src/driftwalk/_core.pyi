@@ -61,7 +61,16 @@ class Model:
 
 # A self-propelled particle instead of the block; `columns` are those of a world after its start.
 class Particle:
-    def __init__(self, *, kind: str, states: int, contact: str, carried: bool) -> None: ...
+    # neighbours: where others are at each time step, shape (steps, neighbours, 2), NaN where not
+    def __init__(
+        self,
+        *,
+        kind: str,
+        states: int,
+        contact: str,
+        carried: bool,
+        neighbours: _Floats | None = None,
+    ) -> None: ...
     @property
     def columns(self) -> int: ...
 

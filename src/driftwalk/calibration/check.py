@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from driftwalk.calibration.models.recorded import body_motion
 from driftwalk.calibration.problem import prepare_problem
 from driftwalk.calibration.refuse import MOST_PARAMETERS, require_searchable
-from driftwalk.conditions import recorded_camera
-from driftwalk.motion import BlockModel, MotionModel
+from driftwalk.conditions import neighbours_of, recorded_camera
+from driftwalk.motion import BlockModel, MotionModel, ParticleModel
 from driftwalk.schema import body_track
 
 if TYPE_CHECKING:
@@ -53,12 +53,17 @@ def check_recording(
     >>> dw.calibration.check_recording(dw.tank30_recording(), dw.Study(), flow=dw.tank30_flow())
     """
     if model is not None and len(model.parameters) > MOST_PARAMETERS:
-        body_motion(recording, study, flow=flow, body=body)
+        motion = body_motion(recording, study, flow=flow, body=body)
+        if isinstance(model, ParticleModel):
+            model.require_others(motion.like)
         return
     if model is not None:
         require_searchable(model)
     track = body_track(recording, body)
     camera = recorded_camera(track, study, position_quantum=0.0)
-    problem = prepare_problem(track, study, flow, camera=camera, model=model)
+    others = neighbours_of(recording, body, study.tank)
+    problem = prepare_problem(track, study, flow, camera=camera, model=model, neighbours=others)
+    if isinstance(problem.model, ParticleModel):
+        problem.model.require_others(problem.like)
     if isinstance(problem.model, BlockModel):
         problem.model.native(problem.like)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from driftwalk.calibration.refuse import require_samples
 from driftwalk.comparison import Statistic, StepDistance, StepReference, plan_steps
-from driftwalk.conditions import Conditions, recorded_conditions
+from driftwalk.conditions import Conditions, Neighbours, recorded_conditions
 from driftwalk.core.seeds import world_keys
 from driftwalk.core.streams import trial_in
 from driftwalk.motion import BlockModel, Details, MotionModel, Parameter, Scores, score_worlds
@@ -81,6 +81,7 @@ def prepare_problem(
     camera: Camera,
     model: MotionModel | None = None,
     statistic: Statistic | None = None,
+    neighbours: Neighbours | None = None,
     threads: int | None = None,
 ) -> Problem:
     """Make a recorded track ready for comparison.
@@ -99,6 +100,8 @@ def prepare_problem(
         Default: the block of the study.
     statistic : Statistic, optional
         Default: `StepDistance`.
+    neighbours : Neighbours, optional
+        The other bodies, on the clock of the track.
     threads : int, optional
         Default: all processors.
 
@@ -111,7 +114,9 @@ def prepare_problem(
     chosen = StepDistance() if statistic is None else statistic
     interval = study.steps.step_interval_s
     reference = chosen.prepare(track, step_interval=None if interval == "auto" else interval)
-    like = recorded_conditions(track, study, camera=camera, flow=flow, threads=threads)
+    like = recorded_conditions(
+        track, study, camera=camera, flow=flow, neighbours=neighbours, threads=threads
+    )
     # Without the recording's gaps the worlds have time stamps, and so a plan, of their own.
     if study.observation.gaps == "none":
         plan = plan_steps(like.sample_time, step_interval=reference.plan.step_interval)

@@ -40,7 +40,7 @@ from driftwalk.calibration.steadiness import Steadiness, steadiness_of
 from driftwalk.calibration.surface import Optimum, at_settings
 from driftwalk.calibration.wall import wall_warning
 from driftwalk.comparison import Statistic
-from driftwalk.conditions import recorded_camera, study_in_arena
+from driftwalk.conditions import neighbours_of, recorded_camera, study_in_arena
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.motion import BlockModel, Details, MotionModel
 from driftwalk.motion.batches import no_numbers
@@ -156,6 +156,7 @@ def calibrate(
     quantum = float(recording.attrs.get("position_quantum_m", 0.0))
     flow_of = _flow_source(chosen, searched, flow)
     camera = recorded_camera(track, chosen, position_quantum=quantum)
+    others = neighbours_of(recording, body, chosen.tank)
     problem = prepare_problem(
         track,
         chosen,
@@ -163,6 +164,7 @@ def calibrate(
         camera=camera,
         model=searched,
         statistic=statistic,
+        neighbours=others,
         threads=threads,
     )
     keep = stores if stores is not None else _in_memory
@@ -392,6 +394,9 @@ def _halves(
         return None
     say("validation", 0, 1)
     middle = 0.5 * (track.time[0] + track.time[-1])
+    others = problem.like.neighbours
+    if others is not None:
+        others = others.since(-float(track.time[0]))
     early = Track(*(values[track.time <= middle] for values in track))
     late = Track(*(values[track.time > middle] for values in track))
     try:
@@ -404,6 +409,7 @@ def _halves(
                 camera=problem.like.camera,
                 model=problem.model,
                 statistic=problem.statistic,
+                neighbours=others,
                 threads=problem.like.threads,
             )
             for half in (early, late)

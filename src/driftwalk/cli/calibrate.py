@@ -54,12 +54,17 @@ def calibrate(
     Reports how well the parameters are known and whether the model explains the motion. After a
     kill, the same command continues.
     """
+    from driftwalk.motion import feels_others
     from driftwalk.runs import CalibrationWork, run_calibration
 
     chosen = chosen_model(model, parameters)
-    read, field, inputs = read_with_flow(recording, flow, given, how)
+    others = feels_others(chosen)
+    read, field, inputs = read_with_flow(
+        recording, flow, given, how, bodies="all" if others else "named"
+    )
+    body = read.body if others else how.body
     work = CalibrationWork(
-        read.trajectories[0], read.study, field, how.body, inputs, threads, chosen, posterior
+        read.trajectories[0], read.study, field, body, inputs, threads, chosen, posterior
     )
     with Workers(cluster, cluster_options).reported("calibrate") as told:
         found = run_calibration(work, out, overwrite=overwrite, begun=tank_note(read), **told)

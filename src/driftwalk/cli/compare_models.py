@@ -52,17 +52,22 @@ def compare_models(
     where a model differs from the recording. After a kill, the same command continues.
     """
     from driftwalk.calibration import ALL_MODELS, DEFAULT_MODELS
+    from driftwalk.motion import feels_others
     from driftwalk.runs import ModelComparisonWork, run_model_comparison
 
-    read, field, inputs = read_with_flow(recording, flow, given, how)
     if models is None:
         chosen: tuple[str, ...] = DEFAULT_MODELS
     elif models.strip() == "all":
         chosen = ALL_MODELS
     else:
         chosen = tuple(name for name in map(str.strip, models.split(",")) if name)
+    others = any(map(feels_others, chosen))
+    read, field, inputs = read_with_flow(
+        recording, flow, given, how, bodies="all" if others else "named"
+    )
+    body = read.body if others else how.body
     work = ModelComparisonWork(
-        read.trajectories[0], chosen, read.study, field, how.body, inputs, threads
+        read.trajectories[0], chosen, read.study, field, body, inputs, threads
     )
     with Workers(cluster, cluster_options).reported("compare models") as told:
         found = run_model_comparison(work, out, overwrite=overwrite, begun=tank_note(read), **told)

@@ -89,6 +89,7 @@ def simulate(
     value. It starts where the recording of --like does, otherwise anywhere in the tank, at rest.
     """
     from driftwalk.core.atomic import write_atomic
+    from driftwalk.motion import feels_others
     from driftwalk.schema.netcdf import netcdf_bytes
 
     if backend not in ("cpu", "reference"):
@@ -96,7 +97,9 @@ def simulate(
     if like is not None and backend == "reference":
         raise InputError("--like runs on the cpu backend only: leave out --backend")
     require_place(out, existing="replace" if overwrite else "error")
-    recording = None if like is None else RecordingOptions(body=body).load(like)
+    others = feels_others(model)
+    kept = None if others else body
+    recording = None if like is None else RecordingOptions(body=kept).load(like)
     if model is not None:
         if backend != "cpu":
             raise InputError("--backend is for the block: leave it out with --model")
@@ -155,7 +158,9 @@ def _of_model(
     if recording is not None:
         chosen = study_for([recording], chosen, body=body)
     field = None if flow is None else load_flow_for(flow, chosen)
-    result = simulate_motion(known.model, known.values, chosen, flow=field, like=recording)
+    result = simulate_motion(
+        known.model, known.values, chosen, flow=field, like=recording, body=body
+    )
     if recording is None and not given.states_tank:
         print_note(f"the tank is the default study's, a {chosen.tank.describe()}")
     for warning in known.warnings:

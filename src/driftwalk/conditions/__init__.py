@@ -6,6 +6,7 @@ reconciled with the study; times and gaps, start and camera; the flow.
 
 from driftwalk.conditions.camera import noise_doubt, recorded_camera
 from driftwalk.conditions.like import simulate_like
+from driftwalk.conditions.neighbours import Neighbours, neighbours_of
 from driftwalk.conditions.own_flow import recording_flow
 from driftwalk.conditions.reading import (
     ReadRecordings,
@@ -21,10 +22,12 @@ from driftwalk.conditions.tank import require_inside, study_in_arena
 
 __all__ = [
     "Conditions",
+    "Neighbours",
     "ReadRecordings",
     "estimated_study",
     "load_for_run",
     "load_with_study",
+    "neighbours_of",
     "noise_doubt",
     "read_recordings",
     "recorded_camera",

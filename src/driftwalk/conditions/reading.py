@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from driftwalk.conditions.refuse import require_motion, require_positions
 from driftwalk.conditions.study import study_for
 from driftwalk.conditions.tank import study_in_arena
+from driftwalk.core.json_text import parse_json
 from driftwalk.record import load
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 Tank = Literal["stated", "unsaid"]
+Bodies = Literal["named", "all"]
 
 
 class ReadRecordings(NamedTuple):
@@ -26,6 +28,8 @@ class ReadRecordings(NamedTuple):
     study: Study
     has_tank: bool
     """Whether anything but the default study says the tank."""
+    body: str | None
+    """The body, where the arguments or the study name one."""
 
 
 def read_recordings(
@@ -35,6 +39,7 @@ def read_recordings(
     *,
     tank: Tank = "stated",
     body: str | None = None,
+    bodies: Bodies = "named",
 ) -> ReadRecordings:
     """Read the recordings of a fit or a calibration, and settle tank and block of the study.
 
@@ -51,6 +56,8 @@ def read_recordings(
         default study's where it holds none.
     body : str, optional
         The body, where there are several.
+    bodies : {"named", "all"}
+        Which bodies the recordings keep where one is named.
 
     Returns
     -------
@@ -77,11 +84,35 @@ def read_recordings(
     for path in paths:
         trajectory, has_tank = load_for_run(path, study, values, tank=tank)
         require_motion(trajectory, body=body, where=path)
+        if bodies == "all":
+            trajectory = _with_others(trajectory, path, study, values)
         trajectories.append(trajectory)
         known.append(has_tank)
     if "tank" in values or study.recording.arena != "tank":
         study = study_in_arena(study, trajectories[0])
-    return ReadRecordings(trajectories, study_for(trajectories, study, body=body), known[0])
+    named = body or study.recording.body
+    return ReadRecordings(trajectories, study_for(trajectories, study, body=named), known[0], named)
+
+
+def _with_others(
+    trajectory: xr.Dataset, path: Path, study: Study, given: Mapping[str, Any]
+) -> xr.Dataset:
+    """Return a recording with the bodies that were not named, placed in the arena of the named one.
+
+    They may be in other tanks, so they have no part in where the arena is.
+    """
+    arguments = {**study.load_options(), **given}
+    if arguments.get("body") in (None, "all"):
+        return trajectory
+    every = load(path, **{**arguments, "body": None, "tank": None, "block": None})
+    placed, unplaced = (
+        parse_json(one.attrs.get("origin_shift_m", "[0.0, 0.0]")) for one in (trajectory, every)
+    )
+    moved = {
+        axis: every[axis] - (here - there)
+        for axis, here, there in zip("xy", placed, unplaced, strict=True)
+    }
+    return every.assign(moved).assign_attrs(trajectory.attrs)
 
 
 def load_for_run(

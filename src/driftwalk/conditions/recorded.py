@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.conditions.neighbours import Neighbours
 from driftwalk.conditions.start import recorded_start
 from driftwalk.core.processors import default_threads
 from driftwalk.simulation.backend import Camera
@@ -43,6 +44,8 @@ class Conditions:
         The water's velocity, a `flow_field`; None where it plays no part.
     threads : int
         Threads to use; results do not depend on it.
+    neighbours : Neighbours or None
+        The other bodies in the tank, for a model that feels them; None where there are none.
     """
 
     sample_time: Floats
@@ -52,6 +55,7 @@ class Conditions:
     view: FieldOfView | None
     flow: xr.Dataset | None
     threads: int
+    neighbours: Neighbours | None = None
 
 
 def recorded_conditions(
@@ -60,6 +64,7 @@ def recorded_conditions(
     *,
     camera: Camera,
     flow: xr.Dataset | None = None,
+    neighbours: Neighbours | None = None,
     threads: int | None = None,
 ) -> Conditions:
     """Return the conditions of a recorded track.
@@ -74,6 +79,8 @@ def recorded_conditions(
         See `recorded_camera`.
     flow : xarray.Dataset, optional
         A `flow_field`.
+    neighbours : Neighbours, optional
+        The other bodies on the clock of the recording, see `neighbours_of`.
     threads : int, optional
         Default: all processors.
 
@@ -100,6 +107,7 @@ def recorded_conditions(
         view=study.observation.field_of_view,
         flow=flow,
         threads=threads or default_threads(),
+        neighbours=None if neighbours is None else neighbours.since(float(track.time[0])),
     )
 
 

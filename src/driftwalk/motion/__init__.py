@@ -2,7 +2,7 @@
 
 from driftwalk.motion.block import BlockModel
 from driftwalk.motion.camera import observe_worlds
-from driftwalk.motion.choose import is_family_name, motion_model
+from driftwalk.motion.choose import feels_others, is_family_name, motion_model
 from driftwalk.motion.family import MEMBERS, PARTS, Member, Part, ParticleModel, models
 from driftwalk.motion.function import FunctionModel, Scene
 from driftwalk.motion.program import ProgramModel
@@ -31,6 +31,7 @@ __all__ = [
     "WorldRandom",
     "Worlds",
     "estimated_values",
+    "feels_others",
     "is_family_name",
     "known_values",
     "model_start",

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any, Final
 
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.motion.family import family_model
+from driftwalk.motion.family import ParticleModel, family_model
+from driftwalk.motion.family.particle import NEIGHBOURS
 from driftwalk.motion.function import MotionFunction, Settings, function_model
 from driftwalk.motion.model_file import SUFFIX, model_of_file
 from driftwalk.motion.program import TIMEOUT_S, ProgramModel
@@ -31,6 +32,24 @@ def is_family_name(model: str) -> bool:
     (True, False)
     """
     return not model.startswith(COMMAND) and SUFFIX not in model
+
+
+def feels_others(model: str | MotionModel | None) -> bool:
+    """Return whether a model, or one of this name, needs the other bodies of a recording.
+
+    Parameters
+    ----------
+    model : str, MotionModel or None
+        The model; None is the block.
+
+    Examples
+    --------
+    >>> feels_others("run_rest+wall+neighbours"), feels_others("run_rest+wall")
+    (True, False)
+    """
+    if isinstance(model, str):
+        return is_family_name(model) and NEIGHBOURS in model.split("+")
+    return isinstance(model, ParticleModel) and model.feels_others
 
 
 def motion_model(

@@ -23,6 +23,7 @@ from driftwalk.simulation.initial import Start
 if TYPE_CHECKING:
     import xarray as xr
 
+    from driftwalk.conditions import Neighbours
     from driftwalk.model import Tank
 
 Settings = Literal["one", "many"]
@@ -52,6 +53,8 @@ class Scene:
         The tank; ``tank.radius_m`` of a circle, ``tank.corners_m`` of other shapes.
     flow : xarray.Dataset or None
         The water's velocity, where the calibration was given one.
+    neighbours : Neighbours or None
+        The other bodies of the recording; ``neighbours.at(times)`` says where they are.
     """
 
     times: Floats
@@ -60,6 +63,7 @@ class Scene:
     random: WorldRandom
     tank: Tank
     flow: xr.Dataset | None
+    neighbours: Neighbours | None = None
 
 
 class FunctionModel:
@@ -115,7 +119,7 @@ class FunctionModel:
         own = keys[batch]
         scene = Scene(
             like.sample_time, own.size, world_starts(like.start, own), WorldRandom(own), like.tank,
-            like.flow,
+            like.flow, like.neighbours,
         )  # fmt: skip
         given = {one.name: np.asarray(values[one.name][batch]) for one in self.parameters}
         if self.settings == "one":

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.conditions.camera import study_as_seen
+from driftwalk.conditions.neighbours import neighbours_of
 from driftwalk.conditions.recorded import Conditions, recorded_conditions
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import default_threads
@@ -119,7 +120,14 @@ def simulate_motion(
         track = body_track(like, body)
         study = study_as_seen(study, like, track)
         camera = plain_camera(study)
-        conditions = recorded_conditions(track, study, camera=camera, flow=flow, threads=threads)
+        conditions = recorded_conditions(
+            track,
+            study,
+            camera=camera,
+            flow=flow,
+            neighbours=neighbours_of(like, body, study.tank),
+            threads=threads,
+        )
     columns = {name: np.full(count, value) for name, value in values.items()}
     worlds = model.simulate(columns, conditions, keys)
     if (worlds.status & STATUS["non_finite"]).all():

@@ -54,6 +54,8 @@ class Scene:
     flow_y: Floats | None = None
     flow_u: Floats | None = None
     flow_v: Floats | None = None
+    others: Floats | None = None
+    """Where other bodies are at every step, shape (steps, bodies, 2); NaN where one is not."""
 
     def water(self, z: Points) -> Points:
         """Return the water's velocity at points."""
@@ -297,6 +299,21 @@ def felt_wall(scene: Scene, columns: Columns, one: Swimmer) -> tuple[Floats, Flo
     return rate * near, 1 - shared["wall_slowing"] * near
 
 
+def pushed_off(scene: Scene, columns: Columns, z: Points, step: int) -> Points:
+    """Return the velocity at which other bodies push, over the speed of the one that is pushed."""
+    if scene.others is None:
+        return np.zeros_like(z)
+    reach = np.maximum(columns.shared["neighbour_range"], 1e-6)
+    total = np.zeros_like(z)
+    for x, y in scene.others[min(step, len(scene.others) - 1)]:
+        if np.isfinite(x):
+            off = z - (x + 1j * y)
+            ranges = np.abs(off) / reach
+            near = np.where(ranges < FARTHEST_RANGES, np.exp(-ranges), 0.0)
+            total = total + columns.shared["neighbour_push"] * near * np.exp(1j * np.angle(off))
+    return total
+
+
 def simulate_switching(
     scene: Scene, table: ParticleTable, *, key: Keys, z: Points, heading: Floats, steps: int
 ) -> Path:
@@ -333,7 +350,8 @@ def _step(scene: Scene, columns: Columns, one: Swimmer, numbers: Numbers, step: 
     )
     turn = (one.turn_rate + wall_rate) * dt + np.sqrt(2 * diffusion * dt) * for_turn
     jitter = np.sqrt(2 * shared["diffusion"] * dt) * (for_place[0] + 1j * for_place[1])
-    moved = (speed * np.exp(1j * (one.heading + turn / 2)) + scene.water(one.z)) * dt + jitter
+    along = np.exp(1j * (one.heading + turn / 2)) + pushed_off(scene, columns, one.z, step)
+    moved = (speed * along + scene.water(one.z)) * dt + jitter
     one.heading = one.heading + turn
 
     def touched(normal: Points, beyond: Mask) -> None:

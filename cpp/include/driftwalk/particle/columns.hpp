@@ -28,6 +28,8 @@ enum SharedColumn : int {
   column_wall_slowing,     // share of the speed that is lost at contact [1]
   column_wall_range,       // over which these three decay [m]
   column_wall_gap,         // where turning away becomes turning towards; 0: nowhere [m]
+  column_neighbour_push,  // part of the speed at which another body pushes it off, at its place [1]
+  column_neighbour_range, // over which that decays [m]
   shared_columns
 };
 
@@ -61,12 +63,21 @@ enum InertialColumn : int {
   inertial_columns
 };
 
+// Where other bodies are at the beginning of each time step, the same for every world; NaN where
+// one is not there. After the last of the steps they stand still.
+struct NeighbourTracks {
+  std::int64_t steps = 0;
+  int count = 0;
+  const double* place = nullptr; // [step][neighbour][x, y] [m]
+};
+
 // The same for every world of a batch.
 struct ParticleModel {
   ParticleKind kind = ParticleKind::none;
   WallContact contact = WallContact::slide;
   int states = 0;
-  bool carried = false;           // the water carries it
+  bool carried = false; // the water carries it
+  NeighbourTracks neighbours;
   const double* values = nullptr; // [column][world]
 };
 

@@ -5,12 +5,13 @@
 // The speed v relaxes to that of the bout, times a slow factor exp(m - var/2), times a stroke
 // 1 + s cos(2 pi f t). Near the wall, with w = exp(-d / range) and psi the angle between the
 // outward normal and the heading, it turns at (away (1 - d / gap) sin(psi) + along sin(2 psi)) w,
-// and loses the share `slowing` w of its speed.
+// and loses the share `slowing` w of its speed. How others push it off: neighbours.hpp.
 #pragma once
 
 #include "driftwalk/flow/bilinear.hpp"
 #include "driftwalk/particle/bout.hpp"
 #include "driftwalk/particle/enclosure.hpp"
+#include "driftwalk/particle/neighbours.hpp"
 
 DRIFTWALK_LANES_BEGIN
 
@@ -35,8 +36,9 @@ public:
 
   SwitchingParticle(const ColumnReader<Real>& columns, const BatchWorlds& worlds, double step)
       : states_(read_states(columns, worlds.particle.states, step)), stream_(columns.stream()),
-        contact_(worlds.particle.contact), carried_(worlds.particle.carried),
-        dt_(static_cast<T>(step)), x_(columns.of(worlds.x)), y_(columns.of(worlds.y)) {
+        neighbours_(columns, worlds.particle.neighbours), contact_(worlds.particle.contact),
+        carried_(worlds.particle.carried), dt_(static_cast<T>(step)), x_(columns.of(worlds.x)),
+        y_(columns.of(worlds.y)) {
     const Real zero{T(0)};
     clearance_ = columns(column_clearance);
     spread_ = sqrt(columns(column_diffusion) * (T(2) * dt_));
@@ -84,6 +86,9 @@ public:
     Real u{T(0)}, v{T(0)};
     if (carried_) {
       water_at(flow, x_, y_, u, v);
+    }
+    if (neighbours_.felt()) {
+      neighbours_.push_off(index, x_, y_, speed, u, v);
     }
     // It moves along the heading in the middle of the step, at the mean speed within it.
     Real sine, cosine;
@@ -190,6 +195,7 @@ private:
 
   States<Real> states_;
   Philox<typename Numbers<Real>::UInt> stream_;
+  Neighbours<Real> neighbours_;
   WallContact contact_;
   bool carried_, slow_, strokes_, feels_wall_;
   T dt_;

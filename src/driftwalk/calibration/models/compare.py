@@ -24,7 +24,7 @@ from driftwalk.calibration.models.recorded import RecordedMotion, body_motion
 from driftwalk.calibration.models.result import build_comparison
 from driftwalk.conditions import study_in_arena
 from driftwalk.core.processors import one_blas_thread
-from driftwalk.motion import MotionModel
+from driftwalk.motion import MotionModel, ParticleModel
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep, threads_of_unit
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ DEFAULT_MODELS: Final = (
 )  # fmt: skip
 ALL_MODELS: Final = (
     *DEFAULT_MODELS, "run_tumble+wall+slow", "run_rest+wall+stroke", "run_rest+wall+reverse",
-    "run_tumble+wall+follow+keep",
+    "run_tumble+wall+follow+keep", "run_rest+wall+neighbours",
 )  # fmt: skip
 Tell = Callable[[int, int, str], None]
 
@@ -166,7 +166,10 @@ def check_models(
     """
     chosen = _study(recording, study)
     motion = body_motion(recording, chosen, flow=flow, body=body)
-    return made_models(models, motion, chosen)
+    made = made_models(models, motion, chosen)
+    if len(made) == 1 and isinstance(made[0], ParticleModel):
+        made[0].require_others(motion.like)
+    return made
 
 
 def _study(recording: xr.Dataset, study: Study | None) -> Study:

@@ -69,7 +69,8 @@ def contestants(
     """Return the models with their conditions and ranges, and warnings.
 
     Where the flow is not known, models that need one get that of the even blocks of time. Where
-    none can be extracted they are left out, with a warning.
+    none can be extracted they are left out, with a warning, and so is a model that feels other
+    bodies where there are none.
 
     Raises
     ------
@@ -117,6 +118,7 @@ def _made(one: Chosen, motion: RecordedMotion, study: Study) -> MotionModel:
 def _contestant(model: MotionModel, motion: RecordedMotion, study: Study) -> Contestant:
     ranges = model.parameters
     if isinstance(model, ParticleModel):
+        model.require_others(motion.like)
         ranges = recorded_ranges(ranges, motion.scales)
     like = motion.like
     if model.needs_flow and like.flow is None:

@@ -26,7 +26,14 @@ from driftwalk.comparison.aspects import (
     own_distance,
     plan_aspects,
 )
-from driftwalk.conditions import Conditions, noise_doubt, recorded_camera, recorded_conditions
+from driftwalk.conditions import (
+    Conditions,
+    Neighbours,
+    neighbours_of,
+    noise_doubt,
+    recorded_camera,
+    recorded_conditions,
+)
 from driftwalk.core.errors import InputError
 from driftwalk.schema import Track, body_track
 
@@ -152,7 +159,14 @@ def body_motion(
     track = body_track(recording, body)
     require_samples(track)
     quantum = float(recording.attrs.get("position_quantum_m", 0.0))
-    return recorded_motion(track, study, position_quantum=quantum, flow=flow, threads=threads)
+    return recorded_motion(
+        track,
+        study,
+        position_quantum=quantum,
+        flow=flow,
+        neighbours=neighbours_of(recording, body, study.tank),
+        threads=threads,
+    )
 
 
 def recorded_motion(
@@ -161,6 +175,7 @@ def recorded_motion(
     *,
     position_quantum: float = 0.0,
     flow: xr.Dataset | None = None,
+    neighbours: Neighbours | None = None,
     threads: int | None = None,
 ) -> RecordedMotion:
     """Prepare a recorded track for the comparison of motion models.
@@ -175,6 +190,8 @@ def recorded_motion(
         Resolution of the recorded positions [m].
     flow : xarray.Dataset, optional
         The water's velocity.
+    neighbours : Neighbours, optional
+        The other bodies, on the clock of the track.
     threads : int, optional
         Default: all processors.
 
@@ -183,9 +200,13 @@ def recorded_motion(
     InputError
         When the track is too short or does not move, or has too few steps in a half.
     """
+    if neighbours is not None:
+        neighbours = neighbours.since(float(track.time[0]))
     track = track._replace(time=track.time - track.time[0])
     camera = recorded_camera(track, study, position_quantum=position_quantum)
-    like = recorded_conditions(track, study, camera=camera, flow=flow, threads=threads)
+    like = recorded_conditions(
+        track, study, camera=camera, flow=flow, neighbours=neighbours, threads=threads
+    )
     interval = study.steps.step_interval_s
     plan = plan_aspects(track.time, step_interval=None if interval == "auto" else interval)
     wall = wall_distance(like)

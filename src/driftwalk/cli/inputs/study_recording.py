@@ -16,11 +16,16 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.conditions import ReadRecordings
+    from driftwalk.conditions.reading import Bodies
     from driftwalk.model import Study
 
 
 def read_for_run(
-    paths: Sequence[Path], given: StudyOptions, how: RecordingOptions
+    paths: Sequence[Path],
+    given: StudyOptions,
+    how: RecordingOptions,
+    *,
+    bodies: Bodies = "named",
 ) -> ReadRecordings:
     """Read the recordings of a fit or a calibration, and make its study.
 
@@ -32,6 +37,8 @@ def read_for_run(
         The study.
     how : RecordingOptions
         How to read them.
+    bodies : {"named", "all"}
+        Which bodies they keep where one is named.
 
     Raises
     ------
@@ -48,6 +55,7 @@ def read_for_run(
             how.arguments(),
             tank="stated" if said else "unsaid",
             body=how.body,
+            bodies=bodies,
         )
 
 
@@ -62,7 +70,12 @@ class ReadForModel(NamedTuple):
 
 
 def read_with_flow(
-    recording: Path, flow: Path | None, given: StudyOptions, how: RecordingOptions
+    recording: Path,
+    flow: Path | None,
+    given: StudyOptions,
+    how: RecordingOptions,
+    *,
+    bodies: Bodies = "named",
 ) -> ReadForModel:
     """Read one recording, and the flow field where one is given.
 
@@ -76,13 +89,15 @@ def read_with_flow(
         The study.
     how : RecordingOptions
         How to read the recording.
+    bodies : {"named", "all"}
+        As in `read_for_run`.
 
     Raises
     ------
     InputError
         As `read_for_run`, and when the flow field cannot be read.
     """
-    read = read_for_run([recording], given, how)
+    read = read_for_run([recording], given, how, bodies=bodies)
     inputs = {"recording": recording, "flow": flow, "study": given.file}
     field = None if flow is None else load_flow_for(flow, read.study)
     return ReadForModel(

@@ -20,6 +20,7 @@ Numbers = Mapping[str, npt.ArrayLike]
 SHARED: Final = (
     "clearance", "diffusion", "slow_std", "slow_time", "stroke", "stroke_frequency", "wall_turn",
     "wall_follow", "wall_slowing", "wall_range", "wall_gap",
+    "neighbour_push", "neighbour_range",
 )  # fmt: skip
 """Columns that all states share."""
 STATE: Final = (
@@ -102,7 +103,7 @@ def switching_table(states: Sequence[State], shared: Numbers, *, worlds: int) ->
     Examples
     --------
     >>> switching_table([State(speed=0.1)], {"diffusion": 1e-6}, worlds=2).columns.shape
-    (2, 24)
+    (2, 26)
     """
     laws = [_law(one, worlds) for one in states]
     chances = [_chances(states, k, worlds) for k in range(len(states))]

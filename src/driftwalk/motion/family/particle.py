@@ -29,6 +29,8 @@ from driftwalk.schema import Parameter
 from driftwalk.simulation.backend import native_scene
 from driftwalk.simulation.initial import world_orientations
 
+NEIGHBOURS: Final = "neighbours"
+"""The part that needs the other bodies of a recording."""
 LONGEST_STEP_S: Final = 0.02
 """Time step, unless samples are so dense that half their interval is shorter."""
 
@@ -53,6 +55,8 @@ class ParticleModel:
     ----------
     states_clearance : bool
         Whether it was given.
+    feels_others : bool
+        Whether it needs the other bodies of a recording.
 
     Examples
     --------
@@ -77,9 +81,10 @@ class ParticleModel:
         named = [part.name for part in parts]
         self.name = "+".join([member.name, *named])
         self.needs_flow = "flow" in named
+        self.feels_others = NEIGHBOURS in named
         self.contact = "reflect" if "reflect" in named else "slide"
         # Of the latest conditions: made once for all work units of a search.
-        self._ready: tuple[Conditions, _core.Model] | None = None
+        self._ready: tuple[Conditions, _core.Model, Floats | None] | None = None
 
     def with_clearance(self, clearance: float) -> ParticleModel:
         """Return the same model with another distance from the wall at contact [m]."""
@@ -93,7 +98,8 @@ class ParticleModel:
         Raises
         ------
         InputError
-            When the water is to carry it and the conditions have no flow.
+            When the water is to carry it and the conditions have no flow, or it feels other
+            bodies and there are none.
         """
         table = self.table(values, keys.size)
         x, y, theta, status = _core.simulate(
@@ -102,7 +108,7 @@ class ParticleModel:
             keys,
             threads=like.threads,
             precision="single",
-            particle=self.particle(table),
+            particle=self.particle(table, like),
         )
         return Worlds(x, y, theta, status)
 
@@ -130,7 +136,7 @@ class ParticleModel:
             keys,
             reference,
             details=details,
-            particle=self.particle(table),
+            particle=self.particle(table, like),
         )
 
     def table(self, values: Values, worlds: int) -> ParticleTable:
@@ -149,10 +155,14 @@ class ParticleModel:
             for one in self.member.states(given)
         ]
 
-    def particle(self, table: ParticleTable) -> _core.Particle:
+    def particle(self, table: ParticleTable, like: Conditions) -> _core.Particle:
         """Return the core's form of what all worlds have in common."""
         return _core.Particle(
-            kind=table.kind, states=table.states, contact=self.contact, carried=self.needs_flow
+            kind=table.kind,
+            states=table.states,
+            contact=self.contact,
+            carried=self.needs_flow,
+            neighbours=self._made_ready(like)[2],
         )
 
     def describe(self) -> dict[str, Any]:
@@ -184,6 +194,10 @@ class ParticleModel:
         InputError
             As `simulate`.
         """
+        return self._made_ready(like)[1]
+
+    def _made_ready(self, like: Conditions) -> tuple[Conditions, _core.Model, Floats | None]:
+        """Return conditions, their core's form, and where the others are at every time step."""
         ready = self._ready
         if ready is None or ready[0] is not like:
             if self.needs_flow and like.flow is None:
@@ -192,15 +206,35 @@ class ParticleModel:
                     "flow field"
                 )
             flow = like.flow if self.needs_flow else None
-            ready = (
-                like,
-                native_scene(
-                    like.tank, like.view, flow, like.sample_time, like.camera,
-                    time_step=time_step_of(like.sample_time),
-                ),
-            )  # fmt: skip
+            time_step = time_step_of(like.sample_time)
+            model = native_scene(
+                like.tank, like.view, flow, like.sample_time, like.camera, time_step=time_step
+            )
+            ready = (like, model, self._others(like, time_step))
             self._ready = ready
-        return ready[1]
+        return ready
+
+    def require_others(self, like: Conditions) -> None:
+        """Refuse conditions without other bodies, where the model feels them.
+
+        Raises
+        ------
+        InputError
+            When it does, and there are none.
+        """
+        if self.feels_others and like.neighbours is None:
+            raise InputError(
+                f"the model {self.name} feels the other bodies of a recording, and there are none: "
+                "give a recording of several bodies, or leave out the part neighbours"
+            )
+
+    def _others(self, like: Conditions, time_step: float) -> Floats | None:
+        """Return where the others are at every time step, shape (steps, bodies, 2)."""
+        self.require_others(like)
+        if not self.feels_others or like.neighbours is None:
+            return None
+        steps = int(np.ceil(like.sample_time[-1] / time_step)) + 1
+        return like.neighbours.at(np.arange(steps) * time_step)
 
     def _rows(self, table: ParticleTable, like: Conditions, keys: Keys) -> Floats:
         """Return starts and numbers of worlds, one row each.

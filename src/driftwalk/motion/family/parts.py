@@ -1,4 +1,4 @@
-"""Parts that a member of the family can have: a wall that it feels, reversals, a slow change."""
+"""Parts that a member of the family can have: a wall or others that it feels, a slow change."""
 
 from __future__ import annotations
 
@@ -81,6 +81,22 @@ PARTS: Final[Mapping[str, Part]] = {
                     meaning="Distance from contact at which turning away becomes turning towards.",
                 ),
                 _RANGE,
+            ),
+        ),
+        Part(
+            "neighbours",
+            "The other bodies of the recording push it off while it moves.",
+            "dx = v (e(phi) - neighbour_push sum of exp(-d / neighbour_range) n) dt",
+            (
+                Parameter(
+                    "neighbour_push", "1", 0.0, 5.0,
+                    meaning="Part of its speed at which another body pushes it off, at that body's"
+                    " place.",
+                ),
+                Parameter(
+                    "neighbour_range", "m", 1e-4, 1.0, scale="log",
+                    meaning="Distance over which the push of another body falls by e.",
+                ),
             ),
         ),
         Part(
