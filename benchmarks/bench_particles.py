@@ -24,8 +24,9 @@ from timing import Times, interleaved, machine, spread
 
 import driftwalk as dw
 from driftwalk import _core
-from driftwalk.conditions import Conditions
+from driftwalk.conditions import Conditions, Neighbours
 from driftwalk.core.seeds import world_keys
+from driftwalk.schema import Track
 from driftwalk.simulation.backend import Camera
 from driftwalk.simulation.initial import Start
 
@@ -35,7 +36,7 @@ BLOCK_STEPS: Final = 2000
 MODELS: Final = (
     "inertial", "active", "active+wall", "run_tumble+wall", "run_rest+wall", "burst_coast+wall",
     "two_state+wall", "run_rest+wall+reverse", "run_tumble+wall+follow+keep",
-    "active+wall+follow+keep+slow+stroke+diffusion",
+    "active+wall+follow+keep+slow+stroke+diffusion", "run_rest+wall+neighbours",
 )  # fmt: skip
 VALUES: Final = {
     "speed_std": 0.02, "memory_time": 1.5, "speed": 0.03, "rotational_diffusion": 0.15,
@@ -46,8 +47,20 @@ VALUES: Final = {
     "fast_rotational_diffusion": 0.05, "relaxation_time": 0.3, "wall_turn": 2.0,
     "wall_slowing": 0.5, "wall_range": 0.02, "wall_follow": 3.0, "slow_std": 0.6, "stroke": 1.0,
     "stroke_frequency": 0.5, "diffusion": 1e-7, "wall_gap": 0.02, "reversal_share": 0.5,
+    "neighbour_push": 1.0, "neighbour_range": 0.03,
 }  # fmt: skip
 """Of every parameter, SI."""
+
+
+def two_others(seconds: float) -> Neighbours:
+    """Return two bodies that go round, for a model that feels them."""
+    time = np.arange(0.0, seconds, 0.1)
+    return Neighbours(
+        tuple(
+            Track(time, r * np.cos(time), r * np.sin(time), np.full(time.size, np.nan))
+            for r in (0.05, 0.1)
+        )
+    )
 
 
 class Bodies:
@@ -62,6 +75,7 @@ class Bodies:
             view=None,
             flow=None,
             threads=1,
+            neighbours=two_others(60.0 * minutes),
         )
         self.model: Any = dw.motion_model(name)
         self.values = {one.name: np.full(BODIES, VALUES[one.name]) for one in self.model.parameters}

@@ -16,9 +16,10 @@ import numpy as np
 from matplotlib.collections import LineCollection
 
 import driftwalk as dw
-from driftwalk.conditions import Conditions
+from driftwalk.conditions import Conditions, Neighbours
 from driftwalk.core.seeds import world_keys
 from driftwalk.model import Tank
+from driftwalk.schema import Track
 from driftwalk.simulation.backend import Camera
 from driftwalk.simulation.initial import Start
 
@@ -32,7 +33,7 @@ FASTEST_CM_S: Final = 6.0
 NAMES: Final = (
     "inertial", "active", "run_tumble", "run_rest", "burst_coast", "two_state",
     "active+wall", "active+wall+follow", "active+follow+keep", "run_rest+reverse",
-    "run_tumble+slow", "active+stroke",
+    "run_tumble+slow", "active+stroke", "run_rest+wall", "active+wall+neighbours",
 )  # fmt: skip
 VALUES: Final = {
     "speed_std": 0.02, "memory_time": 1.5, "speed": 0.03, "rotational_diffusion": 0.15,
@@ -43,9 +44,21 @@ VALUES: Final = {
     "fast_rotational_diffusion": 0.05, "relaxation_time": 0.3, "wall_turn": 2.0,
     "wall_slowing": 0.5, "wall_range": 0.02, "wall_follow": 3.0, "slow_std": 0.6,
     "slow_time_": 10.0, "stroke": 3.0, "stroke_frequency": 0.5, "wall_gap": 0.03,
-    "reversal_share": 0.8,
+    "reversal_share": 0.8, "neighbour_push": 2.0, "neighbour_range": 0.03,
 }  # fmt: skip
 """Of every parameter, SI; `slow_time_` is that of the part `slow`."""
+
+
+OTHERS_M: Final = ((-0.07, 0.0), (0.05, -0.06), (0.05, 0.07))
+"""Places of the bodies that push one off; they stand still."""
+
+
+def standing_others() -> Neighbours:
+    """Return the bodies that push one off."""
+    time = np.array([0.0, SECONDS])
+    return Neighbours(
+        tuple(Track(time, 0 * time + x, 0 * time + y, np.nan * time) for x, y in OTHERS_M)
+    )
 
 
 def path_of(name: str, number: int) -> tuple[np.ndarray, np.ndarray]:
@@ -58,6 +71,7 @@ def path_of(name: str, number: int) -> tuple[np.ndarray, np.ndarray]:
         view=None,
         flow=None,
         threads=1,
+        neighbours=standing_others(),
     )
     model = dw.motion_model(name)
     slow = "slow" in name.split("+")
@@ -82,6 +96,9 @@ def draw(axes: Axes, name: str, number: int) -> LineCollection:
     lines.set_array(np.hypot(np.diff(x), np.diff(y)) * RATE_HZ)
     axes.add_collection(lines)
     axes.add_patch(mpl.patches.Circle((0, 0), 100 * RADIUS_M, fill=False, color="0.5", lw=0.8))
+    if "neighbours" in name:
+        for place in OTHERS_M:
+            axes.add_patch(mpl.patches.Circle(100 * np.array(place), 0.8, color="0.6"))
     axes.plot(x[0], y[0], "o", color="black", markersize=3)
     axes.set(
         xlim=(-16, 16), ylim=(-16, 16), aspect="equal", xticks=(-10, 0, 10), yticks=(-10, 0, 10)
@@ -94,8 +111,8 @@ def main(out: Path) -> None:
     """Draw all, and write the picture."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(13.0, 5.2), layout="constrained")
-    panels = figure.subplots(2, 6, sharex=True, sharey=True)
+    figure = Figure(figsize=(15.0, 5.2), layout="constrained")
+    panels = figure.subplots(2, 7, sharex=True, sharey=True)
     for number, (axes, name) in enumerate(zip(panels.flat, NAMES, strict=True)):
         lines = draw(axes, name, number)
     for axes in panels[-1]:

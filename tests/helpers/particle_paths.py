@@ -43,8 +43,12 @@ def paths(
     heading: npt.ArrayLike = 0.0,
     velocity: npt.ArrayLike = 0.0,
     precision: str = "single",
+    others: Floats | None = None,
 ) -> tuple[Points, Floats]:
-    """Return positions as complex numbers, and headings, of shape (worlds, samples)."""
+    """Return positions as complex numbers, and headings, of shape (worlds, samples).
+
+    `others` are the places of other bodies, shape (time steps, bodies, 2).
+    """
     water = uniform_flow(0.0, 0.0, arena=tank.to_arena()) if flow is None else flow
     model = native_scene(tank, None, water, np.asarray(time, float), Camera(), time_step=time_step)
     count = len(table.columns)
@@ -59,7 +63,11 @@ def paths(
         threads=1,
         precision=precision,
         particle=_core.Particle(
-            kind=table.kind, states=table.states, contact=contact, carried=flow is not None
+            kind=table.kind,
+            states=table.states,
+            contact=contact,
+            carried=flow is not None,
+            neighbours=others,
         ),
     )
     assert not (status & ~np.uint32(4)).any(), "a world broke"

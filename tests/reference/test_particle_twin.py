@@ -41,6 +41,7 @@ class Case:
     tank: Tank = CIRCLE
     reflects: bool = False
     carried: bool = False
+    others: Floats | None = None
 
 
 def spread(low: float, high: float) -> Floats:
@@ -51,6 +52,17 @@ def spread(low: float, high: float) -> Floats:
 RUN = State(
     spread(0.01, 0.03), 0.4, dwell=1.3, rotational_diffusion=spread(0.05, 0.5), turn_std=1.0
 )
+
+
+def moving_others(steps: int) -> Floats:
+    """Return the places of two other bodies: one on a circle, one that is lost and found again."""
+    turn = np.arange(steps) * STEP
+    first = np.column_stack([0.04 * np.cos(turn), 0.04 * np.sin(turn)])
+    second = np.column_stack([-0.05 + 0.002 * turn, 0.01 * turn % 0.08])
+    second[(turn > 2.0) & (turn < 6.0)] = np.nan
+    return np.ascontiguousarray(np.stack([first, second], axis=1))
+
+
 STEADY = State(spread(0.01, 0.05), rotational_diffusion=0.3)
 THREE = (
     State(
@@ -86,6 +98,12 @@ SWITCHING: dict[str, Case] = {
     "three states": Case(THREE),
     "slow": Case((STEADY,), {"slow_std": spread(0.0, 1.0), "slow_time": spread(0.5, 20.0)}),
     "stroke": Case((STEADY,), {"stroke": spread(0.0, 4.0), "stroke_frequency": spread(0.3, 9.0)}),
+    "neighbours": Case(
+        (RUN, State(0.0, dwell=0.5)),
+        {"neighbour_push": spread(0.0, 3.0), "neighbour_range": spread(0.002, 0.06)},
+        # Shorter than the run: then they stand still.
+        others=moving_others(700),
+    ),
     "diffusion": Case((STEADY,), {"diffusion": spread(0.0, 1e-5), "clearance": 0.02}),
 }
 WALLS: dict[str, dict[str, Any]] = {
@@ -140,6 +158,7 @@ def scene_of(case: Case) -> Scene:
         radius=case.tank.radius_m or 0.0,
         edges=wall_edges(case.tank),
         reflects=case.reflects,
+        others=case.others,
         **grid,
     )
 
@@ -156,6 +175,7 @@ def native(
         states=table.states,
         contact="reflect" if case.reflects else "slide",
         carried=case.carried,
+        neighbours=case.others,
     )
     worlds = np.ascontiguousarray(np.hstack([rows, table.columns]))
     return _core.simulate(model, worlds, keys, threads=1, precision=precision, particle=particle)
@@ -281,9 +301,10 @@ EVERYTHING = Case(
     {
         "clearance": 0.01, "diffusion": 1e-7, "slow_std": 0.3, "slow_time": 3.0, "stroke": 0.5,
         "stroke_frequency": 1.3, "wall_turn": 3.0, "wall_follow": 2.0, "wall_slowing": 0.5,
-        "wall_gap": 0.02,
+        "wall_gap": 0.02, "neighbour_push": 1.5, "neighbour_range": 0.03,
     },
     carried=True,
+    others=moving_others(200),
 )  # fmt: skip
 FORGETFUL = Case(
     (),

@@ -11,13 +11,14 @@ from scipy.stats import weibull_min
 
 import driftwalk as dw
 from driftwalk import _core
+from driftwalk.conditions import Neighbours
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.motion.family import MEMBERS, PARTS, family_model
 from driftwalk.motion.family.columns import INERTIAL, SHARED, STATE, State, switching_table
 from driftwalk.motion.family.dwell import dwell_law
 from driftwalk.motion.family.particle import time_step_of
-from driftwalk.schema import Parameter
+from driftwalk.schema import Parameter, Track
 from driftwalk.testing import MotionModelContract
 
 
@@ -58,6 +59,15 @@ class TestTwoState(FamilyContract):
 
 class TestActiveWithManyParts(FamilyContract):
     name = "active+wall+follow+slow+stroke+diffusion+flow+reflect"
+
+
+class TestRunRestAmongOthers(FamilyContract):
+    name = "run_rest+neighbours"
+
+    def conditions(self):
+        time = np.arange(0.0, 50.0, 0.2)
+        other = Track(time, 0.05 * np.cos(time), 0.05 * np.sin(time), np.full(time.size, np.nan))
+        return replace(super().conditions(), neighbours=Neighbours((other,)))
 
 
 class TestRunRestBackAndForth(FamilyContract):
@@ -134,6 +144,14 @@ def test_a_pickle_gives_the_same_bits():
     again = pickle.loads(pickle.dumps(model)).simulate(values, like, keys)
     for a, b in zip(first, again, strict=True):
         np.testing.assert_array_equal(a, b)
+
+
+def test_others_that_push_have_to_be_there():
+    contract = TestRunRestAmongOthers()
+    like, model = replace(contract.conditions(), neighbours=None), contract.model()
+    values = {one.name: np.full(1, one.low) for one in model.parameters}
+    with pytest.raises(InputError, match="feels the other bodies of a recording"):
+        model.simulate(values, like, np.array([1], dtype=np.uint64))
 
 
 def test_water_that_carries_has_to_be_there():

@@ -136,3 +136,10 @@ def test_a_block_without_a_flow_is_left_out_with_its_reason(recorded: xr.Dataset
     found = compare_models(recorded, ["block", "inertial"], study=study, budget=SMALL)
     assert "block" not in found["model"].values
     assert any("the block is left out" in str(text) for text in found["warning"].values)
+
+
+def test_a_model_that_feels_others_is_left_out_where_there_are_none(recorded: xr.Dataset) -> None:
+    found = compare_models(recorded, ["active+neighbours", "inertial"], budget=SMALL)
+    assert "active+neighbours" not in found["model"].values
+    said = [str(text) for text in found["warning"].values]
+    assert any(text.startswith("active+neighbours is left out: the model") for text in said)
