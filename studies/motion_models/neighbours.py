@@ -38,7 +38,7 @@ RANGES: Final = {
     "neighbour_push": (0.7, 3.0), "neighbour_range": (0.03, 0.09),
     "wall_range": (0.025, 0.09),
 }  # fmt: skip
-"""Of the model with neighbours: on body 2 a search from the widest ranges ends in another valley."""
+"""Of the model with neighbours. On body 2 a search of the widest ranges ends in another valley."""
 LONG: Final = slice(2, 5)
 """The facts of `motion_checks` that are added: displacement over 10, 30 and 100 intervals."""
 WEIGHT: Final = 1.5

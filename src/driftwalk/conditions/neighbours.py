@@ -93,12 +93,12 @@ def neighbours_of(recording: xr.Dataset, body: str | None, tank: Tank) -> Neighb
 
 def _mostly_inside(track: Track, tank: Tank) -> bool:
     if tank.radius_m is not None:
-        inside = np.hypot(track.x, track.y) <= tank.radius_m
+        beyond = np.hypot(track.x, track.y) - tank.radius_m
     else:
         edges = wall_edges(tank)
-        across = edges[:, :2] @ np.stack([track.x, track.y])
-        inside = (across <= edges[:, 2, None]).all(axis=0)
-    return bool(inside.mean() > 0.5)
+        across = edges[:, :2] @ np.stack([track.x, track.y]) - edges[:, 2, None]
+        beyond = across.max(axis=0)
+    return bool(np.mean(beyond <= 0.0) > 0.5)
 
 
 def _within_samples(time: Floats, wanted: Floats) -> npt.NDArray[np.bool_]:
