@@ -42,7 +42,7 @@ FlowDraws = Literal["standard_error", "none"]
 Progress = Callable[[int, int], None]
 
 RUNS_TOGETHER: Final = 2 * RUNS_PER_FLOW
-"""Runs of a work unit at least: with half as many, a run takes twice the time, for want of lanes."""
+"""Runs of a work unit at least: with half, a run takes twice the time, for want of lanes."""
 
 
 def assemble(
