@@ -19,7 +19,7 @@ from driftwalk.sweep import WorkerExecutor
 ANSWER_S: Final = 10.0
 """How long a scheduler may take to answer [s]."""
 EVENTS: Final = "all"
-"""What the scheduler tells of its workers."""
+"""Topic under which the scheduler reports that a worker has come or gone."""
 REMARK_S: Final = 10.0
 """How often it is said that no worker has come yet [s]."""
 

@@ -39,7 +39,7 @@ class Handout(Protocol):
         """How many units are handed out at a time."""
 
     def slow(self, age_s: float, /) -> bool:
-        """Return whether a unit that was handed out so long ago should be handed out again."""
+        """Return whether a unit of this age should be handed out again."""
 
     def again(self) -> None:
         """Hear that a unit was."""

@@ -51,7 +51,7 @@ class Parcel(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What a unit gave on a worker."""
+    """Result of a unit on a worker."""
 
     arrays: dict[str, npt.NDArray[Any]]
     seconds: float
@@ -116,7 +116,13 @@ def run_unit(parcel: Parcel, unit: WorkUnit) -> Answer:
 
 
 def this_worker() -> str:
-    """Return how a worker calls itself in a message."""
+    """Return how a worker calls itself in a message.
+
+    Examples
+    --------
+    >>> this_worker().startswith("a worker on ")
+    True
+    """
     return f"a worker on {platform.node()}"
 
 

@@ -121,15 +121,16 @@ def test_a_path_is_the_run_again(flow: xr.Dataset, found: xr.Dataset) -> None:
 def test_finished_units_are_not_computed_again(
     flow: xr.Dataset, found: xr.Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("driftwalk.assembly.runs.run.RUNS_TOGETHER", RUNS_PER_FLOW)
     store, told = MemoryStore(), []
     options: dict[str, Any] = {"store": store, "progress": lambda *done: told.append(done)}
     assert_same_bits(assemble(Study(), flow, **SHORT, **options), found)
-    assert told == [(0, 60), (50, 60), (60, 60)]
+    assert told == [(0, 60), (25, 60), (50, 60), (60, 60)]
     monkeypatch.setattr("driftwalk.assembly.runs.run.simulate_rows", None)
     assert_same_bits(assemble(Study(), flow, **SHORT, **options), found)
 
 
-@pytest.mark.parametrize(("blocks", "runs"), [(1, 51), (4, 1000), (4, 90_000), (9, 5000)])
+@pytest.mark.parametrize(("blocks", "runs"), [(1, 101), (4, 1000), (4, 90_000), (9, 5000)])
 def test_runs_of_a_unit_share_whole_flows(flow: xr.Dataset, blocks: int, runs: int) -> None:
     found = runs_per_unit(make_plan(Study(), flow, settings={"blocks": blocks, "runs": runs}))
     assert found % RUNS_PER_FLOW == 0

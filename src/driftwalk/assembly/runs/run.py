@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 FlowDraws = Literal["standard_error", "none"]
 Progress = Callable[[int, int], None]
 
-RUNS_TOGETHER: Final = 2 * RUNS_PER_FLOW
-"""Runs of a work unit at least: with half, a run takes twice the time, for want of lanes."""
+RUNS_TOGETHER: Final = 4 * RUNS_PER_FLOW
+"""Runs of a work unit at least: fewer leave lanes empty, and each then takes longer."""
 
 
 def assemble(
