@@ -39,7 +39,7 @@ BANDWIDTH_SHARE: Final = 0.125
 PLAUSIBLE: Final = 1.25
 """Settings less than this many floors above the minimum are plausible."""
 PADDING: Final = 0.2
-"""What is added to the plausible settings on each side, as a share of their extent."""
+"""A window goes beyond the plausible settings by this share of their extent on each side."""
 SMALLER: Final = 0.6
 """A window is replaced by one that is smaller by this factor along an axis, or more."""
 BEATEN: Final = 1e-3
@@ -50,7 +50,7 @@ NICE: Final = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 
 
 class Maps(Protocol):
-    """What simulates the windows of a refinement."""
+    """The simulation of the windows of a refinement."""
 
     def full(self, axes: Axes, replicates: int) -> Map:
         """Simulate every setting of a grid."""

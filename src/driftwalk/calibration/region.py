@@ -44,8 +44,6 @@ SURFACE_INTERVALS: Final[dict[int, int]] = {1: 32, 2: 10}
 LEAST_BANDWIDTH_STEPS: Final = 1.5
 KEPT: Final = 1.5
 """Places less than this many floors above the minimum are kept of the stored surface."""
-SIMULATED: Final = 2.0
-"""Settings less than this many floors above the minimum are simulated for it."""
 SURFACE_REPLICATES = 4
 """Simulations of every setting of the stored surface; a recording meets one of them."""
 RECORDINGS_PER_UNIT = 10
@@ -99,6 +97,8 @@ def build_surface(problem: Problem, refined: Refined) -> StoredSurface:
     StoredSurface
         On a grid over the window, where the optimum could be.
     """
+    from scipy.ndimage import binary_dilation
+
     intervals = SURFACE_INTERVALS[len(refined.map.axes)]
     axes = tuple(
         np.linspace(axis[0], axis[-1], min(intervals + 1, axis.size)) for axis in refined.map.axes
@@ -112,7 +112,10 @@ def build_surface(problem: Problem, refined: Refined) -> StoredSurface:
         _between(refined.landscape.smoother.axes, values, lattice)
         for values in (refined.landscape.height, refined.landscape.floor)
     )
-    simulated = at_settings(height) <= SIMULATED
+    # Settings around them, too: a quadratic needs three along each axis, however narrow the valley.
+    low = at_settings(height) <= KEPT
+    low[nearest_point(axes, refined.landscape.optimum.point)] = True
+    simulated = binary_dilation(low, structure=np.ones((3,) * low.ndim))
     smoother = make_smoother(axes, bandwidth=bandwidth, weights=simulated.astype(float))
     # Weights add up to 1 wherever there are settings to say what the surface is.
     supported = smoother.matrix.sum(axis=1).reshape(height.shape) > 0.99

@@ -192,7 +192,7 @@ OF_A_REPLICATE: Final[dict[str, float]] = {
     "ks_quadrant": -1,
     "status": 0,
 }
-"""Arrays with an entry per replicate, and what stands for one that was not simulated."""
+"""Arrays with an entry per replicate, and the value of one that was not simulated."""
 OF_THE_FIRST: Final = ("excerpt_x", "excerpt_y")
 
 
