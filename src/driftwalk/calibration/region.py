@@ -115,7 +115,7 @@ def build_surface(problem: Problem, refined: Refined) -> StoredSurface:
     # Settings around them, too: a quadratic needs three along each axis, however narrow the valley.
     low = at_settings(height) <= KEPT
     low[nearest_point(axes, refined.landscape.optimum.point)] = True
-    simulated = binary_dilation(low, structure=np.ones((3,) * low.ndim))
+    simulated = binary_dilation(low, structure=np.ones((3,) * low.ndim, dtype=np.bool_))
     smoother = make_smoother(axes, bandwidth=bandwidth, weights=simulated.astype(float))
     # Weights add up to 1 wherever there are settings to say what the surface is.
     supported = smoother.matrix.sum(axis=1).reshape(height.shape) > 0.99
