@@ -30,7 +30,12 @@ class Columns(Section):
     frame: Column = Field(default=None, description="Column of the frame number.")
     x: Column = Field(default=None, description="Column of x.")
     y: Column = Field(default=None, description="Column of y.")
+    z: Column = Field(default=None, description="Column of z, if the positions are in space.")
     theta: Column = Field(default=None, description="Column of the orientation.")
+    qx: Column = Field(default=None, description="Column of the quaternion's x.")
+    qy: Column = Field(default=None, description="Column of the quaternion's y.")
+    qz: Column = Field(default=None, description="Column of the quaternion's z.")
+    qw: Column = Field(default=None, description="Column of the quaternion's w, its real part.")
     body: Column = Field(default=None, description="Column of the body's name.")
 
     def to_dict(self) -> dict[str, str]:
@@ -78,8 +83,8 @@ class Recording(Section):
     columns: Columns | None = Field(
         default=None,
         description=(
-            "Columns of a table (t, frame, x, y, theta, body), each by its name in the header or "
-            'its number from 1; a unit may follow, as in "angle:deg".'
+            "Columns of a table (t, frame, x, y, z, theta, qx, qy, qz, qw, body), each by its name "
+            'in the header or its number from 1; a unit may follow, as in "angle:deg".'
         ),
         examples=['{ t = "time", x = 2, y = 3 }'],
     )
@@ -101,6 +106,18 @@ class Recording(Section):
     )
     keypoint: str | None = Field(
         default=None, description="Keypoint of a pose file that is the body.", examples=["centre"]
+    )
+    up: Literal["auto", "x", "y", "z", "-x", "-y", "-z"] = Field(
+        default="auto",
+        description='Axis of a file in space that points up; "auto" uses that of its format.',
+    )
+    topic: str | None = Field(
+        default=None, description="Topic of a ROS bag.", examples=["/block/pose"]
+    )
+    header_line: Annotated[int | None, Quantity("1", ge=1, le=10_000, whole=True)] = Field(
+        default=None,
+        description="Line of a table, from 1, that names its columns, if it is not the first.",
+        examples=[7],
     )
     sort: Literal["error", "sort"] = Field(
         default="error", description='Times that go back: "error" refuses them, "sort" sorts them.'
@@ -146,6 +163,9 @@ class Recording(Section):
             "y": self.y_file,
             "theta": self.theta_file,
             "keypoint": self.keypoint,
+            "up": self.up if self.up != "auto" else None,
+            "topic": self.topic,
+            "header_line": self.header_line,
         }
         return {name: value for name, value in named.items() if value is not None}
 

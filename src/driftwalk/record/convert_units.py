@@ -128,6 +128,11 @@ def _flips(raw: RawRecording, *, y_axis: str | None, in_pixels: bool) -> tuple[b
 
 
 def _describe_flips(raw: RawRecording, flip: bool, flip_theta: bool) -> str:
+    done = _describe_negated(raw, flip, flip_theta)
+    return f"{raw.plane}; {done}" if raw.plane else done
+
+
+def _describe_negated(raw: RawRecording, flip: bool, flip_theta: bool) -> str:
     has_theta = any(body.theta is not None for body in raw.bodies)
     if not flip and not (flip_theta and has_theta):
         return "up in the file: kept"

@@ -25,6 +25,18 @@ def first_lines(head: bytes, count: int = 5) -> list[str]:
     return [line.decode("utf-8", "replace").rstrip("\r") for line in lines[:count] if line.strip()]
 
 
+def head_lines(path: Path, count: int) -> list[str]:
+    """Return the first lines of a text file, blank ones too.
+
+    Raises
+    ------
+    FormatError
+        When one of them is not UTF-8 text.
+    """
+    raw = read_head(path).split(b"\n")[:count]
+    return [_strict(line, path, number) for number, line in enumerate(raw, start=1)]
+
+
 def detect_delimiter(lines: list[str]) -> str:
     """Return the character that separates the fields of the first lines; a blank when none does.
 

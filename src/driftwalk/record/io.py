@@ -53,6 +53,9 @@ def load(
     y: str | PathLike[str] | None = None,
     theta: str | PathLike[str] | None = None,
     keypoint: str | None = None,
+    up: str | None = None,
+    topic: str | None = None,
+    header_line: int | None = None,
     replicate: int | None = None,
 ) -> xr.Dataset:
     """Load a recording as a `trajectory` dataset in SI units, y up.
@@ -63,7 +66,8 @@ def load(
     Parameters
     ----------
     path : path-like
-        File (may be gzip-compressed text), or a folder of SwisTrack tracks or matrices.
+        File (may be gzip-compressed text), or a folder of SwisTrack tracks or matrices, or of a
+        ROS 2 bag.
     format : str, optional
         Name of the format, see `readable_formats`.
     body : str, optional
@@ -97,6 +101,13 @@ def load(
         One matrix per coordinate: a row per frame, a column per body.
     keypoint : str, optional
         Keypoint of a pose file that is the body.
+    up : {"x", "y", "z", "-x", "-y", "-z"}, optional
+        Axis of a file in space that points up; None: as its format has it. The plane of the water
+        is what is seen from its end.
+    topic : str, optional
+        Topic of a ROS bag that holds several, or more than one with commas between them.
+    header_line : int, optional
+        Line of a plain table, from 1, that names its columns; the data follow it.
     replicate : int, optional
         Replicate of a simulation, counted from 0; default: the first.
 
@@ -131,6 +142,9 @@ def load(
         y=None if y is None else Path(y),
         theta=None if theta is None else Path(theta),
         keypoint=keypoint,
+        up=up,
+        topic=topic,
+        header_line=header_line,
         replicate=replicate or 0,
     )
     if replicate is not None and kind_of(source) != "simulation":
@@ -138,6 +152,7 @@ def load(
     loader = find_loader(source, format=format or ("matrices" if options.y is not None else None))
     try:
         raw = loader.read(source, options)
+        _refuse_unused(options, raw, loader.name)
         raw.bodies = _select(raw.bodies, body)
         refuse_many_bodies([one.name for one in raw.bodies])
         raw.notes += [*check_clock(raw), *angle_warnings(raw)]
@@ -166,6 +181,16 @@ def load(
         raise _of_file(error, source) from error
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
+
+
+def _refuse_unused(options: ReadOptions, raw: RawRecording, format: str) -> None:
+    """Refuse what says something about a file that this file has not."""
+    if options.up is not None and not raw.plane:
+        raise InputError("the positions have two axes: leave `up` out")
+    if options.topic is not None and format != "ros":
+        raise InputError("the file is no ROS bag: leave `topic` out")
+    if options.header_line is not None and format != "csv":
+        raise InputError(f"`header_line` is for plain tables, and this is '{format}': leave it out")
 
 
 def _of_file(error: FormatError, path: Path) -> FormatError:

@@ -78,6 +78,9 @@ class RawRecording:
     """Whether a length without a unit is metres in this format."""
     y_axis: str = ""
     """Direction of y in the file, ``"up"`` or ``"down"``; ``""``: down in pixels, else up."""
+    plane: str = ""
+    """Which plane of a file in space the positions lie in, in words; ``""``: they had no third
+    axis."""
     theta_axis: str = ""
     """Direction of y that the angles were measured in; ``""``: the same as `y_axis`."""
     frame_rate_hz: float | None = None
@@ -130,5 +133,12 @@ class ReadOptions:
     """File of the orientation matrix."""
     keypoint: str | None = None
     """Keypoint of a pose file that is the body."""
+    up: str | None = None
+    """Axis of positions in space that points up: ``"x"``, ``"-y"``, ...; None: as the format has
+    it."""
+    topic: str | None = None
+    """Topic of a ROS bag, or several with commas between them."""
+    header_line: int | None = None
+    """Line of a plain table, from 1, that names its columns; None: the first."""
     replicate: int = 0
     """Replicate of a simulation, counted from 0."""

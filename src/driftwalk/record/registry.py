@@ -1,4 +1,4 @@
-"""The readable formats: one file each in `record.loaders`, found by being there.
+"""The readable formats: one file each under `record.loaders`, found by being there.
 
 A further format joins by one file that defines ``LOADER``, an object with the members of
 `Loader`. Nothing else has to be edited.
@@ -53,9 +53,11 @@ def loaders() -> dict[str, Loader]:
     from driftwalk.record import loaders as package
 
     found: dict[str, Loader] = {}
-    for module in sorted(pkgutil.iter_modules(package.__path__), key=lambda entry: entry.name):
-        loader = importlib.import_module(f"{package.__name__}.{module.name}").LOADER
-        found[loader.name] = loader
+    modules = pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
+    for module in sorted(modules, key=lambda entry: entry.name.rpartition(".")[2]):
+        if not module.ispkg:
+            loader = importlib.import_module(module.name).LOADER
+            found[loader.name] = loader
     return found
 
 

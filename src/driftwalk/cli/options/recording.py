@@ -108,6 +108,28 @@ class RecordingOptions:
     keypoint: Annotated[
         str | None, _option("--keypoint", "Keypoint of a pose file that is the body.")
     ] = None
+    up: Annotated[
+        str | None,
+        _option(
+            "--up",
+            "Axis of a file in space that points up (default: as its format has it).",
+            metavar="x|y|z|-x|-y|-z",
+        ),
+    ] = None
+    topic: Annotated[
+        str | None,
+        _option("--topic", "Topic of a ROS bag, or several with commas.", metavar="NAME[,NAME]"),
+    ] = None
+    header_line: Annotated[
+        int | None,
+        typer.Option(
+            "--header-line",
+            min=1,
+            help="Line of a plain table, from 1, that names its columns.",
+            rich_help_panel=PANEL,
+            show_default=False,
+        ),
+    ] = None
     replicate: Annotated[
         int | None,
         typer.Option(

@@ -1,0 +1,181 @@
+"""OptiTrack Motive CSV: a line of settings, rows that name the columns, then a row per frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from driftwalk.core.errors import FormatError
+from driftwalk.record.bad_row import split_fields
+from driftwalk.record.head import head_lines
+from driftwalk.record.layout import TableLayout
+from driftwalk.record.raw import Array, RawRecording, ReadOptions
+from driftwalk.record.space.flat import SpaceTrack, lay_flat
+from driftwalk.record.space.plane import plane_of
+from driftwalk.record.space.turns import QUATERNION, Turns
+from driftwalk.record.text import Table, read_table
+
+START: Final = b"Format Version,"
+_HEADER_ROWS: Final = 12
+"""The rows that name the columns end by then: blank, type, name, id, parent, quantity, axes."""
+_UNITS: Final = {"meters": "m", "centimeters": "cm", "millimeters": "mm"}
+_ORDERS: Final = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
+_UP: Final = "y"
+"""Motive's own axes. Its CSV says nothing about another choice at the export."""
+
+
+@dataclass(frozen=True)
+class _Header:
+    settings: dict[str, str]
+    lines: int
+    """Lines before the data."""
+    types: list[str]
+    names: list[str]
+    quantities: list[str]
+    axes: list[str]
+
+    def columns(self, name: str, kind: str, quantity: str) -> dict[str, int]:
+        """Return the axes of one quantity of a body, each with its column."""
+        rows = zip(self.types, self.names, self.quantities, self.axes, strict=True)
+        return {
+            axis: column
+            for column, (*row, axis) in enumerate(rows)
+            if row == [kind, name, quantity] and axis
+        }
+
+
+class OptiTrackLoader:
+    """Rigid bodies by their names; single markers where there are no rigid bodies."""
+
+    name = "optitrack"
+    description = "OptiTrack Motive CSV (rigid bodies, or markers; y up)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the settings of the first line."""
+        return 0.95 if head.startswith(START) and b"Take Name" in head else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read every rigid body."""
+        header = _read_header(path)
+        kind, bodies = _bodies(header, path)
+        placed = {name: header.columns(name, kind, "Position") for name in bodies}
+        turned = {name: header.columns(name, kind, "Rotation") for name in bodies}
+        clock, clock_unit = _clock(header)
+        used = {clock, *(c for axes in (*placed.values(), *turned.values()) for c in axes.values())}
+        labels = [
+            " ".join(part for part in parts if part) or str(number)
+            for number, parts in enumerate(
+                zip(header.names, header.quantities, header.axes, strict=True), start=1
+            )
+        ]
+        table = read_table(path, TableLayout(",", labels, header.lines, tuple(sorted(used))))
+        plane = plane_of(options.up or _UP)
+        tracks = [
+            SpaceTrack(
+                name,
+                table.numbers[clock],
+                _stack(table, placed[name], "XYZ"),
+                _turns(header, table, turned[name], path),
+            )
+            for name in bodies
+        ]
+        flat, notes = lay_flat(tracks, plane)
+        if kind != "Rigid Body":
+            notes.append("no rigid bodies: each marker is read as a body, without orientation")
+        rate = header.settings.get("Export Frame Rate") or header.settings.get("Capture Frame Rate")
+        return RawRecording(
+            flat,
+            clock_unit=clock_unit,
+            length_unit=_length_unit(header, path),
+            y_axis="up",
+            plane=plane.describe(),
+            frame_rate_hz=_rate(rate, path) if clock_unit == "frame" else None,
+            rows=table.rows,
+            notes=notes,
+        )
+
+
+def _read_header(path: Path) -> _Header:
+    lines = head_lines(path, _HEADER_ROWS + 1)
+    rows = [split_fields(line, ",") for line in lines]
+    settings = dict(zip(rows[0][::2], rows[0][1::2], strict=False))
+    at = next((i for i, row in enumerate(rows) if row[:1] == ["Frame"]), None)
+    above = [] if at is None else [row for row in rows[1:at] if any(row)]
+    if at is None or len(above) < 3:
+        raise FormatError(
+            "the rows that name type, body and axis of each column are missing: export the take "
+            "with its header",
+            path=path,
+        )
+    # A data row may end in a comma that the header has not, and the other way round.
+    width = max(len(rows[at]), *(len(row) for row in rows[at + 1 : at + 2]))
+    types, names, *_, quantities, axes = (
+        (row + [""] * width)[:width] for row in (*above, rows[at])
+    )
+    return _Header(settings, at + 1, types, names, quantities, axes)
+
+
+def _bodies(header: _Header, path: Path) -> tuple[str, list[str]]:
+    """Return which type is read, and the names of its bodies in the file's order."""
+    for kind in ("Rigid Body", "Marker"):
+        named = zip(header.types, header.names, strict=True)
+        names = list(dict.fromkeys(name for type_, name in named if type_ == kind))
+        if names:
+            for name in names:
+                if set(header.columns(name, kind, "Position")) != set("XYZ"):
+                    raise FormatError(f"'{name}' has no columns X, Y, Z of its position", path=path)
+            return kind, names
+    raise FormatError(
+        "there is no rigid body and no marker: export the take with one of them", path=path
+    )
+
+
+def _clock(header: _Header) -> tuple[int, str]:
+    """Return the column of the clock and its unit."""
+    for column, name in enumerate(header.axes):
+        if name in ("Time", "Time (Seconds)"):
+            return column, "s"
+    return header.axes.index("Frame"), "frame"
+
+
+def _rate(text: str | None, path: Path) -> float | None:
+    try:
+        return None if text is None else float(text)
+    except ValueError as error:
+        raise FormatError(f"the frame rate is '{text}'", path=path, line=1) from error
+
+
+def _length_unit(header: _Header, path: Path) -> str:
+    """Return the unit of positions, ``""`` when the settings do not say."""
+    text = header.settings.get("Length Units", "")
+    if text and text.lower() not in _UNITS:
+        raise FormatError(
+            f"the unit of length is '{text}': export in meters or millimeters", path=path, line=1
+        )
+    return _UNITS.get(text.lower(), "")
+
+
+def _turns(header: _Header, table: Table, columns: dict[str, int], path: Path) -> Turns | None:
+    """Return the orientations; Motive's Euler angles turn about the axes of the body."""
+    if not columns:
+        return None
+    form = header.settings.get("Rotation Type", "")
+    axes = "XYZW" if form == "Quaternion" else form
+    if form not in (*_ORDERS, "Quaternion") or set(columns) != set(axes):
+        raise FormatError(
+            f"the rotation type is '{form}' and the columns of rotation are {', '.join(columns)}: "
+            "export quaternions, or Euler angles in an order such as XYZ",
+            path=path,
+        )
+    values = _stack(table, columns, axes)
+    return Turns(values, QUATERNION) if form == "Quaternion" else Turns(values, form, degrees=True)
+
+
+def _stack(table: Table, columns: dict[str, int], axes: str) -> Array:
+    return np.column_stack([table.numbers[columns[axis]] for axis in axes])
+
+
+LOADER = OptiTrackLoader()
