@@ -1,0 +1,180 @@
+"""Vicon CSV: section, frame rate, names, axes, units, then a row per frame."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from driftwalk.core.errors import FormatError
+from driftwalk.record.bad_row import is_number, split_fields
+from driftwalk.record.head import first_lines, head_lines
+from driftwalk.record.layout import TableLayout
+from driftwalk.record.raw import ANGLE_UNITS, LENGTH_UNITS, Array, RawRecording, ReadOptions
+from driftwalk.record.space.flat import SpaceTrack, lay_flat
+from driftwalk.record.space.plane import plane_of
+from driftwalk.record.space.turns import QUATERNION, VECTOR, Turns
+from driftwalk.record.text import Table, read_table
+
+_READ: Final = ("Objects", "Segments", "Trajectories")
+_OTHERS: Final = ("Devices", "Joints", "Model Outputs")
+_LINES: Final = 5
+_UP: Final = "z"
+_POSITIONS: Final = (("TX", "TY", "TZ"), ("X", "Y", "Z"))
+_QUATERNION: Final = ("RX", "RY", "RZ", "RW")
+_PREFIX: Final = re.compile(r"^Global Angle\s+")
+
+
+@dataclass(frozen=True)
+class _Header:
+    rate_hz: float
+    names: list[str]
+    """Body of each column, ``""`` of the first two."""
+    axes: list[str]
+    units: list[str]
+
+    def columns(self, body: str) -> dict[str, int]:
+        """Return the axes of a body, each with its column."""
+        pairs = zip(self.names, self.axes, strict=True)
+        return {axis: at for at, (name, axis) in enumerate(pairs) if name == body and axis}
+
+
+class ViconLoader:
+    """Objects and segments with their rotation, or single markers."""
+
+    name = "vicon"
+    description = "Vicon CSV (Objects, Segments or Trajectories; z up)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the section and the row of axes."""
+        lines = first_lines(head, _LINES)
+        if len(lines) < _LINES - 1 or lines[0].strip(", ") not in (*_READ, *_OTHERS):
+            return 0.0
+        return 0.95 if lines[3].startswith("Frame,Sub Frame") else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read every object; a second section of the file has to go."""
+        header = _read_header(path)
+        bodies = [name for name in dict.fromkeys(header.names) if name]
+        columns = {name: header.columns(name) for name in bodies}
+        placed = {name: _positions(name, columns[name], path) for name in bodies}
+        used = {0, *(column for axes in columns.values() for column in axes.values())}
+        labels = [f"{n} {a}".strip() for n, a in zip(header.names, header.axes, strict=True)]
+        table = _read_rows(path, TableLayout(",", labels, _LINES, tuple(sorted(used))))
+        tracks = [
+            SpaceTrack(
+                name,
+                table.numbers[0],
+                _stack(table, placed[name]),
+                _turns(header, table, columns[name], path),
+            )
+            for name in bodies
+        ]
+        plane = plane_of(options.up or _UP)
+        flat, notes = lay_flat(tracks, plane)
+        return RawRecording(
+            flat,
+            length_unit=_length_unit(header, placed, path),
+            y_axis="up",
+            plane=plane.describe(),
+            frame_rate_hz=header.rate_hz,
+            rows=table.rows,
+            notes=notes,
+        )
+
+
+def _read_header(path: Path) -> _Header:
+    lines = head_lines(path, _LINES + 1)
+    if len(lines) <= _LINES or not lines[_LINES].strip():
+        raise FormatError("the file ends before its first row of data", path=path)
+    section = lines[0].strip(", ")
+    if section not in _READ:
+        raise FormatError(
+            f"begins with the section '{section}': export {', '.join(_READ[:-1])} or {_READ[-1]}",
+            path=path,
+            line=1,
+        )
+    rate = lines[1].strip(", ")
+    if not is_number(rate):
+        raise FormatError(f"expected the frame rate, got '{rate:.40}'", path=path, line=2)
+    names, axes, units, data = (split_fields(line, ",") for line in lines[2 : _LINES + 1])
+    width = max(len(axes), len(data))
+    if len(axes) < 5 or axes[0] != "Frame":
+        raise FormatError("expected the names of the axes, from 'Frame' on", path=path, line=4)
+    padded = [(row + [""] * width)[:width] for row in (names, axes, units)]
+    return _Header(float(rate), _carried(padded[0]), padded[1], padded[2])
+
+
+def _carried(names: list[str]) -> list[str]:
+    """Return the body of each column: a name stands over the first of its columns alone."""
+    carried = ["", ""]
+    for name in names[2:]:
+        subject, _, segment = _PREFIX.sub("", name).partition(":")
+        own = subject if segment in ("", subject) else f"{subject}:{segment}"
+        carried.append(own or carried[-1])
+    return carried
+
+
+def _positions(body: str, columns: dict[str, int], path: Path) -> list[int]:
+    for axes in _POSITIONS:
+        if set(axes) <= set(columns):
+            return [columns[axis] for axis in axes]
+    raise FormatError(
+        f"'{body}' has no columns TX, TY, TZ or X, Y, Z of its position", path=path, line=4
+    )
+
+
+def _length_unit(header: _Header, placed: dict[str, list[int]], path: Path) -> str:
+    units = {header.units[column] for columns in placed.values() for column in columns}
+    if len(units) != 1 or not units <= {*LENGTH_UNITS, ""}:
+        raise FormatError(
+            f"the units of the positions are {', '.join(sorted(units))}: expected one, mm or m",
+            path=path,
+            line=_LINES,
+        )
+    return units.pop()
+
+
+def _turns(header: _Header, table: Table, columns: dict[str, int], path: Path) -> Turns | None:
+    """Return the orientations: a quaternion where there are four axes, else axis times angle."""
+    if not set(_QUATERNION[:3]) <= set(columns):
+        return None
+    if "RW" in columns:
+        return Turns(_stack(table, [columns[axis] for axis in _QUATERNION]), QUATERNION)
+    unit = header.units[columns["RX"]]
+    if unit not in ANGLE_UNITS:
+        raise FormatError(
+            f"the unit of the angles is '{unit}': expected rad or deg", path=path, line=_LINES
+        )
+    values = _stack(table, [columns[axis] for axis in _QUATERNION[:3]])
+    return Turns(values, VECTOR, degrees=unit == "deg")
+
+
+def _stack(table: Table, columns: list[int]) -> Array:
+    return np.column_stack([table.numbers[column] for column in columns])
+
+
+def _read_rows(path: Path, layout: TableLayout) -> Table:
+    """Read the rows; say what to do about a section that follows them."""
+    try:
+        return read_table(path, layout)
+    except FormatError as error:
+        if error.line is None or not _begins_section(path, error.line):
+            raise
+        raise FormatError(
+            "another section begins here: keep one section in a file, or export one alone",
+            path=path,
+            line=error.line,
+        ) from error
+
+
+def _begins_section(path: Path, number: int) -> bool:
+    with path.open("rb") as file:
+        text = next((line for at, line in enumerate(file, start=1) if at == number), b"")
+    return text.decode("utf-8", "replace").strip(", \r\n") in (*_READ, *_OTHERS)
+
+
+LOADER = ViconLoader()
