@@ -1,0 +1,75 @@
+"""EuRoC ground truth: CSV with ``p_RS_R_x [m]`` and ``q_RS_w []``, a clock of nanoseconds."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from driftwalk.core.errors import FormatError
+from driftwalk.record.bad_row import split_fields
+from driftwalk.record.column_names import unit_of_name
+from driftwalk.record.head import first_lines, head_lines
+from driftwalk.record.layout import TableLayout
+from driftwalk.record.raw import CLOCK_UNITS, RawRecording, ReadOptions
+from driftwalk.record.space.flat import SpaceTrack, lay_flat
+from driftwalk.record.space.plane import plane_of
+from driftwalk.record.space.turns import QUATERNION, Turns
+from driftwalk.record.text import read_table
+
+_START: Final = re.compile(r"#\s*timestamp\b[^,]*(,\s*p_\w*[xyz]\b[^,]*){3}")
+_PART: Final = re.compile(r"([pq])_(?:[A-Za-z]+_)*([wxyz])\s*(?:\[.*\])?")
+_POSITION: Final = ("px", "py", "pz")
+_QUATERNION: Final = ("qx", "qy", "qz", "qw")
+_UP: Final = "z"
+
+
+class EurocLoader:
+    """One body; velocities and biases that follow are not read."""
+
+    name = "euroc"
+    description = "EuRoC ground truth CSV (#timestamp [ns], p_RS_R_x [m], …, q_RS_w, …; z up)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the header."""
+        lines = first_lines(head, 1)
+        return 0.9 if lines and _START.match(lines[0]) else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read the one body; its whole nanoseconds stay exact."""
+        names = split_fields(head_lines(path, 1)[0].lstrip("# "), ",")
+        columns = {
+            "".join(match.groups()): column
+            for column, name in enumerate(names)
+            if (match := _PART.fullmatch(name))
+        }
+        lacking = [part for part in _POSITION if part not in columns]
+        if lacking:
+            raise FormatError(
+                f"the header names no column of p_…_{lacking[0][1]}", path=path, line=1
+            )
+        turned = set(_QUATERNION) <= set(columns)
+        parts = (*_POSITION, *(_QUATERNION if turned else ()))
+        used = tuple(columns[part] for part in parts)
+        table = read_table(path, TableLayout(",", names, 1, (0, *used), clock=0))
+        values = np.column_stack([table.numbers[column] for column in used])
+        turns = Turns(values[:, 3:], QUATERNION) if turned else None
+        plane = plane_of(options.up or _UP)
+        track = SpaceTrack("0", table.numbers[0], values[:, :3], turns)
+        bodies, notes = lay_flat([track], plane)
+        unit = unit_of_name(names[0])
+        return RawRecording(
+            bodies,
+            clock_unit=unit if unit in CLOCK_UNITS else "ns",
+            clock_origin=table.clock_origin,
+            length_unit="m",
+            y_axis="up",
+            plane=plane.describe(),
+            rows=table.rows,
+            notes=notes,
+        )
+
+
+LOADER = EurocLoader()
