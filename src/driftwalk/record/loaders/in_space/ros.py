@@ -1,0 +1,154 @@
+"""ROS bags: poses of one topic or several, at the times of their headers."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.record.raw import RawRecording, ReadOptions
+from driftwalk.record.space.flat import SpaceTrack, lay_flat
+from driftwalk.record.space.plane import plane_of
+from driftwalk.record.space.ros_poses import READERS
+from driftwalk.record.space.turns import QUATERNION, Turns
+
+METADATA: Final = "metadata.yaml"
+_MCAP: Final = b"\x89MCAP0\r\n"
+_SQLITE: Final = b"SQLite format 3\0"
+_UP: Final = "z"
+_SECOND: Final = 1_000_000_000
+
+
+@dataclass
+class _Track:
+    stamps: list[int] = field(default_factory=list)
+    values: list[tuple[float, ...]] = field(default_factory=list)
+
+
+class RosLoader:
+    """Bodies by their frames, or by their topics where a message names no frame of the body."""
+
+    name = "ros"
+    description = "ROS 2 bag, sqlite3 or MCAP (poses, odometry, transforms; z up)"
+
+    def sniff(self, head: bytes, path: Path) -> float:
+        """Recognise the folder of a bag, or one of its files."""
+        if path.is_dir():
+            return 0.95 if (path / METADATA).is_file() else 0.0
+        return 0.95 if head.startswith((_MCAP, _SQLITE)) else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read the poses of the chosen topics."""
+        plane = plane_of(options.up or _UP)
+        with _opened(path) as reader:
+            chosen = _choose(reader.connections, options.topic, path)
+            tracks, parents, recorded = _collect(reader, chosen)
+        if not tracks:
+            raise FormatError("the chosen topic has no poses", path=path)
+        origin = min(min(track.stamps) for track in tracks.values())
+        laid, notes = lay_flat(
+            [_in_space(name, track, origin) for name, track in tracks.items()], plane
+        )
+        if recorded:
+            notes.append(
+                f"{recorded} poses have no time stamp: they stand at the time when they were "
+                "recorded, which is later"
+            )
+        if len(parents) > 1:
+            notes.append(
+                f"the poses are in different frames, {', '.join(sorted(parents))}: compare bodies "
+                "of one frame only"
+            )
+        return RawRecording(
+            laid,
+            clock_unit="ns",
+            clock_origin=origin,
+            length_unit="m",
+            y_axis="up",
+            plane=plane.describe(),
+            rows=sum(len(track.stamps) for track in tracks.values()),
+            notes=notes,
+        )
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """Open a bag; what goes wrong inside becomes a `FormatError`."""
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError as error:
+        raise InputError("a ROS bag needs rosbags: pip install 'driftwalk[ros]'") from error
+    try:
+        # A bag that does not describe its messages is taken to hold those of a common ROS 2.
+        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+            yield reader
+    except InputError:
+        raise
+    except Exception as error:
+        # On a damaged bag the library fails with whatever the damage leads it to.
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise FormatError(f"cannot be read as a ROS bag: {reason}", path=path) from error
+
+
+def _choose(connections: list[Any], topic: str | None, path: Path) -> list[Any]:
+    """Return the connections of the chosen topics, or of the only one that holds poses."""
+    usable = [one for one in connections if one.msgtype in READERS]
+    topics = list(dict.fromkeys(one.topic for one in usable))
+    if not topics:
+        found = ", ".join(sorted({one.msgtype for one in connections})[:8]) or "no topics"
+        raise FormatError(
+            f"has no topic of poses, only {found}; read are "
+            f"{', '.join(name.rpartition('/')[2] for name in READERS)}",
+            path=path,
+        )
+    wanted = [name.strip() for name in topic.split(",")] if topic is not None else topics
+    if (len(wanted) > 1 and topic is None) or not set(wanted) <= set(topics):
+        shown = ", ".join(
+            f"{one.topic} ({one.msgtype.rpartition('/')[2]}, {one.msgcount} messages)"
+            for one in usable
+        )
+        got = "several topics of poses" if topic is None else f"no topic of poses '{topic}'"
+        raise InputError(f"the bag has {got}: name it with `topic`: {shown}")
+    return [one for one in usable if one.topic in wanted]
+
+
+def _collect(reader: Any, chosen: list[Any]) -> tuple[dict[str, _Track], set[str], int]:
+    """Return the tracks by body, the frames they are in, and how many have no time of their own."""
+    tracks: dict[tuple[str, str], _Track] = {}
+    parents: set[str] = set()
+    recorded = 0
+    for connection, received, data in reader.messages(connections=chosen):
+        message = reader.deserialize(data, connection.msgtype)
+        for pose in READERS[connection.msgtype](message, connection.topic.strip("/")):
+            stamp = 0 if pose.stamp is None else pose.stamp.sec * _SECOND + pose.stamp.nanosec
+            recorded += stamp == 0
+            track = tracks.setdefault((connection.topic, pose.body), _Track())
+            track.stamps.append(stamp or received)
+            track.values.append(pose.values)
+            parents.add(pose.parent)
+    return _named(tracks), parents, recorded
+
+
+def _named(tracks: dict[tuple[str, str], _Track]) -> dict[str, _Track]:
+    """Return the tracks by body, and by topic too where two topics have a body of one name."""
+    times = Counter(body for _, body in tracks)
+    return {
+        body if times[body] == 1 else f"{topic.strip('/')}/{body}": track
+        for (topic, body), track in tracks.items()
+    }
+
+
+def _in_space(name: str, track: _Track, origin: int) -> SpaceTrack:
+    clock = np.array([stamp - origin for stamp in track.stamps], dtype=np.float64)
+    values = np.array(track.values, dtype=np.float64)
+    return SpaceTrack(name, clock, values[:, :3], Turns(values[:, 3:], QUATERNION))
+
+
+LOADER = RosLoader()
