@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import InputError
@@ -15,6 +16,8 @@ _ROOTS: dict[str, str] = {
     ),
     **dict.fromkeys(("x", "posx", "xpos", "cx", "xc"), "x"),
     **dict.fromkeys(("y", "posy", "ypos", "cy", "yc"), "y"),
+    **dict.fromkeys(("z", "posz", "zpos", "cz", "zc"), "z"),
+    **{part: part for part in ("qx", "qy", "qz", "qw")},
     **dict.fromkeys(("theta", "heading", "orientation", "angle", "yaw"), "theta"),
     **dict.fromkeys(
         ("body", "id", "track", "trackid", "robot", "robotid", "individual", "animal", "name"),
@@ -40,9 +43,16 @@ _ALLOWED: dict[str, frozenset[str]] = {
     "frame": frozenset(),
     "x": frozenset({"m", "cm", "mm", "um", "km", "px"}),
     "y": frozenset({"m", "cm", "mm", "um", "km", "px"}),
+    "z": frozenset({"m", "cm", "mm", "um", "km", "px"}),
     "theta": frozenset({"rad", "deg"}),
+    **dict.fromkeys(("qx", "qy", "qz", "qw"), frozenset[str]()),
     "body": frozenset(),
 }
+_QUATERNION = ("qx", "qy", "qz", "qw")
+_OF_BODY = ("x", "y", "z", "theta", *_QUATERNION)
+"""Quantities that a table may have once for each body."""
+# Words before x, y, z or w that make them a part of a quaternion: "orientation.x", "q_w".
+_QUATERNION_WORDS = frozenset({"q", "quat", "quaternion", "orientation"})
 # Words next to x or y that do not name a body. They hint at an image, so a length next to
 # them is not taken for metres.
 _IMAGE_WORDS = frozenset({"pos", "position", "center", "centre", "centroid", "image", "coord"})
@@ -60,7 +70,8 @@ class ColumnMeaning:
     """Meaning of a column."""
 
     quantity: str
-    """``"t"``, ``"frame"``, ``"x"``, ``"y"``, ``"theta"`` or ``"body"``."""
+    """``"t"``, ``"frame"``, ``"x"``, ``"y"``, ``"z"``, ``"theta"``, ``"qx"`` to ``"qw"`` or
+    ``"body"``."""
     unit: str = ""
     """Unit in the name, ``""`` when there is none."""
     body: str = ""
@@ -82,16 +93,16 @@ def column_meaning(name: str) -> ColumnMeaning | None:
     text, unit = _split_brackets(name.strip().strip("\"'").strip().lstrip("#%").strip())
     if unit is None:
         return None
-    tokens = [token for token in re.split(r"[\s_.\-/]+", text) if token]
+    tokens = _join_quaternion([token for token in re.split(r"[\s_.\-/]+", text) if token])
     if not unit and len(tokens) > 1 and tokens[-1].lower() in _UNITS:
         unit = _UNITS[tokens.pop().lower()]
     found = [(index, *_root(token)) for index, token in enumerate(tokens)]
     found = [entry for entry in found if entry[1]]
-    if len(found) == 2 and found[0][1] == "body" and found[1][1] in ("x", "y", "theta"):
+    if len(found) == 2 and found[0][1] == "body" and found[1][1] in _OF_BODY:
         found = found[1:]  # "robot x", "id_1_x": the body's own name, then the quantity
     elif len(found) == 2 and found[0][1] == found[1][1] == "body":
         found = found[:1]  # "track id"
-    elif len(found) == 2 and found[0][1] in ("x", "y", "theta") and found[1][1] == "body":
+    elif len(found) == 2 and found[0][1] in _OF_BODY and found[1][1] == "body":
         found = found[:1]  # "x_fish"
     elif len(found) == 2 and found[0][1] == "frame" and found[1][1] == "body":
         found = found[:1]  # "frame id"
@@ -104,7 +115,7 @@ def column_meaning(name: str) -> ColumnMeaning | None:
     allowed = words | {"id"} | (_WITH_ID if tokens[index].lower() == "id" else frozenset())
     if quantity in ("t", "frame", "body") and lower - allowed:
         return None
-    if quantity in ("x", "y", "theta") and lower & _NO_POSITION:
+    if quantity in _OF_BODY and lower & _NO_POSITION:
         return None
     if unit and unit not in _ALLOWED[quantity]:
         return None
@@ -113,11 +124,18 @@ def column_meaning(name: str) -> ColumnMeaning | None:
     return ColumnMeaning(
         quantity=quantity,
         unit=unit or ("s" if tokens[index].lower() == "seconds" else ""),
-        body="_".join([*names, number] if number else names)
-        if quantity in ("x", "y", "theta")
-        else "",
-        bare=not image and tokens[index].lower().rstrip("0123456789") in ("x", "y", "theta", "t"),
+        body="_".join([*names, number] if number else names) if quantity in _OF_BODY else "",
+        bare=not image
+        and tokens[index].lower().rstrip("0123456789") in ("x", "y", "z", "theta", "t"),
     )
+
+
+def _join_quaternion(tokens: list[str]) -> list[str]:
+    """Return the words of a name with those of a part of a quaternion as one."""
+    for at, (first, second) in enumerate(pairwise(tokens)):
+        if first.lower() in _QUATERNION_WORDS and second.lower() in ("x", "y", "z", "w"):
+            return [*tokens[:at], f"q{second.lower()}", *tokens[at + 2 :]]
+    return tokens
 
 
 def unit_of_name(name: str) -> str:
@@ -146,7 +164,7 @@ def _root(token: str) -> tuple[str, str]:
     match = re.fullmatch(r"(.*?)(\d*)", token.lower())
     stem, number = match.groups() if match else (token.lower(), "")
     quantity = _ROOTS.get(stem, "")
-    if number and quantity not in ("x", "y", "theta"):
+    if number and quantity not in _OF_BODY:
         return "", ""
     return quantity, number
 
@@ -161,14 +179,16 @@ class ColumnMap:
     bare_clock: bool = False
     """Whether the clock is one of times whose unit nobody named."""
     bodies: dict[str, dict[str, int]] = field(default_factory=dict)
-    """Body to quantity (x, y, theta) to column."""
+    """Body to quantity (x, y, theta, and of a pose in space z, qx, qy, qz, qw) to column."""
     body_column: int | None = None
     length_unit: str = ""
     angle_unit: str = ""
     bare: bool = True
 
 
-def map_columns(names: list[str], chosen: dict[str, str], *, use_frames: bool) -> ColumnMap:
+def map_columns(
+    names: list[str], chosen: dict[str, str], *, use_frames: bool, in_space: bool = False
+) -> ColumnMap:
     """Find the columns of a table by their names and by what the user says.
 
     Parameters
@@ -179,6 +199,8 @@ def map_columns(names: list[str], chosen: dict[str, str], *, use_frames: bool) -
         Quantity to the name or the number (from 1) of its column, ``":unit"`` may follow.
     use_frames : bool
         Whether a frame rate was given, so that frame numbers are the clock where there are any.
+    in_space : bool
+        Whether columns of z are read, because an axis was said to be up.
 
     Raises
     ------
@@ -204,7 +226,25 @@ def map_columns(names: list[str], chosen: dict[str, str], *, use_frames: bool) -
         stated = unit_of_name(names[index])
         inferred = stated if stated in _ALLOWED[quantity] else ""
         meanings[index] = ColumnMeaning(quantity, unit or inferred, "", bool(known and known.bare))
+    meanings = {
+        index: meaning
+        for index, meaning in meanings.items()
+        if (in_space or meaning.quantity != "z")
+        and (meaning.quantity not in _QUATERNION or _is_turned(meaning.body, meanings, chosen))
+    }
     return _collect(meanings, names, use_frames=use_frames)
+
+
+def _is_turned(body: str, meanings: dict[int, ColumnMeaning], chosen: dict[str, str]) -> bool:
+    """Whether a body has a quaternion and no angle; half of a chosen quaternion is refused."""
+    own = [meaning.quantity for meaning in meanings.values() if meaning.body == body]
+    whole = all(own.count(part) == 1 for part in _QUATERNION)
+    if not whole and any(part in chosen for part in _QUATERNION):
+        raise InputError(
+            'an orientation in space has four parts: name each with `columns={"qx": "NAME"}`, qy, '
+            "qz and qw"
+        )
+    return whole and "theta" not in own
 
 
 def _find(reference: str, names: list[str], quantity: str) -> tuple[int, str]:
@@ -232,7 +272,7 @@ def _collect(
     single: dict[str, int] = {}
     result = ColumnMap()
     for index, meaning in sorted(meanings.items()):
-        if meaning.quantity in ("x", "y", "theta"):
+        if meaning.quantity in _OF_BODY:
             place = result.bodies.setdefault(meaning.body, {})
         else:
             place = single
@@ -245,7 +285,7 @@ def _collect(
         place[meaning.quantity] = index
     _require_positions(result, names)
     result.body_column = single.get("body")
-    wanted = [meaning for meaning in meanings.values() if meaning.quantity in ("x", "y")]
+    wanted = [meaning for meaning in meanings.values() if meaning.quantity in ("x", "y", "z")]
     result.length_unit = _agreed([meaning.unit for meaning in wanted], "positions")
     angles = [meaning.unit for meaning in meanings.values() if meaning.quantity == "theta"]
     result.angle_unit = _agreed(angles, "angles") if angles else ""

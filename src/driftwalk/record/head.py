@@ -55,17 +55,22 @@ def is_numeric_row(fields: list[str]) -> bool:
     return bool(known) and all(is_number(field) for field in known)
 
 
-def read_header(path: Path, *, delimiter: str | None = None) -> tuple[list[str], str, int, bool]:
+def read_header(
+    path: Path, *, delimiter: str | None = None, header_line: int | None = None
+) -> tuple[list[str], str, int, bool]:
     """Return (names of the columns, delimiter, lines before the data, whether there is a header).
 
-    Lines that start with ``#`` before the header are comments; a header may start with ``#`` or
-    ``%`` itself when it is the last of them and has as many fields as the data.
+    The header is line `header_line`, from 1, where that is given. Otherwise lines that start with
+    ``#`` before it are comments; a header may start with ``#`` or ``%`` itself when it is the last
+    of them and has as many fields as the data.
 
     Raises
     ------
     FormatError
-        When the file is empty or its first lines are not UTF-8 text.
+        When the file is empty, ends before its header, or its first lines are not UTF-8 text.
     """
+    if header_line is not None:
+        return _header_at(path, header_line, delimiter)
     head = read_head(path)
     if b"\0" in head:
         raise FormatError("is not a text file", path=path)
@@ -84,6 +89,18 @@ def read_header(path: Path, *, delimiter: str | None = None) -> tuple[list[str],
         if len(commented) == len(fields) > 1:
             return commented, separator, at, True
     return [""] * len(fields), separator, at, False
+
+
+def _header_at(path: Path, number: int, delimiter: str | None) -> tuple[list[str], str, int, bool]:
+    """Return what `read_header` does, with the header in a line that the user names."""
+    lines = head_lines(path, number + 1)
+    if len(lines) <= number or not lines[number].strip():
+        raise FormatError(f"has no rows of data below line {number}, its header", path=path)
+    separator = delimiter or detect_delimiter(lines[number - 1 :])
+    names, data = (split_fields(line.lstrip("# "), separator) for line in lines[number - 1 :])
+    # A delimiter at the end of a line leaves a field without a name, in the header or in the data.
+    names += [""] * (len(data) - len(names))
+    return (_without_trailing(names) if len(data) < len(names) else names), separator, number, True
 
 
 def _strict(line: bytes, path: Path, number: int) -> str:

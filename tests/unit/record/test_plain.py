@@ -234,7 +234,7 @@ def test_the_header_of_a_column_that_does_not_exist(tmp_path: Path) -> None:
     ):
         load(path, columns={"x": "east"})
     with pytest.raises(FormatError, match="unknown quantity"):
-        load(path, columns={"z": "x"})
+        load(path, columns={"w": "x"})
 
 
 def test_one_row_constant_and_missing_positions_load_with_a_warning(tmp_path: Path) -> None:

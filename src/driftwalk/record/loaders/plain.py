@@ -14,6 +14,8 @@ from driftwalk.record.column_names import ColumnMap, map_columns, unit_of_name
 from driftwalk.record.head import first_lines, read_header
 from driftwalk.record.layout import TableLayout
 from driftwalk.record.raw import ANGLE_UNITS, Array, RawBody, RawRecording, ReadOptions
+from driftwalk.record.space.columns import body_in_plane, plane_of_columns
+from driftwalk.record.space.plane import Plane
 from driftwalk.record.stacked import split_bodies
 from driftwalk.record.text import Table, read_table
 
@@ -40,7 +42,9 @@ class PlainLoader:
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the table as its header and `columns` describe it."""
-        names, delimiter, skip, has_header = read_header(path, delimiter=options.delimiter)
+        names, delimiter, skip, has_header = read_header(
+            path, delimiter=options.delimiter, header_line=options.header_line
+        )
         if not has_header and not options.columns:
             raise FormatError(
                 f"the file has {len(names)} columns and no header: name them with `columns`, "
@@ -49,8 +53,12 @@ class PlainLoader:
             )
         try:
             columns = map_columns(
-                names, options.columns, use_frames=options.frame_rate_hz is not None
+                names,
+                options.columns,
+                use_frames=options.frame_rate_hz is not None,
+                in_space=options.up is not None,
             )
+            planes = [plane_of_columns(of, options.up) for of in columns.bodies.values()]
         except InputError as error:
             raise FormatError(str(error), path=path, line=skip if has_header else None) from error
         labels = [name or str(index) for index, name in enumerate(names, start=1)]
@@ -67,21 +75,24 @@ class PlainLoader:
         if "body" not in options.columns and _numbers_the_rows(table, columns.body_column, clock):
             notes.append(f"column '{labels[columns.body_column or 0]}' numbers the rows: one body")
             columns.body_column = None
+        bodies, against = _bodies(table, columns, clock, planes, path=path)
+        plane = next((one for one in planes if one is not None), None)
         return RawRecording(
-            bodies=_bodies(table, columns, clock, path=path),
+            bodies=bodies,
             clock_unit=columns.clock_unit,
             clock_origin=table.clock_origin,
             length_unit=columns.length_unit,
             angle_unit=columns.angle_unit or "rad",
             bare_clock=_bare_clock(columns, labels),
-            bare_angle=not columns.angle_unit,
+            bare_angle=not columns.angle_unit and plane is None,
+            plane="" if plane is None else plane.describe(),
             body_columns=lambda in_order: body_columns(
                 path, columns, labels, delimiter=delimiter, skip=skip, in_order=in_order
             ),
             # Bare `x, y` next to a time in seconds is SI; next to frame numbers it may be pixels.
             bare_length_is_si=columns.bare and columns.clock_unit != "frame",
             rows=table.rows,
-            notes=notes,
+            notes=[*notes, *against],
         )
 
 
@@ -108,7 +119,7 @@ def _require_rows_are_frames(
 
 def _unread_angles(columns: ColumnMap, labels: list[str]) -> list[str]:
     """Say which columns look like the orientation by their unit alone, where none was found."""
-    if any("theta" in places for places in columns.bodies.values()):
+    if any({"theta", "qw"} & set(places) for places in columns.bodies.values()):
         return []
     angles = [name for name in labels if unit_of_name(name) in ANGLE_UNITS]
     if len(angles) != 1:
@@ -148,34 +159,37 @@ def _layout(columns: ColumnMap, names: list[str], *, delimiter: str, skip: int) 
     )
 
 
-def _bodies(table: Table, columns: ColumnMap, clock: Array, *, path: Path) -> list[RawBody]:
-    values = table.numbers
-    if columns.body_column is None:
-        return [
-            RawBody(
-                name or "0",
-                clock,
-                values[places["x"]],
-                values[places["y"]],
-                values[places["theta"]] if "theta" in places else None,
-            )
-            for name, places in columns.bodies.items()
-        ]
-    if len(columns.bodies) > 1:
+def _bodies(
+    table: Table, columns: ColumnMap, clock: Array, planes: list[Plane | None], *, path: Path
+) -> tuple[list[RawBody], list[str]]:
+    """Return the bodies, and what speaks against the planes that they were laid into."""
+    if columns.body_column is not None and len(columns.bodies) > 1:
         raise FormatError(
             "has several columns of x and also a column that names the body: choose one layout "
             "with `columns`",
             path=path,
         )
-    places = next(iter(columns.bodies.values()))
-    return split_bodies(
-        table.codes[columns.body_column],
-        table.labels[columns.body_column],
-        clock=clock,
-        x=values[places["x"]],
-        y=values[places["y"]],
-        theta=values[places["theta"]] if "theta" in places else None,
-    )
+    found, notes = [], []
+    for (name, places), plane in zip(columns.bodies.items(), planes, strict=True):
+        body, against = _body(table.numbers, places, clock, plane)
+        body.name = name or "0"
+        found.append(body)
+        notes += against
+    if columns.body_column is None:
+        return found, notes
+    codes, labels = table.codes[columns.body_column], table.labels[columns.body_column]
+    one = found[0]
+    return split_bodies(codes, labels, clock=clock, x=one.x, y=one.y, theta=one.theta), notes
+
+
+def _body(
+    values: dict[int, Array], places: dict[str, int], clock: Array, plane: Plane | None
+) -> tuple[RawBody, list[str]]:
+    """Return the body of some columns, and what speaks against its plane."""
+    if plane is not None:
+        return body_in_plane(values, places, clock, plane)
+    theta = values[places["theta"]] if "theta" in places else None
+    return RawBody("0", clock, values[places["x"]], values[places["y"]], theta), []
 
 
 LOADER = PlainLoader()

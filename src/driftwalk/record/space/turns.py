@@ -58,11 +58,11 @@ class Turns:
         return angle, tilt
 
     def _known(self) -> npt.NDArray[np.bool_]:
-        known: npt.NDArray[np.bool_] = np.isfinite(self.values).all(axis=1)
+        known = np.isfinite(self.values).all(axis=1)
         if self.form == QUATERNION:
             # Four zeros are how some programs write that there is none.
-            return known & (self.values != 0.0).any(axis=1)
-        return known
+            known = known & (self.values != 0.0).any(axis=1)
+        return np.asarray(known)
 
     def _rotation(self, values: Array) -> Rotation:
         from scipy.spatial.transform import Rotation
