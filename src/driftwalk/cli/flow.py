@@ -9,9 +9,11 @@ import typer
 
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json
 from driftwalk.cli.options.study import StudyOptions, with_study_options
+from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_json, print_note
+from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import FLOW_KEYS
 
 if TYPE_CHECKING:
@@ -34,20 +36,38 @@ def flow(
     ],
     given: StudyOptions,
     how: RecordingOptions,
+    frame_interval: FrameInterval = None,
+    flow_variables: FlowVariables = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a file that exists.")
     ] = False,
     json: Json = False,
 ) -> None:
-    """Take the flow field from a recording.
+    """Take the flow field from a recording, or from a file of PIV.
 
     Averages the velocity of the body in each cell and corrects it for the body's inertia. Cells
     that the body never visited are filled in and flagged. Mass and side come from the study; the
-    default is the 11.6-g, 3-cm block of the paper.
+    default is the 11.6-g, 3-cm block of the paper. A field that was measured otherwise is brought
+    to metres, with its masked nodes filled; --arena circle:D@X,Y says where its tank is.
     """
+    from driftwalk.cli.inputs.flow_file import is_flow_file, load_flow_file
     from driftwalk.conditions import load_with_study, require_motion
     from driftwalk.flow import save_flow
 
+    existing = "replace" if overwrite else "error"
+    if is_flow_file(recording, how) or flow_variables is not None:
+        field = load_flow_file(
+            recording,
+            how,
+            frame_interval=frame_interval,
+            variables=flow_variables,
+            tank_diameter=given.overrides.get(FLOW_KEYS["tank_diameter"]),
+        )
+        save_flow(field, out, existing=existing)
+        _report_file(field, out, json=json)
+        return
+    if frame_interval is not None:
+        raise InputError("--frame-interval is for a flow field, and this is a recording")
     resolved = given.study()
     if given.file is None:
         # Without a study nobody has said how large the tank is: the default one is no answer.
@@ -58,7 +78,7 @@ def flow(
             trajectory = load_with_study(recording, resolved, how.arguments())
     require_motion(trajectory, body=how.body, where=recording)
     field = _extract(trajectory, resolved, body=how.body)
-    save_flow(field, out, existing="replace" if overwrite else "error")
+    save_flow(field, out, existing=existing)
     _report(field, out, json=json)
 
 
@@ -78,6 +98,22 @@ def _extract(trajectory: xr.Dataset, study: Study, *, body: str | None) -> xr.Da
         water_density=study.water.density_kg_m3,
         flow_drag_coefficient=study.flow.flow_drag_coefficient,
         min_count=study.flow.min_count,
+    )
+
+
+def _report_file(field: xr.Dataset, out: Path, *, json: bool) -> None:
+    """Say what was written of a file, and what to know about it."""
+    from driftwalk.cli.inputs.flow_file import describe_field
+
+    facts = describe_field(field)
+    if json:
+        print_json({"out": out, **facts})
+        return
+    for warning in facts["warnings"]:
+        print_note(f"warning: {to_options(warning)}")
+    print_note(
+        f"wrote {out}: {facts['columns']} x {facts['rows']} nodes from a file, "
+        f"{100 * facts['measured_share']:.0f} % of them measured, the rest filled or outside"
     )
 
 

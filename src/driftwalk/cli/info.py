@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json
 from driftwalk.cli.options.study import Side, TankDiameter
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_json, print_note, print_table
+from driftwalk.core.errors import InputError
 
 SIDE_BY_SIDE = 5
 """Bodies shown as columns; more are shown as rows, with fewer numbers."""
@@ -75,15 +76,30 @@ def info(
     how: RecordingOptions,
     tank_diameter: TankDiameter = None,
     side: Side = None,
+    frame_interval: FrameInterval = None,
+    flow_variables: FlowVariables = None,
     json: Json = False,
 ) -> None:
-    """Say what a recording holds and how driftwalk reads it.
+    """Say what a recording, or a flow field, holds and how driftwalk reads it.
 
     Prints bodies, clock and its jitter, gaps, extent, the circle that the centres stay in, speed,
     and the tracking noise estimated from the recording itself.
     """
+    from driftwalk.cli.inputs.flow_file import describe_field, is_flow_file, load_flow_file
     from driftwalk.record import describe
 
+    if is_flow_file(recording, how) or flow_variables is not None:
+        field = load_flow_file(
+            recording,
+            how,
+            frame_interval=frame_interval,
+            variables=flow_variables,
+            tank_diameter=tank_diameter,
+        )
+        _print_field(describe_field(field), json=json)
+        return
+    if frame_interval is not None:
+        raise InputError("--frame-interval is for a flow field, and this is a recording")
     described = describe(how.load(recording, tank_diameter=tank_diameter, side=side))
     if json:
         print_json(described)
@@ -98,6 +114,30 @@ def info(
     _print_counts(described["counts"])
     for warning in described["warnings"]:
         print_note(f"warning: {warning}")
+
+
+def _print_field(described: dict[str, Any], *, json: bool) -> None:
+    """Print what a flow field holds."""
+    if json:
+        print_json(described)
+        return
+    print_table(
+        [
+            ["file", described["source"] or "-"],
+            ["flow field", f"{described['columns']} x {described['rows']} nodes"],
+            ["frames", described["frames"]],
+            *(
+                [f"{axis} {word} [cm]", 100 * described[f"{axis}_{side}_m"]]
+                for axis in ("x", "y")
+                for word, side in (("from", "min"), ("to", "max"))
+            ),
+            ["measured nodes [%]", 100 * described["measured_share"]],
+            ["speed, mean [cm/s]", 100 * described["speed_mean_m_s"]],
+            ["speed, largest [cm/s]", 100 * described["speed_max_m_s"]],
+        ]
+    )
+    for warning in described["warnings"]:
+        print_note(f"warning: {to_options(warning)}")
 
 
 def _print_file(described: dict[str, Any]) -> None:

@@ -20,11 +20,13 @@ from driftwalk.flow.extract import extract_flow
 from driftwalk.flow.inertia import inertia_correction
 from driftwalk.flow.random_flow import random_tank_flow
 from driftwalk.flow.read import load_flow
+from driftwalk.flow.recognise import flow_format
 from driftwalk.flow.write import save_flow
 
 __all__ = [
     "bilinear",
     "extract_flow",
+    "flow_format",
     "flow_from_function",
     "inertia_correction",
     "jets_flow",

@@ -16,8 +16,11 @@ from driftwalk.core.file_names import text_of_name
 from driftwalk.flow.arena import Outline, outline_of, read_arena
 from driftwalk.flow.fill import fill_velocity
 from driftwalk.flow.grid import Grid
+from driftwalk.flow.readers.formats import read_raw
 from driftwalk.flow.readers.netcdf import to_si
-from driftwalk.flow.readers.table import read_csv
+from driftwalk.flow.readers.pivlab import is_pivlab
+from driftwalk.flow.readers.raw import FieldOptions
+from driftwalk.flow.readers.units import raw_to_si
 from driftwalk.flow.rows import grid_rows
 from driftwalk.schema import FLAGS, build_flow_field, check_flow_field
 from driftwalk.schema.contents import check_contents
@@ -34,32 +37,55 @@ def load_flow(
     *,
     arena: Mapping[str, Any] | str | None = None,
     own_flags: Literal["refuse", "keep"] = "refuse",
+    metres_per_pixel: float | None = None,
+    frame_interval: float | None = None,
+    length_unit: str | None = None,
+    y_axis: str | None = None,
+    origin: tuple[float, float] | None = None,
+    variables: Mapping[str, str] | None = None,
 ) -> xr.Dataset:
-    """Load a flow field from NetCDF or CSV, recognised by content.
+    """Load a flow field from NetCDF, CSV or the file of a PIV program, recognised by content.
 
     Parameters
     ----------
     path : path-like
-        NetCDF that `save_flow` wrote; any other NetCDF with variables u, v over ([time,] y, x) and
-        coordinates x, y, each with its attribute ``units``; or CSV with the columns x, y, u, v in m
-        and m/s, a row for every node of a regular grid, in any order.
+        NetCDF that `save_flow` wrote; any other NetCDF with velocities over ([time,] y, x) and
+        coordinates x, y, each with its attribute ``units``; CSV with the columns x, y, u, v in m
+        and m/s, a row for every node of a regular grid, in any order; text of OpenPIV, Insight
+        (``.vec``) or DaVis; ``.mat`` of PIVlab.
     arena : mapping or str, optional
         The tank, for a file that does not know it: nodes beyond its wall are flagged *outside*.
     own_flags : {"refuse", "keep"}
         Behaviour of `arena` for a file with its own flags: "keep" ignores it.
+    metres_per_pixel : float, optional
+        Scale of a field in pixels [m].
+    frame_interval : float, optional
+        Time between the two images of a pair [s], where velocities are shifts in pixels.
+    length_unit : {"m", "cm", "mm", "um", "px"}, optional
+        Unit of positions, and per second of velocities, of a file that does not say.
+    y_axis : {"up", "down"}, optional
+        Direction of y in the file; None: as its format has it. Where it is down, y and v are
+        negated.
+    origin : (float, float), optional
+        Point of the field that becomes its origin, such as the centre of the tank [m], y up.
+    variables : mapping, optional
+        From u, v, x, y, time or mask to the variable of a NetCDF file, where names and attributes
+        do not say it. Nodes whose mask is not zero are missing.
 
     Returns
     -------
     xarray.Dataset
         A `flow_field`. A file without flags has *measured* nodes, and where a velocity is missing
-        (NaN in NetCDF) *filled* ones, continued from their neighbours (`fill_velocity`).
+        (NaN in NetCDF, masked or rejected by a PIV program) *filled* ones, continued from their
+        neighbours (`fill_velocity`). ``attrs["warning"]`` says what was left out.
 
     Raises
     ------
     FormatError
-        When the file is not one of these; with line and column for CSV.
+        When the file is not one of these; with line and column for text.
     InputError
-        When `arena` is not an arena, or the file knows its own.
+        When `arena` is not an arena, or the file knows its own; when a unit is missing, or given
+        although the file names it.
 
     Examples
     --------
@@ -71,34 +97,54 @@ def load_flow(
     source = Path(path)
     if not source.is_file():
         raise FormatError("there is no such file", path=source)
-    if not is_netcdf(source):
-        field = grid_rows(read_csv(source), source)
-        return _new_field(
-            field.x,
-            field.y,
-            field.velocity,
-            arena=arena,
-            attrs={"source": text_of_name(source.name)},
-        )
-    dataset = open_netcdf(source)
-    if str(dataset.attrs.get("kind")) == "flow_field" and "flag" in dataset:
-        if arena is not None and own_flags == "refuse":
-            raise InputError(f"{source} has its own flags: leave the arena out")
-        return _checked(check_contents(dataset, source), source)
-    si = to_si(dataset, source)
-    time = si["time"].values if "time" in si.dims else None
-    velocity = np.stack([si["u"].values, si["v"].values], axis=-1)
+    if y_axis not in (None, "up", "down"):
+        raise InputError(f"`y_axis` is 'up' or 'down', got '{y_axis}'")
+    options = FieldOptions(
+        metres_per_pixel, frame_interval, length_unit, y_axis, origin, dict(variables or {})
+    )
+    attrs: dict[str, Any] = {"source": text_of_name(source.name)}
     try:
-        return _new_field(
-            si["x"].values,
-            si["y"].values,
-            velocity,
-            time=time,
-            arena=arena,
-            attrs={"source": text_of_name(source.name)},
-        )
+        if not is_netcdf(source) or is_pivlab(source):
+            return _from_rows(source, options, arena=arena, attrs=attrs)
+        dataset = open_netcdf(source)
+        if str(dataset.attrs.get("kind")) == "flow_field" and "flag" in dataset:
+            if arena is not None and own_flags == "refuse":
+                raise InputError("it has its own flags: leave the arena out")
+            if options != FieldOptions():
+                raise InputError("the field is one of driftwalk's own: leave its units out")
+            return _checked(check_contents(dataset, source), source)
+        si, notes = to_si(dataset, source, options)
+        time = si["time"].values if "time" in si.dims else None
+        velocity = np.stack([si["u"].values, si["v"].values], axis=-1)
+        x, y = si["x"].values, si["y"].values
+        attrs |= _warning(notes)
+        return _new_field(x, y, velocity, time=time, arena=arena, attrs=attrs)
+    except FormatError as error:
+        raise error if error.path else FormatError(error.reason, path=source) from error
     except InputError as error:
         raise FormatError(str(error), path=source) from error
+
+
+def _from_rows(
+    path: Path,
+    options: FieldOptions,
+    *,
+    arena: Mapping[str, Any] | str | None,
+    attrs: dict[str, Any],
+) -> xr.Dataset:
+    """Return the field of a file that has a row for each node."""
+    if options.variables:
+        raise InputError("`variables` are those of a NetCDF file, and this is none: leave it out")
+    raw = read_raw(path)
+    rows, notes = raw_to_si(raw, options)
+    field = grid_rows(rows, path)
+    return _new_field(
+        field.x, field.y, field.velocity, arena=arena, attrs={**attrs, **_warning(notes)}
+    )
+
+
+def _warning(notes: list[str]) -> dict[str, str]:
+    return {"warning": "; ".join(notes)} if notes else {}
 
 
 def _checked(dataset: xr.Dataset, path: Path) -> xr.Dataset:

@@ -4,6 +4,7 @@
 says what a recording holds; `save_trajectory` keeps it.
 """
 
+from driftwalk.record.arena import PlacedArena, place_arena
 from driftwalk.record.circle import CircleFit, fit_circle, tank_radius_bound
 from driftwalk.record.info import describe
 from driftwalk.record.io import load, readable_formats
@@ -19,11 +20,13 @@ __all__ = [
     "CircleFit",
     "NoiseBound",
     "NoiseEstimate",
+    "PlacedArena",
     "describe",
     "estimate_tracking_noise",
     "fit_circle",
     "load",
     "noise_bound",
+    "place_arena",
     "readable_formats",
     "save_trajectory",
     "tank_radius_bound",

@@ -47,6 +47,11 @@ def place_arena(text: str, x: Array, y: Array, *, block_side: float | None = Non
         Side of a square block [m]; with ``fit`` it turns the circle of the centres into a lower
         bound of the tank's radius.
 
+    Returns
+    -------
+    PlacedArena
+        The arena, and where its centre lies in the file's frame.
+
     Notes
     -----
     Without ``@X,Y`` the centre is the file's origin if 99.9 % of the positions lie inside the arena
@@ -56,6 +61,11 @@ def place_arena(text: str, x: Array, y: Array, *, block_side: float | None = Non
     ------
     InputError
         When the text cannot be read, or the centre cannot be fitted.
+
+    Examples
+    --------
+    >>> place_arena("circle:30cm@0.2,0.1", np.array([0.2]), np.array([0.15])).origin
+    (0.2, 0.1)
     """
     known = np.isfinite(x) & np.isfinite(y)
     x, y = x[known], y[known]

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.cli.options.study import StudyOptions, option_name
+from driftwalk.cli.terminal.argument_names import to_options
+from driftwalk.cli.terminal.output import print_note
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -138,7 +140,10 @@ def load_flow_for(path: Path, study: Study) -> xr.Dataset:
     """Return the flow field of a file; one that knows no tank is that of the study's."""
     from driftwalk.flow import load_flow
 
-    return load_flow(path, arena=study.tank.to_arena(), own_flags="keep")
+    field = load_flow(path, arena=study.tank.to_arena(), own_flags="keep")
+    if field.attrs.get("method") == "file" and "warning" in field.attrs:
+        print_note(f"warning: {path}: {to_options(field.attrs['warning'])}")
+    return field
 
 
 def _with_sections(study: Study, path: Path, folder: Path) -> Study:

@@ -33,6 +33,8 @@ def explained() -> Iterator[None]:
         yield
     except FormatError as error:
         other = None if error.path is None else what_else(Path(error.path))
+        if other is None and error.path is not None and "format is not recognised" in error.reason:
+            other = _maybe_a_field(Path(error.path))
         if other is None:
             raise
         raise InputError(f"{error.path} {other}") from error
@@ -64,6 +66,19 @@ def what_else(path: Path) -> str | None:
         return "is a video: driftwalk track makes a recording of it"
     kind = _netcdf_kind(path)
     return None if kind is None else f"holds {KINDS.get(kind, _OTHER.format(kind))}"
+
+
+def _maybe_a_field(path: Path) -> str | None:
+    """Return how to read NetCDF that is no known recording as a flow field, None of other files."""
+    from driftwalk.schema.netcdf import is_netcdf, kind_of, open_netcdf
+
+    if not path.is_file() or not is_netcdf(path) or kind_of(path) is not None:
+        return None
+    names = ", ".join(list(map(str, open_netcdf(path).variables))[:12])
+    return (
+        f"is NetCDF of no recording that is known, with {names}: if it is a flow field, name its "
+        "variables with --flow-variables u=NAME,v=NAME,x=NAME,y=NAME"
+    )
 
 
 def _netcdf_kind(path: Path) -> str | None:

@@ -197,13 +197,25 @@ def parse_columns(texts: list[str]) -> dict[str, str]:
     >>> parse_columns(["t=Time:ms,x=3", "y=4"])
     {'t': 'Time:ms', 'x': '3', 'y': '4'}
     """
-    columns: dict[str, str] = {}
+    return parse_pairs(texts, "--columns")
+
+
+def parse_pairs(texts: list[str], option: str) -> dict[str, str]:
+    """Read ``QUANTITY=NAME`` with commas between, as the value of an option.
+
+    Examples
+    --------
+    >>> parse_pairs(["u=water_u,v=water_v"], "--flow-variables")
+    {'u': 'water_u', 'v': 'water_v'}
+    """
+    pairs: dict[str, str] = {}
     for part in (part for text in texts for part in text.split(",")):
         quantity, equals, name = part.partition("=")
         if not equals or not name:
-            raise InputError(f"--columns takes QUANTITY=NAME such as t=Time,x=2; got '{part}'")
-        columns[quantity.strip()] = name.strip()
-    return columns
+            example = "t=Time,x=2" if option == "--columns" else "u=NAME,v=NAME"
+            raise InputError(f"{option} takes QUANTITY=NAME such as {example}; got '{part}'")
+        pairs[quantity.strip()] = name.strip()
+    return pairs
 
 
 def with_recording_options(function: Command) -> Command:

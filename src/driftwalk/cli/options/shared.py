@@ -69,6 +69,25 @@ FlowFile = Annotated[
     Path | None,
     typer.Option("--flow", metavar="FILE", help="Flow field to use.", show_default=False),
 ]
+FrameInterval = Annotated[
+    float | None,
+    quantity_option(
+        "--frame-interval",
+        "s",
+        "Time between the two images of a pair, for a flow field of shifts in pixels.",
+        panel="How to read the recording",
+    ),
+]
+FlowVariables = Annotated[
+    str | None,
+    typer.Option(
+        "--flow-variables",
+        metavar="u=NAME,v=NAME",
+        help="Variables of a flow field in NetCDF: u, v, x, y, time, mask.",
+        rich_help_panel="How to read the recording",
+        show_default=False,
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
 RunFolder = Annotated[
     Path, typer.Option("--out", "-o", metavar="DIR", help="Run directory to make or continue.")

@@ -1,74 +1,216 @@
-"""Flow fields in NetCDF of any program: u, v, x, y and their units."""
+"""Flow fields in NetCDF of any program: which variables are velocities, and their units."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import ConfigurationError, FormatError
-from driftwalk.core.units import parse_quantity
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.flow.grid import round_nodes
+from driftwalk.flow.readers.raw import FieldOptions
+from driftwalk.flow.readers.units import FieldScale
 
 if TYPE_CHECKING:
     import xarray as xr
 
 Array = npt.NDArray[np.float64]
 
-_LONG_WORDS = {"meters": "m", "metres": "m", "meter": "m", "metre": "m", "seconds": "s"}
+QUANTITIES: Final = ("u", "v", "x", "y", "time", "mask")
+_STANDARD: Final = {
+    "u": (
+        "sea_water_x_velocity",
+        "eastward_sea_water_velocity",
+        "surface_eastward_sea_water_velocity",
+    ),
+    "v": (
+        "sea_water_y_velocity",
+        "northward_sea_water_velocity",
+        "surface_northward_sea_water_velocity",
+    ),
+    "x": ("projection_x_coordinate", "longitude"),
+    "y": ("projection_y_coordinate", "latitude"),
+}
+"""Names of the CF conventions."""
+_AXES: Final = {"x": "X", "y": "Y"}
+_USUAL: Final = {
+    "u": ("U", "uo", "water_u", "vozocrtx"),
+    "v": ("V", "vo", "water_v", "vomecrty"),
+    "x": ("lon", "longitude", "nav_lon"),
+    "y": ("lat", "latitude", "nav_lat"),
+    "time": ("t", "time_counter", "ocean_time"),
+}
+"""Names that ocean models and Parcels write."""
+_COUNTED: Final = ("frame", "frames", "", "1")
+"""Units of a time that counts frames."""
 
 
-def to_si(dataset: xr.Dataset, path: Path) -> xr.Dataset:
-    """Return u and v [m/s] over (y, x) or (time, y, x), x and y [m] rising, of any NetCDF.
+class SiField(NamedTuple):
+    """A field in SI on its grid."""
+
+    field: xr.Dataset
+    """u and v [m/s] over (y, x) or (time, y, x), x and y [m] rising."""
+    notes: list[str]
+    """Sentences for the person who loads the file."""
+
+
+def to_si(dataset: xr.Dataset, path: Path, options: FieldOptions) -> SiField:
+    """Return the field of any NetCDF in SI.
 
     Raises
     ------
     FormatError
-        When one of them, its dimensions or its unit is missing or unusable.
+        When a variable, its dimensions or its unit is missing or unusable.
+    InputError
+        When a fact about its units is missing, or is given and of no use.
     """
-    for required in ("u", "v", "x", "y"):
-        if required not in dataset.variables:
-            has = ", ".join(str(name) for name in dataset.variables)
-            raise FormatError(f"there is no variable '{required}'; it has {has}", path=path)
-    for name in ("u", "v", "x", "y", *({"time"} & set(map(str, dataset.variables)))):
-        if dataset[name].dtype.kind not in "fiu":
+    named = _named(dataset, path, options)
+    for name in ("u", "v", "x", "y", *({"time", "mask"} & set(map(str, named.variables)))):
+        if named[name].dtype.kind not in "fiub":
             raise FormatError(f"'{name}' holds no numbers", path=path)
-        if name in ("x", "y") and dataset[name].dims != (name,):
+        if name in ("x", "y") and named[name].dims != (name,):
             raise FormatError(
-                f"'{name}' needs the dimension {name} alone, got {dataset[name].dims}", path=path
+                f"'{name}' needs one dimension of its own, got {named[name].dims}: is the grid "
+                "curved, or in longitude and latitude? Interpolate it to an even one in metres",
+                path=path,
             )
-    chosen = dataset[["u", "v"]]
+    chosen = _planar(named, path)
+    notes: list[str] = []
+    if "time" in chosen.dims:
+        chosen, notes = _with_times(chosen, path)
+    scale = FieldScale(options)
+    for name in map(str, chosen.variables):
+        if name == "time":
+            continue
+        unit = _unit(chosen, name, path)
+        try:
+            factor = scale.velocity(unit) if name in ("u", "v") else scale.length(unit)
+        except InputError as error:
+            raise FormatError(f"the units of '{name}' are '{unit}': {error}", path=path) from error
+        chosen[name] = (chosen[name].dims, factor * chosen[name].values.astype(np.float64))
+    scale.refuse_unused()
+    if options.y_axis == "down":
+        chosen["y"] = ("y", -chosen["y"].values)
+        chosen["v"] = (chosen["v"].dims, -chosen["v"].values)
+    if options.origin is not None:
+        for axis, shift in zip("xy", options.origin, strict=True):
+            chosen[axis] = (axis, round_nodes(chosen[axis].values - shift))
+    ordered = chosen.sortby([name for name in ("x", "y") if name in chosen.dims])
+    return SiField(
+        ordered.transpose(*[name for name in ("time", "y", "x") if name in ordered.dims]), notes
+    )
+
+
+def holds_velocities(dataset: xr.Dataset) -> bool:
+    """Return whether names or attributes say that variables are velocities of water."""
+    return all(next(_candidates(dataset, quantity), None) is not None for quantity in "uv")
+
+
+def _named(dataset: xr.Dataset, path: Path, options: FieldOptions) -> xr.Dataset:
+    """Return the variables under the names u, v, x, y, and time and mask where there are any."""
+    unknown = sorted(set(options.variables) - set(QUANTITIES))
+    if unknown:
+        raise InputError(f"`variables` are of {', '.join(QUANTITIES)}; got '{unknown[0]}'")
+    found = {}
+    for quantity in QUANTITIES:
+        stated = options.variables.get(quantity)
+        name = stated or next(_candidates(dataset, quantity), None)
+        if name is None and quantity in ("time", "mask"):
+            continue
+        if name is None or name not in dataset.variables:
+            has = ", ".join(str(name) for name in dataset.variables)
+            raise FormatError(
+                f"there is no variable '{name or quantity}'; it has {has}: name them with "
+                '`variables={"u": "NAME", "v": "NAME", "x": "NAME", "y": "NAME"}`',
+                path=path,
+            )
+        found[quantity] = name
+    if len(set(found.values())) < len(found):
+        raise InputError("`variables` names one variable twice")
+    kept = dataset[list(found.values())].reset_coords()
+    # A dimension takes the name of its coordinate, whatever it was called.
+    for quantity in ("x", "y", "time"):
+        name = found.get(quantity)
+        if name is not None and kept[name].ndim == 1 and kept[name].dims[0] != name:
+            kept = _free(kept, name, found).swap_dims({kept[name].dims[0]: name})
+    kept = kept.drop_vars([str(c) for c in kept.coords if c not in found.values()])
+    renamed = {name: quantity for quantity, name in found.items() if name != quantity}
+    return kept.rename(renamed)
+
+
+def _free(dataset: xr.Dataset, name: str, found: dict[str, str]) -> xr.Dataset:
+    """Return the dataset without an index of the dimension that another coordinate names."""
+    dimension = str(dataset[name].dims[0])
+    index = dimension in dataset.coords and dimension not in found.values()
+    return dataset.drop_vars(dimension) if index else dataset
+
+
+def _candidates(dataset: xr.Dataset, quantity: str) -> Iterator[str]:
+    """Yield the variables that may hold a quantity, the surest first."""
+    names = [str(name) for name in dataset.variables]
+    if quantity in names and quantity != "mask":
+        yield quantity
+    for name in names:
+        standard = str(dataset[name].attrs.get("standard_name", ""))
+        axis = str(dataset[name].attrs.get("axis", ""))
+        if standard in _STANDARD.get(quantity, ()) or axis == _AXES.get(quantity):
+            yield name
+    yield from (name for name in _USUAL.get(quantity, ()) if name in names)
+
+
+def _planar(named: xr.Dataset, path: Path) -> xr.Dataset:
+    """Return u and v over ([time,] y, x), missing where they are masked."""
+    chosen = named[["u", "v"]]
+    if "mask" in named:
+        chosen = chosen.where(named["mask"] == 0)
+        for name in ("u", "v"):
+            chosen[name].attrs = named[name].attrs
     extra = [name for name in chosen.dims if name not in ("time", "y", "x")]
     long = [name for name in extra if chosen.sizes[name] > 1]
     if long or not {"x", "y"} <= set(chosen["u"].dims) & set(chosen["v"].dims):
         raise FormatError(
-            f"u and v need the dimensions ([time,] y, x), got {dict(chosen.sizes)}", path=path
+            f"u and v need the dimensions ([time,] y, x), got {dict(chosen.sizes)}: keep one layer "
+            "or member in the file",
+            path=path,
         )
     chosen = chosen.squeeze([str(name) for name in extra], drop=True)
     for axis in ("x", "y"):
         nodes = chosen[axis].values
         if nodes.size < 2 or not np.isfinite(nodes).all():
             raise FormatError(f"'{axis}' needs at least 2 finite positions", path=path)
-    for name in map(str, chosen.variables):
-        unit = {"u": "m/s", "v": "m/s", "time": "s"}.get(name, "m")
-        factor = _factor(dataset[name].attrs.get("units"), unit, name, path)
-        chosen[name] = (chosen[name].dims, factor * chosen[name].values.astype(np.float64))
-    return chosen.sortby([name for name in ("x", "y") if name in chosen.dims]).transpose(
-        *[name for name in ("time", "y", "x") if name in chosen.dims]
-    )
+    return chosen
 
 
-def _factor(text: object, unit: str, name: str, path: Path) -> float:
-    """Return what one of the file's units is in SI."""
-    if not isinstance(text, str) or not text.strip():
-        raise FormatError(
-            f"'{name}' has no units; write its attribute 'units', such as '{unit}'", path=path
-        )
-    # "seconds since ..." counts from a date that nothing here needs; UDUNITS joins with dots.
-    words = text.split(" since ")[0].replace(".", " ").split()
-    symbol = " ".join(_LONG_WORDS.get(word.lower(), word) for word in words)
+def _with_times(chosen: xr.Dataset, path: Path) -> tuple[xr.Dataset, list[str]]:
+    """Return the frames at their times [s]; frames that are counted, or one alone, have none."""
+    count = chosen.sizes["time"]
+    unit = str(chosen["time"].attrs.get("units", "")).strip()
+    if count == 1:
+        return chosen.isel(time=0, drop=True), []
+    if unit in _COUNTED:
+        attrs = {name: chosen[name].attrs for name in ("u", "v")}
+        mean = chosen.mean("time", skipna=True)
+        for name in ("u", "v"):
+            mean[name].attrs = attrs[name]
+        for axis in ("x", "y"):
+            mean[axis].attrs = chosen[axis].attrs
+        return mean, [f"the flow is the mean of {count} frames: the file holds no times"]
     try:
-        return parse_quantity(f"1 {symbol}", unit)
-    except ConfigurationError as error:
-        raise FormatError(f"the units of '{name}' are '{text}': {error}", path=path) from error
+        # "seconds since ..." counts from a date that nothing here needs.
+        factor = FieldScale(FieldOptions()).time(unit.split(" since ")[0])
+    except InputError as error:
+        raise FormatError(f"the units of 'time' are '{unit}': {error}", path=path) from error
+    return chosen.assign_coords(time=factor * chosen["time"].values.astype(np.float64)), []
+
+
+def _unit(chosen: xr.Dataset, name: str, path: Path) -> str:
+    text = chosen[name].attrs.get("units")
+    if not isinstance(text, str) or not text.strip():
+        example = "m/s" if name in ("u", "v") else "m"
+        raise FormatError(
+            f"'{name}' has no units; write its attribute 'units', such as '{example}'", path=path
+        )
+    return text

@@ -6,21 +6,21 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError
+from driftwalk.flow.readers.raw import RawField
 from driftwalk.flow.rows import FieldRows
 
 Array = npt.NDArray[np.float64]
 
-_SI_NAMES = {
-    "x": ("x", "x_m"),
-    "y": ("y", "y_m"),
-    "u": ("u", "u_m_s"),
-    "v": ("v", "v_m_s"),
-}
+_NAMES: Final = re.compile(
+    r"([xyuv])(?:_(m)|_(m)_(s)|\s*[\[(]\s*([^\])]+?)\s*[\])])?", re.IGNORECASE
+)
+"""A column's name, with a unit in the name of SI or any unit in brackets."""
 
 
 def read_text(path: Path) -> str:
@@ -31,11 +31,12 @@ def read_text(path: Path) -> str:
         raise FormatError("is not UTF-8 text", path=path) from error
 
 
-def read_csv(path: Path) -> FieldRows:
-    """Read a CSV table with the columns x, y, u, v in m and m/s.
+def read(path: Path) -> RawField:
+    """Read a CSV table with the columns x, y, u, v in m and m/s, or in units in brackets.
 
-    The header may also say x_m, y_m, u_m_s, v_m_s; further columns are not read. Fields are
-    separated by commas, semicolons or tabs; empty lines and lines that begin with # are skipped.
+    The header may also say x_m, y_m, u_m_s, v_m_s, or ``x [mm]``, ``u (cm/s)``; further columns are
+    not read. Fields are separated by commas, semicolons or tabs; empty lines and lines that begin
+    with # are skipped.
 
     Raises
     ------
@@ -48,9 +49,10 @@ def read_csv(path: Path) -> FieldRows:
     (header_line, header), *rest = lines
     split = next((re.compile(mark).split for mark in (",", ";", "\t") if mark in header), str.split)
     names = [name.strip().strip('"').lower() for name in split(header)]
-    columns = []
-    for wanted, accepted in _SI_NAMES.items():
-        at = [index for index, name in enumerate(names) if name in accepted]
+    columns, units = [], []
+    for wanted in "xyuv":
+        unit = "m" if wanted in "xy" else "m/s"
+        at = [(index, found) for index, name in enumerate(names) if (found := _unit(name, wanted))]
         if len(at) != 1:
             raise FormatError(
                 f"the header needs one column '{wanted}' (x and y in m, u and v in m/s), "
@@ -58,14 +60,42 @@ def read_csv(path: Path) -> FieldRows:
                 path=path,
                 line=header_line,
             )
-        columns.append(at[0])
+        columns.append(at[0][0])
+        units.append(unit if at[0][1] == wanted else at[0][1])
+    if units[0] != units[1] or units[2] != units[3]:
+        raise FormatError(
+            f"x, y, u, v have the units {', '.join(units)}: name those of x and y alike, and those "
+            "of u and v",
+            path=path,
+            line=header_line,
+        )
     if not rest:
         raise FormatError("there is no row under the header", path=path, line=header_line)
     fields = [(number, split(line)) for number, line in rest]
     values = read_numbers(fields, columns, width=len(names), path=path)
     x, y, u, v = values.T
     line = np.array([number for number, _ in fields], dtype=np.intp)
-    return FieldRows(line, x, y, u, v)
+    return RawField(FieldRows(line, x, y, u, v), length_unit=units[0], velocity_unit=units[2])
+
+
+def is_field_table(path: Path) -> bool:
+    """Return whether a text file begins with a header of x, y, u, v and names no time."""
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        start = file.read(4096)
+    header = next((line for _, line in content_lines(start)), "")
+    names = [name.strip().strip('"').lower() for name in re.split(r"[,;\t]|\s+(?![\[(])", header)]
+    timed = {"t", "t_s", "time", "time_s", "frame"} & set(names)
+    return not timed and all(any(_unit(name, wanted) for name in names) for wanted in "xyuv")
+
+
+def _unit(name: str, wanted: str) -> str:
+    """Return the unit in a column's name, `wanted` itself when it has none, ``""`` for others."""
+    match = _NAMES.fullmatch(name)
+    if match is None or match[1].lower() != wanted:
+        return ""
+    if match[2] or match[3]:
+        return wanted if bool(match[3]) == (wanted in "uv") else ""
+    return match[4 + 1] or wanted
 
 
 def content_lines(text: str) -> Iterator[tuple[int, str]]:

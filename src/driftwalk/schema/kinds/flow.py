@@ -56,7 +56,7 @@ FLOW_FIELD: Final = Kind(
         Attribute("samples_outside_tank", "number", "samples beyond the wall", _RECORDED),
         Attribute("measured_share", "number", "share of the tank's cells", _RECORDED),
         Attribute("filled_share", "number", "share of the tank's cells", _RECORDED),
-        Attribute("warning", "text", "one sentence", "little was measured"),
+        Attribute("warning", "text", "what to know about it", "there is something"),
     ),
     read="u v x y",
 )  # fmt: skip

@@ -1,0 +1,122 @@
+"""A flow field from a file of another program, with what the options say about it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from driftwalk.cli.options.recording import RecordingOptions, parse_pairs
+from driftwalk.core.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def is_flow_file(path: Path, how: RecordingOptions) -> bool:
+    """Return whether a file is a flow field; a recording is what its options say it is.
+
+    Parameters
+    ----------
+    path : Path
+        Any file.
+    how : RecordingOptions
+        How to read it as a recording.
+    """
+    from driftwalk.flow import flow_format
+
+    recording = how.format, how.columns, how.x, how.header_line
+    return all(one is None for one in recording) and flow_format(path) is not None
+
+
+def load_flow_file(
+    path: Path,
+    how: RecordingOptions,
+    *,
+    frame_interval: float | None,
+    variables: str | None,
+    tank_diameter: float | None,
+) -> xr.Dataset:
+    """Load a flow field in the frame of its tank.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    how : RecordingOptions
+        Its scale, unit, direction of y and arena.
+    frame_interval : float or None
+        Time between the two images of a pair [s].
+    variables : str or None
+        ``u=NAME,v=NAME`` of a NetCDF file.
+    tank_diameter : float or None
+        Diameter of a round tank [m], as ``--arena circle:D``.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, the centre of the tank is not stated, or ``--arena`` and
+        ``--tank-diameter`` are both given.
+    """
+    from driftwalk.flow import load_flow
+
+    values: dict[str, Any] = {
+        "metres_per_pixel": how.metres_per_pixel,
+        "frame_interval": frame_interval,
+        "length_unit": how.length_unit,
+        "y_axis": how.y_axis,
+        "variables": None if variables is None else parse_pairs([variables], "--flow-variables"),
+    }
+    if how.arena is not None and tank_diameter is not None:
+        raise InputError("give --arena or --tank-diameter, not both")
+    tank = how.arena if tank_diameter is None else f"circle:{tank_diameter!r}"
+    field = load_flow(path, **values)
+    if tank is None:
+        return field
+    return load_flow(path, **values, **_placed(tank, field))
+
+
+def _placed(tank: str, field: xr.Dataset) -> dict[str, Any]:
+    """Return where the tank lies in the field: an arena with its centre at the origin."""
+    from driftwalk.record import place_arena
+
+    x, y = (part.ravel() for part in np.meshgrid(field["x"].values, field["y"].values))
+    kind, _, rest = tank.partition(":")
+    stated = "@" in rest or kind == "polygon"
+    if not stated and kind != "fit":
+        tank = f"{tank}@0,0"
+    elif kind == "fit":
+        raise InputError("--arena fit is for recordings: state the tank, as in circle:D@X,Y")
+    placed = place_arena(tank, x, y)
+    return {"arena": json.dumps(placed.arena), "origin": placed.origin}
+
+
+def describe_field(field: xr.Dataset) -> dict[str, Any]:
+    """Return what a flow field holds, with units in the keys.
+
+    Parameters
+    ----------
+    field : xarray.Dataset
+        A `flow_field`.
+    """
+    speed = np.hypot(field["u"].values, field["v"].values)
+    measured = field["flag"].values == 1
+    known = speed[measured] if measured.any() else speed
+    return {
+        "source": field.attrs.get("source"),
+        "method": field.attrs.get("method"),
+        "columns": field.sizes["x"],
+        "rows": field.sizes["y"],
+        "frames": field.sizes.get("time", 1),
+        **{
+            f"{axis}_{side}_m": float(getattr(np, side)(field[axis].values))
+            for axis in ("x", "y")
+            for side in ("min", "max")
+        },
+        "measured_share": float(measured.mean()),
+        "speed_mean_m_s": float(known.mean()),
+        "speed_max_m_s": float(known.max()),
+        "warnings": [text for text in (field.attrs.get("warning"),) if text],
+    }

@@ -1,0 +1,215 @@
+"""PIVlab ``.mat``: one field for each pair of images, in MATLAB's old format or its HDF5."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import FormatError
+from driftwalk.flow.grid import MAX_CELLS
+from driftwalk.flow.readers.raw import RawField
+from driftwalk.flow.readers.text import masked_rows
+
+Array = npt.NDArray[np.float64]
+
+_MATLAB: Final = b"MATLAB 5.0 MAT-file"
+_HDF5: Final = (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 MAT-file")
+_ENDINGS: Final = ("_filtered", "_original", "")
+"""Of what PIVlab saves of the velocities, the first that is there is read."""
+_NUMBERED: Final = re.compile(r"u_(\d+)")
+_MOST_FRAMES: Final = 10_000
+_REGULAR: Final = 1
+"""Type of a vector that was measured; 0 is masked, 2 was replaced by its neighbours."""
+
+
+class _Names(NamedTuple):
+    """Names of the arrays of one frame."""
+
+    x: str
+    y: str
+    u: str
+    v: str
+    kind: str
+
+
+class _File(NamedTuple):
+    """A file in either format of MATLAB."""
+
+    names: list[str]
+    read: Callable[[str], list[Any]]
+    """Returns the arrays of a variable, several when it is a cell array."""
+
+
+def is_pivlab(path: Path) -> bool:
+    """Return whether a file is one of MATLAB's."""
+    with path.open("rb") as file:
+        head = file.read(len(_MATLAB))
+    return head.startswith((_MATLAB, _HDF5[1])) or (
+        path.suffix.lower() == ".mat" and head.startswith(_HDF5[0])
+    )
+
+
+def read(path: Path) -> RawField:
+    """Read all frames and average them: the file does not hold the times between them.
+
+    PIVlab's y counts downwards. Masked and replaced vectors are missing.
+
+    Raises
+    ------
+    FormatError
+        When there is no field in the file, or frames differ in their nodes.
+    """
+    with _opened(path) as file:
+        frames = [frame for names in _frames(file) for frame in _frame(file, names, path)]
+        length, velocity, scale = _units(file)
+    if not frames:
+        has = ", ".join(file.names[:12])
+        raise FormatError(f"has no velocities of PIVlab (x, y, u, v), only {has}", path=path)
+    if len(frames) > _MOST_FRAMES or any(f[:, :2].shape != frames[0][:, :2].shape for f in frames):
+        raise FormatError("the frames have different nodes: save one alone", path=path)
+    stack = np.stack(frames)
+    if (stack[:, :, :2] != stack[0, :, :2]).any():
+        raise FormatError("the frames have different nodes: save one alone", path=path)
+    values = np.column_stack([stack[0, :, :2], _mean(stack[:, :, 2:])]) * scale
+    line = np.arange(1, len(values) + 1, dtype=np.intp)
+    notes = []
+    if len(frames) > 1:
+        notes.append(f"the flow is the mean of {len(frames)} frames: the file holds no times")
+    rows = masked_rows(line, values, np.zeros(len(values), dtype=bool), path)
+    return RawField(rows, length, velocity, down=True, notes=notes)
+
+
+def _mean(velocity: Array) -> Array:
+    """Return the mean over frames at each node, shape (n, 2), NaN where no frame has any."""
+    count = np.isfinite(velocity).sum(axis=0)
+    return np.where(count > 0, np.nansum(velocity, axis=0) / np.maximum(count, 1), np.nan)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[_File]:
+    """Open a file of MATLAB; what goes wrong inside becomes a `FormatError`."""
+    with path.open("rb") as binary:
+        old = binary.read(len(_MATLAB)) == _MATLAB
+    try:
+        if old:
+            yield _old_file(path)
+            return
+        import h5py
+
+        with h5py.File(path, "r") as file:
+            yield _File(list(file), lambda name: _hdf5_arrays(file, name))
+    except FormatError:
+        raise
+    except Exception as error:
+        # On a damaged file the libraries fail with whatever the damage leads them to.
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise FormatError(f"cannot be read as a MATLAB file: {reason}", path=path) from error
+
+
+def _old_file(path: Path) -> _File:
+    from scipy.io import loadmat
+
+    content = loadmat(path, appendmat=False)
+
+    def arrays(name: str) -> list[Any]:
+        values = content[name]
+        return list(values.ravel()) if values.dtype.kind == "O" else [values]
+
+    return _File([name for name in content if not name.startswith("__")], arrays)
+
+
+def _hdf5_arrays(file: Any, name: str) -> list[Any]:
+    import h5py
+
+    entry = file[name]
+    if not isinstance(entry, h5py.Dataset):
+        return []
+    _refuse_huge(entry)
+    if entry.dtype.kind != "O":
+        return [entry[...]]
+    cells = [file[reference] for reference in entry[...].ravel()]
+    for cell in cells:
+        _refuse_huge(cell)
+    return [cell[...] for cell in cells]
+
+
+def _refuse_huge(entry: Any) -> None:
+    """Refuse an array that its header declares larger than any field."""
+    if entry.size > MAX_CELLS**2:
+        raise FormatError(f"'{entry.name}' has {entry.size} values, more than a field of flow has")
+
+
+def _frames(file: _File) -> list[_Names]:
+    """Return the names of the arrays of each frame, or of all where they are cell arrays."""
+    numbers = sorted(int(match[1]) for name in file.names if (match := _NUMBERED.fullmatch(name)))
+    if numbers:
+        return [
+            _Names(*(f"{what}_{number}" for what in ("x", "y", "u", "v", "typevector")))
+            for number in numbers
+        ]
+    for ending in _ENDINGS:
+        if {f"u{ending}", f"v{ending}"} <= set(file.names):
+            return [_Names("x", "y", f"u{ending}", f"v{ending}", f"typevector{ending}")]
+    return []
+
+
+def _frame(file: _File, names: _Names, path: Path) -> Iterator[Array]:
+    """Yield x, y, u, v of every frame, shape (n, 4), NaN where a vector was not measured."""
+    lacking = [name for name in names[:4] if name not in file.names]
+    if lacking:
+        raise FormatError(f"has no variable '{lacking[0]}'", path=path)
+    columns = [file.read(name) for name in names[:4]]
+    kinds = file.read(names.kind) if names.kind in file.names else []
+    if len({len(arrays) for arrays in columns}) != 1 or len(kinds) not in (0, len(columns[0])):
+        raise FormatError("has different numbers of frames in x, y, u and v", path=path)
+    for number, arrays in enumerate(zip(*columns, strict=True)):
+        if not arrays[0].size:
+            continue  # PIVlab leaves the cells of pairs that it was not asked for empty
+        shapes = {array.shape for array in arrays}
+        if len(shapes) != 1 or any(array.dtype.kind not in "fiu" for array in arrays):
+            raise FormatError(
+                f"x, y, u and v of frame {number + 1} are no matrices of one size", path=path
+            )
+        frame = np.column_stack([array.ravel().astype(np.float64) for array in arrays])
+        if kinds and kinds[number].shape == arrays[0].shape:
+            frame[kinds[number].ravel() != _REGULAR, 2:] = np.nan
+        yield frame
+
+
+def _units(file: _File) -> tuple[str, str, Array]:
+    """Return the units of positions and velocities, and the factors to them.
+
+    An export says its units and is calibrated. A session has pixels, and factors to m and m/s that
+    are 1 where nobody has calibrated it.
+    """
+    if "units" in file.names:
+        text = _text(file.read("units"))
+        length, velocity = ("m", "m/s") if "[m]" in text else ("px", "px/frame")
+        return length, velocity, np.ones(4)
+    factors = [
+        _factor(file, ("calxy",)),
+        _factor(file, ("calu", "caluv")),
+        _factor(file, ("calv", "caluv")),
+    ]
+    if factors[0] == 1.0:
+        return "px", "px/frame", np.ones(4)
+    return "m", "m/s", np.array([factors[0], factors[0], factors[1], factors[2]])
+
+
+def _factor(file: _File, names: tuple[str, ...]) -> float:
+    for name in names:
+        if name in file.names:
+            return float(np.ravel(file.read(name)[0])[0])
+    return 1.0
+
+
+def _text(arrays: list[Any]) -> str:
+    """Return a text of MATLAB, which its HDF5 keeps as the numbers of the letters."""
+    values = np.ravel(arrays[0])
+    return "".join(chr(value) for value in values) if values.dtype.kind == "u" else str(values)

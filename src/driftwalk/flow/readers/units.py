@@ -1,0 +1,175 @@
+"""From the units of a velocity field to SI: the only place for scale and interval."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Final
+
+from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.units import parse_quantity
+from driftwalk.flow.readers.raw import FieldOptions, RawField
+from driftwalk.flow.rows import FieldRows
+
+LENGTH_UNITS: Final = ("m", "cm", "mm", "um", "px")
+_WORDS: Final = {
+    **dict.fromkeys(("meters", "metres", "meter", "metre"), "m"),
+    **dict.fromkeys(("seconds", "second", "sec", "secs"), "s"),
+    **dict.fromkeys(("minutes", "minute"), "min"),
+    **dict.fromkeys(("hours", "hour"), "h"),
+    **dict.fromkeys(("px", "pix", "pixel", "pixels"), "px"),
+    **dict.fromkeys(("frame", "frames", "dt", "deltat"), "frame"),
+}
+_DEGREES: Final = re.compile(r"degrees?(_?(east|west|north|south|e|n|w|s))?|°", re.IGNORECASE)
+_SHIFTS: Final = ("px", "px/frame", "px / frame", "px frame-1")
+"""Velocities that are shifts between the two images of a pair."""
+
+
+class FieldScale:
+    """Factors from a file's units to SI, and which of the user's facts they took."""
+
+    def __init__(self, options: FieldOptions, frame_interval: float | None = None) -> None:
+        self._options = options
+        self._interval = frame_interval
+        self._used: set[str] = set()
+        if options.length_unit is not None and options.length_unit not in LENGTH_UNITS:
+            raise InputError(
+                f"`length_unit` is one of {', '.join(LENGTH_UNITS)}; got '{options.length_unit}'"
+            )
+
+    def length(self, unit: str) -> float:
+        """Return the metres per unit of a position.
+
+        Raises
+        ------
+        InputError
+            When the unit is none of length, or a fact is missing.
+        """
+        known = words_of_unit(unit) or self._stated()
+        if known == "px":
+            return self._metres_per_pixel()
+        return _parse(known, "m")
+
+    def velocity(self, unit: str) -> float:
+        """Return the metres per second of a velocity in some unit, as `length` does."""
+        known = words_of_unit(unit)
+        if not known:
+            stated = self._stated()
+            known = stated if stated == "px" else f"{stated}/s"
+        if known in _SHIFTS:
+            return self._metres_per_pixel() / self._frame_interval()
+        if known.startswith("px"):
+            return self._metres_per_pixel() * _parse(f"m{known.removeprefix('px')}", "m/s")
+        return _parse(known, "m/s")
+
+    def time(self, unit: str) -> float:
+        """Return the seconds per unit of a time."""
+        return _parse(words_of_unit(unit), "s")
+
+    def refuse_unused(self) -> None:
+        """Refuse facts that the units of the file have no use for.
+
+        Raises
+        ------
+        InputError
+            Names the first one.
+        """
+        given = {
+            "metres_per_pixel": self._options.metres_per_pixel,
+            "frame_interval": self._options.frame_interval,
+            "length_unit": self._options.length_unit,
+        }
+        for name, value in given.items():
+            if value is not None and name not in self._used:
+                raise InputError(f"the file itself says what `{name}` would: leave it out")
+
+    def _stated(self) -> str:
+        """Return the unit of a file that names none."""
+        if self._options.length_unit is not None:
+            self._used.add("length_unit")
+            return self._options.length_unit
+        if self._options.metres_per_pixel is not None:
+            return "px"
+        raise InputError(
+            "the file does not name its units: give `metres_per_pixel` and `frame_interval` for "
+            "pixels and shifts between two images, or `length_unit` for positions in m, cm or mm "
+            "and velocities in these per second; driftwalk flow FILE -o flow.nc takes them"
+        )
+
+    def _metres_per_pixel(self) -> float:
+        self._used.add("metres_per_pixel")
+        return _positive(self._options.metres_per_pixel, "metres_per_pixel", "are in pixels")
+
+    def _frame_interval(self) -> float:
+        if self._interval is not None:
+            return self._interval
+        self._used.add("frame_interval")
+        return _positive(
+            self._options.frame_interval, "frame_interval", "are shifts between two images"
+        )
+
+
+def raw_to_si(raw: RawField, options: FieldOptions) -> tuple[FieldRows, list[str]]:
+    """Return the rows in m and m/s with y up, and what to say about them.
+
+    Raises
+    ------
+    InputError
+        When a unit is none, or a fact is missing, or is given and of no use.
+    """
+    scale = FieldScale(options, raw.frame_interval)
+    length, velocity = scale.length(raw.length_unit), scale.velocity(raw.velocity_unit)
+    scale.refuse_unused()
+    down = raw.down if options.y_axis is None else options.y_axis == "down"
+    sign = -1.0 if down else 1.0
+    x0, y0 = options.origin or (0.0, 0.0)
+    rows = raw.rows
+    si = FieldRows(
+        rows.line,
+        length * rows.x - x0,
+        sign * length * rows.y - y0,
+        velocity * rows.u,
+        sign * velocity * rows.v,
+    )
+    notes = [*raw.notes]
+    if raw.down and options.y_axis is None:
+        notes.append("y counts downwards in the file: y and v are negated (`y_axis`)")
+    return si, notes
+
+
+def words_of_unit(text: str) -> str:
+    """Return a unit in symbols that `parse_quantity` knows, pixels as ``px``.
+
+    Examples
+    --------
+    >>> words_of_unit("meters second-1"), words_of_unit("pixel/frame"), words_of_unit("m.s-1")
+    ('m s-1', 'px/frame', 'm s-1')
+    """
+    # UDUNITS joins with dots.
+    return re.sub(
+        r"[A-Za-z]+", lambda word: _WORDS.get(word[0].lower(), word[0]), text.replace(".", " ")
+    ).strip()
+
+
+def _parse(unit: str, wanted: str) -> float:
+    if _DEGREES.fullmatch(unit.split(" ")[0]):
+        raise InputError(
+            "the positions are degrees of longitude and latitude: project the field to metres "
+            "first, for example with pyproj"
+        )
+    try:
+        return parse_quantity(f"1 {unit}", wanted)
+    except ConfigurationError as error:
+        raise InputError(str(error)) from error
+
+
+def _positive(value: float | None, argument: str, what: str) -> float:
+    if value is None:
+        subject = "positions" if argument == "metres_per_pixel" else "velocities"
+        raise InputError(
+            f"the {subject} {what}: give `{argument}`, which driftwalk flow FILE -o flow.nc takes "
+            "to make a field in metres"
+        )
+    if not (math.isfinite(value) and value > 0.0):
+        raise InputError(f"`{argument}` must be a number above zero, got {value}")
+    return value
