@@ -13,6 +13,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import space_files
 import xarray as xr
 from drawn_blocks import camera_of, marker_of, moving_blocks
 from finished_run import write_finished_run
@@ -130,6 +131,33 @@ def _recordings(place: Path) -> Iterator[Seed]:
         folder = _kept(place / kind, lambda folder, files_of=files_of: _write(folder, files_of))
         yield Seed(folder, name, _reading(f"@/{name}", options))
     yield from _binary_recordings(place)
+    yield from _in_space(place)
+
+
+def _in_space(place: Path) -> Iterator[Seed]:
+    for kind, (name, content, options) in space_files.recordings().items():
+        folder = _kept(place / kind, lambda at, one={name: content}: _write(at, one))
+        yield Seed(folder, name, _reading(f"@/{name}", options))
+    for mcap, ending in ((False, "db3"), (True, "mcap")):
+        bag = _kept(
+            place / f"ros-{ending}",
+            lambda at, mcap=mcap: space_files.write_bag(at / "bag", mcap=mcap),
+        )
+        yield Seed(bag, f"bag/bag.{ending}", _reading(f"@/bag/bag.{ending}"))
+        yield Seed(bag, "bag/metadata.yaml", _reading("@/bag"))
+    for kind, (name, content, options) in space_files.fields().items():
+        folder = _kept(place / kind, lambda at, one={name: content}: _write(at, one))
+        yield Seed(folder, name, _of_field(f"@/{name}", options))
+    session = _kept(place / "pivlab", lambda at: space_files.write_session(at / "session.mat"))
+    yield Seed(session, "session.mat", _of_field("@/session.mat", space_files.SHIFTS))
+
+
+def _of_field(file: str, options: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
+    return (
+        ("info", file, *options),
+        ("flow", file, "--out", "@/flow-out.nc", "--arena", "circle:0.1@0.07,0.08", *options),
+        ("simulate", "--flow", file, "--out", "@/out.nc", "--duration", "1", *MODEL),
+    )
 
 
 def _write(folder: Path, contents: dict[str, str | bytes]) -> None:

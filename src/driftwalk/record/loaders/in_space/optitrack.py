@@ -111,7 +111,7 @@ def _read_header(path: Path) -> _Header:
             path=path,
         )
     # A data row may end in a comma that the header has not, and the other way round.
-    width = max(len(rows[at]), *(len(row) for row in rows[at + 1 : at + 2]))
+    width = max(len(row) for row in rows[at : at + 2])
     types, names, *_, quantities, axes = (
         (row + [""] * width)[:width] for row in (*above, rows[at])
     )
