@@ -31,6 +31,14 @@ HEADERS = [
     b"$FRAMENUMBER,1\n",
     b'\'list(Areas=matrix(c(1,2,3,4),4,1,dimname=list(c("W"),c("05"))))\'\n'
     b"Area,Territory,X,Y,time,L\n",
+    b"Format Version,1.23,Take Name,a,Rotation Type,XYZ,Length Units,Meters\n\n,Type,Rigid Body\n"
+    b",Name,A\n,,Position\nFrame,Time,X\n",
+    b"Objects\n100\n,,A:A,,,,,\nFrame,Sub Frame,RX,RY,RZ,TX,TY,TZ\n,,rad,rad,rad,mm,mm,mm\n",
+    b"#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y []\n",
+    b"# timestamp tx ty tz qx qy qz qw\n0 1 2 3 0 0 0 1\n",
+    b"t,x,y,z,qx,qy,qz,qw\n",
+    b"\x89MCAP0\r\n",
+    b"SQLite format 3\0",
     b"[[1, 2], ",
     b"\x89HDF\r\n\x1a\n",
     b"CDF\x01",
