@@ -13,7 +13,6 @@ from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_json, print_note
-from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import FLOW_KEYS
 
 if TYPE_CHECKING:
@@ -50,28 +49,26 @@ def flow(
     default is the 11.6-g, 3-cm block of the paper. A field that was measured otherwise is brought
     to metres, with its masked nodes filled; --arena circle:D@X,Y says where its tank is.
     """
-    from driftwalk.cli.inputs.flow_file import is_flow_file, load_flow_file
+    from driftwalk.cli.inputs.flow_file import read_flow_file
     from driftwalk.conditions import load_with_study, require_motion
     from driftwalk.flow import save_flow
 
     existing = "replace" if overwrite else "error"
-    if is_flow_file(recording, how) or flow_variables is not None:
-        field = load_flow_file(
-            recording,
-            how,
-            frame_interval=frame_interval,
-            variables=flow_variables,
-            tank_diameter=given.overrides.get(FLOW_KEYS["tank_diameter"]),
-        )
-        save_flow(field, out, existing=existing)
-        _report_file(field, out, json=json)
+    diameter = given.overrides.get(FLOW_KEYS["tank_diameter"])
+    measured = read_flow_file(
+        recording,
+        how,
+        frame_interval=frame_interval,
+        variables=flow_variables,
+        tank_diameter=diameter,
+    )
+    if measured is not None:
+        save_flow(measured, out, existing=existing)
+        _report_file(measured, out, json=json)
         return
-    if frame_interval is not None:
-        raise InputError("--frame-interval is for a flow field, and this is a recording")
     resolved = given.study()
     if given.file is None:
         # Without a study nobody has said how large the tank is: the default one is no answer.
-        diameter = given.overrides.get(FLOW_KEYS["tank_diameter"])
         trajectory = how.load(recording, tank_diameter=diameter, side=resolved.block.side_m)
     else:
         with explained():

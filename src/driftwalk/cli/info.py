@@ -9,7 +9,6 @@ from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json
 from driftwalk.cli.options.study import Side, TankDiameter
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_json, print_note, print_table
-from driftwalk.core.errors import InputError
 
 SIDE_BY_SIDE = 5
 """Bodies shown as columns; more are shown as rows, with fewer numbers."""
@@ -85,21 +84,19 @@ def info(
     Prints bodies, clock and its jitter, gaps, extent, the circle that the centres stay in, speed,
     and the tracking noise estimated from the recording itself.
     """
-    from driftwalk.cli.inputs.flow_file import describe_field, is_flow_file, load_flow_file
+    from driftwalk.cli.inputs.flow_file import describe_field, read_flow_file
     from driftwalk.record import describe
 
-    if is_flow_file(recording, how) or flow_variables is not None:
-        field = load_flow_file(
-            recording,
-            how,
-            frame_interval=frame_interval,
-            variables=flow_variables,
-            tank_diameter=tank_diameter,
-        )
+    field = read_flow_file(
+        recording,
+        how,
+        frame_interval=frame_interval,
+        variables=flow_variables,
+        tank_diameter=tank_diameter,
+    )
+    if field is not None:
         _print_field(describe_field(field), json=json)
         return
-    if frame_interval is not None:
-        raise InputError("--frame-interval is for a flow field, and this is a recording")
     described = describe(how.load(recording, tank_diameter=tank_diameter, side=side))
     if json:
         print_json(described)

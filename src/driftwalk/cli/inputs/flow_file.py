@@ -15,36 +15,20 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def is_flow_file(path: Path, how: RecordingOptions) -> bool:
-    """Return whether a file is a flow field; a recording is what its options say it is.
-
-    Parameters
-    ----------
-    path : Path
-        Any file.
-    how : RecordingOptions
-        How to read it as a recording.
-    """
-    from driftwalk.flow import flow_format
-
-    recording = how.format, how.columns, how.x, how.header_line
-    return all(one is None for one in recording) and flow_format(path) is not None
-
-
-def load_flow_file(
+def read_flow_file(
     path: Path,
     how: RecordingOptions,
     *,
     frame_interval: float | None,
     variables: str | None,
     tank_diameter: float | None,
-) -> xr.Dataset:
-    """Load a flow field in the frame of its tank.
+) -> xr.Dataset | None:
+    """Load a flow field in the frame of its tank; None of a recording.
 
     Parameters
     ----------
     path : Path
-        The file.
+        Any file. It is a recording where an option says how to read one.
     how : RecordingOptions
         Its scale, unit, direction of y and arena.
     frame_interval : float or None
@@ -57,9 +41,27 @@ def load_flow_file(
     Raises
     ------
     InputError
-        When the file cannot be read, the centre of the tank is not stated, or ``--arena`` and
-        ``--tank-diameter`` are both given.
+        When the field cannot be read, the centre of the tank is not stated, ``--arena`` and
+        ``--tank-diameter`` are both given, or ``--frame-interval`` for a recording.
     """
+    from driftwalk.flow import flow_format
+
+    recording = how.format, how.columns, how.x, how.header_line
+    said = any(one is not None for one in recording)
+    if variables is None and (said or flow_format(path) is None):
+        if frame_interval is not None:
+            raise InputError("--frame-interval is for a flow field, and this is a recording")
+        return None
+    return _load(path, how, frame_interval, variables, tank_diameter)
+
+
+def _load(
+    path: Path,
+    how: RecordingOptions,
+    frame_interval: float | None,
+    variables: str | None,
+    tank_diameter: float | None,
+) -> xr.Dataset:
     from driftwalk.flow import load_flow
 
     values: dict[str, Any] = {

@@ -70,5 +70,5 @@ def body_in_plane(
     turned = set(PARTS) <= set(places)
     parts = [values[places[part]] for part in PARTS] if turned else []
     turns = Turns(np.column_stack(parts), QUATERNION) if turned else None
-    (body,), notes = lay_flat([SpaceTrack("0", clock, np.column_stack(axes), turns)], plane)
-    return body, notes
+    flat = lay_flat([SpaceTrack("0", clock, np.column_stack(axes), turns)], plane)
+    return flat.bodies[0], flat.notes

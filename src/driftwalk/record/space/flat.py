@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from driftwalk.record.raw import Array, RawBody
+from driftwalk.record.raw import Array, RawBody, RawRecording
 from driftwalk.record.space.plane import Plane
 from driftwalk.record.space.turns import Turns
 
@@ -30,8 +30,10 @@ class SpaceTrack:
     """Orientations; None when the file has none."""
 
 
-def lay_flat(tracks: Sequence[SpaceTrack], plane: Plane) -> tuple[list[RawBody], list[str]]:
-    """Return the bodies in the plane, and what speaks against the plane.
+def lay_flat(tracks: Sequence[SpaceTrack], plane: Plane) -> RawRecording:
+    """Return the bodies in the plane, with notes on what speaks against the plane.
+
+    The loader says the rest: clock, units and rows.
 
     Parameters
     ----------
@@ -52,7 +54,7 @@ def lay_flat(tracks: Sequence[SpaceTrack], plane: Plane) -> tuple[list[RawBody],
         angle, tilt = (None, None) if track.turns is None else track.turns.in_plane(plane)
         bodies.append(RawBody(track.name, track.clock, x, y, angle))
         notes += _against(track.name, plane, _span(height), max(_span(x), _span(y)), tilt)
-    return bodies, notes
+    return RawRecording(bodies, y_axis="up", plane=plane.describe(), notes=notes)
 
 
 def _span(values: Array) -> float:

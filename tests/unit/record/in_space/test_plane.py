@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -36,10 +34,9 @@ def test_planes_are_right_handed_and_seen_from_above(up: str) -> None:
 def test_a_body_that_turns_about_the_upward_axis(up: str, form: str) -> None:
     time, x, y, angle = spin()
     position, rotation = in_space(up, x, y, angle)
-    (body,), notes = lay_flat(
-        [SpaceTrack("a", time, position, in_form(rotation, form))], plane_of(up)
-    )
-    assert notes == []
+    flat = lay_flat([SpaceTrack("a", time, position, in_form(rotation, form))], plane_of(up))
+    (body,) = flat.bodies
+    assert flat.notes == []
     np.testing.assert_allclose(body.x, x, rtol=0, atol=1e-15)
     np.testing.assert_allclose(body.y, y, rtol=0, atol=1e-15)
     # Rounding of a dozen products and an arc tangent of numbers of size 1.
@@ -67,7 +64,7 @@ def test_unknown_orientations_and_positions_stay_unknown() -> None:
     values = np.array([[0, 0, 0, 1.0], [np.nan] * 4, [0, 0, 0, 0], [0, 0, 1.0, 0]])
     position = np.array([[1, 2, 3.0], [np.nan] * 3, [1, 2, np.inf], [4, 5, 6]])
     track = SpaceTrack("a", np.arange(4.0), position, Turns(values, QUATERNION))
-    (body,), _ = lay_flat([track], plane_of("z"))
+    (body,) = lay_flat([track], plane_of("z")).bodies
     np.testing.assert_array_equal(body.theta, [0.0, np.nan, np.nan, np.pi])
     np.testing.assert_array_equal(np.isfinite(body.x), [True, False, False, True])
 
@@ -87,6 +84,6 @@ def test_a_wrong_axis_is_noticed(up: str, said: int) -> None:
     time, x, y, angle = spin()
     position, rotation = in_space("z", 0.3 * x, y, angle)
     track = SpaceTrack("a", time, position, in_form(rotation, QUATERNION))
-    notes: list[Any] = lay_flat([track], plane_of(up))[1]
+    notes = lay_flat([track], plane_of(up)).notes
     assert len(notes) == said
     assert all("is `up` right?" in note for note in notes)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -56,19 +57,14 @@ class EurocLoader:
         table = read_table(path, TableLayout(",", names, 1, (0, *used), clock=0))
         values = np.column_stack([table.numbers[column] for column in used])
         turns = Turns(values[:, 3:], QUATERNION) if turned else None
-        plane = plane_of(options.up or _UP)
         track = SpaceTrack("0", table.numbers[0], values[:, :3], turns)
-        bodies, notes = lay_flat([track], plane)
         unit = unit_of_name(names[0])
-        return RawRecording(
-            bodies,
+        return replace(
+            lay_flat([track], plane_of(options.up or _UP)),
             clock_unit=unit if unit in CLOCK_UNITS else "ns",
             clock_origin=table.clock_origin,
             length_unit="m",
-            y_axis="up",
-            plane=plane.describe(),
             rows=table.rows,
-            notes=notes,
         )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -72,7 +72,6 @@ class OptiTrackLoader:
             )
         ]
         table = read_table(path, TableLayout(",", labels, header.lines, tuple(sorted(used))))
-        plane = plane_of(options.up or _UP)
         tracks = [
             SpaceTrack(
                 name,
@@ -82,19 +81,16 @@ class OptiTrackLoader:
             )
             for name in bodies
         ]
-        flat, notes = lay_flat(tracks, plane)
+        flat = lay_flat(tracks, plane_of(options.up or _UP))
         if kind != "Rigid Body":
-            notes.append("no rigid bodies: each marker is read as a body, without orientation")
+            flat.notes.append("no rigid bodies: each marker is read as a body, without orientation")
         rate = header.settings.get("Export Frame Rate") or header.settings.get("Capture Frame Rate")
-        return RawRecording(
+        return replace(
             flat,
             clock_unit=clock_unit,
             length_unit=_length_unit(header, path),
-            y_axis="up",
-            plane=plane.describe(),
             frame_rate_hz=_rate(rate, path) if clock_unit == "frame" else None,
             rows=table.rows,
-            notes=notes,
         )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -52,28 +52,23 @@ class RosLoader:
         if not tracks:
             raise FormatError("the chosen topic has no poses", path=path)
         origin = min(min(track.stamps) for track in tracks.values())
-        laid, notes = lay_flat(
-            [_in_space(name, track, origin) for name, track in tracks.items()], plane
-        )
+        flat = lay_flat([_in_space(name, track, origin) for name, track in tracks.items()], plane)
         if recorded:
-            notes.append(
+            flat.notes.append(
                 f"{recorded} poses have no time stamp: they stand at the time when they were "
                 "recorded, which is later"
             )
         if len(parents) > 1:
-            notes.append(
+            flat.notes.append(
                 f"the poses are in different frames, {', '.join(sorted(parents))}: compare bodies "
                 "of one frame only"
             )
-        return RawRecording(
-            laid,
+        return replace(
+            flat,
             clock_unit="ns",
             clock_origin=origin,
             length_unit="m",
-            y_axis="up",
-            plane=plane.describe(),
             rows=sum(len(track.stamps) for track in tracks.values()),
-            notes=notes,
         )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import takewhile
 from pathlib import Path
 from typing import Final
@@ -43,17 +44,12 @@ class TumLoader:
         layout = TableLayout(" ", _NAMES, len(list(comments)), tuple(range(len(_NAMES))))
         table = read_table(path, layout)
         values = np.column_stack([table.numbers[column] for column in range(1, len(_NAMES))])
-        plane = plane_of(options.up or _UP)
         track = SpaceTrack("0", table.numbers[0], values[:, :3], Turns(values[:, 3:], QUATERNION))
-        bodies, notes = lay_flat([track], plane)
-        return RawRecording(
-            bodies,
+        return replace(
+            lay_flat([track], plane_of(options.up or _UP)),
             clock_unit="s",
             length_unit="m",
-            y_axis="up",
-            plane=plane.describe(),
             rows=table.rows,
-            notes=notes,
         )
 
 

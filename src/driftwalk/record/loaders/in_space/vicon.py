@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -73,16 +73,11 @@ class ViconLoader:
             )
             for name in bodies
         ]
-        plane = plane_of(options.up or _UP)
-        flat, notes = lay_flat(tracks, plane)
-        return RawRecording(
-            flat,
+        return replace(
+            lay_flat(tracks, plane_of(options.up or _UP)),
             length_unit=_length_unit(header, placed, path),
-            y_axis="up",
-            plane=plane.describe(),
             frame_rate_hz=header.rate_hz,
             rows=table.rows,
-            notes=notes,
         )
 
 
