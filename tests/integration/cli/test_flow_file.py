@@ -103,3 +103,14 @@ def test_a_recording_has_no_time_between_images(tmp_path: Path) -> None:
     for command in ("info",), ("flow", "--out", tmp_path / "a.nc"):
         said = refusal(here(command[0], path, *command[1:], "--frame-interval", "1s"))
         assert "--frame-interval is for a flow field" in said
+
+
+def test_a_field_is_no_recording(shifts: Path, tmp_path: Path) -> None:
+    said = refusal(here("convert", shifts, tmp_path / "out.nc"))
+    assert f"{shifts} holds a flow field, and no positions: it is for --flow" in said
+    binary = tmp_path / "B00001.vc7"
+    binary.write_bytes(b"\0\1")
+    assert "export it from DaVis as txt" in refusal(here("info", binary))
+    assert "export it from DaVis as txt" in refusal(
+        here("simulate", "--flow", binary, "--out", tmp_path / "out.nc")
+    )

@@ -64,8 +64,19 @@ def what_else(path: Path) -> str | None:
         return None
     if path.suffix.lower() in VIDEOS:
         return "is a video: driftwalk track makes a recording of it"
+    if _is_field(path):
+        return f"holds {KINDS['flow_field']}"
     kind = _netcdf_kind(path)
     return None if kind is None else f"holds {KINDS.get(kind, _OTHER.format(kind))}"
+
+
+def _is_field(path: Path) -> bool:
+    from driftwalk.flow import flow_format
+
+    try:
+        return flow_format(path) is not None
+    except FormatError:
+        return True  # a field that only its own program reads
 
 
 def _maybe_a_field(path: Path) -> str | None:
@@ -74,7 +85,10 @@ def _maybe_a_field(path: Path) -> str | None:
 
     if not path.is_file() or not is_netcdf(path) or kind_of(path) is not None:
         return None
-    names = ", ".join(list(map(str, open_netcdf(path).variables))[:12])
+    try:
+        names = ", ".join(list(map(str, open_netcdf(path).variables))[:12])
+    except FormatError:
+        return None  # damaged: nobody knows what it was
     return (
         f"is NetCDF of no recording that is known, with {names}: if it is a flow field, name its "
         "variables with --flow-variables u=NAME,v=NAME,x=NAME,y=NAME"
