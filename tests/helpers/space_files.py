@@ -97,8 +97,10 @@ def fields() -> dict[str, tuple[str, str, tuple[str, ...]]]:
 def write_session(path) -> None:
     """Write a session of PIVlab with two frames."""
     x, y = np.meshgrid(16.0 * np.arange(1, 9), 16.0 * np.arange(1, 10))
-    with h5py.File(path, "w") as file:
+    with h5py.File(path, "w", userblock_size=512) as file:
         for frame in range(2):
             for name, values in (("x", x), ("y", y), ("u", 0.01 * y), ("v", 0.01 * x)):
                 file[f"{name}_{frame}"] = values.T
             file[f"typevector_{frame}"] = np.ones(x.T.shape)
+    # As MATLAB begins it, and no NetCDF to what damages NetCDF.
+    path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(512) + path.read_bytes()[512:])

@@ -129,7 +129,7 @@ def _opened(path: Path) -> Iterator[xr.Dataset]:
         with warnings.catch_warnings():
             # What the libraries remark about a file of the user's is no line of ours.
             warnings.simplefilter("ignore")
-            _refuse_huge(_declared_hdf5(path) if is_hdf5 else _declared_classic(path), path)
+            refuse_huge(_declared_hdf5(path) if is_hdf5 else _declared_classic(path), path)
             with xr.open_dataset(path, decode_times=False, **options) as dataset:
                 yield dataset
     except FormatError:
@@ -140,7 +140,21 @@ def _opened(path: Path) -> Iterator[xr.Dataset]:
         raise FormatError(f"cannot be read as NetCDF: {reason}", path=path) from error
 
 
-def _refuse_huge(declared: int, path: Path) -> None:
+def refuse_huge(declared: int, path: Path) -> None:
+    """Refuse a file that declares more than a file of its size can hold.
+
+    Parameters
+    ----------
+    declared : int
+        Bytes in memory by its header.
+    path : Path
+        The file.
+
+    Raises
+    ------
+    FormatError
+        Says both sizes.
+    """
     size = path.stat().st_size
     if declared > ALLOWANCE_BYTES + LARGEST_RATIO * size:
         raise FormatError(

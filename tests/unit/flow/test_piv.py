@@ -389,6 +389,15 @@ def test_truncated_files(tmp_path: Path, name: str, share: float) -> None:
     assert "\n" not in str(caught.value)
 
 
+def test_a_declared_size_that_no_file_holds(tmp_path: Path) -> None:
+    path = pivlab(tmp_path, "session")
+    with h5py.File(path, "a") as file:
+        del file["u_1"]
+        file.create_dataset("u_1", shape=(10**6, 10**6), chunks=(100, 100), dtype="f8")
+    with pytest.raises(InputError, match="is damaged: its header declares 8e"):
+        load_flow(path, **PIXELS)
+
+
 def test_renamed_and_missing_variables_of_pivlab(tmp_path: Path) -> None:
     path = pivlab(tmp_path, "session")
     with h5py.File(path, "a") as file:

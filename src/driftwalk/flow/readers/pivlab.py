@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError
-from driftwalk.flow.grid import MAX_CELLS
 from driftwalk.flow.readers.raw import RawField
 from driftwalk.flow.readers.text import masked_rows
+from driftwalk.schema.netcdf import refuse_huge
 
 Array = npt.NDArray[np.float64]
 
@@ -24,6 +24,8 @@ _ENDINGS: Final = ("_filtered", "_original", "")
 """Of what PIVlab saves of the velocities, the first that is there is read."""
 _NUMBERED: Final = re.compile(r"u_(\d+)")
 _MOST_FRAMES: Final = 10_000
+_WIDTH: Final = 8
+"""Bytes of a number in memory."""
 _REGULAR: Final = 1
 """Type of a vector that was measured; 0 is masked, 2 was replaced by its neighbours."""
 
@@ -103,6 +105,7 @@ def _opened(path: Path) -> Iterator[_File]:
         import h5py
 
         with h5py.File(path, "r") as file:
+            refuse_huge(_declared(file), path)
             yield _File(list(file), lambda name: _hdf5_arrays(file, name))
     except FormatError:
         raise
@@ -130,19 +133,26 @@ def _hdf5_arrays(file: Any, name: str) -> list[Any]:
     entry = file[name]
     if not isinstance(entry, h5py.Dataset):
         return []
-    _refuse_huge(entry)
     if entry.dtype.kind != "O":
         return [entry[...]]
-    cells = [file[reference] for reference in entry[...].ravel()]
-    for cell in cells:
-        _refuse_huge(cell)
-    return [cell[...] for cell in cells]
+    if entry.size > _MOST_FRAMES:
+        raise FormatError(f"'{name}' has {entry.size} frames, more than the {_MOST_FRAMES} read")
+    return [file[reference][...] for reference in entry[...].ravel()]
 
 
-def _refuse_huge(entry: Any) -> None:
-    """Refuse an array that its header declares larger than any field."""
-    if entry.size > MAX_CELLS**2:
-        raise FormatError(f"'{entry.name}' has {entry.size} values, more than a field of flow has")
+def _declared(file: Any) -> int:
+    """Return how many bytes the arrays of a file have in memory by its header."""
+    import h5py
+
+    sizes: list[int] = []
+    file.visititems(
+        lambda _, entry: sizes.append(
+            entry.size * _WIDTH
+            if isinstance(entry, h5py.Dataset) and entry.shape is not None
+            else 0
+        )
+    )
+    return sum(sizes)
 
 
 def _frames(file: _File) -> list[_Names]:
