@@ -166,6 +166,14 @@ def test_what_is_refused(tmp_path: Path, options: dict[str, Any], message: str) 
     assert "\n" not in str(caught.value)
 
 
+def test_a_fill_value_that_nobody_declared_is_no_velocity(tmp_path: Path) -> None:
+    dataset = ocean(("u", "v", "x", "y"), [SPEED, SPEED, METRES, METRES])
+    dataset["u"][0, 0] = 9.96921e36
+    dataset["v"][1, 1] = np.nan
+    with pytest.raises(InputError, match=r"the flow reaches 9.97e\+36 m/s, as no water does"):
+        load_flow(write(tmp_path / "field.nc", dataset))
+
+
 def test_layers_are_refused(tmp_path: Path) -> None:
     dataset = ocean(("u", "v", "x", "y"), [SPEED, SPEED, METRES, METRES], ("depth",))
     both = xr.concat([dataset, dataset], dim="depth")
