@@ -93,6 +93,18 @@ class Recording(Section):
         description="Character between the fields of a table; recognised when not given.",
         examples=[";"],
     )
+    up: Literal["auto", "x", "y", "z", "-x", "-y", "-z"] = Field(
+        default="auto",
+        description='Axis of a file in space that points up; "auto" uses that of its format.',
+    )
+    topic: str | None = Field(
+        default=None, description="Topic of a ROS bag.", examples=["/block/pose"]
+    )
+    header_line: Annotated[int | None, Quantity("1", ge=1, le=10_000, whole=True)] = Field(
+        default=None,
+        description="Line of a table, from 1, that names its columns, if it is not the first.",
+        examples=[7],
+    )
     x_file: str | None = Field(
         default=None,
         description="File of the x matrix, if each coordinate has its own file.",
@@ -106,18 +118,6 @@ class Recording(Section):
     )
     keypoint: str | None = Field(
         default=None, description="Keypoint of a pose file that is the body.", examples=["centre"]
-    )
-    up: Literal["auto", "x", "y", "z", "-x", "-y", "-z"] = Field(
-        default="auto",
-        description='Axis of a file in space that points up; "auto" uses that of its format.',
-    )
-    topic: str | None = Field(
-        default=None, description="Topic of a ROS bag.", examples=["/block/pose"]
-    )
-    header_line: Annotated[int | None, Quantity("1", ge=1, le=10_000, whole=True)] = Field(
-        default=None,
-        description="Line of a table, from 1, that names its columns, if it is not the first.",
-        examples=[7],
     )
     sort: Literal["error", "sort"] = Field(
         default="error", description='Times that go back: "error" refuses them, "sort" sorts them.'
@@ -159,13 +159,13 @@ class Recording(Section):
             "sort": self.sort,
             "columns": self.columns.to_dict() if self.columns is not None else None,
             "delimiter": self.delimiter,
+            "up": self.up if self.up != "auto" else None,
+            "topic": self.topic,
+            "header_line": self.header_line,
             "x": self.x_file,
             "y": self.y_file,
             "theta": self.theta_file,
             "keypoint": self.keypoint,
-            "up": self.up if self.up != "auto" else None,
-            "topic": self.topic,
-            "header_line": self.header_line,
         }
         return {name: value for name, value in named.items() if value is not None}
 

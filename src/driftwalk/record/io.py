@@ -49,13 +49,13 @@ def load(
     sort: str = "error",
     columns: Mapping[str, str] | None = None,
     delimiter: str | None = None,
+    up: str | None = None,
+    topic: str | None = None,
+    header_line: int | None = None,
     x: str | PathLike[str] | None = None,
     y: str | PathLike[str] | None = None,
     theta: str | PathLike[str] | None = None,
     keypoint: str | None = None,
-    up: str | None = None,
-    topic: str | None = None,
-    header_line: int | None = None,
     replicate: int | None = None,
 ) -> xr.Dataset:
     """Load a recording as a `trajectory` dataset in SI units, y up.
@@ -97,10 +97,6 @@ def load(
         column; ``":unit"`` may follow, such as ``{"x": "2:mm"}``.
     delimiter : str, optional
         Character between fields of a plain table, or ``"tab"``, ``"space"``.
-    x, y, theta : path-like, optional
-        One matrix per coordinate: a row per frame, a column per body.
-    keypoint : str, optional
-        Keypoint of a pose file that is the body.
     up : {"x", "y", "z", "-x", "-y", "-z"}, optional
         Axis of a file in space that points up; None: as its format has it. The plane of the water
         is what is seen from its end.
@@ -108,6 +104,10 @@ def load(
         Topic of a ROS bag that holds several, or more than one with commas between them.
     header_line : int, optional
         Line of a plain table, from 1, that names its columns; the data follow it.
+    x, y, theta : path-like, optional
+        One matrix per coordinate: a row per frame, a column per body.
+    keypoint : str, optional
+        Keypoint of a pose file that is the body.
     replicate : int, optional
         Replicate of a simulation, counted from 0; default: the first.
 
@@ -135,6 +135,9 @@ def load(
     options = ReadOptions(
         columns=dict(columns or {}),
         delimiter=DELIMITERS.get(delimiter or "", delimiter),
+        up=up,
+        topic=topic,
+        header_line=header_line,
         frame_rate_hz=frame_rate,
         metres_per_pixel=metres_per_pixel,
         length_unit=length_unit,
@@ -142,9 +145,6 @@ def load(
         y=None if y is None else Path(y),
         theta=None if theta is None else Path(theta),
         keypoint=keypoint,
-        up=up,
-        topic=topic,
-        header_line=header_line,
         replicate=replicate or 0,
     )
     if replicate is not None and kind_of(source) != "simulation":
@@ -152,9 +152,9 @@ def load(
     loader = find_loader(source, format=format or ("matrices" if options.y is not None else None))
     try:
         raw = loader.read(source, options)
-        _refuse_unused(options, raw, loader.name)
         raw.bodies = _select(raw.bodies, body)
         refuse_many_bodies([one.name for one in raw.bodies])
+        _refuse_unused(options, raw, loader.name)
         raw.notes += [*check_clock(raw), *angle_warnings(raw)]
         bodies, attrs = convert_units(raw, options, y_axis=y_axis)
         clean = partial(

@@ -125,6 +125,13 @@ class ReadOptions:
     """Scale of a recording in pixels [m]."""
     length_unit: str | None = None
     """Unit of positions in a file that does not say: ``"m"``, ``"cm"``, ``"mm"``, ``"um"``."""
+    up: str | None = None
+    """Axis of positions in space that points up: ``"x"``, ``"-y"``, ...; None: as the format has
+    it."""
+    topic: str | None = None
+    """Topic of a ROS bag, or several with commas between them."""
+    header_line: int | None = None
+    """Line of a plain table, from 1, that names its columns; None: the first."""
     x: Path | None = None
     """File of the x matrix (one row a frame, one column a body)."""
     y: Path | None = None
@@ -133,12 +140,5 @@ class ReadOptions:
     """File of the orientation matrix."""
     keypoint: str | None = None
     """Keypoint of a pose file that is the body."""
-    up: str | None = None
-    """Axis of positions in space that points up: ``"x"``, ``"-y"``, ...; None: as the format has
-    it."""
-    topic: str | None = None
-    """Topic of a ROS bag, or several with commas between them."""
-    header_line: int | None = None
-    """Line of a plain table, from 1, that names its columns; None: the first."""
     replicate: int = 0
     """Replicate of a simulation, counted from 0."""

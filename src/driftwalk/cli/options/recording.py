@@ -100,14 +100,6 @@ class RecordingOptions:
         str | None,
         _option("--delimiter", "Character between fields, or tab or space (default: recognised)."),
     ] = None
-    x: Annotated[
-        Path | None, _option("--x", "Matrix of x: a row per frame, a column per body.")
-    ] = None
-    y: Annotated[Path | None, _option("--y", "Matrix of y.", metavar="FILE")] = None
-    theta: Annotated[Path | None, _option("--theta", "Matrix of angles.", metavar="FILE")] = None
-    keypoint: Annotated[
-        str | None, _option("--keypoint", "Keypoint of a pose file that is the body.")
-    ] = None
     up: Annotated[
         str | None,
         _option(
@@ -129,6 +121,14 @@ class RecordingOptions:
             rich_help_panel=PANEL,
             show_default=False,
         ),
+    ] = None
+    x: Annotated[
+        Path | None, _option("--x", "Matrix of x: a row per frame, a column per body.")
+    ] = None
+    y: Annotated[Path | None, _option("--y", "Matrix of y.", metavar="FILE")] = None
+    theta: Annotated[Path | None, _option("--theta", "Matrix of angles.", metavar="FILE")] = None
+    keypoint: Annotated[
+        str | None, _option("--keypoint", "Keypoint of a pose file that is the body.")
     ] = None
     replicate: Annotated[
         int | None,
