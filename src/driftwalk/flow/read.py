@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 FASTEST_M_S: Final = 1e4
-"""A few times the speed of sound in water: a wrong unit, or a number that stands for none."""
+"""A few times the speed of sound in water: a wrong unit, or a number that means none."""
 
 
 def load_flow(

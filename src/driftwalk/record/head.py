@@ -91,18 +91,6 @@ def read_header(
     return [""] * len(fields), separator, at, False
 
 
-def _header_at(path: Path, number: int, delimiter: str | None) -> tuple[list[str], str, int, bool]:
-    """Return what `read_header` does, with the header in a line that the user names."""
-    lines = head_lines(path, number + 1)
-    if len(lines) <= number or not lines[number].strip():
-        raise FormatError(f"has no rows of data below line {number}, its header", path=path)
-    separator = delimiter or detect_delimiter(lines[number - 1 :])
-    names, data = (split_fields(line.lstrip("# "), separator) for line in lines[number - 1 :])
-    # A delimiter at the end of a line leaves a field without a name, in the header or in the data.
-    names += [""] * (len(data) - len(names))
-    return (_without_trailing(names) if len(data) < len(names) else names), separator, number, True
-
-
 def _strict(line: bytes, path: Path, number: int) -> str:
     try:
         return line.decode("utf-8").rstrip("\r")
@@ -118,3 +106,15 @@ def _strict(line: bytes, path: Path, number: int) -> str:
 def _without_trailing(fields: list[str]) -> list[str]:
     """Drop one empty field that a delimiter at the end of a line leaves."""
     return fields[:-1] if len(fields) > 1 and not fields[-1] else fields
+
+
+def _header_at(path: Path, number: int, delimiter: str | None) -> tuple[list[str], str, int, bool]:
+    """Return what `read_header` does, with the header in a line that the user names."""
+    lines = head_lines(path, number + 1)
+    if len(lines) <= number or not lines[number].strip():
+        raise FormatError(f"has no rows of data below line {number}, its header", path=path)
+    separator = delimiter or detect_delimiter(lines[number - 1 :])
+    names, data = (split_fields(line.lstrip("# "), separator) for line in lines[number - 1 :])
+    # A delimiter at the end of a line leaves a field without a name, in the header or in the data.
+    names += [""] * (len(data) - len(names))
+    return (_without_trailing(names) if len(data) < len(names) else names), separator, number, True

@@ -183,16 +183,6 @@ def load(
         raise InputError(f"{source}: {error}") from error
 
 
-def _refuse_unused(options: ReadOptions, raw: RawRecording, format: str) -> None:
-    """Refuse what says something about a file that this file has not."""
-    if options.up is not None and not raw.plane:
-        raise InputError("the positions have two axes: leave `up` out")
-    if options.topic is not None and format != "ros":
-        raise InputError("the file is no ROS bag: leave `topic` out")
-    if options.header_line is not None and format != "csv":
-        raise InputError(f"`header_line` is for plain tables, and this is '{format}': leave it out")
-
-
 def _of_file(error: FormatError, path: Path) -> FormatError:
     """Return the error with the file that it is about, which not all that raise it know."""
     return error if error.path is not None else FormatError(error.reason, path=path)
@@ -209,6 +199,16 @@ def readable_formats() -> dict[str, str]:
     from driftwalk.record.registry import loaders
 
     return {name: loader.description for name, loader in loaders().items()}
+
+
+def _refuse_unused(options: ReadOptions, raw: RawRecording, format: str) -> None:
+    """Refuse what says something about a file that this file has not."""
+    if options.up is not None and not raw.plane:
+        raise InputError("the positions have two axes: leave `up` out")
+    if options.topic is not None and format != "ros":
+        raise InputError("the file is no ROS bag: leave `topic` out")
+    if options.header_line is not None and format != "csv":
+        raise InputError(f"`header_line` is for plain tables, and this is '{format}': leave it out")
 
 
 def _side(block: float | str) -> float:

@@ -89,7 +89,11 @@ def _opened(path: Path) -> Iterator[Any]:
     except Exception as error:
         # On a damaged bag the library fails with whatever the damage leads it to.
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise FormatError(f"cannot be read as a ROS bag: {reason}", path=path) from error
+        raise FormatError(
+            f"cannot be read as a ROS bag: {reason.rstrip('.')}; if it was cut off, mend it first "
+            "(ros2 bag reindex, mcap recover)",
+            path=path,
+        ) from error
 
 
 def _choose(connections: list[Any], topic: str | None, path: Path) -> list[Any]:
