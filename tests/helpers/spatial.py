@@ -37,3 +37,13 @@ def in_space(up: str, x: Any, y: Any, angle: Any) -> tuple[Any, Rotation]:
 def wrapped(angle: Any) -> Any:
     """Return angles from -pi to pi."""
     return (np.asarray(angle) + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def assert_spin(
+    track: Any, *, shift: float = 0.0, digits: float = 1e-9, turn: float = 1e-8
+) -> None:
+    """Compare a track, but for its times, with `spin` moved along x; tolerances in m and rad."""
+    _, x, y, angle = spin()
+    np.testing.assert_allclose(track.x, x + shift, rtol=0, atol=digits)
+    np.testing.assert_allclose(track.y, y, rtol=0, atol=digits)
+    np.testing.assert_allclose(wrapped(track.theta - angle), 0.0, atol=turn)

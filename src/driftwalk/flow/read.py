@@ -180,7 +180,14 @@ def _new_field(
     flag = np.where(known, FLAGS["measured"], FLAGS["filled"])
     if outline is not None:
         at_x, at_y = (part.ravel() for part in grid.nodes())
-        flag[:, (outline.depth(at_x, at_y) < 0.0).reshape(grid.shape)] = FLAGS["outside"]
+        outside = outline.depth(at_x, at_y) < 0.0
+        if outside.all():
+            box = f"x from {x[0]:.4g} to {x[-1]:.4g} m, y from {y[0]:.4g} to {y[-1]:.4g} m"
+            raise InputError(
+                f"no node of the field ({box}) lies in the tank: say with `origin` where the centre of "
+                "the tank is, which driftwalk flow FILE -o flow.nc takes"
+            )
+        flag[:, outside.reshape(grid.shape)] = FLAGS["outside"]
     filled = np.stack([_fill(grid, *frame, outline) for frame in zip(frames, known, strict=True)])
     filled = filled.reshape(velocity.shape)
     facts = {"method": "file", "cell_size_m": grid.cell_size, **attrs}

@@ -441,3 +441,5 @@ def test_the_centre_of_the_tank_becomes_the_origin(tmp_path: Path) -> None:
     np.testing.assert_allclose(field.y, 1e-3 * Y - 0.040, atol=1e-12)
     x, y = np.meshgrid(field.x, field.y)
     np.testing.assert_array_equal(field.flag == FLAGS["outside"], np.hypot(x, y) > 0.025)
+    with pytest.raises(InputError, match=r"x from 0\.016 to 0\.08 m, .*say with `origin` where"):
+        load_flow(insight(tmp_path), arena={"shape": "circle", "diameter_m": 0.02})

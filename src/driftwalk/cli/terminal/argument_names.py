@@ -45,6 +45,7 @@ OPTIONS: Final[dict[str, str | None]] = {
     "metres_per_pixel": "--metres-per-pixel",
     "min_count": "--min-count",
     "noise": None,
+    "origin": "--arena",
     "parameters": "--parameter",
     "port": "--port",
     "rate": "--image-rate",

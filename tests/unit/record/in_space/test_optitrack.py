@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from spatial import in_space, spin, wrapped
+from spatial import assert_spin, in_space, spin
 
 from driftwalk.core.errors import InputError
 from driftwalk.record import load
@@ -70,14 +70,11 @@ def test_rigid_bodies_by_name(tmp_path: Path, newer: bool, unit: str, rotation: 
     dataset = load(take(tmp_path, rotation_type=rotation, unit=unit, newer=newer))
     assert dataset.attrs["format"] == "optitrack"
     assert body_names(dataset) == ["Block A", "Block B"]
-    time, x, y, angle = spin()
     for shift, name in enumerate(body_names(dataset)):
         track = body_track(dataset, name)
-        np.testing.assert_allclose(track.time, time, atol=1e-9)
-        np.testing.assert_allclose(track.x, x + shift, atol=1e-9)
-        np.testing.assert_allclose(track.y, y, atol=1e-9)
+        np.testing.assert_allclose(track.time, spin()[0], atol=1e-9)
         # Printed with nine digits, in degrees at best.
-        np.testing.assert_allclose(wrapped(track.theta - angle), 0.0, atol=1e-7)
+        assert_spin(track, shift=shift)
 
 
 def test_the_real_take(shared_data: Callable[[str], Path]) -> None:

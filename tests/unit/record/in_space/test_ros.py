@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from spatial import in_space, spin, wrapped
+from spatial import assert_spin, in_space, spin, wrapped
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record import load
@@ -121,7 +121,6 @@ def bag(folder: Path, kind: str, *, mcap: bool = False, topic: str = "/block/pos
 @pytest.mark.parametrize("kind", list(MESSAGES))
 def test_every_kind_of_message(tmp_path: Path, kind: str, mcap: bool) -> None:
     dataset = load(bag(tmp_path, kind, mcap=mcap))
-    time, x, y, angle = spin()
     assert dataset.attrs["format"] == "ros"
     assert body_names(dataset) == MESSAGES[kind][1]
     stamped = kind != "geometry_msgs/msg/Pose"
@@ -129,10 +128,8 @@ def test_every_kind_of_message(tmp_path: Path, kind: str, mcap: bool) -> None:
     assert dataset.attrs["time_origin_unix_s"] == pytest.approx(begin / 1e9, abs=1e-6)
     for shift, name in enumerate(body_names(dataset)):
         track = body_track(dataset, name)
-        np.testing.assert_allclose(track.time, time, atol=1e-12)
-        np.testing.assert_allclose(track.x, x + shift, atol=1e-15)
-        np.testing.assert_allclose(track.y, y, atol=1e-15)
-        np.testing.assert_allclose(wrapped(track.theta - angle), 0.0, atol=1e-12)
+        np.testing.assert_allclose(track.time, spin()[0], atol=1e-12)
+        assert_spin(track, shift=shift, digits=1e-15, turn=1e-12)
     notes = json.loads(dataset.attrs["counts"])["warnings"]
     assert [note for note in notes if "no time stamp" in note] == (
         []

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from spatial import in_space, spin, wrapped
+from spatial import assert_spin, in_space, spin
 
 from driftwalk.core.errors import InputError
 from driftwalk.record import load
@@ -50,21 +50,14 @@ def test_tum(tmp_path: Path, comment: str) -> None:
     dataset = load(tum(tmp_path, comment=comment))
     assert dataset.attrs["format"] == "tum"
     track = body_track(dataset)
-    time, x, y, angle = spin()
     assert dataset.attrs["time_origin_unix_s"] == 1305031102.25
-    np.testing.assert_allclose(track.time, time, atol=3e-7)  # a digit of 1.3e9 in float64
-    np.testing.assert_allclose(track.x, x, atol=1e-9)
-    np.testing.assert_allclose(track.y, y, atol=1e-9)
-    np.testing.assert_allclose(wrapped(track.theta - angle), 0.0, atol=1e-8)
+    np.testing.assert_allclose(track.time, spin()[0], atol=3e-7)  # a digit of 1.3e9 in float64
+    assert_spin(track)
 
 
 @pytest.mark.parametrize("up", ["-y", "x"])
 def test_another_axis_of_a_tum_trajectory(tmp_path: Path, up: str) -> None:
-    _, x, y, angle = spin()
-    track = body_track(load(tum(tmp_path, up=up), up=up))
-    np.testing.assert_allclose(track.x, x, atol=1e-9)
-    np.testing.assert_allclose(track.y, y, atol=1e-9)
-    np.testing.assert_allclose(wrapped(track.theta - angle), 0.0, atol=1e-8)
+    assert_spin(body_track(load(tum(tmp_path, up=up), up=up)))
 
 
 def test_eight_numbers_without_a_quaternion_are_a_plain_table(tmp_path: Path) -> None:
@@ -80,11 +73,9 @@ def test_euroc(tmp_path: Path, unit: str) -> None:
     assert dataset.attrs["format"] == "euroc"
     assert dataset.attrs["time_origin_unix_s"] == pytest.approx(ORIGIN / 1e9, abs=1e-6)
     track = body_track(dataset)
-    _, x, y, angle = spin()
-    np.testing.assert_allclose(track.time, 1e-9 * STEP * np.arange(x.size), rtol=0, atol=1e-12)
-    np.testing.assert_allclose(track.x, x, atol=1e-9)
-    np.testing.assert_allclose(track.y, y, atol=1e-9)
-    np.testing.assert_allclose(wrapped(track.theta - angle), 0.0, atol=1e-8)
+    stamps = 1e-9 * STEP * np.arange(track.time.size)
+    np.testing.assert_allclose(track.time, stamps, rtol=0, atol=1e-12)
+    assert_spin(track)
 
 
 def test_euroc_positions_alone(tmp_path: Path) -> None:

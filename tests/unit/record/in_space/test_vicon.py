@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from spatial import in_space, spin, wrapped
+from spatial import assert_spin, in_space, spin
 
 from driftwalk.core.errors import InputError
 from driftwalk.record import load
@@ -56,13 +56,10 @@ def test_objects_by_name(tmp_path: Path, unit: str, quaternion: bool, section: s
     dataset = load(capture(tmp_path, unit=unit, quaternion=quaternion, section=section))
     assert dataset.attrs["format"] == "vicon"
     assert body_names(dataset) == ["Block", "Boat:Hull"]
-    time, x, y, angle = spin()
     for shift, name in enumerate(body_names(dataset)):
         track = body_track(dataset, name)
-        np.testing.assert_allclose(track.time, time + 0.1, atol=1e-12)
-        np.testing.assert_allclose(track.x, x + shift, atol=1e-11)
-        np.testing.assert_allclose(track.y, y, atol=1e-11)
-        np.testing.assert_allclose(wrapped(track.theta - angle), 0.0, atol=1e-8)
+        np.testing.assert_allclose(track.time, spin()[0] + 0.1, atol=1e-12)
+        assert_spin(track, shift=shift, digits=1e-11)
 
 
 def test_the_real_capture(shared_data: Callable[[str], Path]) -> None:
