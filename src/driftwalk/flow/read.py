@@ -184,8 +184,8 @@ def _new_field(
         if outside.all():
             box = f"x from {x[0]:.4g} to {x[-1]:.4g} m, y from {y[0]:.4g} to {y[-1]:.4g} m"
             raise InputError(
-                f"no node of the field ({box}) lies in the tank: say with `origin` where the centre of "
-                "the tank is, which driftwalk flow FILE -o flow.nc takes"
+                f"no node of the field ({box}) lies in the tank: say with `origin` where the "
+                "centre of the tank is, which driftwalk flow FILE -o flow.nc takes"
             )
         flag[:, outside.reshape(grid.shape)] = FLAGS["outside"]
     filled = np.stack([_fill(grid, *frame, outline) for frame in zip(frames, known, strict=True)])
