@@ -119,6 +119,19 @@ class Recording(Section):
     keypoint: str | None = Field(
         default=None, description="Keypoint of a pose file that is the body.", examples=["centre"]
     )
+    heading: tuple[str, str] | None = Field(
+        default=None,
+        description=(
+            "Two keypoints of a pose file, or two bodies that are markers of one: the orientation "
+            "is the angle from the first to the second."
+        ),
+        examples=['["tail", "nose"]'],
+    )
+    min_confidence: Annotated[float | None, Quantity("1", ge=0)] = Field(
+        default=None,
+        description="Keypoints seen with less confidence are missing; unset: usual for the format.",
+        examples=[0.6],
+    )
     sort: Literal["error", "sort"] = Field(
         default="error", description='Times that go back: "error" refuses them, "sort" sorts them.'
     )
@@ -166,6 +179,8 @@ class Recording(Section):
             "y": self.y_file,
             "theta": self.theta_file,
             "keypoint": self.keypoint,
+            "heading": self.heading,
+            "min_confidence": self.min_confidence,
         }
         return {name: value for name, value in named.items() if value is not None}
 

@@ -21,6 +21,8 @@ from driftwalk.record.clean import Counts, clean_body
 from driftwalk.record.clock import check_clock
 from driftwalk.record.convert_units import convert_units
 from driftwalk.record.extent import refuse_many_bodies, refuse_sparse
+from driftwalk.record.pose.markers import join_markers
+from driftwalk.record.pose.options import two_names
 from driftwalk.record.raw import DELIMITERS, Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.registry import find_loader
 from driftwalk.record.text import DAMAGED_GZIP
@@ -56,6 +58,8 @@ def load(
     y: str | PathLike[str] | None = None,
     theta: str | PathLike[str] | None = None,
     keypoint: str | None = None,
+    heading: Sequence[str] | None = None,
+    min_confidence: float | None = None,
     replicate: int | None = None,
 ) -> xr.Dataset:
     """Load a recording as a `trajectory` dataset in SI units, y up.
@@ -108,6 +112,12 @@ def load(
         One matrix per coordinate: a row per frame, a column per body.
     keypoint : str, optional
         Keypoint of a pose file that is the body.
+    heading : sequence of str, optional
+        Two keypoints of a pose file, or two bodies that are markers of one: the orientation is the
+        angle from the first to the second, and the body of markers their middle, or `keypoint`.
+    min_confidence : float, optional
+        Keypoints of a pose file seen with less confidence are missing, from 0 to 1; None: a value
+        that is usual for the format, and a note says which.
     replicate : int, optional
         Replicate of a simulation, counted from 0; default: the first.
 
@@ -145,6 +155,8 @@ def load(
         y=None if y is None else Path(y),
         theta=None if theta is None else Path(theta),
         keypoint=keypoint,
+        heading=two_names(heading),
+        min_confidence=min_confidence,
         replicate=replicate or 0,
     )
     if replicate is not None and kind_of(source) != "simulation":
@@ -152,6 +164,7 @@ def load(
     loader = find_loader(source, format=format or ("matrices" if options.y is not None else None))
     try:
         raw = loader.read(source, options)
+        join_markers(raw, options)
         raw.bodies = _select(raw.bodies, body)
         refuse_many_bodies([one.name for one in raw.bodies])
         _refuse_unused(options, raw, loader.name)

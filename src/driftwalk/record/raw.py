@@ -102,6 +102,8 @@ class RawRecording:
     """Whether angles are taken as radians though nothing says so."""
     separate: bool = False
     """Whether the format itself keeps bodies apart: rows at one time come of a coarse clock."""
+    has_keypoints: bool = False
+    """Whether the format has keypoints, of which the loader has made the bodies."""
     body_columns: Callable[[bool], list[str]] | None = None
     """Finds the columns that could name the body, see `record.several_bodies`; None: there are no
     columns to choose from."""
@@ -140,5 +142,9 @@ class ReadOptions:
     """File of the orientation matrix."""
     keypoint: str | None = None
     """Keypoint of a pose file that is the body."""
+    heading: tuple[str, str] | None = None
+    """Two keypoints, or markers: the body points from the first to the second."""
+    min_confidence: float | None = None
+    """Keypoints seen with less confidence are missing; None: as usual for the format."""
     replicate: int = 0
     """Replicate of a simulation, counted from 0."""

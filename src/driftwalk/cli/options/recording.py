@@ -130,6 +130,24 @@ class RecordingOptions:
     keypoint: Annotated[
         str | None, _option("--keypoint", "Keypoint of a pose file that is the body.")
     ] = None
+    heading: Annotated[
+        str | None,
+        _option(
+            "--heading",
+            "Two keypoints, or bodies that are markers of one: the angle from one to the other.",
+            metavar="FROM,TO",
+        ),
+    ] = None
+    min_confidence: Annotated[
+        float | None,
+        typer.Option(
+            "--min-confidence",
+            min=0.0,
+            help="Keypoints seen with less confidence are missing (default: that of the format).",
+            rich_help_panel=PANEL,
+            show_default=False,
+        ),
+    ] = None
     replicate: Annotated[
         int | None,
         typer.Option(
@@ -150,6 +168,8 @@ class RecordingOptions:
             given["sort"] = "sort"
         if self.columns:
             given["columns"] = parse_columns(self.columns)
+        if self.heading:
+            given["heading"] = self.heading.split(",")
         if self.arena:
             given["tank"] = given.pop("arena")
         return given

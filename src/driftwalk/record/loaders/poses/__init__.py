@@ -1,0 +1,1 @@
+"""Formats of programs that follow the points of bodies in videos."""

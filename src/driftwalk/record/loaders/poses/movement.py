@@ -1,0 +1,124 @@
+"""NetCDF of the `movement` package: ``position`` over time, space, keypoint and individual.
+
+Dimensions are ``keypoints`` and ``individuals``, or the same in the singular; bounding boxes have
+no keypoints.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from driftwalk.core.errors import FormatError
+from driftwalk.record.pose.keypoints import Confidence, Point, Poses, bodies_of, choose_keypoints
+from driftwalk.record.raw import Array, RawRecording, ReadOptions
+from driftwalk.record.recognise.marks import Marks
+from driftwalk.schema.netcdf import MAGIC, open_netcdf, read_attributes
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SINGLE: Final = "centroid"
+"""Name of the one point of a bounding box."""
+SLEAP: Final = Confidence(0.2, "SLEAP's threshold of peaks")
+USUAL: Final = Confidence(0.6, "movement's threshold")
+
+
+class MovementLoader:
+    """Positions in pixels unless another unit is given; seconds, or frames with a rate."""
+
+    name = "movement"
+    description = "movement NetCDF (position over time, space, keypoints, individuals; pixels)"
+    marks = (Marks("HDF5", ("position", "time", "space", "ds_type", "time_unit")),)
+
+    def sniff(self, head: bytes, path: Path) -> float:
+        """Recognise the attributes that `movement` writes."""
+        attributes = read_attributes(path) if head.startswith(MAGIC) else {}
+        return 0.9 if {"time_unit", "ds_type"} & set(attributes) else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read every individual; of several keypoints one has to be named."""
+        dataset = open_netcdf(path)
+        position = _array(dataset, "position", path)
+        if not {"time", "space"} <= set(position.dims):
+            raise FormatError("has no variable 'position' over time and space", path=path)
+        space = [str(axis) for axis in position["space"].values]
+        if not {"x", "y"} <= set(space):
+            raise FormatError(f"the dimension 'space' has {space}, expected x and y", path=path)
+        position = _in_order(position, "space")
+        confidence = (
+            _in_order(_array(dataset, "confidence", path)) if "confidence" in dataset else None
+        )
+        if confidence is not None and confidence.shape != (position.shape[0], *position.shape[2:]):
+            raise FormatError("'confidence' has another shape than 'position'", path=path)
+
+        def read_point(place: tuple[int, int]) -> Point:
+            point = position.values[:, :, *place].astype(np.float64)
+            known = None if confidence is None else confidence.values[:, *place].astype(np.float64)
+            x, y = (np.ascontiguousarray(point[:, space.index(axis)]) for axis in ("x", "y"))
+            return x, y, known
+
+        keypoints, individuals = (_names(position, name) for name in ("keypoint", "individual"))
+        places = {
+            individual: {keypoint: (at, of) for at, keypoint in enumerate(keypoints)}
+            for of, individual in enumerate(individuals)
+        }
+        time, unit = _clock(dataset, path)
+        sleap = str(dataset.attrs.get("source_software")) == "SLEAP"
+        chosen = choose_keypoints(keypoints, options)
+        bodies, notes = bodies_of(
+            Poses(places, read_point), chosen, time, options, usual=SLEAP if sleap else USUAL
+        )
+        rate = dataset.attrs.get("fps")
+        return RawRecording(
+            bodies,
+            clock_unit=unit,
+            length_unit=options.length_unit or "px",
+            frame_rate_hz=float(rate) if rate is not None and unit == "frame" else None,
+            has_keypoints=True,
+            rows=time.size,
+            notes=notes,
+        )
+
+
+def _array(dataset: xr.Dataset, name: str, path: Path) -> xr.DataArray:
+    if name not in dataset:
+        raise FormatError(f"has no variable '{name}' over time and space", path=path)
+    if dataset[name].dtype.kind not in "fiu":
+        raise FormatError(f"'{name}' holds no numbers", path=path)
+    return dataset[name]
+
+
+def _in_order(values: xr.DataArray, *further: str) -> xr.DataArray:
+    """Return an array over time, further dimensions, keypoint and individual.
+
+    A dimension that is missing has the length one. Dimensions have the singular, or the plural, for a name.
+    """
+    values = values.rename(
+        {dim: str(dim)[:-1] for dim in values.dims if dim in ("keypoints", "individuals")}
+    )
+    missing = {
+        name: [only]
+        for name, only in (("keypoint", SINGLE), ("individual", "0"))
+        if name not in values.dims
+    }
+    return values.expand_dims(missing).transpose("time", *further, "keypoint", "individual")
+
+
+def _names(values: xr.DataArray, dimension: str) -> list[str]:
+    if dimension in values.coords:
+        return [str(name) for name in values[dimension].values]
+    return [str(index) for index in range(values.sizes[dimension])]
+
+
+def _clock(dataset: xr.Dataset, path: Path) -> tuple[Array, str]:
+    """Return the time stamps and their unit."""
+    if "time" not in dataset.coords:
+        return np.arange(dataset.sizes["time"], dtype=np.float64), "frame"
+    unit = "s" if str(dataset.attrs.get("time_unit", "")).startswith("s") else "frame"
+    return np.asarray(_array(dataset, "time", path).values, dtype=np.float64), unit
+
+
+LOADER = MovementLoader()

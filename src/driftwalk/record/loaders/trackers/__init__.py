@@ -1,0 +1,1 @@
+"""Formats of programs that follow bodies in videos."""

@@ -1,0 +1,174 @@
+"""Keypoints of a pose file to bodies: which point is the body, which two say where it points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from driftwalk.core.errors import InputError
+from driftwalk.record.pose.heading import angle_between
+from driftwalk.record.raw import Array, RawBody, ReadOptions
+
+Place = TypeVar("Place")
+"""Where a file holds a keypoint: its columns, or its indices."""
+
+Point = tuple[Array, Array, "Array | None"]
+"""x, y and confidence of a keypoint, shape (n,) each; None: the file holds no confidence."""
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """Keypoints that make the pose of a body."""
+
+    position: str
+    """Keypoint that is the body."""
+    heading: tuple[str, str] | None = None
+    """Keypoints from the first of which to the second the body points."""
+
+    def names(self) -> list[str]:
+        """Return the keypoints that have to be read."""
+        return list(dict.fromkeys((self.position, *(self.heading or ()))))
+
+
+@dataclass(frozen=True)
+class Confidence:
+    """Least confidence of a keypoint in a format, unless the user states another one."""
+
+    least: float
+    """Below it a position is missing."""
+    reason: str
+    """Where that number comes from."""
+
+
+@dataclass
+class Poses(Generic[Place]):
+    """Keypoints of every individual, read one by one."""
+
+    individuals: Mapping[str, Mapping[str, Place]]
+    """Individual to keypoint to its place in the file."""
+    read: Callable[[Place], Point]
+    """Returns a keypoint; arrays that nobody else holds."""
+    dropped: int = field(default=0, init=False)
+    seen: int = field(default=0, init=False)
+    confident: bool = field(default=False, init=False)
+
+
+def choose_keypoints(names: Sequence[str], options: ReadOptions) -> Chosen:
+    """Return the keypoints that the user named, or the only one.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Keypoints of the file.
+    options : ReadOptions
+        Its `keypoint` and `heading`.
+
+    Raises
+    ------
+    InputError
+        When several could be the body and none is named, or one that is named does not exist.
+    """
+    known = list(dict.fromkeys(names))
+    position = options.keypoint
+    if position is None and len(known) == 1:
+        position = known[0]
+    if position not in known:
+        got = "" if position is None else f" (got '{position}')"
+        raise InputError(f"name the body's keypoint with `keypoint`{got}: {_listed(known)}")
+    unknown = [name for name in options.heading or () if name not in known]
+    if unknown:
+        raise InputError(
+            f"`heading`: there is no keypoint '{unknown[0]}'; there are {_listed(known)}"
+        )
+    return Chosen(position, options.heading)
+
+
+def bodies_of(
+    poses: Poses[Place],
+    chosen: Chosen,
+    clock: Array,
+    options: ReadOptions,
+    *,
+    usual: Confidence,
+) -> tuple[list[RawBody], list[str]]:
+    """Return one body per individual that has the chosen keypoint, and what the user should know.
+
+    Parameters
+    ----------
+    poses : Poses
+        The keypoints.
+    chosen : Chosen
+        Which of them make the pose.
+    clock : array, shape (n,)
+        Times or frame numbers of the rows.
+    options : ReadOptions
+        Its `min_confidence`.
+    usual : Confidence
+        Used where `min_confidence` is not given.
+
+    Raises
+    ------
+    InputError
+        When a least confidence is asked for and the file holds no confidences.
+    """
+    least = usual.least if options.min_confidence is None else options.min_confidence
+    bodies = []
+    for individual, places in poses.individuals.items():
+        if chosen.position not in places:
+            continue
+        points = {
+            name: _confident(poses, places[name], least)
+            for name in chosen.names()
+            if name in places
+        }
+        x, y = points[chosen.position]
+        theta = None
+        if chosen.heading is not None and set(chosen.heading) <= set(points):
+            theta = angle_between(points[chosen.heading[0]], points[chosen.heading[1]])
+        bodies.append(RawBody(individual, clock, x, y, theta))
+    return bodies, _notes(poses, bodies, options, least=least, usual=usual)
+
+
+def _confident(poses: Poses[Place], place: Place, least: float) -> tuple[Array, Array]:
+    """Return the positions of a keypoint, missing where it was not seen with confidence."""
+    x, y, confidence = poses.read(place)
+    seen = np.isfinite(x) & np.isfinite(y)
+    poses.seen += int(seen.sum())
+    if confidence is not None and np.isfinite(confidence).any():
+        poses.confident = True
+        unsure = seen & (confidence < least)  # a confidence that is missing says nothing
+        x[unsure] = y[unsure] = np.nan
+        poses.dropped += int(unsure.sum())
+    return x, y
+
+
+def _notes(
+    poses: Poses[Place],
+    bodies: list[RawBody],
+    options: ReadOptions,
+    *,
+    least: float,
+    usual: Confidence,
+) -> list[str]:
+    notes = []
+    without = [name for name in poses.individuals if name not in {body.name for body in bodies}]
+    if without:
+        notes.append(f"without the keypoint, and left out: {_listed(without)}")
+    if not poses.confident:
+        if options.min_confidence is not None:
+            raise InputError("the file holds no confidences: leave `min_confidence` out")
+        return [*notes, "the file holds no confidences: every position counts as seen"]
+    source = "" if options.min_confidence is not None else f" ({usual.reason})"
+    change = "" if options.min_confidence is not None else "; `min_confidence` changes it"
+    notes.append(
+        f"keypoints seen with a confidence below {least:g}{source} are missing: {poses.dropped} of "
+        f"{poses.seen}{change}"
+    )
+    return notes
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names[:20]) + (", …" if len(names) > 20 else "")

@@ -1,0 +1,244 @@
+"""Keypoints to the pose of a body: which point, which way it points, how sure the tracker was."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.record import load
+from driftwalk.schema import body_names, body_track
+
+FRAMES = {"frame_rate": 10.0, "metres_per_pixel": 0.01}
+PARTS = ("nose", "tail")
+
+
+def warnings_of(dataset: xr.Dataset) -> str:
+    return " | ".join(json.loads(dataset.attrs["counts"])["warnings"])
+
+
+def swimmer(count: int = 6) -> np.ndarray[Any, Any]:
+    """Return x, y, likelihood of nose and tail, shape (frame, individual, part, 3): it turns."""
+    values = np.empty((count, 2, 2, 3))
+    for individual in range(2):
+        angle = 0.3 * np.arange(count) + individual
+        middle = np.stack([100.0 + np.arange(count), 50.0 + 7.0 * np.arange(count)], axis=1)
+        away = 5.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        values[:, individual, 0, :2] = middle + away
+        values[:, individual, 1, :2] = middle - away
+        values[:, individual, :, 2] = 0.99
+    values[2, 0, 0, 2] = 0.3  # the nose of the first is hardly seen in frame 2
+    return values
+
+
+def check_swimmer(dataset: xr.Dataset, names: list[str], *, lost: list[int]) -> None:
+    """Hold a recording of the first keypoint, heading from tail to nose, to its closed form."""
+    assert body_names(dataset) == names
+    values = swimmer()
+    for index, name in enumerate(names):
+        x, y = 0.01 * values[:, index, 0, 0], -0.01 * values[:, index, 0, 1]
+        theta = -(0.3 * np.arange(6) + index)
+        if index == 0:
+            x[lost] = y[lost] = theta[lost] = np.nan
+        np.testing.assert_allclose(dataset["x"].sel(body=name), x, rtol=1e-12)
+        np.testing.assert_allclose(dataset["y"].sel(body=name), y, rtol=1e-12)
+        turned = np.angle(np.exp(1j * (dataset["theta"].sel(body=name).values - theta)))
+        np.testing.assert_allclose(turned, np.where(np.isnan(theta), np.nan, 0.0), atol=1e-12)
+
+
+def movement_file(path: Path, *, plural: str = "s", source: str = "DeepLabCut") -> Path:
+    values = swimmer()
+    dims = ("time", "space", f"keypoint{plural}", f"individual{plural}")
+    position = values[..., :2].transpose(0, 3, 2, 1)
+    xr.Dataset(
+        {
+            "position": (dims, position),
+            "confidence": ((dims[0], *dims[2:]), values[..., 2].transpose(0, 2, 1)),
+        },
+        coords={
+            "time": 0.1 * np.arange(6),
+            "space": ["x", "y"],
+            dims[2]: list(PARTS),
+            dims[3]: ["a", "b"],
+        },
+        attrs={"time_unit": "seconds", "fps": 10.0, "ds_type": "poses", "source_software": source},
+    ).to_netcdf(path, engine="h5netcdf")
+    return path
+
+
+POSE: dict[str, Any] = {"keypoint": "nose", "heading": ("tail", "nose")}
+
+
+@pytest.mark.parametrize("plural", ["", "s"])
+def test_movement_with_confidence_and_heading(tmp_path: Path, plural: str) -> None:
+    path = movement_file(tmp_path / "poses.nc", plural=plural)
+    dataset = load(path, metres_per_pixel=0.01, **POSE)
+    check_swimmer(dataset, ["a", "b"], lost=[2])
+    assert "below 0.6 (movement's threshold) are missing: 1 of 24" in warnings_of(dataset)
+    all_seen = load(path, metres_per_pixel=0.01, min_confidence=0.2, **POSE)
+    check_swimmer(all_seen, ["a", "b"], lost=[])
+    assert "below 0.2 are missing: 0 of 24" in warnings_of(all_seen)
+    sleap = load(movement_file(tmp_path / "s.nc", source="SLEAP"), metres_per_pixel=0.01, **POSE)
+    check_swimmer(sleap, ["a", "b"], lost=[])
+
+
+def test_movement_of_bounding_boxes_and_without_confidence(tmp_path: Path) -> None:
+    path = tmp_path / "boxes.nc"
+    values = np.arange(12.0).reshape(3, 2, 2)
+    xr.Dataset(
+        {"position": (("time", "space", "individuals"), values)},
+        coords={"space": ["x", "y"], "individuals": ["a", "b"]},
+        attrs={"time_unit": "frames", "ds_type": "bboxes"},
+    ).to_netcdf(path, engine="h5netcdf")
+    dataset = load(path, **FRAMES)
+    np.testing.assert_allclose(dataset["x"].values, 0.01 * values[:, 0])
+    assert "holds no confidences" in warnings_of(dataset)
+    with pytest.raises(InputError, match="no confidences: leave `min_confidence` out"):
+        load(path, min_confidence=0.5, **FRAMES)
+
+
+def dlc_columns(individuals: list[str]) -> list[list[str]]:
+    """Return the header rows of DeepLabCut, without their first field."""
+    columns = [
+        ("net", individual, part, coordinate)
+        for individual in individuals
+        for part in PARTS
+        for coordinate in ("x", "y", "likelihood")
+    ]
+    rows = [list(row) for row in zip(*columns, strict=True)]
+    return rows if len(individuals) > 1 else [rows[0], *rows[2:]]
+
+
+def dlc_csv(folder: Path, individuals: list[str]) -> Path:
+    titles = ["scorer", "individuals", "bodyparts", "coords"]
+    rows = dlc_columns(individuals)
+    titles = titles if len(rows) == 4 else [titles[0], *titles[2:]]
+    values = swimmer()[:, : len(individuals)].reshape(6, -1)
+    lines = [",".join([title, *row]) for title, row in zip(titles, rows, strict=True)]
+    lines += [",".join([str(k), *(repr(v) for v in row)]) for k, row in enumerate(values.tolist())]
+    path = folder / "videoDLC_resnet50.csv"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("individuals", [["one"], ["one", "two"]])
+def test_deeplabcut_csv(tmp_path: Path, individuals: list[str]) -> None:
+    path = dlc_csv(tmp_path, individuals)
+    names = individuals if len(individuals) > 1 else ["0"]
+    dataset = load(path, **FRAMES, **POSE)
+    assert dataset.attrs["format"] == "deeplabcut"
+    check_swimmer(dataset, names, lost=[2])
+    assert "below 0.6 (DeepLabCut's pcutoff)" in warnings_of(dataset)
+    check_swimmer(load(path, min_confidence=0, **FRAMES, **POSE), names, lost=[])
+    with pytest.raises(InputError, match="`keypoint`: nose, tail"):
+        load(path, **FRAMES)
+    with pytest.raises(InputError, match="no keypoint 'ear'; there are nose, tail"):
+        load(path, keypoint="nose", heading=("ear", "nose"), **FRAMES)
+    with pytest.raises(InputError, match="give their rate in Hz"):
+        load(path, keypoint="nose", metres_per_pixel=0.01)
+
+
+def dlc_hdf5(path: Path, individuals: list[str]) -> Path:
+    """Write a table as pandas and PyTables lay it out: one compound array, pickled names."""
+    import pickle
+
+    rows = dlc_columns(individuals)
+    names = list(zip(*rows, strict=True))
+    values = swimmer()[:, : len(individuals)].reshape(6, -1)
+    kind = np.dtype([("index", "i8"), ("values_block_0", "f8", (values.shape[1],))])
+    table = np.zeros(6, kind)
+    table["index"], table["values_block_0"] = np.arange(6), values
+    with h5py.File(path, "w") as file:
+        group = file.create_group("df_with_missing")
+        group.attrs["pandas_type"] = np.bytes_("frame_table")
+        stored = group.create_dataset("table", data=table)
+        stored.attrs["values_block_0_kind"] = np.bytes_(pickle.dumps(names, protocol=0))
+    return path
+
+
+def test_deeplabcut_hdf5(tmp_path: Path) -> None:
+    for individuals, names in ((["one"], ["0"]), (["one", "two"], ["one", "two"])):
+        dataset = load(dlc_hdf5(tmp_path / "dlc.h5", individuals), **FRAMES, **POSE)
+        assert dataset.attrs["format"] == "deeplabcut"
+        check_swimmer(dataset, names, lost=[2])
+
+
+def test_deeplabcut_of_a_bodypart_that_one_individual_lacks(tmp_path: Path) -> None:
+    path = dlc_csv(tmp_path, ["one", "two"])
+    text = path.read_text().splitlines()
+    text[2] = "bodyparts," + ",".join(["nose"] * 3 + ["tail"] * 3 + ["ear"] * 3 + ["tail"] * 3)
+    path.write_text("\n".join(text) + "\n")
+    dataset = load(path, **FRAMES, **POSE)
+    assert body_names(dataset) == ["one"]
+    assert "left out: two" in warnings_of(dataset)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("coords,x", "coord,x", "first column of the header is not scorer"),
+        ("coords,x,y", "coords,x,z", "no column of y for bodypart 'nose'"),
+        ("scorer,net,", "scorer,", "different numbers of fields"),
+        ("\n0,", "\nlabeled-data/v/img0.png,", "line 4: the rows are named by images"),
+        ("\n3,", "\nthree,", "line 7, column 1: 'three' in column 'scorer.bodyparts.coords'"),
+    ],
+)
+def test_a_damaged_deeplabcut_table(tmp_path: Path, old: str, new: str, message: str) -> None:
+    path = dlc_csv(tmp_path, ["one"])
+    path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.raises(FormatError, match=message):
+        load(path, **FRAMES, **POSE)
+
+
+def test_a_truncated_deeplabcut_table(tmp_path: Path) -> None:
+    path = dlc_csv(tmp_path, ["one"])
+    path.write_bytes(path.read_bytes()[:-30])
+    with pytest.raises(FormatError, match="line 9: expected 7 fields"):
+        load(path, **FRAMES, **POSE)
+    path.write_bytes(b"\n".join(path.read_bytes().split(b"\n")[:3]) + b"\n")
+    with pytest.raises(FormatError, match="no rows of data"):
+        load(path, **FRAMES, **POSE)
+
+
+def test_two_markers_of_one_robot_make_a_pose(tmp_path: Path) -> None:
+    """Formats without keypoints: bodies are markers."""
+    values = swimmer()[:, 1, :, :2]
+    rows = [f"{k},{n[0]!r},{n[1]!r},{t[0]!r},{t[1]!r}" for k, (n, t) in enumerate(values.tolist())]
+    path = tmp_path / "markers.csv"
+    path.write_text("frame,x_front_px,y_front_px,x_back_px,y_back_px\n" + "\n".join(rows) + "\n")
+    joined = load(path, heading=("back", "front"), **FRAMES)
+    assert body_names(joined) == ["0"]
+    track = body_track(joined)
+    np.testing.assert_allclose(track.x, 0.01 * (100.0 + np.arange(6)), rtol=1e-12)
+    np.testing.assert_allclose(track.y, -0.01 * (50.0 + 7.0 * np.arange(6)), rtol=1e-12)
+    turned = np.angle(np.exp(1j * (track.theta + 0.3 * np.arange(6) + 1.0)))
+    np.testing.assert_allclose(turned, 0.0, atol=1e-12)
+    front = body_track(load(path, heading=("back", "front"), keypoint="front", **FRAMES))
+    np.testing.assert_allclose(front.x, 0.01 * values[:, 0, 0], rtol=1e-12)
+    np.testing.assert_allclose(front.theta, track.theta)
+    for options, message in (
+        ({"heading": ("back", "side")}, "no marker 'side'; there are front, back"),
+        ({"heading": ("back",)}, "`heading` is two points"),
+        ({"heading": ("back", "back")}, "`heading` is two points"),
+        ({"keypoint": "front"}, "no keypoints: leave `keypoint` out"),
+        ({"min_confidence": 0.5}, "no confidences: leave `min_confidence` out"),
+    ):
+        with pytest.raises(InputError, match=message):
+            load(path, **FRAMES, **options)
+
+
+def test_markers_with_clocks_of_their_own(tmp_path: Path) -> None:
+    path = tmp_path / "stacked.csv"
+    path.write_text("frame,x_px,y_px,id\n0,0,0,a\n1,1,0,a\n2,2,0,a\n1,1,4,b\n2,2,4,b\n3,3,4,b\n")
+    joined = body_track(load(path, heading=("a", "b"), **FRAMES))
+    np.testing.assert_allclose(joined.time, [0.1, 0.2])
+    np.testing.assert_allclose(joined.y, [-0.02, -0.02])
+    np.testing.assert_allclose(joined.theta, [-np.pi / 2, -np.pi / 2])
+    first = body_track(load(path, heading=("a", "b"), keypoint="a", **FRAMES))
+    np.testing.assert_allclose(first.theta, [np.nan, -np.pi / 2, -np.pi / 2])
