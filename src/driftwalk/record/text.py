@@ -135,6 +135,32 @@ def read_head(path: Path) -> bytes:
     return head.removeprefix(BOM)
 
 
+def header_rows(path: Path, count: int) -> list[str]:
+    """Return the first lines of a text file, however long, without their ends.
+
+    Raises
+    ------
+    FormatError
+        When one is too long for a text file, or no UTF-8.
+    """
+    rows = []
+    with open_binary(path) as file:
+        for number in range(1, count + 1):
+            try:
+                line = file.readline(LONGEST_LINE + 1)
+            except (OSError, *DAMAGED_GZIP) as error:
+                raise FormatError(f"cannot be read to its end: {error}", path=path) from error
+            refuse_long_line(line, path, number)
+            try:
+                text = line.removeprefix(BOM if number == 1 else b"").decode("utf-8")
+            except UnicodeDecodeError as error:
+                raise FormatError("is not UTF-8 text", path=path, line=number) from error
+            if not text.strip():
+                break
+            rows.append(text.rstrip("\r\n"))
+    return rows
+
+
 def read_table(path: Path, layout: TableLayout, *, blocks: int | None = None) -> Table:
     """Read the numbered and the text columns of a table.
 

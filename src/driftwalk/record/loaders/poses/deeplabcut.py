@@ -1,0 +1,171 @@
+"""DeepLabCut tables, also of Lightning Pose: header rows of scorer, individuals, bodyparts, coords.
+
+CSV, or the same table in HDF5 (``df_with_missing``). Positions in pixels, one row per frame; files
+of several animals have the row of individuals, those of one have not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from driftwalk.core.errors import FormatError
+from driftwalk.record.bad_row import is_number, split_fields
+from driftwalk.record.layout import TableLayout
+from driftwalk.record.pose.keypoints import (
+    Chosen,
+    Confidence,
+    Point,
+    Poses,
+    bodies_of,
+    choose_keypoints,
+)
+from driftwalk.record.raw import Array, RawRecording, ReadOptions
+from driftwalk.record.recognise.marks import Marks
+from driftwalk.record.stores.hdf5 import names_in, opened_hdf5
+from driftwalk.record.stores.pandas_frame import frame_in
+from driftwalk.record.text import header_rows, read_table
+from driftwalk.schema.netcdf import HDF5
+
+KEYS: Final = ("df_with_missing", "tracks")
+"""Names under which DeepLabCut stores its table."""
+LEVELS: Final = {3: (None, 1, 2), 4: (1, 2, 3)}
+"""Rows of individual, bodypart and coordinate, by the number of header rows."""
+USUAL: Final = Confidence(0.6, "DeepLabCut's pcutoff")
+
+Places = dict[str, dict[str, dict[str, int]]]
+"""Individual to bodypart to coordinate to column."""
+
+
+class DeepLabCutLoader:
+    """Bodyparts of every individual; of several one has to be named."""
+
+    name = "deeplabcut"
+    description = "DeepLabCut and Lightning Pose, CSV and HDF5 (scorer, bodyparts, coords; pixels)"
+    marks = (
+        Marks("table", ("scorer", "bodyparts", "coords", "x", "y", "likelihood")),
+        Marks("HDF5", ("df_with_missing",)),
+    )
+
+    def sniff(self, head: bytes, path: Path) -> float:
+        """Recognise the first header row, or the name of the table in HDF5."""
+        if head.startswith(b"scorer,"):
+            return 0.95
+        known = head.startswith(HDF5) and KEYS[0] in names_in(path, head)
+        return 0.95 if known else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read the chosen bodyparts of every individual."""
+        with path.open("rb") as file:
+            is_hdf5 = file.read(len(HDF5)) == HDF5
+        return _read_hdf5(path, options) if is_hdf5 else _read_csv(path, options)
+
+
+def _read_csv(path: Path, options: ReadOptions) -> RawRecording:
+    header = _header(path)
+    places = _places(list(zip(*(row[1:] for row in header), strict=True)), path)
+    chosen = _chosen(places, options)
+    used = {column + 1 for column in _columns(places, chosen)}
+    names = [".".join(part for part in column if part) for column in zip(*header, strict=True)]
+    layout = TableLayout(",", names, len(header), tuple(sorted({0, *used})))
+    table = read_table(path, layout)
+    columns = {column - 1: table.numbers[column] for column in used}
+    return _recording(places, chosen, columns, table.numbers[0], options)
+
+
+def _read_hdf5(path: Path, options: ReadOptions) -> RawRecording:
+    with opened_hdf5(path) as contents:
+        key = next((key for key in KEYS if key in contents.file), KEYS[0])
+        frame = frame_in(contents, key)
+        if any(len(column) not in LEVELS for column in frame.columns):
+            raise FormatError(f"'{key}' has no columns of scorer, bodyparts, coords", path=path)
+        places = _places(frame.columns, path)
+        chosen = _chosen(places, options)
+        columns = {column: frame.numbers(column) for column in _columns(places, chosen)}
+        return _recording(places, chosen, columns, frame.index(), options)
+
+
+def _header(path: Path) -> list[list[str]]:
+    """Return the header rows, equally long."""
+    rows = [split_fields(line, ",") for line in header_rows(path, 4)]
+    count = next((at for at, row in enumerate(rows) if row[0] == "coords"), -1) + 1
+    first = [row[0] for row in rows[:count]]
+    if first not in (
+        ["scorer", "bodyparts", "coords"],
+        ["scorer", "individuals", "bodyparts", "coords"],
+    ):
+        raise FormatError(
+            "the first column of the header is not scorer, (individuals,) bodyparts, coords: is it "
+            "DeepLabCut's?",
+            path=path,
+            line=1,
+        )
+    if any(len(row) != len(rows[0]) for row in rows[:count]):
+        raise FormatError("the header rows have different numbers of fields", path=path, line=count)
+    if len(rows) > count and not is_number(rows[count][0]):
+        raise FormatError(
+            "the rows are named by images, as those of labelled frames are, which are no track: "
+            "give the file of the analysed video",
+            path=path,
+            line=count + 1,
+        )
+    return rows[:count]
+
+
+def _places(columns: Sequence[tuple[str, ...]], path: Path) -> Places:
+    """Return which column holds what; coordinates of other names are left out."""
+    found: Places = {}
+    for at, column in enumerate(columns):
+        of_individual, of_part, of_coordinate = LEVELS[len(column)]
+        individual = "0" if of_individual is None else column[of_individual]
+        if column[of_coordinate] in ("x", "y", "likelihood"):
+            parts = found.setdefault(individual, {})
+            parts.setdefault(column[of_part], {})[column[of_coordinate]] = at
+    for individual, parts in found.items():
+        for part, coordinates in parts.items():
+            missing = {"x", "y"} - set(coordinates)
+            if missing:
+                raise FormatError(
+                    f"no column of {min(missing)} for bodypart '{part}' of individual "
+                    f"'{individual}'",
+                    path=path,
+                )
+    if not found:
+        raise FormatError("no columns of x and y below any bodypart", path=path)
+    return found
+
+
+def _chosen(places: Places, options: ReadOptions) -> Chosen:
+    return choose_keypoints([part for parts in places.values() for part in parts], options)
+
+
+def _columns(places: Places, chosen: Chosen) -> set[int]:
+    return {
+        column
+        for parts in places.values()
+        for part in chosen.names()
+        for column in parts.get(part, {}).values()
+    }
+
+
+def _recording(
+    places: Places,
+    chosen: Chosen,
+    columns: dict[int, Array],
+    frame: Array,
+    options: ReadOptions,
+) -> RawRecording:
+    def read_point(place: Mapping[str, int]) -> Point:
+        likelihood = columns[place["likelihood"]] if "likelihood" in place else None
+        return columns[place["x"]], columns[place["y"]], likelihood
+
+    bodies, notes = bodies_of(Poses(places, read_point), chosen, frame, options, usual=USUAL)
+    return RawRecording(
+        bodies, length_unit="px", has_keypoints=True, rows=int(np.size(frame)), notes=notes
+    )
+
+
+LOADER = DeepLabCutLoader()

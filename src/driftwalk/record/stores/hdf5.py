@@ -1,0 +1,120 @@
+"""HDF5 files that are no NetCDF: what is in them, and arrays no larger than the file can hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.record.raw import Array
+from driftwalk.schema.netcdf import HDF5, refuse_huge
+
+if TYPE_CHECKING:
+    import h5py
+
+
+class Hdf5Contents:
+    """An open HDF5 file, whose arrays are read within what its size allows."""
+
+    def __init__(self, file: h5py.File, path: Path) -> None:
+        self.file = file
+        self.path = path
+        self._declared = 0
+
+    def array(self, name: str) -> npt.NDArray[Any]:
+        """Return the values of an array.
+
+        Raises
+        ------
+        FormatError
+            When there is none of that name, or it declares more than the file can hold.
+        """
+        import h5py
+
+        entry = self.file.get(name)
+        if not isinstance(entry, h5py.Dataset) or entry.shape is None:
+            raise FormatError(f"has no array '{name}'", path=self.path)
+        # A file may hold many arrays that each declare a little too much.
+        self._declared += entry.size * max(entry.dtype.itemsize, 8)
+        refuse_huge(self._declared, self.path)
+        return np.asarray(entry[()])
+
+    def numbers(self, name: str) -> Array:
+        """Return the values of an array of numbers as float64, which nobody else holds.
+
+        Raises
+        ------
+        FormatError
+            As `array`, and when it holds no numbers.
+        """
+        values = self.array(name)
+        if values.dtype.kind not in "fiub":
+            raise FormatError(f"'{name}' holds no numbers", path=self.path)
+        return np.array(values, dtype=np.float64)
+
+    def texts(self, name: str) -> list[str]:
+        """Return the values of a one-dimensional array of texts.
+
+        Raises
+        ------
+        FormatError
+            As `array`.
+        """
+        return [text_of(value) for value in self.array(name).ravel().tolist()]
+
+
+def text_of(value: Any) -> str:
+    """Return a text of HDF5, which may be stored as bytes.
+
+    Examples
+    --------
+    >>> text_of(b"head")
+    'head'
+    """
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
+
+@contextmanager
+def opened_hdf5(path: Path) -> Iterator[Hdf5Contents]:
+    """Open an HDF5 file; what goes wrong with it inside becomes a `FormatError`.
+
+    Raises
+    ------
+    FormatError
+        When it is none, or is damaged.
+    """
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            yield Hdf5Contents(file, path)
+    except InputError:
+        raise
+    except Exception as error:
+        # On a damaged file the library fails with whatever the damage leads it to.
+        reason = (str(error) or type(error).__name__).splitlines()[0]
+        raise FormatError(f"cannot be read as HDF5: {reason}", path=path) from error
+
+
+def names_in(path: Path, head: bytes) -> set[str]:
+    """Return the names of what lies at the top of an HDF5 file; {} when it is none or damaged.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    head : bytes
+        Its start.
+    """
+    if not head.startswith(HDF5):
+        return set()
+    try:
+        with opened_hdf5(path) as contents:
+            return set(map(str, contents.file)) | set(map(str, contents.file.attrs))
+    except FormatError:
+        return set()
