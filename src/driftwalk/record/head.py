@@ -8,7 +8,7 @@ from pathlib import Path
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.layout import MISSING
-from driftwalk.record.text import read_head
+from driftwalk.record.text import header_rows, read_head
 
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 """Bytes that no text file holds."""
@@ -89,6 +89,17 @@ def read_header(
         if len(commented) == len(fields) > 1:
             return commented, separator, at, True
     return [""] * len(fields), separator, at, False
+
+
+def first_row(path: Path, delimiter: str = ",") -> list[str]:
+    """Return the fields of the first line of a table, however long, [] where there is none.
+
+    Raises
+    ------
+    FormatError
+        When it is no text.
+    """
+    return split_fields(next(iter(header_rows(path, 1)), ""), delimiter)
 
 
 def _strict(line: bytes, path: Path, number: int) -> str:

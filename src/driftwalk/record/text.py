@@ -155,7 +155,7 @@ def header_rows(path: Path, count: int) -> list[str]:
                 text = line.removeprefix(BOM if number == 1 else b"").decode("utf-8")
             except UnicodeDecodeError as error:
                 raise FormatError("is not UTF-8 text", path=path, line=number) from error
-            if not text.strip():
+            if not line:
                 break
             rows.append(text.rstrip("\r\n"))
     return rows

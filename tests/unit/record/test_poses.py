@@ -206,6 +206,107 @@ def test_a_truncated_deeplabcut_table(tmp_path: Path) -> None:
         load(path, **FRAMES, **POSE)
 
 
+ORDER = ("track", "xy", "node", "frame")
+
+
+def sleap_hdf5(path: Path, *, dims: tuple[str, ...] | None = None, scores: bool = True) -> Path:
+    """Write an analysis file: as SLEAP lays it out, or in an order that attributes state."""
+    values = swimmer().transpose(1, 3, 2, 0)  # track, xy and score, node, frame
+    with h5py.File(path, "w") as file:
+        order = dims or ORDER
+        tracks = values[:, :2].transpose([ORDER.index(one) for one in order])
+        file.create_dataset("tracks", data=tracks, compression="gzip")
+        if scores:
+            of_scores = [one for one in order if one != "xy"]
+            known = values[:, 2].transpose([("track", "node", "frame").index(o) for o in of_scores])
+            file["point_scores"] = known
+        if dims is not None:
+            file["tracks"].attrs["dims"] = json.dumps(dims)
+            file["point_scores"].attrs["dims"] = json.dumps(of_scores)
+        file["node_names"] = np.array(PARTS, "S")
+        file["track_names"] = np.array(["a", "b"], "S")
+    return path
+
+
+@pytest.mark.parametrize("dims", [None, ORDER, ("frame", "track", "node", "xy")])
+def test_sleap_hdf5(tmp_path: Path, dims: tuple[str, ...] | None) -> None:
+    path = sleap_hdf5(tmp_path / "a.analysis.h5", dims=dims)
+    dataset = load(path, min_confidence=0.5, **FRAMES, **POSE)
+    assert dataset.attrs["format"] == "sleap"
+    check_swimmer(dataset, ["a", "b"], lost=[2])
+    usual = load(path, **FRAMES, **POSE)
+    check_swimmer(usual, ["a", "b"], lost=[])
+    assert "below 0.2 (SLEAP's threshold of peaks) are missing: 0 of 24" in warnings_of(usual)
+
+
+def test_sleap_hdf5_without_scores_or_names(tmp_path: Path) -> None:
+    path = sleap_hdf5(tmp_path / "a.h5", scores=False)
+    with h5py.File(path, "a") as file:
+        del file["track_names"]
+        file["track_names"] = np.zeros(0)
+    dataset = load(path, **FRAMES, **POSE)
+    check_swimmer(dataset, ["0", "1"], lost=[])
+    assert "holds no confidences" in warnings_of(dataset)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "message"),
+    [
+        ("node_names", np.array([b"nose"]), "expected track, xy, node, frame with 1 nodes"),
+        ("tracks", np.zeros((2, 2, 2)), "no numbers over track, xy, node, frame"),
+        ("tracks", np.zeros((2, 2, 2, 6), "S3"), "no numbers over track, xy, node, frame"),
+        ("point_scores", np.zeros((2, 2, 5)), "'point_scores' has another shape"),
+    ],
+)
+def test_a_damaged_sleap_file(
+    tmp_path: Path, name: str, values: np.ndarray[Any, Any], message: str
+) -> None:
+    path = sleap_hdf5(tmp_path / "a.h5")
+    with h5py.File(path, "a") as file:
+        del file[name]
+        file[name] = values
+    with pytest.raises(FormatError, match=message):
+        load(path, **FRAMES, **{**POSE, "keypoint": "nose", "heading": None})
+
+
+def test_an_array_that_declares_more_than_its_file_holds(tmp_path: Path) -> None:
+    path = sleap_hdf5(tmp_path / "a.h5")
+    with h5py.File(path, "a") as file:
+        del file["tracks"]
+        file.create_dataset("tracks", (2, 2, 2, 10**9), "f8", chunks=(1, 1, 1, 1000))
+    with pytest.raises(FormatError, match="declares 64 GB, which a file of"):
+        load(path, **FRAMES, **POSE)
+
+
+def sleap_csv(path: Path, names: list[str]) -> Path:
+    columns = [f"{part}.{one}" for part in PARTS for one in ("x", "y", "score")]
+    rows = [
+        ",".join([name, str(frame), "0.9", *(repr(v) for v in row.ravel().tolist())])
+        for name, individual in zip(names, swimmer().transpose(1, 0, 2, 3), strict=False)
+        for frame, row in enumerate(individual)
+    ]
+    path.write_text(
+        "\n".join([",".join(["track,frame_idx,instance.score", *columns]), *rows]) + "\n"
+    )
+    return path
+
+
+def test_sleap_csv(tmp_path: Path) -> None:
+    path = sleap_csv(tmp_path / "a.analysis.csv", ["a", "b"])
+    dataset = load(path, min_confidence=0.5, **FRAMES, **POSE)
+    assert dataset.attrs["format"] == "sleap-csv"
+    check_swimmer(dataset, ["a", "b"], lost=[2])
+    one = sleap_csv(tmp_path / "one.csv", [""])
+    check_swimmer(load(one, **FRAMES, **POSE), ["0"], lost=[])
+    untracked = sleap_csv(tmp_path / "two.csv", ["", ""])
+    with pytest.raises(FormatError, match="several instances of one frame have no track"):
+        load(untracked, **FRAMES, **POSE)
+    renamed = tmp_path / "r.csv"
+    renamed.write_text(path.read_text().replace("frame_idx", "frame"))
+    with pytest.raises(FormatError, match=r"no columns frame_idx, NODE\.x"):
+        load(renamed, format="sleap-csv", **FRAMES, **POSE)
+
+
 def test_two_markers_of_one_robot_make_a_pose(tmp_path: Path) -> None:
     """Formats without keypoints: bodies are markers."""
     values = swimmer()[:, 1, :, :2]

@@ -90,8 +90,8 @@ def _read_hdf5(path: Path, options: ReadOptions) -> RawRecording:
 
 def _header(path: Path) -> list[list[str]]:
     """Return the header rows, equally long."""
-    rows = [split_fields(line, ",") for line in header_rows(path, 4)]
-    count = next((at for at, row in enumerate(rows) if row[0] == "coords"), -1) + 1
+    rows = [split_fields(line, ",") or [""] for line in header_rows(path, 5)]
+    count = next((at for at, row in enumerate(rows[:4]) if row[0] == "coords"), -1) + 1
     first = [row[0] for row in rows[:count]]
     if first not in (
         ["scorer", "bodyparts", "coords"],

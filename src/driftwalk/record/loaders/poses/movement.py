@@ -94,7 +94,7 @@ def _array(dataset: xr.Dataset, name: str, path: Path) -> xr.DataArray:
 def _in_order(values: xr.DataArray, *further: str) -> xr.DataArray:
     """Return an array over time, further dimensions, keypoint and individual.
 
-    A dimension that is missing has the length one. Dimensions have the singular, or the plural, for a name.
+    A dimension that is missing has the length one; its name is the singular or the plural.
     """
     values = values.rename(
         {dim: str(dim)[:-1] for dim in values.dims if dim in ("keypoints", "individuals")}
