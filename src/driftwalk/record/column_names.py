@@ -33,6 +33,7 @@ _UNITS: dict[str, str] = {
     **{unit: unit for unit in ("m", "cm", "mm", "um", "km", "s", "ms", "us", "ns", "min", "px")},
     **{"µm": "um", "μm": "um", "µs": "us", "μs": "us", "metres": "m", "meters": "m"},
     **dict.fromkeys(("pix", "pixel", "pixels"), "px"),
+    **dict.fromkeys(("micron", "microns"), "um"),
     **dict.fromkeys(("sec", "secs", "second", "seconds"), "s"),
     **dict.fromkeys(("msec", "milliseconds"), "ms"),
     **dict.fromkeys(("rad", "radian", "radians"), "rad"),

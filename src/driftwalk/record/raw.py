@@ -104,6 +104,8 @@ class RawRecording:
     """Whether the format itself keeps bodies apart: rows at one time come of a coarse clock."""
     has_keypoints: bool = False
     """Whether the format has keypoints, of which the loader has made the bodies."""
+    has_confidence: bool = False
+    """Whether the loader has minded the least confidence."""
     body_columns: Callable[[bool], list[str]] | None = None
     """Finds the columns that could name the body, see `record.several_bodies`; None: there are no
     columns to choose from."""

@@ -49,6 +49,24 @@ def split_bodies(
     ]
 
 
+def number_codes(values: Array) -> tuple[npt.NDArray[np.int32], list[str]]:
+    """Return, for numbers that name bodies, the index of each row's body, and their names.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        Numbers, all of them finite.
+
+    Examples
+    --------
+    >>> number_codes(np.array([7.0, 3.0, 7.0]))[1]
+    ['3', '7']
+    """
+    numbers, codes = np.unique(values, return_inverse=True)
+    names = [str(int(number)) if number % 1 == 0 else f"{number:g}" for number in numbers.tolist()]
+    return codes.ravel().astype(np.int32), names
+
+
 def order_in_frame(frame: npt.ArrayLike) -> npt.NDArray[np.int32]:
     """Return, for rows in the order of their frames, the place of each row within its frame."""
     values = np.asarray(frame)

@@ -1,29 +1,42 @@
-"""ToxTrac text: tab-separated without header ``frame, arena, track, x, y, label``, pixels."""
+"""ToxTrac text: image space without header (pixels), or real space with one (seconds, mm)."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
-from driftwalk.record.head import first_lines, is_numeric_row
+from driftwalk.core.errors import FormatError
+from driftwalk.record.column_names import unit_of_name
+from driftwalk.record.head import first_lines, first_row, is_numeric_row
 from driftwalk.record.layout import TableLayout
 from driftwalk.record.raw import RawRecording, ReadOptions
+from driftwalk.record.recognise.marks import Marks
 from driftwalk.record.stacked import split_bodies
 from driftwalk.record.text import read_table
 
-NAMES = ["frame", "arena", "track", "x", "y", "label"]
+NAMES: Final = ["frame", "arena", "track", "x", "y", "label"]
+REAL_SPACE: Final = ("Time", "Arena", "Track", "Pos. X", "Pos. Y", "Label")
+"""Names of the columns in real space; units follow in brackets."""
+PREDICTED: Final = 0.0
+"""Label of a position that was not seen."""
 
 
 class ToxTracLoader:
     """One row per frame and track; a body is a track, or arena/track where there are arenas."""
 
     name = "toxtrac"
-    description = "ToxTrac text (frame, arena, track, x, y, label; tabs, no header, pixels)"
+    description = "ToxTrac text (frame or time, arena, track, x, y, label; tabs; pixels or mm)"
+    marks = (
+        Marks("table", ("Time (sec)", "Arena", "Track", "Pos. X (mm)", "Pos. Y (mm)", "Label")),
+    )
 
     def sniff(self, head: bytes, _path: Path) -> float:
-        """Recognise six tab-separated numbers of which four are whole."""
+        """Recognise the header of real space, or six numbers of which four are whole."""
         rows = [line.split("\t") for line in first_lines(head)]
+        if rows and _is_real_space(rows[0]):
+            return 0.95
         if not rows or any(len(row) != 6 or not is_numeric_row(row) for row in rows):
             return 0.0
         whole = all(row[index].strip().isdecimal() for row in rows for index in (0, 1, 2, 5))
@@ -31,16 +44,33 @@ class ToxTracLoader:
 
     def read(self, path: Path, _options: ReadOptions) -> RawRecording:
         """Read every track."""
-        table = read_table(path, TableLayout("\t", NAMES, numbers=(0, 1, 2, 3, 4)))
-        frame, arena, track, x, y = (table.numbers[column] for column in range(5))
+        header = first_row(path, "\t")
+        real = _is_real_space(header)
+        layout = TableLayout("\t", header if real else NAMES, int(real), numbers=tuple(range(6)))
+        table = read_table(path, layout)
+        clock, arena, track, x, y, label = (table.numbers[column] for column in range(6))
+        if not (np.isfinite(arena) & np.isfinite(track)).all():
+            raise FormatError("a row names no arena or no track", path=path)
         pairs, codes = np.unique(np.stack([arena, track]), axis=1, return_inverse=True)
         several = np.unique(pairs[0]).size > 1
         labels = [
             f"{place:g}/{number:g}" if several else f"{number:g}"
             for place, number in pairs.T.tolist()
         ]
-        bodies = split_bodies(codes.ravel().astype(np.int32), labels, clock=frame, x=x, y=y)
-        return RawRecording(bodies, length_unit="px", rows=table.rows)
+        bodies = split_bodies(codes.ravel().astype(np.int32), labels, clock=clock, x=x, y=y)
+        predicted = int((label == PREDICTED).sum())
+        return RawRecording(
+            bodies,
+            clock_unit=unit_of_name(header[0]) if real else "frame",
+            length_unit=unit_of_name(header[3]) if real else "px",
+            y_axis="down",
+            rows=table.rows,
+            notes=[f"positions that ToxTrac predicted, not seen: {predicted}"] if predicted else [],
+        )
+
+
+def _is_real_space(row: list[str]) -> bool:
+    return tuple(name.partition("(")[0].strip() for name in row) == REAL_SPACE
 
 
 LOADER = ToxTracLoader()

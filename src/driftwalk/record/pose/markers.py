@@ -27,10 +27,10 @@ def join_markers(raw: RawRecording, options: ReadOptions) -> None:
     InputError
         When a marker does not exist, or a confidence is asked of a format without any.
     """
+    if options.min_confidence is not None and not (raw.has_keypoints or raw.has_confidence):
+        raise InputError("the format holds no confidences: leave `min_confidence` out")
     if raw.has_keypoints:
         return
-    if options.min_confidence is not None:
-        raise InputError("the format holds no confidences: leave `min_confidence` out")
     if options.heading is None:
         if options.keypoint is not None:
             raise InputError("the format has no keypoints: leave `keypoint` out (`body` keeps one)")

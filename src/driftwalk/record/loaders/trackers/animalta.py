@@ -1,0 +1,136 @@
+"""AnimalTA's coordinates: semicolons, pixels, ``Frame;Time`` and the targets.
+
+They stand side by side, ``X_Arena0_Ind0;Y_Arena0_Ind0``, where their number is fixed, and stacked,
+``Arena;Ind;X;Y``, where it varies. A target is named by its arena where there are several.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from driftwalk.core.errors import FormatError
+from driftwalk.record.head import first_lines, read_header
+from driftwalk.record.layout import TableLayout
+from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
+from driftwalk.record.recognise.marks import Marks
+from driftwalk.record.stacked import split_bodies
+from driftwalk.record.text import read_table
+
+STACKED: Final = ("Frame", "Time", "Arena", "Ind", "X", "Y")
+HALF_DIGIT_S: Final = 0.0051
+"""Times are rounded to 0.01 s."""
+_X: Final = re.compile(r"X_Arena(\d+)_(.+)")
+
+
+class AnimalTALoader:
+    """Pixels; the frame rate comes of frames and times, which are rounded."""
+
+    name = "animalta"
+    description = "AnimalTA coordinates (Frame;Time;X_Arena0_Ind0;... or Frame;Time;Arena;Ind;X;Y)"
+    marks = (
+        Marks("table", ("Frame", "Time", "X_Arena0_Ind0", "Y_Arena0_Ind0")),
+        Marks("table", STACKED),
+    )
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the header."""
+        lines = first_lines(head, 1)
+        names = lines[0].split(";") if lines else []
+        known = names[:2] == ["Frame", "Time"] and (
+            tuple(names[:6]) == STACKED or any(_X.fullmatch(name) for name in names[2:])
+        )
+        return 0.95 if known else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read every target."""
+        names, _, skip, _ = read_header(path, delimiter=";")
+        if names[:2] != ["Frame", "Time"]:
+            raise FormatError("the first columns are not Frame and Time", path=path, line=1)
+        stacked = tuple(names[:6]) == STACKED
+        bodies, frame, time = (_stacked if stacked else _side_by_side)(path, names, skip)
+        rate = None if options.frame_rate_hz is not None else _rate(frame, time)
+        timed = rate is None and options.frame_rate_hz is None
+        if timed:
+            bodies = [
+                RawBody(one.name, _times(one.clock, frame, time), one.x, one.y) for one in bodies
+            ]
+        return RawRecording(
+            bodies,
+            clock_unit="s" if timed else "frame",
+            length_unit="px",
+            frame_rate_hz=rate,
+            rows=frame.size,
+        )
+
+
+def _side_by_side(path: Path, names: list[str], skip: int) -> tuple[list[RawBody], Array, Array]:
+    targets = [match for name in names if (match := _X.fullmatch(name))]
+    missing = [one[0] for one in targets if f"Y{one[0][1:]}" not in names]
+    if missing or not targets:
+        raise FormatError(
+            f"no column of y for {missing[0] if missing else 'any target'}", path=path
+        )
+    several = len({one[1] for one in targets}) > 1
+    table = read_table(path, TableLayout(";", names, skip, tuple(range(len(names)))))
+    frame, time = table.numbers[0], table.numbers[1]
+    bodies = [
+        RawBody(
+            f"{one[1]}/{one[2]}" if several else one[2],
+            frame,
+            table.numbers[names.index(one[0])],
+            table.numbers[names.index(f"Y{one[0][1:]}")],
+        )
+        for one in targets
+    ]
+    return bodies, frame, time
+
+
+def _stacked(path: Path, names: list[str], skip: int) -> tuple[list[RawBody], Array, Array]:
+    table = read_table(path, TableLayout(";", names, skip, (0, 1, 4, 5), (2, 3)))
+    arenas, targets = table.labels[2], table.labels[3]
+    pairs = table.codes[2].astype(np.int64) * len(targets) + table.codes[3]
+    found, codes = np.unique(pairs, return_inverse=True)
+    labels = [
+        f"{arenas[pair // len(targets)]}/Ind{targets[pair % len(targets)]}"
+        if len(arenas) > 1
+        else f"Ind{targets[pair % len(targets)]}"
+        for pair in found.tolist()
+    ]
+    frame, time, x, y = (table.numbers[column] for column in (0, 1, 4, 5))
+    bodies = split_bodies(codes.ravel().astype(np.int32), labels, clock=frame, x=x, y=y)
+    return bodies, frame.copy(), time
+
+
+def _rate(frame: Array, time: Array) -> float | None:
+    """Return the rate that agrees with all rounded times, None where there is none.
+
+    The whole number that is nearest is taken where it agrees as well: times are short of digits.
+    """
+    known = np.isfinite(frame) & np.isfinite(time)
+    frame, time = frame[known], time[known]
+    if frame.size < 2 or np.ptp(time) <= 0.0:
+        return None
+    exact = float(np.ptp(frame) / np.ptp(time))
+    if exact * 2 * HALF_DIGIT_S > 0.5 * np.ptp(time):
+        return None  # too short a recording: several whole numbers agree
+    for rate in (float(round(exact)), exact):
+        if (
+            rate > 0.0
+            and (np.abs(time - time[0] - (frame - frame[0]) / rate) < 2 * HALF_DIGIT_S).all()
+        ):
+            return rate
+    return None
+
+
+def _times(clock: Array, frame: Array, time: Array) -> Array:
+    """Return the times of frames."""
+    order = np.argsort(frame, kind="stable")
+    times: Array = time[order][np.searchsorted(frame[order], clock).clip(0, frame.size - 1)]
+    return times
+
+
+LOADER = AnimalTALoader()

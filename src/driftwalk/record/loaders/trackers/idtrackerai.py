@@ -1,0 +1,274 @@
+"""idtracker.ai 4 to 6: a dictionary in ``.npy`` or ``.pickle``, HDF5, or CSV beside its attributes.
+
+Trajectories over frame, individual and (x, y), in pixels, with the frame rate. A pickle is read
+without executing anything in it: see `record.stores.plain_pickle`.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.bounded import MIB, read_bounded
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.json_text import parse_json
+from driftwalk.record.head import first_row
+from driftwalk.record.layout import TableLayout
+from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
+from driftwalk.record.recognise.marks import Marks
+from driftwalk.record.stacked import number_codes, split_bodies
+from driftwalk.record.stores.hdf5 import names_in, opened_hdf5
+from driftwalk.record.stores.plain_pickle import PickledArray, unpickle
+from driftwalk.record.text import read_table
+from driftwalk.schema.netcdf import HDF5
+
+NPY: Final = b"\x93NUMPY"
+TABLE: Final = "trajectories.csv"
+ATTRIBUTES: Final = "attributes.json"
+TIDY: Final = ["frame", "time", "individual", "x", "y", "probability"]
+TIDY_ATTRIBUTES: Final = "attributes_tidy.json"
+PROBABILITIES: Final = "id_probabilities"
+
+
+@dataclass
+class _Session:
+    """What a file of idtracker.ai holds."""
+
+    trajectories: npt.NDArray[Any]
+    """Shape (frame, individual, 2)."""
+    probabilities: Callable[[], npt.NDArray[Any] | None]
+    """Returns the probabilities of the identities, shape (frame, individual) or one more."""
+    attributes: dict[str, Any]
+
+
+class IdTrackerAiLoader:
+    """Every individual, by its label where there is one."""
+
+    name = "idtrackerai"
+    description = "idtracker.ai 4 to 6 (.npy, .pickle, .h5, folder of CSV, tidy CSV; pixels)"
+    marks = (
+        Marks("npy", ("trajectories", "frames_per_second", PROBABILITIES)),
+        Marks("HDF5", ("trajectories", "frames_per_second", PROBABILITIES)),
+        Marks("table", tuple(TIDY)),
+        Marks("folder", (TABLE, ATTRIBUTES)),
+    )
+
+    def sniff(self, head: bytes, path: Path) -> float:
+        """Recognise a dictionary in NumPy's form, the arrays in HDF5, or the files of CSV."""
+        if path.is_dir() or path.name == TABLE:
+            folder = path if path.is_dir() else path.parent
+            return 0.96 if (folder / TABLE).is_file() and (folder / ATTRIBUTES).is_file() else 0.0
+        if head.startswith(NPY):
+            return 0.9 if b"'|O'" in head[:200] and b"trajectories" in head else 0.3
+        if head.startswith(b"\x80"):
+            return 0.9 if b"trajectories" in head else 0.0
+        if head.startswith(HDF5):
+            names = names_in(path, head)
+            known = "trajectories" in names and {"frames_per_second", PROBABILITIES} & names
+            return 0.95 if known else 0.0
+        return 0.95 if head.startswith(",".join(TIDY).encode()) else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read every individual; `min_confidence` asks for the probability of its identity."""
+        if path.is_dir() or path.name == TABLE:
+            return _recording(_of_folder(path if path.is_dir() else path.parent), path, options)
+        with path.open("rb") as file:
+            start = file.read(len(HDF5))
+        if start == HDF5:
+            return _recording(_of_hdf5(path), path, options)
+        if start.startswith((NPY, b"\x80")):
+            return _recording(_of_pickle(path), path, options)
+        return _of_tidy(path, options)
+
+
+def _recording(session: _Session, path: Path, options: ReadOptions) -> RawRecording:
+    values = session.trajectories
+    if values.ndim != 3 or values.shape[2] != 2 or values.dtype.kind not in "fiu":
+        raise FormatError(
+            f"'trajectories' has the shape {values.shape}, expected frames, individuals, 2",
+            path=path,
+        )
+    frame = np.arange(len(values), dtype=np.float64)
+    names = _labels(session.attributes.get("identities_labels"), values.shape[1])
+    bodies = [
+        RawBody(name, frame, *(np.array(values[:, at, axis], dtype=np.float64) for axis in (0, 1)))
+        for at, name in enumerate(names)
+    ]
+    notes = _unit_note(session.attributes)
+    if options.min_confidence is not None:
+        notes.append(_drop_unsure(bodies, session.probabilities(), options.min_confidence))
+    return RawRecording(
+        bodies,
+        length_unit="px",
+        frame_rate_hz=_rate(session.attributes, path),
+        has_confidence=True,
+        rows=frame.size,
+        notes=notes,
+    )
+
+
+def _labels(stated: Any, count: int) -> list[str]:
+    labels = [str(label) for label in stated] if isinstance(stated, list | tuple) else []
+    usable = len(labels) == count and len(set(labels)) == count
+    return labels if usable else [str(at + 1) for at in range(count)]
+
+
+def _unit_note(attributes: dict[str, Any]) -> list[str]:
+    """Say what the file knows of its scale: pixels per a unit that it does not name."""
+    unit = attributes.get("length_unit")
+    if not isinstance(unit, int | float) or not unit > 0:
+        return []
+    return [
+        f"the file states {unit:g} pixels to its user's unit of length, without naming that: if it "
+        f"is 1 cm, `metres_per_pixel` is {0.01 / unit:.6g}"
+    ]
+
+
+def _rate(attributes: dict[str, Any], path: Path) -> float | None:
+    rate = attributes.get("frames_per_second")
+    if rate is None:
+        return None
+    if not isinstance(rate, int | float) or not 0 < rate < 1e9:
+        raise FormatError(f"'frames_per_second' is {str(rate)[:40]}", path=path)
+    return float(rate)
+
+
+def _drop_unsure(
+    bodies: list[RawBody], probabilities: npt.NDArray[Any] | None, least: float
+) -> str:
+    count = bodies[0].clock.size if bodies else 0
+    if probabilities is None or probabilities.size != count * len(bodies):
+        raise InputError("the file holds no confidences: leave `min_confidence` out")
+    dropped = 0
+    for body, known in zip(bodies, probabilities.reshape(count, len(bodies)).T, strict=True):
+        unsure = np.isfinite(body.x) & (known < least)
+        body.x[unsure] = body.y[unsure] = np.nan
+        dropped += int(unsure.sum())
+    return f"positions with a probability of the identity below {least:g} are missing: {dropped}"
+
+
+def _of_pickle(path: Path) -> _Session:
+    content = path.read_bytes()
+    if content.startswith(NPY):
+        content = _behind_header(content, path)
+    found = unpickle(content, where="the file", path=path)
+    if isinstance(found, PickledArray) and len(found.objects()) == 1:
+        found = found.objects()[0]
+    if not isinstance(found, dict) or not isinstance(found.get("trajectories"), PickledArray):
+        held = ", ".join(map(str, list(found)[:8])) if isinstance(found, dict) else "no dictionary"
+        raise FormatError(f"has no 'trajectories' as idtracker.ai's have it, but {held}", path=path)
+
+    def array(name: str) -> npt.NDArray[Any] | None:
+        try:
+            return found[name].values() if isinstance(found.get(name), PickledArray) else None
+        except (ValueError, TypeError, MemoryError) as error:
+            raise FormatError(f"'{name}' is damaged: {error}", path=path) from error
+
+    trajectories = array("trajectories")
+    assert trajectories is not None
+    return _Session(trajectories, lambda: array(PROBABILITIES), found)
+
+
+def _behind_header(content: bytes, path: Path) -> bytes:
+    """Return the pickle of an array of objects in NumPy's file."""
+    file = io.BytesIO(content)
+    try:
+        version = np.lib.format.read_magic(file)
+        read = (
+            np.lib.format.read_array_header_1_0
+            if version == (1, 0)
+            else np.lib.format.read_array_header_2_0
+        )
+        shape, _, kind = read(file)
+    except (ValueError, TypeError, SyntaxError, RecursionError, MemoryError) as error:
+        raise FormatError(f"has a damaged header: {error}", path=path) from error
+    if kind.kind != "O":
+        raise FormatError(
+            f"is an array of {kind} of shape {shape}, and no dictionary of idtracker.ai: save "
+            "columns of time, x and y as CSV",
+            path=path,
+        )
+    return content[file.tell() :]
+
+
+def _of_hdf5(path: Path) -> _Session:
+    with opened_hdf5(path) as contents:
+        trajectories = contents.array("trajectories")
+        attributes = {
+            str(name): value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+            for name, value in contents.file.attrs.items()
+        }
+        known = contents.array(PROBABILITIES) if PROBABILITIES in contents.file else None
+    return _Session(trajectories, lambda: known, attributes)
+
+
+def _of_folder(folder: Path) -> _Session:
+    attributes = _attributes(folder / ATTRIBUTES)
+    path = folder / TABLE
+    columns = _columns(path)
+    places = [name for name in columns if name[:1] in "xy" and name[1:].isdecimal()]
+    count = len(places) // 2
+    expected = [f"{axis}{at}" for at in range(1, count + 1) for axis in "xy"]
+    if places != expected or not count:
+        raise FormatError("no columns x1, y1, x2, y2, ... as idtracker.ai writes them", path=path)
+    trajectories = np.stack([columns[name] for name in places], axis=1).reshape(-1, count, 2)
+
+    def probabilities() -> npt.NDArray[Any] | None:
+        file = folder / f"{PROBABILITIES}.csv"
+        if not file.is_file():
+            return None
+        return np.stack([one for name, one in _columns(file).items() if name != "time"], axis=1)
+
+    return _Session(trajectories, probabilities, attributes)
+
+
+def _columns(path: Path) -> dict[str, Array]:
+    names = first_row(path)
+    table = read_table(path, TableLayout(",", names, 1, tuple(range(len(names)))))
+    return {name: table.numbers[at] for at, name in enumerate(names)}
+
+
+def _attributes(path: Path) -> dict[str, Any]:
+    """Return the attributes that idtracker.ai writes beside its tables, {} where it wrote none."""
+    if not path.is_file():
+        return {}
+    attributes = parse_json(read_bounded(path, most=64 * MIB), path=path)
+    return attributes if isinstance(attributes, dict) else {}
+
+
+def _of_tidy(path: Path, options: ReadOptions) -> RawRecording:
+    names = first_row(path)
+    if names != TIDY:
+        raise FormatError(f"the columns are not {','.join(TIDY)}", path=path, line=1)
+    table = read_table(path, TableLayout(",", names, 1, (0, 1, 2, 3, 4, 5)))
+    frame, time, individual, x, y, known = (table.numbers[at] for at in range(6))
+    if not np.isfinite(individual).all():
+        raise FormatError("a row names no individual", path=path)
+    attributes = _attributes(path.with_name(TIDY_ATTRIBUTES))
+    rate = _rate(attributes, path)
+    by_frames = rate is not None or options.frame_rate_hz is not None
+    notes = _unit_note(attributes)
+    if options.min_confidence is not None:
+        rows = RawBody("", frame, x, y)
+        notes.append(_drop_unsure([rows], known[:, None], options.min_confidence))
+    codes, _ = number_codes(individual)
+    count = int(codes.max()) + 1
+    labels = _labels(attributes.get("identities_labels"), count)
+    return RawRecording(
+        split_bodies(codes, labels, clock=frame if by_frames else time, x=x, y=y),
+        clock_unit="frame" if by_frames else "s",
+        length_unit="px",
+        frame_rate_hz=rate,
+        has_confidence=True,
+        rows=table.rows,
+        notes=notes,
+    )
+
+
+LOADER = IdTrackerAiLoader()

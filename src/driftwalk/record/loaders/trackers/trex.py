@@ -1,0 +1,243 @@
+"""TRex: one file of arrays, or table, per individual; a folder of them is the recording.
+
+Positions in cm, y down as in the image; a frame in which the individual is lost has infinity.
+Points of a pose are in pixels.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.record.bad_row import split_fields
+from driftwalk.record.column_names import unit_of_name
+from driftwalk.record.head import first_lines, first_row
+from driftwalk.record.layout import TableLayout
+from driftwalk.record.pose.heading import angle_between
+from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
+from driftwalk.record.recognise.marks import Marks
+from driftwalk.record.stores.npz import ZIP, members, opened_npz
+from driftwalk.record.text import read_table
+
+CENTRES: Final = ("wcentroid", "centroid", "pcentroid", "head")
+"""Points that TRex knows of an individual, the first that a file has is the body."""
+POSE: Final = tuple(f"pose{at}" for at in range(100))
+ASSUMED: Final = (
+    "the file does not hold cm_per_pixel, and TRex takes the image to be 30 cm wide where nobody "
+    "set it: check the scale"
+)
+_USED: Final = re.compile(r"frame|time|missing|ANGLE|[XY](#[wp]?centroid)?|pose[XY]\d+")
+_NUMBER: Final = re.compile(r"(.*?)_?(?:fish|id)?(\d+)\.(?:npz|csv)")
+
+
+@dataclass
+class _Individual:
+    """Columns of one individual, read when they are asked for."""
+
+    path: Path
+    names: set[str]
+    column: Callable[[str], Array]
+    """Returns a column by its name, an array that nobody else holds."""
+    length_unit: str
+    cm_per_pixel: float | None = None
+    frame_rate_hz: float | None = None
+    body: RawBody = field(init=False)
+    clock_unit: str = field(init=False)
+
+    def make_body(self, options: ReadOptions) -> None:
+        """Read the columns that make the body."""
+        if "frame" not in self.names:
+            raise FormatError("has no 'frame'", path=self.path)
+        timed = "time" in self.names and options.frame_rate_hz is None
+        self.clock_unit = "s" if timed else "frame"
+        clock = self.column("time" if timed else "frame")
+        x, y = self.point(options.keypoint or self._centre())
+        theta = None
+        if options.heading is not None:
+            theta = angle_between(*map(self.point, options.heading))
+        elif "ANGLE" in self.names:
+            theta = self.column("ANGLE")
+            theta[~np.isfinite(theta)] = np.nan
+        if any(one is not None and one.size != clock.size for one in (x, y, theta)):
+            raise FormatError("the arrays have different lengths", path=self.path)
+        self.body = RawBody(_individual(self.path), clock, x, y, theta)
+
+    def point(self, name: str) -> tuple[Array, Array]:
+        """Return x and y of a point of the individual, NaN where it was not seen."""
+        keys = _keys(name)
+        if not set(keys) <= self.names:
+            known = [one for one in (*CENTRES, *POSE) if set(_keys(one)) <= self.names]
+            raise FormatError(
+                f"has no point '{name}' in x and y; there are {', '.join(known) or 'none'}",
+                path=self.path,
+            )
+        x, y = (self.column(key) for key in keys)
+        if x.size != y.size:
+            raise FormatError("the arrays have different lengths", path=self.path)
+        lost = ~(np.isfinite(x) & np.isfinite(y))
+        if "missing" in self.names:  # a position may be interpolated there
+            missing = self.column("missing")
+            lost |= missing == 1.0 if missing.size == lost.size else False
+        x[lost] = y[lost] = np.nan
+        if name not in POSE:
+            return x, y
+        if self.cm_per_pixel is None:
+            raise FormatError(
+                "points of a pose are in pixels, and cm_per_pixel is not there", path=self.path
+            )
+        return x * self.cm_per_pixel, y * self.cm_per_pixel
+
+    def _centre(self) -> str:
+        found = next((name for name in CENTRES if set(_keys(name)) <= self.names), None)
+        if found is None:
+            raise FormatError("has no position (X#wcentroid, Y#wcentroid)", path=self.path)
+        return found
+
+
+class TrexLoader:
+    """One body per file; `keypoint` chooses among the centres and the points of a pose."""
+
+    name = "trex"
+    description = "TRex, one .npz or CSV per individual, or a folder of .npz (X#wcentroid; cm)"
+    marks = (
+        Marks("npz", ("X#wcentroid", "Y#wcentroid", "frame", "time", "missing")),
+        Marks("table", ("frame", "X#wcentroid (cm)", "Y#wcentroid (cm)")),
+    )
+
+    def sniff(self, head: bytes, path: Path) -> float:
+        """Recognise the names of its arrays or columns."""
+        if path.is_dir():
+            return 0.8 if _files(path) else 0.0
+        if head.startswith(ZIP):
+            return 0.95 if _is_individual(members(path)) else 0.0
+        lines = first_lines(head, 1)
+        names = [name.partition(" ")[0] for name in split_fields(lines[0], ",")] if lines else []
+        return 0.95 if "frame" in names and any("#wcentroid" in name for name in names) else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read one individual, or every one of a folder."""
+        if options.min_confidence is not None:
+            raise InputError("the file holds no confidences: leave `min_confidence` out")
+        files = _files(path) if path.is_dir() else [path]
+        if not files:
+            raise FormatError(
+                "the folder holds no file of an individual (VIDEO_id0.npz)", path=path
+            )
+        videos = sorted({_video(file) for file in files})
+        if len(videos) > 1:
+            raise FormatError(
+                f"the folder holds several videos ({', '.join(videos[:4])}): give a folder with "
+                "the files of one",
+                path=path,
+            )
+        read = [_read(file, options) for file in files]
+        if len({(one.clock_unit, one.length_unit) for one in read}) > 1:
+            raise FormatError("the files of the folder differ in clock or unit", path=path)
+        calibrated = all(one.cm_per_pixel is not None for one in read)
+        return RawRecording(
+            [one.body for one in read],
+            clock_unit=read[0].clock_unit,
+            length_unit=read[0].length_unit,
+            frame_rate_hz=read[0].frame_rate_hz,
+            has_keypoints=True,
+            y_axis="down",
+            rows=sum(one.body.clock.size for one in read),
+            notes=[] if calibrated else [ASSUMED],
+        )
+
+
+def _files(folder: Path) -> list[Path]:
+    """Return the files of individuals in a folder, in the order of their numbers."""
+    found = [file for file in folder.glob("*.npz") if _is_individual(members(file))]
+    return sorted(found, key=lambda file: (_video(file), int(_individual(file))))
+
+
+def _is_individual(names: set[str]) -> bool:
+    return "frame" in names and bool({"X#wcentroid", "X"} & names)
+
+
+def _video(file: Path) -> str:
+    match = _NUMBER.fullmatch(file.name)
+    return match.group(1) if match else file.stem
+
+
+def _individual(file: Path) -> str:
+    match = _NUMBER.fullmatch(file.name)
+    return match.group(2) if match else "0"
+
+
+def _keys(point: str) -> tuple[str, str]:
+    """Return the names of x and y of a point."""
+    if point == "head":
+        return "X", "Y"
+    return (
+        (f"poseX{point[4:]}", f"poseY{point[4:]}")
+        if point in POSE
+        else (f"X#{point}", f"Y#{point}")
+    )
+
+
+def _read(path: Path, options: ReadOptions) -> _Individual:
+    with path.open("rb") as file:
+        is_npz = file.read(len(ZIP)) == ZIP
+    if not is_npz:
+        individual = _of_csv(path)
+        individual.make_body(options)
+        return individual
+    with opened_npz(path) as arrays:
+        names = set(arrays)
+        scale = _first(arrays, "cm_per_pixel", path)
+        # Without it, what is called cm may be pixels.
+        unit = options.length_unit or ("px" if options.metres_per_pixel else "cm")
+        individual = _Individual(
+            path,
+            names,
+            lambda name: _numbers(arrays[name], name, path),
+            unit if scale is None else "cm",
+            scale,
+            _first(arrays, "frame_rate", path),
+        )
+        individual.make_body(options)
+        return individual
+
+
+def _numbers(values: npt.NDArray[Any], name: str, path: Path) -> Array:
+    if values.dtype.kind not in "fiub" or values.ndim != 1:
+        raise FormatError(f"'{name}' is no row of numbers", path=path)
+    return np.array(values, dtype=np.float64)
+
+
+def _first(arrays: Mapping[str, npt.NDArray[Any]], name: str, path: Path) -> float | None:
+    """Return the number in an array of one, None where there is none above zero."""
+    if name not in arrays:
+        return None
+    values = _numbers(np.ravel(arrays[name]), name, path)
+    return float(values[0]) if values.size and 0 < values[0] < np.inf else None
+
+
+def _of_csv(path: Path) -> _Individual:
+    """Return the columns of a table by their names without units."""
+    names = first_row(path)
+    used = {
+        at: bare
+        for at, name in enumerate(names)
+        if _USED.fullmatch(bare := name.partition(" (")[0])
+    }
+    if not used:
+        raise FormatError("has no columns frame, X#wcentroid and Y#wcentroid", path=path, line=1)
+    units = {unit_of_name(names[at]) for at, bare in used.items() if bare[0] in "XY"}
+    if len(units) > 1:
+        raise FormatError("the columns of positions name different units", path=path, line=1)
+    table = read_table(path, TableLayout(",", names, 1, tuple(used)))
+    columns = {bare: table.numbers[at] for at, bare in used.items()}
+    return _Individual(path, set(columns), lambda name: columns[name], next(iter(units), ""))
+
+
+LOADER = TrexLoader()
