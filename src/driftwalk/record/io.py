@@ -24,7 +24,7 @@ from driftwalk.record.extent import refuse_many_bodies, refuse_sparse
 from driftwalk.record.pose.markers import join_markers
 from driftwalk.record.pose.options import two_names
 from driftwalk.record.raw import DELIMITERS, Array, RawBody, RawRecording, ReadOptions
-from driftwalk.record.registry import find_loader
+from driftwalk.record.registry import PLAIN, failed_format, find_loader
 from driftwalk.record.text import DAMAGED_GZIP
 from driftwalk.record.warn import angle_warnings, plausibility_warnings
 from driftwalk.schema import build_trajectory
@@ -161,7 +161,8 @@ def load(
     )
     if replicate is not None and kind_of(source) != "simulation":
         raise InputError(f"{source}: no simulation, so it has no replicates: omit `replicate`")
-    loader = find_loader(source, format=format or ("matrices" if options.y is not None else None))
+    named = format or ("matrices" if options.y is not None else None)
+    loader = find_loader(source, format=named, by_columns=bool(options.columns))
     try:
         raw = loader.read(source, options)
         join_markers(raw, options)
@@ -191,14 +192,17 @@ def load(
     except DAMAGED_GZIP as error:
         raise FormatError(f"is a damaged gzip file: {error}", path=source) from error
     except FormatError as error:
-        raise _of_file(error, source) from error
+        # A table that no loader of its own recognised may be one of theirs gone wrong.
+        hint = failed_format(source) if format is None and loader.name == PLAIN else ""
+        raise _of_file(error, source, hint) from error
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
 
 
-def _of_file(error: FormatError, path: Path) -> FormatError:
+def _of_file(error: FormatError, path: Path, hint: str) -> FormatError:
     """Return the error with the file that it is about, which not all that raise it know."""
-    return error if error.path is not None else FormatError(error.reason, path=path)
+    where = error.path or path
+    return FormatError(error.reason + hint, path=where, line=error.line, column=error.column)
 
 
 def readable_formats() -> dict[str, str]:

@@ -8,16 +8,24 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
-from typing import Protocol, runtime_checkable
+from typing import Final, Protocol, runtime_checkable
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.raw import RawRecording, ReadOptions
+from driftwalk.record.recognise.nearest import nearest_table, unknown_file
 from driftwalk.record.text import read_head
+
+PLAIN: Final = "csv"
+"""Name of the format of plain tables."""
 
 
 @runtime_checkable
 class Loader(Protocol):
-    """Reads one file format."""
+    """Reads one file format.
+
+    It may have `marks`, a tuple of `record.recognise.marks.Marks`: of a file that is nearly of the
+    format, the user is then told what it lacks.
+    """
 
     @property
     def name(self) -> str:
@@ -61,7 +69,7 @@ def loaders() -> dict[str, Loader]:
     return found
 
 
-def find_loader(path: Path, *, format: str | None = None) -> Loader:
+def find_loader(path: Path, *, format: str | None = None, by_columns: bool = False) -> Loader:
     """Return the loader of a file, by the name of its format or by its content.
 
     Parameters
@@ -70,6 +78,8 @@ def find_loader(path: Path, *, format: str | None = None) -> Loader:
         File or folder.
     format : str, optional
         Name of the format; None: the loader that is most sure.
+    by_columns : bool
+        Whether the user says what the columns hold: a text is then a plain table.
 
     Raises
     ------
@@ -87,14 +97,26 @@ def find_loader(path: Path, *, format: str | None = None) -> Loader:
     if not head.strip() and not path.is_dir():
         raise FormatError("the file is empty", path=path)
     _refuse_utf16(head, path)
+    if by_columns and known[PLAIN].sniff(head, path) > 0.0:
+        return known[PLAIN]
     confidence = {name: loader.sniff(head, path) for name, loader in known.items()}
     best = max(confidence, key=lambda name: confidence[name])
     if confidence[best] <= 0.0:
         raise FormatError(
-            f"the format is not recognised; name it with `format` (readable: {', '.join(known)})",
-            path=path,
+            f"the format is not recognised: {unknown_file(path, head, known)}", path=path
         )
     return known[best]
+
+
+def failed_format(path: Path) -> str:
+    """Return of which format a table that could not be read may be, as the end of a sentence.
+
+    Parameters
+    ----------
+    path : Path
+        A file that the reader of plain tables has refused.
+    """
+    return nearest_table(path, read_head(path), loaders())
 
 
 def _refuse_utf16(head: bytes, path: Path) -> None:

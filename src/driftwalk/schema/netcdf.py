@@ -82,12 +82,31 @@ def netcdf_bytes(dataset: xr.Dataset) -> bytes:
 def read_attributes(path: Path) -> dict[str, Any]:
     """Return the global attributes of a NetCDF file, {} when it is none or damaged."""
     try:
+        if _start(path).startswith(HDF5):
+            return _attributes_of_hdf5(path)
         if not is_netcdf(path):
             return {}
         with _opened(path) as dataset:
             return {str(key): value for key, value in dataset.attrs.items()}
     except FormatError:
         return {}
+
+
+def _attributes_of_hdf5(path: Path) -> dict[str, Any]:
+    """Return the same of HDF5, which h5py opens without the libraries of datasets."""
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            return {str(key): _plain(value) for key, value in file.attrs.items()}
+    except Exception:  # whatever the damage of a file leads the library to
+        return {}
+
+
+def _plain(value: Any) -> Any:
+    """Return a text or a number of HDF5, which may be bytes and an array of one."""
+    one = value.item() if getattr(value, "size", 0) == 1 else value
+    return one.decode("utf-8", "replace") if isinstance(one, bytes) else one
 
 
 def kind_of(path: Path) -> str | None:

@@ -361,7 +361,7 @@ def check_session(dataset: xr.Dataset, *, lost: int = 0) -> None:
     assert "12.5 pixels to its user's unit" in warnings_of(dataset)
 
 
-@pytest.mark.parametrize("protocol", [2, 3, 4])
+@pytest.mark.parametrize("protocol", [2, 3, 4, 5])
 def test_idtrackerai_dictionary(tmp_path: Path, protocol: int) -> None:
     """4 and 5 wrote NumPy's file of one dictionary, in the protocol of their time."""
     path = tmp_path / "trajectories.npy"

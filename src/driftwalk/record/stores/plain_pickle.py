@@ -21,7 +21,7 @@ from driftwalk.core.errors import FormatError
 
 _TEXTS: Final = frozenset(
     {"STRING", "BINSTRING", "SHORT_BINSTRING", "UNICODE", "BINUNICODE", "SHORT_BINUNICODE"}
-    | {"BINUNICODE8", "BINBYTES", "SHORT_BINBYTES", "BINBYTES8"}
+    | {"BINUNICODE8", "BINBYTES", "SHORT_BINBYTES", "BINBYTES8", "BYTEARRAY8"}
 )
 _NUMBERS: Final = frozenset(
     {"NONE", "NEWTRUE", "NEWFALSE", "INT", "BININT", "BININT1", "BININT2", "LONG", "LONG1"}
@@ -121,11 +121,22 @@ def _number(kind: object, content: object = b"") -> Any:
     return np.frombuffer(content, dtype=kind.numpy())[0].item()
 
 
-_ARRAYS: Final = tuple(f"numpy.{core}.multiarray" for core in ("core", "_core"))
+def _from_buffer(content: object, kind: object, shape: object, order: object) -> PickledArray:
+    """Return an array as protocol 5 of pickle has it."""
+    if not isinstance(content, bytes | bytearray) or order not in ("C", "F"):
+        raise ValueError("an array without values")
+    array = PickledArray()
+    array.__setstate__((1, shape, kind, order == "F", bytes(content)))
+    return array
+
+
+_CORES: Final = ("core", "_core")
+_ARRAYS: Final = tuple(f"numpy.{core}.multiarray" for core in _CORES)
 _KNOWN: Final[dict[tuple[str, str], Callable[..., Any]]] = {
     ("numpy", "ndarray"): PickledArray,
     ("numpy", "dtype"): PickledType,
     ("_codecs", "encode"): _Function(_encode),
+    **{(f"numpy.{core}.numeric", "_frombuffer"): _Function(_from_buffer) for core in _CORES},
     **{(module, "_reconstruct"): PickledArray for module in _ARRAYS},
     **{(module, "scalar"): _Function(_number) for module in _ARRAYS},
 }

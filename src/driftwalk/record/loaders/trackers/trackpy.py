@@ -44,7 +44,7 @@ class TrackpyLoader:
             return 0.5 if "PYTABLES_FORMAT_VERSION" in names_in(path, head) else 0.0
         lines = first_lines(head, 1)
         names = set(split_fields(lines[0], ",")) if lines else set()
-        return 0.9 if {"x", "y", "frame"} <= names and len(OWN & names) > 1 else 0.0
+        return 0.9 if set(NEEDED) <= names and len(OWN & names) > 1 else 0.0
 
     def read(self, path: Path, _options: ReadOptions) -> RawRecording:
         """Read every particle; rows that are linked to none are left out."""

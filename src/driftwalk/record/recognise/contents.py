@@ -1,0 +1,97 @@
+"""What a file holds at its top: the names by which formats are told apart."""
+
+from __future__ import annotations
+
+import ast
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from driftwalk.record.bad_row import is_number, split_fields
+from driftwalk.record.head import detect_delimiter, first_lines
+from driftwalk.record.stores.hdf5 import names_in
+from driftwalk.record.stores.npz import ZIP, members
+from driftwalk.schema.netcdf import HDF5
+
+HEADER_ROWS: Final = 4
+MOST_NAMES: Final = 6
+OTHERS: Final = {
+    b"CDF": "NetCDF 3",
+    b"SQLite format 3": "an SQLite database",
+    b"PAR1": "Parquet, which is to be saved as CSV",
+    b"%PDF": "a PDF",
+    b"\x89PNG": "an image",
+    b"\xff\xd8\xff": "an image",
+    b"MATLAB 5.0": "a MATLAB file",
+    b"{": "JSON",
+    b"[": "JSON",
+}
+"""Starts of files of other kinds."""
+_NAME: Final = re.compile(rb"[A-Za-z_]\w{2,}")
+
+
+@dataclass(frozen=True)
+class Contents:
+    """Container of a file and the names in it."""
+
+    container: str
+    """As in `Marks`, or ``""``."""
+    kind: str
+    """The same in words."""
+    names: tuple[str, ...]
+
+    def described(self) -> str:
+        """Return what the file is in a few words."""
+        shown = [f"'{name:.30}'" for name in self.names[:MOST_NAMES]]
+        more = ", …" if len(self.names) > MOST_NAMES else ""
+        return f"{self.kind} with {', '.join(shown)}{more}" if shown else self.kind
+
+
+def contents_of(path: Path, head: bytes) -> Contents:
+    """Return what a file holds; it does not raise.
+
+    Parameters
+    ----------
+    path : Path
+        File or folder.
+    head : bytes
+        Its start, empty for a folder.
+    """
+    if path.is_dir():
+        return Contents("folder", "a folder", tuple(sorted(one.name for one in path.iterdir())))
+    if head.startswith(HDF5):
+        names = tuple(sorted(names_in(path, head)))
+        return Contents("HDF5", "HDF5" if names else "HDF5 that is empty or damaged", names)
+    if head.startswith(ZIP):
+        names = tuple(sorted(members(path)))
+        return Contents("npz", "NumPy's .npz" if names else "a zip file", names)
+    if head.startswith(b"\x93NUMPY"):
+        return Contents("npy", "NumPy's .npy", _fields_of_npy(head))
+    for start, kind in OTHERS.items():
+        if head.lstrip().startswith(start):
+            return Contents("", kind, ())
+    lines = first_lines(head, HEADER_ROWS)
+    if not lines:
+        return Contents("", "no text", ())
+    if head.lstrip().startswith(b"<"):
+        elements = re.findall(r"<([A-Za-z]\w*)", " ".join(lines))
+        return Contents("XML", "XML", tuple(dict.fromkeys(elements)))
+    delimiter = detect_delimiter(lines[:2])
+    fields = [one for line in lines for one in split_fields(line, delimiter)]
+    names = tuple(dict.fromkeys(one for one in fields if one and not is_number(one)))
+    return Contents("table", "a table", names)
+
+
+def _fields_of_npy(head: bytes) -> tuple[str, ...]:
+    """Return names that stand in the start of a pickled dictionary, or the type of an array."""
+    end = head.find(b"\n") + 1
+    found = re.search(rb"\{.*?\}", head[:end])
+    try:
+        header = ast.literal_eval(found.group().decode("latin1")) if found else {}
+    except (ValueError, SyntaxError):
+        header = {}
+    if header.get("descr") != "|O":
+        return (f"array of {header.get('descr', 'unknown type')}",)
+    words = (word.decode() for word in _NAME.findall(head[end:]))
+    return tuple(dict.fromkeys(words))
