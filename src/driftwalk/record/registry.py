@@ -23,8 +23,8 @@ PLAIN: Final = "csv"
 class Loader(Protocol):
     """Reads one file format.
 
-    It may have `marks`, a tuple of `record.recognise.marks.Marks`: of a file that is nearly of the
-    format, the user is then told what it lacks.
+    It may have `marks`, a tuple of `record.recognise.marks.Marks`: the error about a
+    file that is nearly of the format then names what it lacks.
     """
 
     @property

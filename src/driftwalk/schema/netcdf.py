@@ -82,7 +82,7 @@ def netcdf_bytes(dataset: xr.Dataset) -> bytes:
 def read_attributes(path: Path) -> dict[str, Any]:
     """Return the global attributes of a NetCDF file, {} when it is none or damaged."""
     try:
-        if _start(path).startswith(HDF5):
+        if file_start(path).startswith(HDF5):
             return _attributes_of_hdf5(path)
         if not is_netcdf(path):
             return {}
@@ -123,10 +123,17 @@ def is_netcdf(path: Path) -> bool:
     FormatError
         When it cannot be opened.
     """
-    return _start(path).startswith(MAGIC)
+    return file_start(path).startswith(MAGIC)
 
 
-def _start(path: Path) -> bytes:
+def file_start(path: Path) -> bytes:
+    """Return the first eight bytes of a file, by which formats that are no text are known.
+
+    Raises
+    ------
+    FormatError
+        When it cannot be opened.
+    """
     try:
         with path.open("rb") as file:
             return file.read(len(HDF5))
@@ -139,7 +146,7 @@ def _opened(path: Path) -> Iterator[xr.Dataset]:
     """Open a file that begins as NetCDF; what goes wrong with it inside becomes a `FormatError`."""
     import xarray as xr
 
-    is_hdf5 = _start(path).startswith(HDF5)
+    is_hdf5 = file_start(path).startswith(HDF5)
     options: dict[str, Any] = {"engine": "h5netcdf" if is_hdf5 else "scipy"}
     if is_hdf5:
         # HDF5 of other programs has dimensions without names.

@@ -1,4 +1,4 @@
-"""What may be said of keypoints."""
+"""Checks of the arguments about keypoints."""
 
 from __future__ import annotations
 

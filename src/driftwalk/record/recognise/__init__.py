@@ -1,1 +1,1 @@
-"""What a file holds, and which formats it is nearest to."""
+"""Names in a file, and the formats that have most of them."""

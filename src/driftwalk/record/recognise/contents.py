@@ -1,4 +1,4 @@
-"""What a file holds at its top: the names by which formats are told apart."""
+"""Names at the top of a file, by which formats are distinguished."""
 
 from __future__ import annotations
 

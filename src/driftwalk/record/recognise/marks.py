@@ -1,4 +1,4 @@
-"""What a file of a format holds, in the words of its container."""
+"""Names that the files of a format hold."""
 
 from __future__ import annotations
 

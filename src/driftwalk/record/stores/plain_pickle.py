@@ -146,7 +146,7 @@ class _Plain(pickle.Unpickler):
     """Knows no names but those of arrays."""
 
     def find_class(self, module: str, name: str, /) -> Any:
-        """Return what stands for a name, or refuse it."""
+        """Return the function of this module for a name, or refuse it."""
         if (module, name) not in _KNOWN:
             raise _ForbiddenError(f"{module}.{name}")
         return _KNOWN[module, name]

@@ -28,7 +28,7 @@ from driftwalk.record.recognise.marks import Marks
 from driftwalk.record.stores.hdf5 import names_in, opened_hdf5
 from driftwalk.record.stores.pandas_frame import frame_in
 from driftwalk.record.text import header_rows, read_table
-from driftwalk.schema.netcdf import HDF5
+from driftwalk.schema.netcdf import HDF5, file_start
 
 KEYS: Final = ("df_with_missing", "tracks")
 """Names under which DeepLabCut stores its table."""
@@ -59,8 +59,7 @@ class DeepLabCutLoader:
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the chosen bodyparts of every individual."""
-        with path.open("rb") as file:
-            is_hdf5 = file.read(len(HDF5)) == HDF5
+        is_hdf5 = file_start(path) == HDF5
         return _read_hdf5(path, options) if is_hdf5 else _read_csv(path, options)
 
 

@@ -1,4 +1,4 @@
-"""idtracker.ai 4 to 6: a dictionary in ``.npy`` or ``.pickle``, HDF5, or CSV beside its attributes.
+"""idtracker.ai 4 to 6: a dictionary in ``.npy`` or ``.pickle``, HDF5, or CSV and its attributes.
 
 Trajectories over frame, individual and (x, y), in pixels, with the frame rate. A pickle is read
 without executing anything in it: see `record.stores.plain_pickle`.
@@ -26,7 +26,7 @@ from driftwalk.record.stacked import number_codes, split_bodies
 from driftwalk.record.stores.hdf5 import names_in, opened_hdf5
 from driftwalk.record.stores.plain_pickle import PickledArray, unpickle
 from driftwalk.record.text import read_table
-from driftwalk.schema.netcdf import HDF5
+from driftwalk.schema.netcdf import HDF5, file_start
 
 NPY: Final = b"\x93NUMPY"
 TABLE: Final = "trajectories.csv"
@@ -38,7 +38,7 @@ PROBABILITIES: Final = "id_probabilities"
 
 @dataclass
 class _Session:
-    """What a file of idtracker.ai holds."""
+    """Contents of a file of idtracker.ai."""
 
     trajectories: npt.NDArray[Any]
     """Shape (frame, individual, 2)."""
@@ -78,8 +78,7 @@ class IdTrackerAiLoader:
         """Read every individual; `min_confidence` asks for the probability of its identity."""
         if path.is_dir() or path.name == TABLE:
             return _recording(_of_folder(path if path.is_dir() else path.parent), path, options)
-        with path.open("rb") as file:
-            start = file.read(len(HDF5))
+        start = file_start(path)
         if start == HDF5:
             return _recording(_of_hdf5(path), path, options)
         if start.startswith((NPY, b"\x80")):
@@ -186,8 +185,9 @@ def _behind_header(content: bytes, path: Path) -> bytes:
             else np.lib.format.read_array_header_2_0
         )
         shape, _, kind = read(file)
-    except (ValueError, TypeError, SyntaxError, RecursionError, MemoryError) as error:
-        raise FormatError(f"has a damaged header: {error}", path=path) from error
+    except Exception as error:
+        # NumPy parses the header as Python, and fails with whatever damage leads it to.
+        raise FormatError(f"has a damaged header: {type(error).__name__}", path=path) from error
     if kind.kind != "O":
         raise FormatError(
             f"is an array of {kind} of shape {shape}, and no dictionary of idtracker.ai: save "
@@ -235,7 +235,7 @@ def _columns(path: Path) -> dict[str, Array]:
 
 
 def _attributes(path: Path) -> dict[str, Any]:
-    """Return the attributes that idtracker.ai writes beside its tables, {} where it wrote none."""
+    """Return the attributes that idtracker.ai writes next to its tables, {} where it wrote none."""
     if not path.is_file():
         return {}
     attributes = parse_json(read_bounded(path, most=64 * MIB), path=path)

@@ -22,7 +22,7 @@ _SPOT: Final = ("ID", "POSITION_X", "POSITION_Y", "POSITION_T", "FRAME")
 
 @dataclass
 class _Contents:
-    """What the elements of the file say."""
+    """Attributes of the elements of a file."""
 
     units: dict[str, str] = field(default_factory=dict)
     spots: list[float] = field(default_factory=list)

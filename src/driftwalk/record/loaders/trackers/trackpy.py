@@ -20,7 +20,7 @@ from driftwalk.record.stacked import number_codes, split_bodies
 from driftwalk.record.stores.hdf5 import Hdf5Contents, names_in, opened_hdf5
 from driftwalk.record.stores.pandas_frame import Frame, frame_in
 from driftwalk.record.text import read_table
-from driftwalk.schema.netcdf import HDF5
+from driftwalk.schema.netcdf import HDF5, file_start
 
 NEEDED: Final = ("x", "y", "frame", "particle")
 OWN: Final = frozenset({"mass", "size", "ecc", "signal", "raw_mass", "ep"})
@@ -48,8 +48,7 @@ class TrackpyLoader:
 
     def read(self, path: Path, _options: ReadOptions) -> RawRecording:
         """Read every particle; rows that are linked to none are left out."""
-        with path.open("rb") as file:
-            is_hdf5 = file.read(len(HDF5)) == HDF5
+        is_hdf5 = file_start(path) == HDF5
         columns = _of_store(path) if is_hdf5 else _of_csv(path)
         linked = np.isfinite(columns["particle"])
         rows = linked.size

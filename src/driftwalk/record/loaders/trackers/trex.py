@@ -25,6 +25,7 @@ from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.recognise.marks import Marks
 from driftwalk.record.stores.npz import ZIP, members, opened_npz
 from driftwalk.record.text import read_table
+from driftwalk.schema.netcdf import file_start
 
 CENTRES: Final = ("wcentroid", "centroid", "pcentroid", "head")
 """Points that TRex knows of an individual, the first that a file has is the body."""
@@ -185,8 +186,7 @@ def _keys(point: str) -> tuple[str, str]:
 
 
 def _read(path: Path, options: ReadOptions) -> _Individual:
-    with path.open("rb") as file:
-        is_npz = file.read(len(ZIP)) == ZIP
+    is_npz = file_start(path).startswith(ZIP)
     if not is_npz:
         individual = _of_csv(path)
         individual.make_body(options)
