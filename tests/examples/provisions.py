@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 from command_line import FLOW, GRID, RECORDING, here
 from finished_run import write_finished_run
@@ -244,6 +245,22 @@ def _pixels(folder: Path) -> Names:
     return {}
 
 
+def _poses(folder: Path) -> Names:
+    """Provide a file of SLEAP's, and one that is nearly such."""
+    step = np.arange(100.0)
+    nodes = np.stack(
+        [np.stack([200 + step, 300 + 0 * step]), np.stack([190 + step, 300 + step])], 1
+    )
+    with h5py.File(folder / "flies.analysis.h5", "w") as file:
+        file["tracks"] = nodes[None]
+        file["node_names"] = np.array(["thorax", "abdomen"], "S")
+        file["track_names"] = np.array(["fly"], "S")
+        file["point_scores"] = np.full((1, 2, 100), 0.9)
+    with h5py.File(folder / "results.h5", "w") as file:
+        file["tracks"], file["track_names"] = nodes, np.array(["fly"], "S")
+    return {}
+
+
 def _pendulum(folder: Path) -> Names:
     """Provide a log of the format that the page adds."""
     (folder / "log.txt").write_text("#pendulum\n0|1.5|2\n1|3|4\n", encoding="utf-8")
@@ -413,7 +430,7 @@ PAGES: dict[str, Page] = {
         provide=_recording(), numbers=Numbers.SAME, holds=("u.shape == (2,)",)
     ),
     "docs/how-to/load-a-recording.md": Page(
-        provide=_files(_recording(60.0), _pixels), numbers=Numbers.SAME
+        provide=_files(_recording(60.0), _pixels, _poses), numbers=Numbers.SAME
     ),
     "docs/how-to/report.md": Page(
         provide=_files(_recording(60.0), _calibrated, _simulated), slow=True

@@ -18,6 +18,7 @@ import xarray as xr
 from drawn_blocks import camera_of, marker_of, moving_blocks
 from finished_run import write_finished_run
 from recovery_worlds import small_study
+from tracker_seeds import tracker_files
 
 import driftwalk as dw
 from driftwalk.cli.main import main
@@ -132,6 +133,9 @@ def _recordings(place: Path) -> Iterator[Seed]:
         yield Seed(folder, name, _reading(f"@/{name}", options))
     yield from _binary_recordings(place)
     yield from _in_space(place)
+    for kind, name, options, write in tracker_files():
+        made = _kept(place / kind, lambda folder, write=write, name=name: write(folder / name))
+        yield Seed(made, name, _reading(f"@/{name}", options))
 
 
 def _in_space(place: Path) -> Iterator[Seed]:

@@ -10,31 +10,17 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
+from tracker_files import ORDER, dlc_csv, dlc_hdf5, movement_file, sleap_csv, sleap_hdf5, swimmer
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record import load
 from driftwalk.schema import body_names, body_track
 
 FRAMES = {"frame_rate": 10.0, "metres_per_pixel": 0.01}
-PARTS = ("nose", "tail")
 
 
 def warnings_of(dataset: xr.Dataset) -> str:
     return " | ".join(json.loads(dataset.attrs["counts"])["warnings"])
-
-
-def swimmer(count: int = 6) -> np.ndarray[Any, Any]:
-    """Return x, y, likelihood of nose and tail, shape (frame, individual, part, 3): it turns."""
-    values = np.empty((count, 2, 2, 3))
-    for individual in range(2):
-        angle = 0.3 * np.arange(count) + individual
-        middle = np.stack([100.0 + np.arange(count), 50.0 + 7.0 * np.arange(count)], axis=1)
-        away = 5.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        values[:, individual, 0, :2] = middle + away
-        values[:, individual, 1, :2] = middle - away
-        values[:, individual, :, 2] = 0.99
-    values[2, 0, 0, 2] = 0.3  # the nose of the first is hardly seen in frame 2
-    return values
 
 
 def check_swimmer(dataset: xr.Dataset, names: list[str], *, lost: list[int]) -> None:
@@ -50,26 +36,6 @@ def check_swimmer(dataset: xr.Dataset, names: list[str], *, lost: list[int]) -> 
         np.testing.assert_allclose(dataset["y"].sel(body=name), y, rtol=1e-12)
         turned = np.angle(np.exp(1j * (dataset["theta"].sel(body=name).values - theta)))
         np.testing.assert_allclose(turned, np.where(np.isnan(theta), np.nan, 0.0), atol=1e-12)
-
-
-def movement_file(path: Path, *, plural: str = "s", source: str = "DeepLabCut") -> Path:
-    values = swimmer()
-    dims = ("time", "space", f"keypoint{plural}", f"individual{plural}")
-    position = values[..., :2].transpose(0, 3, 2, 1)
-    xr.Dataset(
-        {
-            "position": (dims, position),
-            "confidence": ((dims[0], *dims[2:]), values[..., 2].transpose(0, 2, 1)),
-        },
-        coords={
-            "time": 0.1 * np.arange(6),
-            "space": ["x", "y"],
-            dims[2]: list(PARTS),
-            dims[3]: ["a", "b"],
-        },
-        attrs={"time_unit": "seconds", "fps": 10.0, "ds_type": "poses", "source_software": source},
-    ).to_netcdf(path, engine="h5netcdf")
-    return path
 
 
 POSE: dict[str, Any] = {"keypoint": "nose", "heading": ("tail", "nose")}
@@ -103,30 +69,6 @@ def test_movement_of_bounding_boxes_and_without_confidence(tmp_path: Path) -> No
         load(path, min_confidence=0.5, **FRAMES)
 
 
-def dlc_columns(individuals: list[str]) -> list[list[str]]:
-    """Return the header rows of DeepLabCut, without their first field."""
-    columns = [
-        ("net", individual, part, coordinate)
-        for individual in individuals
-        for part in PARTS
-        for coordinate in ("x", "y", "likelihood")
-    ]
-    rows = [list(row) for row in zip(*columns, strict=True)]
-    return rows if len(individuals) > 1 else [rows[0], *rows[2:]]
-
-
-def dlc_csv(folder: Path, individuals: list[str]) -> Path:
-    titles = ["scorer", "individuals", "bodyparts", "coords"]
-    rows = dlc_columns(individuals)
-    titles = titles if len(rows) == 4 else [titles[0], *titles[2:]]
-    values = swimmer()[:, : len(individuals)].reshape(6, -1)
-    lines = [",".join([title, *row]) for title, row in zip(titles, rows, strict=True)]
-    lines += [",".join([str(k), *(repr(v) for v in row)]) for k, row in enumerate(values.tolist())]
-    path = folder / "videoDLC_resnet50.csv"
-    path.write_text("\n".join(lines) + "\n")
-    return path
-
-
 @pytest.mark.parametrize("individuals", [["one"], ["one", "two"]])
 def test_deeplabcut_csv(tmp_path: Path, individuals: list[str]) -> None:
     path = dlc_csv(tmp_path, individuals)
@@ -142,24 +84,6 @@ def test_deeplabcut_csv(tmp_path: Path, individuals: list[str]) -> None:
         load(path, keypoint="nose", heading=("ear", "nose"), **FRAMES)
     with pytest.raises(InputError, match="give their rate in Hz"):
         load(path, keypoint="nose", metres_per_pixel=0.01)
-
-
-def dlc_hdf5(path: Path, individuals: list[str]) -> Path:
-    """Write a table as pandas and PyTables lay it out: one compound array, pickled names."""
-    import pickle
-
-    rows = dlc_columns(individuals)
-    names = list(zip(*rows, strict=True))
-    values = swimmer()[:, : len(individuals)].reshape(6, -1)
-    kind = np.dtype([("index", "i8"), ("values_block_0", "f8", (values.shape[1],))])
-    table = np.zeros(6, kind)
-    table["index"], table["values_block_0"] = np.arange(6), values
-    with h5py.File(path, "w") as file:
-        group = file.create_group("df_with_missing")
-        group.attrs["pandas_type"] = np.bytes_("frame_table")
-        stored = group.create_dataset("table", data=table)
-        stored.attrs["values_block_0_kind"] = np.bytes_(pickle.dumps(names, protocol=0))
-    return path
 
 
 def test_deeplabcut_hdf5(tmp_path: Path) -> None:
@@ -204,28 +128,6 @@ def test_a_truncated_deeplabcut_table(tmp_path: Path) -> None:
     path.write_bytes(b"\n".join(path.read_bytes().split(b"\n")[:3]) + b"\n")
     with pytest.raises(FormatError, match="no rows of data"):
         load(path, **FRAMES, **POSE)
-
-
-ORDER = ("track", "xy", "node", "frame")
-
-
-def sleap_hdf5(path: Path, *, dims: tuple[str, ...] | None = None, scores: bool = True) -> Path:
-    """Write an analysis file: as SLEAP lays it out, or in an order that attributes state."""
-    values = swimmer().transpose(1, 3, 2, 0)  # track, xy and score, node, frame
-    with h5py.File(path, "w") as file:
-        order = dims or ORDER
-        tracks = values[:, :2].transpose([ORDER.index(one) for one in order])
-        file.create_dataset("tracks", data=tracks, compression="gzip")
-        if scores:
-            of_scores = [one for one in order if one != "xy"]
-            known = values[:, 2].transpose([("track", "node", "frame").index(o) for o in of_scores])
-            file["point_scores"] = known
-        if dims is not None:
-            file["tracks"].attrs["dims"] = json.dumps(dims)
-            file["point_scores"].attrs["dims"] = json.dumps(of_scores)
-        file["node_names"] = np.array(PARTS, "S")
-        file["track_names"] = np.array(["a", "b"], "S")
-    return path
 
 
 @pytest.mark.parametrize("dims", [None, ORDER, ("frame", "track", "node", "xy")])
@@ -276,19 +178,6 @@ def test_an_array_that_declares_more_than_its_file_holds(tmp_path: Path) -> None
         file.create_dataset("tracks", (2, 2, 2, 10**9), "f8", chunks=(1, 1, 1, 1000))
     with pytest.raises(FormatError, match="declares 64 GB, which a file of"):
         load(path, **FRAMES, **POSE)
-
-
-def sleap_csv(path: Path, names: list[str]) -> Path:
-    columns = [f"{part}.{one}" for part in PARTS for one in ("x", "y", "score")]
-    rows = [
-        ",".join([name, str(frame), "0.9", *(repr(v) for v in row.ravel().tolist())])
-        for name, individual in zip(names, swimmer().transpose(1, 0, 2, 3), strict=False)
-        for frame, row in enumerate(individual)
-    ]
-    path.write_text(
-        "\n".join([",".join(["track,frame_idx,instance.score", *columns]), *rows]) + "\n"
-    )
-    return path
 
 
 def test_sleap_csv(tmp_path: Path) -> None:

@@ -11,6 +11,17 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
+from tracker_files import (
+    FEATURES,
+    NAMES,
+    SESSION,
+    animalta,
+    frame_table,
+    session,
+    spots_csv,
+    trex,
+    write,
+)
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record import load
@@ -24,21 +35,7 @@ def warnings_of(dataset: xr.Dataset) -> str:
     return " | ".join(json.loads(dataset.attrs["counts"])["warnings"])
 
 
-def write(path: Path, *lines: str) -> Path:
-    path.write_text("\n".join(lines) + "\n", newline="")
-    return path
-
-
 # trackpy
-
-
-FEATURES = [  # y, x, mass, ecc, frame, particle
-    (10.5, 1.0, 200.0, 0.1, 0, 3),
-    (20.5, 2.0, 210.0, 0.1, 0, 7),
-    (11.5, 1.5, 205.0, 0.1, 1, 3),
-    (21.5, 2.5, 207.0, 0.1, 2, 7),
-]
-NAMES = ["y", "x", "mass", "ecc", "frame", "particle"]
 
 
 def check_features(dataset: xr.Dataset) -> None:
@@ -63,19 +60,6 @@ def test_trackpy_csv(tmp_path: Path, index: str) -> None:
         other = write(tmp_path / "o.csv", path.read_text().replace(name, "other"))
         with pytest.raises(FormatError, match=message):
             load(other, format="trackpy", **FRAMES)
-
-
-def frame_table(file: h5py.File, key: str, rows: list[tuple[float, ...]]) -> None:
-    """Write rows of features as pandas' table format has them: a block per type."""
-    group = file.create_group(key)
-    group.attrs["pandas_type"] = np.bytes_("frame_table")
-    kind = [("index", "i8"), ("values_block_0", "f8", (4,)), ("values_block_1", "i8", (2,))]
-    table = np.zeros(len(rows), np.dtype(kind))
-    table["values_block_0"] = [row[:4] for row in rows]
-    table["values_block_1"] = [row[4:] for row in rows]
-    stored = group.create_dataset("table", data=table)
-    for block, names in (("values_block_0", NAMES[:4]), ("values_block_1", NAMES[4:])):
-        stored.attrs[f"{block}_kind"] = np.bytes_(pickle.dumps(names, protocol=0))
 
 
 def test_trackpy_store_of_a_table_per_frame(tmp_path: Path) -> None:
@@ -129,21 +113,6 @@ def test_a_pickled_name_that_runs_a_program_is_refused(tmp_path: Path) -> None:
 # TrackMate
 
 
-SPOTS = "LABEL,ID,TRACK_ID,QUALITY,POSITION_X,POSITION_Y,POSITION_Z,POSITION_T,FRAME"
-
-
-def spots_csv(path: Path, length: str, time: str, *, rows: int = 4) -> Path:
-    header = [
-        SPOTS,
-        "Label,Spot ID,Track ID,Quality,X,Y,Z,T,Frame",
-        "Label,Spot ID,Track ID,Quality,X,Y,Z,T,Frame",
-        f",,,(quality),({length}),({length}),({length}),({time}),",
-    ]
-    spots = ["ID1,1,0,8,10,20,0,0.0,0", "ID2,2,0,8,11,21,0,0.5,1", "ID3,3,,8,99,99,0,0.5,1",
-             "ID4,4,2,8,30,40,0,0.5,1"]  # fmt: skip
-    return write(path, *header[:rows], *spots)
-
-
 @pytest.mark.parametrize(("unit", "metres"), [("micron", 1e-6), ("µm", 1e-6), ("mm", 1e-3)])
 def test_trackmate_csv_in_the_units_it_states(tmp_path: Path, unit: str, metres: float) -> None:
     dataset = load(spots_csv(tmp_path / "spots.csv", unit, "sec"))
@@ -171,37 +140,6 @@ def test_trackmate_csv_in_pixels_and_frames(tmp_path: Path) -> None:
     renamed = write(tmp_path / "r.csv", path.read_text().replace("POSITION_T", "TIME"))
     with pytest.raises(FormatError, match="line 1: no column POSITION_T"):
         load(renamed)
-
-
-SESSION = """<?xml version="1.0" encoding="UTF-8"?>
-<TrackMate version="7.6.1">
-  <Model spatialunits="{length}" timeunits="{time}">
-    <AllSpots nspots="5">
-      <SpotsInFrame frame="0">
-        <Spot ID="11" name="a" POSITION_X="1.5" POSITION_Y="2.5" POSITION_T="0.0" FRAME="0" />
-        <Spot ID="12" name="b" POSITION_X="9.0" POSITION_Y="9.0" POSITION_T="0.0" FRAME="0" />
-      </SpotsInFrame>
-      <SpotsInFrame frame="1">
-        <Spot ID="7" name="c" POSITION_X="2.5" POSITION_Y="3.5" POSITION_T="0.2" FRAME="1" />
-        <Spot ID="13" name="d" POSITION_X="5.0" POSITION_Y="5.0" POSITION_T="0.2" FRAME="1" />
-      </SpotsInFrame>
-      <SpotsInFrame frame="2">
-        <Spot ID="14" name="e" POSITION_X="3.5" POSITION_Y="4.5" POSITION_T="0.4" FRAME="2" />
-      </SpotsInFrame>
-    </AllSpots>
-    <AllTracks>
-      <Track name="Track_4" TRACK_ID="4">
-        <Edge SPOT_SOURCE_ID="7" SPOT_TARGET_ID="14" />
-        <Edge SPOT_SOURCE_ID="11" SPOT_TARGET_ID="7" />
-      </Track>
-      <Track name="Track_5" TRACK_ID="5">
-        <Edge SPOT_SOURCE_ID="12" SPOT_TARGET_ID="13" />
-      </Track>
-    </AllTracks>
-    <FilteredTracks><TrackID TRACK_ID="4" /></FilteredTracks>
-  </Model>
-</TrackMate>
-"""
 
 
 def test_trackmate_xml(tmp_path: Path) -> None:
@@ -242,14 +180,6 @@ def test_a_damaged_trackmate_session(tmp_path: Path, old: str, new: str, message
 
 
 # AnimalTA, ToxTrac, traja, yupi
-
-
-def animalta(path: Path, *, rate: float = 25.0, count: int = 60) -> Path:
-    rows = [
-        f"{k};{round(k / rate, 2)};{100 + k};{50};{'NA' if k == 3 else 200 - k};{60}"
-        for k in range(count)
-    ]
-    return write(path, "Frame;Time;X_Arena0_Ind0;Y_Arena0_Ind0;X_Arena0_Ind1;Y_Arena0_Ind1", *rows)
 
 
 @pytest.mark.parametrize("rate", [25.0, 30.0, 29.97, 7.5])
@@ -328,26 +258,6 @@ def test_yupi_of_both_versions(tmp_path: Path) -> None:
 
 
 # idtracker.ai
-
-
-def session(count: int = 5) -> dict[str, Any]:
-    values = np.arange(count * 4, dtype=float).reshape(count, 2, 2)
-    values[1, 0] = np.nan
-    known = np.full((count, 2, 1), 0.99)
-    known[2, 1] = 0.4
-    return {
-        "trajectories": values,
-        "id_probabilities": known,
-        "version": "6.0.1",
-        "frames_per_second": 20.0,
-        "body_length": np.float64(33.0),
-        "video_paths": ["/data/a.avi"],
-        "setup_points": {"border": np.array([[1, 2], [3, 4]])},
-        "areas": {"mean": np.array([1.0, 2.0])},
-        "identities_labels": ["red", "blue"],
-        "identities_groups": {"all": ["red"]},
-        "length_unit": 12.5,
-    }
 
 
 def check_session(dataset: xr.Dataset, *, lost: int = 0) -> None:
@@ -439,31 +349,6 @@ def test_idtrackerai_files_that_hold_something_else(tmp_path: Path) -> None:
 
 
 # TRex
-
-
-def trex(folder: Path, number: int, **changed: Any) -> Path:
-    frame = np.arange(6.0)
-    x = 10.0 + frame + number
-    x[2] = np.inf
-    arrays = {
-        "frame": frame,
-        "time": frame / 20,
-        "missing": (frame == 2).astype(float),
-        "X#wcentroid": x,
-        "Y#wcentroid": 5.0 + 0 * frame,
-        "X": x + 1,
-        "Y": 5.0 + 0 * frame,
-        "ANGLE": 0.1 * frame,
-        "poseX0": 100 * x,
-        "poseY0": 300.0 + 0 * frame,
-        "poseX1": 100 * x,
-        "poseY1": 310.0 + 0 * frame,
-        "cm_per_pixel": np.array([0.01]),
-        "frame_rate": np.array([20.0]),
-    } | changed
-    path = folder / f"tank_id{number}.npz"
-    np.savez(path, **{name: one for name, one in arrays.items() if one is not None})
-    return path
 
 
 def test_trex_folder(tmp_path: Path) -> None:

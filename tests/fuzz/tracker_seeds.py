@@ -1,0 +1,74 @@
+"""One small valid file of every format of trackers, and the options that it needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+from tracker_files import (
+    FEATURES,
+    NAMES,
+    SESSION,
+    animalta,
+    dlc_csv,
+    dlc_hdf5,
+    frame_table,
+    movement_file,
+    session,
+    sleap_csv,
+    sleap_hdf5,
+    spots_csv,
+    trex,
+    write,
+)
+
+PIXELS = ("--metres-per-pixel", "0.001")
+FRAMES = ("--frame-rate", "10", *PIXELS)
+POSE = ("--keypoint", "nose", "--heading", "tail,nose")
+
+
+def tracker_files() -> Iterator[tuple[str, str, tuple[str, ...], Callable[[Path], object]]]:
+    """Yield kind, name of the file, options, and how it is written at a path."""
+    individuals = ["one", "two"]
+    yield "deeplabcut", "videoDLC_resnet50.csv", (*FRAMES, *POSE), _deeplabcut(individuals)
+    yield "deeplabcut-h5", "a.h5", (*FRAMES, *POSE), lambda path: dlc_hdf5(path, individuals)
+    yield "sleap", "a.h5", (*FRAMES, *POSE), sleap_hdf5
+    yield "sleap-csv", "a.csv", (*FRAMES, *POSE), lambda path: sleap_csv(path, individuals)
+    yield "movement-poses", "a.nc", (*PIXELS, *POSE), movement_file
+    rows = [",".join(map(str, row)) for row in FEATURES]
+    yield "trackpy", "a.csv", FRAMES, lambda path: write(path, ",".join(NAMES), *rows)
+    yield "trackpy-h5", "a.h5", FRAMES, _store
+    yield "trackmate", "a.csv", (), lambda path: spots_csv(path, "mm", "sec")
+    text = SESSION.format(length="mm", time="sec")
+    yield "trackmate-xml", "a.xml", (), lambda path: write(path, text)
+    yield "animalta", "a.csv", PIXELS, animalta
+    yield "idtrackerai", "a.npy", PIXELS, lambda path: np.save(path, np.array(session(), object))
+    yield "idtrackerai-h5", "a.h5", PIXELS, _session
+    yield "trex", "tank_id0.npz", (), lambda path: trex(path.parent, 0)
+    settings = ("v2,6", "walk,,2", "1,1,1", "", "", "tag")
+    steps = [f"{0.1 * k:.1f},{0.2 * k:.1f},{0.1 * k:.1f},a" for k in range(20)]
+    yield "yupi", "a.csv", ("--length-unit", "m"), lambda path: write(path, *settings, *steps)
+    names = "Frame,Time,TrackId,x,y,ValueChanged"
+    places = [f"{k},{0.02 * k:.2f},8,{k}.5,{2 * k},TRUE" for k in range(20)]
+    yield "traja", "a.csv", ("--length-unit", "mm"), lambda path: write(path, names, *places)
+
+
+def _deeplabcut(individuals: list[str]) -> Callable[[Path], object]:
+    return lambda path: dlc_csv(path.parent, individuals)
+
+
+def _store(path: Path) -> None:
+    with h5py.File(path, "w") as file:
+        file.attrs["PYTABLES_FORMAT_VERSION"] = np.bytes_("2.1")
+        frame_table(file, "tracks", FEATURES)
+
+
+def _session(path: Path) -> None:
+    values = session()
+    with h5py.File(path, "w") as file:
+        for name in ("trajectories", "id_probabilities"):
+            file[name] = values[name]
+        for name in ("frames_per_second", "length_unit", "identities_labels"):
+            file.attrs[name] = values[name]
