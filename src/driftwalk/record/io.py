@@ -21,6 +21,7 @@ from driftwalk.record.clean import Counts, clean_body
 from driftwalk.record.clock import check_clock
 from driftwalk.record.convert_units import convert_units
 from driftwalk.record.extent import refuse_many_bodies, refuse_sparse
+from driftwalk.record.pose.listed import listed
 from driftwalk.record.pose.markers import join_markers
 from driftwalk.record.pose.options import two_names
 from driftwalk.record.raw import DELIMITERS, Array, RawBody, RawRecording, ReadOptions
@@ -241,9 +242,8 @@ def _select(bodies: list[RawBody], wanted: str | None) -> list[RawBody]:
         return bodies
     chosen = [body for body in bodies if body.name == wanted]
     if not chosen:
-        names = [body.name for body in bodies]
-        shown = ", ".join(names[:20]) + (", …" if len(names) > 20 else "")
-        raise InputError(f"`body` '{wanted}': no such body in the recording; it has {shown}")
+        names = listed([body.name for body in bodies])
+        raise InputError(f"`body` '{wanted}': no such body in the recording; it has {names}")
     return chosen
 
 

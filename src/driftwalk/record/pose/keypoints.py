@@ -10,6 +10,7 @@ import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.record.pose.heading import angle_between
+from driftwalk.record.pose.listed import listed
 from driftwalk.record.raw import Array, RawBody, ReadOptions
 
 Place = TypeVar("Place")
@@ -77,11 +78,11 @@ def choose_keypoints(names: Sequence[str], options: ReadOptions) -> Chosen:
         position = known[0]
     if position not in known:
         got = "" if position is None else f" (got '{position}')"
-        raise InputError(f"name the body's keypoint with `keypoint`{got}: {_listed(known)}")
+        raise InputError(f"name the body's keypoint with `keypoint`{got}: {listed(known)}")
     unknown = [name for name in options.heading or () if name not in known]
     if unknown:
         raise InputError(
-            f"`heading`: there is no keypoint '{unknown[0]}'; there are {_listed(known)}"
+            f"`heading`: there is no keypoint '{unknown[0]}'; there are {listed(known)}"
         )
     return Chosen(position, options.heading)
 
@@ -156,7 +157,7 @@ def _notes(
     notes = []
     without = [name for name in poses.individuals if name not in {body.name for body in bodies}]
     if without:
-        notes.append(f"without the keypoint, and left out: {_listed(without)}")
+        notes.append(f"without the keypoint, and left out: {listed(without)}")
     if not poses.confident:
         if options.min_confidence is not None:
             raise InputError("the file holds no confidences: leave `min_confidence` out")
@@ -168,7 +169,3 @@ def _notes(
         f"{poses.seen}{change}"
     )
     return notes
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names[:20]) + (", …" if len(names) > 20 else "")

@@ -6,6 +6,7 @@ import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.record.pose.heading import angle_between
+from driftwalk.record.pose.listed import listed
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
 
 
@@ -56,9 +57,8 @@ def join_markers(raw: RawRecording, options: ReadOptions) -> None:
 def _marker(raw: RawRecording, name: str, argument: str) -> RawBody:
     found = next((body for body in raw.bodies if body.name == name), None)
     if found is None:
-        names = [body.name for body in raw.bodies]
-        shown = ", ".join(names[:20]) + (", …" if len(names) > 20 else "")
-        raise InputError(f"`{argument}`: there is no marker '{name}'; there are {shown}")
+        names = listed([body.name for body in raw.bodies])
+        raise InputError(f"`{argument}`: there is no marker '{name}'; there are {names}")
     return found
 
 
