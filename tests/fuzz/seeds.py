@@ -48,7 +48,9 @@ class Seed:
 
     @property
     def is_netcdf(self) -> bool:
-        return (self.folder / self.target).read_bytes()[:4] in (b"\x89HDF", b"CDF\x01", b"CDF\x02")
+        content = (self.folder / self.target).read_bytes()
+        # Other HDF5 has no dimensions, without which its variables cannot be written again.
+        return content[:4] in (b"CDF\x01", b"CDF\x02") or b"_NCProperties" in content
 
 
 def seeds(place: Path, *, runs: bool = True) -> list[Seed]:

@@ -204,5 +204,8 @@ def test_what_the_files_do_not_hold_is_asked_for(shared_data: SharedData) -> Non
         load(fish, metres_per_pixel=1e-3)
     with pytest.raises(InputError, match="`metres_per_pixel`"):
         load(fish, frame_rate=25.0)
-    walk = load(shared_data("trajr-walks") / "3537.csv")
+    table = shared_data("trajr-walks") / "3537.csv"
+    with pytest.raises(InputError, match="does not name the unit of its positions"):
+        load(table)
+    walk = load(table, length_unit="m")
     assert any("is the unit" in text for text in describe(walk)["warnings"])

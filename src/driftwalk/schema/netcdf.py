@@ -97,6 +97,9 @@ def _attributes_of_hdf5(path: Path) -> dict[str, Any]:
     import h5py
 
     try:
+        # On values of attributes the library may not come to an end where the file is damaged: so
+        # first what else is in it.
+        _declared_hdf5(path)
         with h5py.File(path, "r") as file:
             return {str(key): _plain(value) for key, value in file.attrs.items()}
     except Exception:  # whatever the damage of a file leads the library to

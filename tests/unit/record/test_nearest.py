@@ -8,6 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from tracker_files import movement_file
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record import load, readable_formats
@@ -36,6 +37,17 @@ def test_hdf5_that_is_nearly_a_format(tmp_path: Path) -> None:
     with h5py.File(path, "w") as file:
         file["spectrum"] = np.zeros(3)
     assert "sleap (lacks 'tracks', 'node_names'" in refused(path) or "movement" in refused(path)
+
+
+def test_a_damaged_file_that_has_the_names_of_a_format(tmp_path: Path) -> None:
+    """Found by damaging files: the library did not come to an end on values of attributes."""
+    path = movement_file(tmp_path / "poses.nc")
+    content = bytearray(path.read_bytes())
+    with h5py.File(path) as file:
+        place = file["space"].id.get_offset() or h5py.h5o.get_info(file["space"].id).addr
+    content[place : place + 200] = b"\xff" * 200
+    path.write_bytes(content)
+    assert "not recognised" in refused(path) or "cannot be read as NetCDF" in refused(path)
 
 
 def test_other_containers(tmp_path: Path) -> None:

@@ -54,6 +54,16 @@ def test_movement_with_confidence_and_heading(tmp_path: Path, plural: str) -> No
     check_swimmer(sleap, ["a", "b"], lost=[])
 
 
+def test_a_movement_file_over_other_dimensions(tmp_path: Path) -> None:
+    """Found by damaging files: xarray's error came through."""
+    path = movement_file(tmp_path / "poses.nc")
+    with xr.open_dataset(path) as stored:
+        other = stored.load().rename_dims({"keypoints": "points"})
+    other.to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
+    with pytest.raises(FormatError, match=r"'position' is over .*points.*, expected time, space"):
+        load(tmp_path / "other.nc", metres_per_pixel=0.01)
+
+
 def test_movement_of_bounding_boxes_and_without_confidence(tmp_path: Path) -> None:
     path = tmp_path / "boxes.nc"
     values = np.arange(12.0).reshape(3, 2, 2)

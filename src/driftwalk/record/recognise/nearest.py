@@ -39,7 +39,7 @@ def unknown_file(path: Path, head: bytes, loaders: Mapping[str, Any]) -> str:
         if container == contents.container and names <= set(contents.names):
             return advice
     near = _near(contents, loaders)
-    found = [f"{name} ({lacks})" for _, name, lacks in near[:MOST_SHOWN]]
+    found = [f"{name} ({lacks or 'it is damaged'})" for _, name, lacks in near[:MOST_SHOWN]]
     if found:
         nearest = f"the nearest are {', '.join(found)}; if it is one of these, name it"
     else:

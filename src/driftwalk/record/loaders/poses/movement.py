@@ -104,7 +104,12 @@ def _in_order(values: xr.DataArray, *further: str) -> xr.DataArray:
         for name, only in (("keypoint", SINGLE), ("individual", "0"))
         if name not in values.dims
     }
-    return values.expand_dims(missing).transpose("time", *further, "keypoint", "individual")
+    values = values.expand_dims(missing)
+    order = ("time", *further, "keypoint", "individual")
+    if sorted(map(str, values.dims)) != sorted(order):
+        found = ", ".join(map(str, values.dims))
+        raise FormatError(f"'{values.name}' is over {found}, expected {', '.join(order)}")
+    return values.transpose(*order)
 
 
 def _names(values: xr.DataArray, dimension: str) -> list[str]:
