@@ -79,43 +79,48 @@ def netcdf_bytes(dataset: xr.Dataset) -> bytes:
     return bytes(dataset.to_netcdf(engine="h5netcdf", encoding=packed))
 
 
-def read_attributes(path: Path) -> dict[str, Any]:
-    """Return the global attributes of a NetCDF file, {} when it is none or damaged."""
+def text_attribute(path: Path, name: str) -> str | None:
+    """Return a global attribute of a NetCDF file, None when it is no text, or the file none.
+
+    Parameters
+    ----------
+    path : Path
+        The file, which may be damaged.
+    name : str
+        Name of the attribute.
+    """
     try:
         if file_start(path).startswith(HDF5):
-            return _attributes_of_hdf5(path)
-        if not is_netcdf(path):
-            return {}
-        with _opened(path) as dataset:
-            return {str(key): value for key, value in dataset.attrs.items()}
+            value = _attribute_of_hdf5(path, name)
+        elif is_netcdf(path):
+            with _opened(path) as dataset:
+                value = dataset.attrs.get(name)
+        else:
+            value = None
     except FormatError:
-        return {}
+        return None
+    return value if isinstance(value, str) else None
 
 
-def _attributes_of_hdf5(path: Path) -> dict[str, Any]:
+def _attribute_of_hdf5(path: Path, name: str) -> Any:
     """Return the same of HDF5, which h5py opens without the libraries of datasets."""
     import h5py
 
     try:
         # On values of attributes the library may not come to an end where the file is damaged: so
-        # first what else is in it.
+        # first what else is in it, and then no more than the one that is asked for.
         _declared_hdf5(path)
         with h5py.File(path, "r") as file:
-            return {str(key): _plain(value) for key, value in file.attrs.items()}
+            value = file.attrs.get(name)
+            one = value.item() if getattr(value, "size", 0) == 1 else value
+            return one.decode("utf-8", "replace") if isinstance(one, bytes) else one
     except Exception:  # whatever the damage of a file leads the library to
-        return {}
-
-
-def _plain(value: Any) -> Any:
-    """Return a text or a number of HDF5, which may be bytes and an array of one."""
-    one = value.item() if getattr(value, "size", 0) == 1 else value
-    return one.decode("utf-8", "replace") if isinstance(one, bytes) else one
+        return None
 
 
 def kind_of(path: Path) -> str | None:
     """Return which kind of driftwalk's own datasets a file holds, None for any other file."""
-    kind = read_attributes(path).get("kind")
-    return kind if isinstance(kind, str) else None
+    return text_attribute(path, "kind")
 
 
 def is_netcdf(path: Path) -> bool:

@@ -15,7 +15,7 @@ from driftwalk.core.errors import FormatError
 from driftwalk.record.pose.keypoints import Confidence, Point, Poses, bodies_of, choose_keypoints
 from driftwalk.record.raw import Array, RawRecording, ReadOptions
 from driftwalk.record.recognise.marks import Marks
-from driftwalk.schema.netcdf import MAGIC, open_netcdf, read_attributes
+from driftwalk.schema.netcdf import MAGIC, open_netcdf, text_attribute
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,8 +35,9 @@ class MovementLoader:
 
     def sniff(self, head: bytes, path: Path) -> float:
         """Recognise the attributes that `movement` writes."""
-        attributes = read_attributes(path) if head.startswith(MAGIC) else {}
-        return 0.9 if {"time_unit", "ds_type"} & set(attributes) else 0.0
+        names = ("time_unit", "ds_type")
+        known = head.startswith(MAGIC) and any(text_attribute(path, name) for name in names)
+        return 0.9 if known else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every individual; of several keypoints one has to be named."""

@@ -33,6 +33,8 @@ TABLE: Final = "trajectories.csv"
 ATTRIBUTES: Final = "attributes.json"
 TIDY: Final = ["frame", "time", "individual", "x", "y", "probability"]
 TIDY_ATTRIBUTES: Final = "attributes_tidy.json"
+KNOWN: Final = ("frames_per_second", "length_unit", "identities_labels")
+"""Attributes that are read."""
 PROBABILITIES: Final = "id_probabilities"
 
 
@@ -201,8 +203,9 @@ def _of_hdf5(path: Path) -> _Session:
     with opened_hdf5(path) as contents:
         trajectories = contents.array("trajectories")
         attributes = {
-            str(name): value.tolist() if isinstance(value, np.ndarray | np.generic) else value
-            for name, value in contents.file.attrs.items()
+            name: value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+            for name in KNOWN
+            if (value := contents.file.attrs.get(name)) is not None
         }
         known = contents.array(PROBABILITIES) if PROBABILITIES in contents.file else None
     return _Session(trajectories, lambda: known, attributes)
