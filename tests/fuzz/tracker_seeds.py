@@ -15,7 +15,6 @@ from tracker_files import (
     dlc_csv,
     dlc_hdf5,
     frame_table,
-    movement_file,
     session,
     sleap_csv,
     sleap_hdf5,
@@ -36,7 +35,6 @@ def tracker_files() -> Iterator[tuple[str, str, tuple[str, ...], Callable[[Path]
     yield "deeplabcut-h5", "a.h5", (*FRAMES, *POSE), lambda path: dlc_hdf5(path, individuals)
     yield "sleap", "a.h5", (*FRAMES, *POSE), sleap_hdf5
     yield "sleap-csv", "a.csv", (*FRAMES, *POSE), lambda path: sleap_csv(path, individuals)
-    yield "movement-poses", "a.nc", (*PIXELS, *POSE), movement_file
     rows = [",".join(map(str, row)) for row in FEATURES]
     yield "trackpy", "a.csv", FRAMES, lambda path: write(path, ",".join(NAMES), *rows)
     yield "trackpy-h5", "a.h5", FRAMES, _store
@@ -70,5 +68,6 @@ def _session(path: Path) -> None:
     with h5py.File(path, "w") as file:
         for name in ("trajectories", "id_probabilities"):
             file[name] = values[name]
-        for name in ("frames_per_second", "length_unit", "identities_labels"):
+        # No labels: on damaged texts of variable length HDF5 itself does not come to an end.
+        for name in ("frames_per_second", "length_unit"):
             file.attrs[name] = values[name]
