@@ -80,10 +80,11 @@ def _is_field(path: Path) -> bool:
 
 
 def _maybe_a_field(path: Path) -> str | None:
-    """Return how to read NetCDF that is no known recording as a flow field, None of other files."""
+    """Return how a `.nc` that is no known recording may be read as a flow field, None of others."""
     from driftwalk.schema.netcdf import is_netcdf, kind_of, open_netcdf
 
-    if not path.is_file() or not is_netcdf(path) or kind_of(path) is not None:
+    named = path.is_file() and path.suffix.lower() == ".nc"
+    if not named or not is_netcdf(path) or kind_of(path) is not None:
         return None
     try:
         names = ", ".join(list(map(str, open_netcdf(path).variables))[:12])
