@@ -27,7 +27,7 @@ LOCATING: Final[dict[int, int]] = {1: 24, 2: 12}
 """Intervals along an axis of a window that locates the valley, by the number of parameters."""
 MOST: Final[dict[int, int]] = {1: 96, 2: 18}
 """Intervals along an axis of the refined map, at most."""
-ABOUT: Final = 1.6
+ABOUT: Final = 1.3
 """A step may be larger than it should be by this factor."""
 MOST_WINDOWS: Final = 6
 """Windows that locate the valley, at most."""

@@ -111,11 +111,12 @@ def test_cameras_differ_where_their_noise_is_estimated(worlds, motion):
     """Sixteen settings in a row have one camera, and the cameras' noise has the stated spread."""
     assert motion.noise_doubt == 0.0
     unsure = replace(motion, noise_doubt=0.2)
-    settings = np.tile(settings_of(1), (AT_ONCE, 1))
+    count = ALIKE * len(DEVIATIONS)
+    settings = np.tile(settings_of(1), (count, 1))
     found = objective_of(worlds, unsure)(settings)
     nominal = worlds.like.camera.position_noise
     noises = []
-    for number in range(0, AT_ONCE, ALIKE):
+    for number in range(0, count, ALIKE):
         objective = objective_of(worlds, unsure)
         noise = nominal * np.exp(0.2 * DEVIATIONS[number // ALIKE])
         camera = replace(worlds.like.camera, position_noise=float(noise))
