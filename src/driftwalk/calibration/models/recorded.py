@@ -130,6 +130,17 @@ class RecordedMotion:
             usual_step=self.usual_step,
         )
 
+    @cached_property
+    def usual_distance(self) -> float:
+        """Median distance from the nearest of the other bodies [m]; NaN where there are none."""
+        others = self.like.neighbours
+        if others is None:
+            return float("nan")
+        x, y = np.moveaxis(others.at(self.track.time), 2, 0)
+        apart = np.hypot(x - self.track.x[:, None], y - self.track.y[:, None])
+        nearest = np.where(np.isfinite(apart), apart, np.inf).min(axis=1)
+        return float(np.median(nearest))
+
     @property
     def steps(self) -> Aspect:
         """Step lengths [m] and turning angles [rad] of the whole recording."""
