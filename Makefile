@@ -18,7 +18,7 @@ CPP := $(shell find cpp -name '*.cpp' -o -name '*.hpp')
 # Every worker imports every test file: with the bytecode of the last run that takes half the time.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-slow test-fresh test-browser fuzz doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs web wheel clean
+.PHONY: demo test test-slow test-fresh test-browser fuzz doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs site web wheel clean
 
 demo: $(PACKAGE)
 	$(BIN)/driftwalk demo
@@ -59,6 +59,12 @@ doctest: $(TEST_TOOLS)
 
 docs: doctest
 	$(BIN)/python -m pytest tests/architecture/test_docs_links.py
+
+# All pages, the reference and a gallery that is drawn now, as a site that works offline: build/site. A
+# link that leads nowhere and an example that fails end it.
+site: $(DEV_TOOLS)
+	$(BIN)/sphinx-build -W --keep-going -q -c docs/site -b html . build/site
+	@echo "site: build/site/index.html"
 
 lint: $(DEV_TOOLS)
 	$(BIN)/ruff check .

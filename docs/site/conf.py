@@ -1,0 +1,74 @@
+"""Configuration of the site: every page of this folder's repository, and a gallery.
+
+    make site    # builds it into build/site
+
+The sources lie in the root of the repository, so that links between the pages and to files beside
+`docs` mean the same here and where the code is read.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import version as version_of
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+
+from contents import add_contents  # noqa: E402
+
+project = "driftwalk"
+author = "The driftwalk developers"
+copyright = author
+release = version_of("driftwalk")
+
+extensions = [
+    "myst_parser",
+    "sphinx_copybutton",
+    "sphinx_gallery.gen_gallery",
+    "sphinx.ext.mathjax",
+    "sphinx-mathjax-offline",
+]
+root_doc = "docs/index"
+include_patterns = [
+    "*.md",
+    "docs/*.md",
+    "docs/**/*.md",
+    "docs/gallery/**",
+    "studies/*/README.md",
+]
+exclude_patterns = ["docs/gallery/**/*.ipynb", "docs/gallery/**/*.py", "docs/gallery/**/*.zip"]
+
+myst_heading_anchors = 4
+myst_enable_extensions = ["dollarmath"]
+
+html_theme = "furo"
+html_title = f"driftwalk {release}"
+html_copy_source = False
+html_show_sourcelink = False
+html_show_copyright = False
+html_extra_path = [str(HERE / "front")]
+
+copybutton_prompt_text = "$ "
+copybutton_only_copy_prompt_lines = False
+
+sphinx_gallery_conf = {
+    "examples_dirs": "docs/site/gallery",
+    "gallery_dirs": "docs/gallery",
+    "filename_pattern": r"\.py$",
+    "within_subsection_order": "FileNameSortKey",
+    "download_all_examples": False,
+    "show_memory": False,
+    "show_signature": False,
+    "remove_config_comments": True,
+    "min_reported_time": 1e9,
+    "abort_on_example_error": True,
+    "matplotlib_animations": False,
+    "image_scrapers": ("matplotlib",),
+    "reset_modules": ("matplotlib",),
+}
+
+
+def setup(app: object) -> None:
+    """Let the front page's own links be the table of contents."""
+    app.connect("source-read", add_contents)  # type: ignore[attr-defined]

@@ -1,0 +1,22 @@
+"""
+A flow field from a track, and the true one
+===========================================
+
+The velocities of the block, averaged in cells, are the paper's estimate of the flow. It is too
+slow, because the water drags the block behind it, and it knows nothing of places where the block
+has not been. The true flow stands beside it.
+"""
+
+import matplotlib.pyplot as plt
+
+import driftwalk as dw
+
+recording = dw.tank30_recording()
+estimated = dw.extract_flow(recording, mass=0.0116, side=0.03)
+
+figure, axes = plt.subplots(1, 2, figsize=(9, 4.2), layout="constrained")
+for flow, ax, title in zip(
+    (estimated, dw.tank30_flow()), axes, ("from the track", "true"), strict=True
+):
+    dw.plot.flow(flow, ax, speed_limit=0.08)
+    ax.set_title(title)
