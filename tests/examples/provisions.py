@@ -172,7 +172,7 @@ def _wide_tank(_: Path) -> Names:
 
 def _active_body(folder: Path) -> Names:
     """Provide ``recording.nc``: three minutes of an active body."""
-    values = {"speed": 0.03, "rotational_diffusion": 0.5, "turn_rate": 2.0}
+    values = {"speed": 0.03, "rotational_diffusion": 0.5, "turn_rate": 0.3}
     seen = moving(dw.motion_model("active", clearance=0.015), values, 180.0, seed=3, noise=3e-4)
     dw.save_trajectory(seen, folder / "recording.nc")
     return {}
@@ -358,7 +358,7 @@ PAGES: dict[str, Page] = {
         provide=_active_body,
         instead={
             "--model active ": "--model active --parameter clearance=0.015 ",
-            "run-tumble+wall --parameter turn_rate=0": "active+diffusion --parameter turn_rate=2 "
+            "run-tumble+wall --parameter turn_rate=0": "active+diffusion --parameter turn_rate=0.3 "
             "--parameter clearance=0.015 --bootstrap 20",
         },
         makes=("run/model_calibration.nc", "known/model_calibration.nc", "drawn/posterior.csv"),

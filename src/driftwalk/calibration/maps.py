@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,9 @@ from driftwalk.calibration.problem import Axes, Problem
 from driftwalk.calibration.search import Map, Progress, add_replicates, run_map
 from driftwalk.motion import Details
 from driftwalk.sweep import Store
+
+PARTS: Final = 1000
+"""Of which progress through windows is counted."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +83,37 @@ class Mapper:
             return None
         fingerprint = {"axes": [axis.tolist() for axis in axes], **facts}
         return self.stores(f"{name}-{window_id(axes)}", fingerprint)
+
+
+class Narrowing:
+    """Progress through windows of which nobody knows how many there will be.
+
+    Each takes half of what is left, so that progress never goes back.
+
+    Parameters
+    ----------
+    say : callable
+        Called with how much is done, of `PARTS`.
+
+    Examples
+    --------
+    >>> told = []
+    >>> narrowing = Narrowing(lambda done, total: told.append(done / total))
+    >>> for done in (5, 10, 5, 10):
+    ...     narrowing(done, 10)
+    >>> told
+    [0.25, 0.5, 0.625, 0.75]
+    """
+
+    def __init__(self, say: Progress) -> None:
+        self._say, self._before, self._left = say, 0.0, 1.0
+
+    def __call__(self, done: int, total: int) -> None:
+        """Tell how much is done when so many settings of a window are."""
+        share = self._before + 0.5 * self._left * done / max(total, 1)
+        if done >= total:
+            self._before, self._left = share, 0.5 * self._left
+        self._say(round(PARTS * share), PARTS)
 
 
 def window_id(window: Axes) -> str:

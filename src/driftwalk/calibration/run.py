@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.calibration.estimation import Stores, Tell, calibrate_many
-from driftwalk.calibration.maps import Mapper, window_id
+from driftwalk.calibration.maps import Mapper, Narrowing, window_id
 from driftwalk.calibration.problem import Axes, Problem, limits_of, prepare_problem
 from driftwalk.calibration.quality import (
     FAR_ABOVE_FLOOR,
@@ -272,6 +272,9 @@ class _Calibration:
         raise InputError(no_numbers(self.problem.model.name, setting))
 
     def _maps(self, stage: str, details: Details, *, apart: bool) -> Mapper:
+        def say(done: int, total: int) -> None:
+            self._say(stage, done, total)
+
         return Mapper(
             self.problem,
             stage,
@@ -279,7 +282,7 @@ class _Calibration:
             apart=apart,
             stores=self._keep,
             executor=self._executor,
-            progress=lambda done, total: self._say(stage, done, total),
+            progress=Narrowing(say) if stage == "refined" else say,
         )
 
     def _refine(self, wanted: int) -> None:
