@@ -105,7 +105,7 @@ def print_next(page: Path) -> None:
     """Say what comes next; whoever waits may open the page of the fit meanwhile."""
     print(f"Its page: {page}")
     print(
-        "Next, the paper's method: a map of KS distances in the fitted flow, about half a minute.\n",
+        "Next, the paper's method: a map of KS distances in the fitted flow, some 30 s.\n",
         flush=True,
     )
 
