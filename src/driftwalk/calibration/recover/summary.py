@@ -38,7 +38,7 @@ def relative_errors(
     Examples
     --------
     >>> ends = np.array([[[-5.0, 5.0]]])
-    >>> relative_errors(np.array([[0.2]]), np.array([0.0]), ends, ["linear"]).tolist()
+    >>> relative_errors(np.array([[0.4]]), np.array([0.0]), ends, ["linear"]).tolist()
     [[0.2]]
     """
     error = np.empty_like(estimate)
