@@ -97,11 +97,11 @@ class Narrowing:
 
     Examples
     --------
-    >>> told = []
-    >>> narrowing = Narrowing(lambda done, total: told.append(done / total))
+    >>> shares = []
+    >>> narrowing = Narrowing(lambda done, total: shares.append(done / total))
     >>> for done in (5, 10, 5, 10):
     ...     narrowing(done, 10)
-    >>> told
+    >>> shares
     [0.25, 0.5, 0.625, 0.75]
     """
 
