@@ -23,7 +23,7 @@ void simulate_particles(const Prepared<float>& run, const BatchWorlds& worlds, s
   for (int done = 0; done < count; done += float_lanes) {
     const int left = count - done;
     run_particle_kind<Real>(run, worlds, first + done, left < float_lanes ? left : float_lanes,
-                            sink.at_world(done), status + done);
+                            samples_from(sink, done), status + done);
   }
 }
 

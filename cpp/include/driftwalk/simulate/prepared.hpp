@@ -122,13 +122,6 @@ struct SampleSink {
   std::int64_t lane_stride;
   // Scratch for one frame of the flow table, used when there are several.
   typename FlowNumber<T>::type* blended_flow;
-
-  // The same for the worlds from lane `lane` on.
-  SampleSink at_world(std::int64_t lane) const {
-    const std::int64_t offset = lane * lane_stride;
-    return {x + offset, y + offset, theta == nullptr ? nullptr : theta + offset, lane_stride,
-            blended_flow};
-  }
 };
 
 // Packs of worlds that one call of a kernel takes together.

@@ -8,6 +8,14 @@
 
 DRIFTWALK_LANES_BEGIN
 
+// Where the samples of the worlds from lane `lane` on go.
+template <class T>
+inline SampleSink<T> samples_from(const SampleSink<T>& sink, std::int64_t lane) {
+  const std::int64_t offset = lane * sink.lane_stride;
+  return {sink.x + offset, sink.y + offset, sink.theta == nullptr ? nullptr : sink.theta + offset,
+          sink.lane_stride, sink.blended_flow};
+}
+
 template <class Real>
 inline void load_worlds(const BatchWorlds& worlds, std::int64_t first, int count, Body<Real>& state,
                         Real& drag_coefficient, Real& force_std,
@@ -354,7 +362,7 @@ private:
     const Real x = before.x + (pose.x - before.x) * weight;
     const Real y = before.y + (pose.y - before.y) * weight;
     record.rest.add(sample_, x, y);
-    write_sample(run_, sink_.at_world(p * lanes), sample_, record.count, record.stream, x, y,
+    write_sample(run_, samples_from(sink_, p * lanes), sample_, record.count, record.stream, x, y,
                  wrap_angle(before.theta + pack_[p].turned * weight));
   }
 

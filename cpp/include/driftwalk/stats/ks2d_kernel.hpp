@@ -55,11 +55,13 @@ struct KsVector {
 // Key of a number: shifted so that the whole range of a signed type is used.
 template <class Key>
 inline Key ks_key(std::int64_t number) {
-  return Key(number + std::int64_t(std::numeric_limits<Key>::min()));
+  constexpr std::int64_t lowest = std::numeric_limits<Key>::min();
+  return Key(number + lowest);
 }
 template <class Key>
 inline std::int64_t ks_number(Key key) {
-  return std::int64_t(key) - std::int64_t(std::numeric_limits<Key>::min());
+  constexpr std::int64_t lowest = std::numeric_limits<Key>::min();
+  return std::int64_t(key) - lowest;
 }
 
 // The points of one block: each sample by itself as elements to be counted, and the counts.

@@ -33,13 +33,13 @@ def relative_errors(
     -------
     ndarray
         ln(estimate / truth) on a logarithmic scale. On a linear one the difference over the truth,
-        or over a tenth of the range where the truth is smaller than that.
+        or over a twentieth of the range where the truth is smaller than that.
 
     Examples
     --------
     >>> ends = np.array([[[-5.0, 5.0]]])
-    >>> relative_errors(np.array([[0.4]]), np.array([0.0]), ends, ["linear"]).tolist()
-    [[0.2]]
+    >>> relative_errors(np.array([[0.2]]), np.array([0.0]), ends, ["linear"]).tolist()
+    [[0.4]]
     """
     error = np.empty_like(estimate)
     for index, scale in enumerate(scales):
