@@ -8,7 +8,7 @@ from pathlib import Path
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.layout import MISSING
-from driftwalk.record.text import header_rows, read_head
+from driftwalk.record.text import decoded_line, header_rows, read_head
 
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 """Bytes that no text file holds."""
@@ -23,18 +23,6 @@ def first_lines(head: bytes, count: int = 5) -> list[str]:
         return []
     lines = head.split(b"\n")
     return [line.decode("utf-8", "replace").rstrip("\r") for line in lines[:count] if line.strip()]
-
-
-def head_lines(path: Path, count: int) -> list[str]:
-    """Return the first lines of a text file, blank ones too.
-
-    Raises
-    ------
-    FormatError
-        When one of them is not UTF-8 text.
-    """
-    raw = read_head(path).split(b"\n")[:count]
-    return [_strict(line, path, number) for number, line in enumerate(raw, start=1)]
 
 
 def detect_delimiter(lines: list[str]) -> str:
@@ -78,7 +66,7 @@ def read_header(
     at = next((i for i, line in enumerate(raw) if line.strip() and not line.startswith(b"#")), None)
     if at is None:
         raise FormatError("the file is empty", path=path)
-    lines = [_strict(line, path, number) for number, line in enumerate(raw[: at + 2], start=1)]
+    lines = [decoded_line(line, path, number) for number, line in enumerate(raw[: at + 2], start=1)]
     separator = delimiter or detect_delimiter(lines[at : at + 2])
     fields = _without_trailing(split_fields(lines[at], separator))
     if not is_numeric_row(fields):
@@ -102,18 +90,6 @@ def first_row(path: Path, delimiter: str = ",") -> list[str]:
     return split_fields(next(iter(header_rows(path, 1)), ""), delimiter)
 
 
-def _strict(line: bytes, path: Path, number: int) -> str:
-    try:
-        return line.decode("utf-8").rstrip("\r")
-    except UnicodeDecodeError as error:
-        raise FormatError(
-            f"is not UTF-8 text (byte 0x{line[error.start]:02x}): save the file as UTF-8",
-            path=path,
-            line=number,
-            column=error.start + 1,
-        ) from error
-
-
 def _without_trailing(fields: list[str]) -> list[str]:
     """Drop one empty field that a delimiter at the end of a line leaves."""
     return fields[:-1] if len(fields) > 1 and not fields[-1] else fields
@@ -121,7 +97,7 @@ def _without_trailing(fields: list[str]) -> list[str]:
 
 def _header_at(path: Path, number: int, delimiter: str | None) -> tuple[list[str], str, int, bool]:
     """Return what `read_header` does, with the header in a line that the user names."""
-    lines = head_lines(path, number + 1)
+    lines = header_rows(path, number + 1)
     if len(lines) <= number or not lines[number].strip():
         raise FormatError(f"has no rows of data below line {number}, its header", path=path)
     separator = delimiter or detect_delimiter(lines[number - 1 :])

@@ -136,7 +136,7 @@ def read_head(path: Path) -> bytes:
 
 
 def header_rows(path: Path, count: int) -> list[str]:
-    """Return the first lines of a text file, however long, without their ends.
+    """Return the first lines of a text file, blank ones too, however long, without their ends.
 
     Raises
     ------
@@ -151,14 +151,30 @@ def header_rows(path: Path, count: int) -> list[str]:
             except (OSError, *DAMAGED_GZIP) as error:
                 raise FormatError(f"cannot be read to its end: {error}", path=path) from error
             refuse_long_line(line, path, number)
-            try:
-                text = line.removeprefix(BOM if number == 1 else b"").decode("utf-8")
-            except UnicodeDecodeError as error:
-                raise FormatError("is not UTF-8 text", path=path, line=number) from error
             if not line:
                 break
-            rows.append(text.rstrip("\r\n"))
+            text = line.removeprefix(BOM if number == 1 else b"").removesuffix(b"\n")
+            rows.append(decoded_line(text, path, number))
     return rows
+
+
+def decoded_line(line: bytes, path: Path, number: int) -> str:
+    """Return a line as text, without the carriage return at its end.
+
+    Raises
+    ------
+    FormatError
+        When it is not UTF-8.
+    """
+    try:
+        return line.decode("utf-8").rstrip("\r")
+    except UnicodeDecodeError as error:
+        raise FormatError(
+            f"is not UTF-8 text (byte 0x{line[error.start]:02x}): save the file as UTF-8",
+            path=path,
+            line=number,
+            column=error.start + 1,
+        ) from error
 
 
 def read_table(path: Path, layout: TableLayout, *, blocks: int | None = None) -> Table:

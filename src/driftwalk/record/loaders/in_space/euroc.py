@@ -10,9 +10,8 @@ from typing import Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.bad_row import split_fields
 from driftwalk.record.column_names import unit_of_name
-from driftwalk.record.head import first_lines, head_lines
+from driftwalk.record.head import first_lines, first_row
 from driftwalk.record.layout import TableLayout
 from driftwalk.record.raw import CLOCK_UNITS, RawRecording, ReadOptions
 from driftwalk.record.space.flat import SpaceTrack, lay_flat
@@ -40,7 +39,7 @@ class EurocLoader:
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the one body; its whole nanoseconds stay exact."""
-        names = split_fields(head_lines(path, 1)[0].lstrip("# "), ",")
+        names = [name.lstrip("# ") for name in first_row(path)]
         columns = {
             "".join(match.groups()): column
             for column, name in enumerate(names)

@@ -10,13 +10,12 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import split_fields
-from driftwalk.record.head import head_lines
 from driftwalk.record.layout import TableLayout
 from driftwalk.record.raw import Array, RawRecording, ReadOptions
 from driftwalk.record.space.flat import SpaceTrack, lay_flat
 from driftwalk.record.space.plane import plane_of
 from driftwalk.record.space.turns import QUATERNION, Turns
-from driftwalk.record.text import Table, read_table
+from driftwalk.record.text import Table, header_rows, read_table
 
 START: Final = b"Format Version,"
 _HEADER_ROWS: Final = 12
@@ -95,9 +94,8 @@ class OptiTrackLoader:
 
 
 def _read_header(path: Path) -> _Header:
-    lines = head_lines(path, _HEADER_ROWS + 1)
+    lines = header_rows(path, _HEADER_ROWS + 1)
     rows = [split_fields(line, ",") for line in lines]
-    settings = dict(zip(rows[0][::2], rows[0][1::2], strict=False))
     at = next((i for i, row in enumerate(rows) if row[:1] == ["Frame"]), None)
     above = [] if at is None else [row for row in rows[1:at] if any(row)]
     if at is None or len(above) < 3:
@@ -106,6 +104,7 @@ def _read_header(path: Path) -> _Header:
             "with its header",
             path=path,
         )
+    settings = dict(zip(rows[0][::2], rows[0][1::2], strict=False))
     # A data row may end in a comma that the header has not, and the other way round.
     width = max(len(row) for row in rows[at : at + 2])
     types, names, *_, quantities, axes = (

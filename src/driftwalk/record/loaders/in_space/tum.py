@@ -10,13 +10,13 @@ from typing import Final
 
 import numpy as np
 
-from driftwalk.record.head import first_lines, head_lines, is_numeric_row
+from driftwalk.record.head import first_lines, is_numeric_row
 from driftwalk.record.layout import TableLayout
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.space.flat import SpaceTrack, lay_flat
 from driftwalk.record.space.plane import plane_of
 from driftwalk.record.space.turns import QUATERNION, Turns
-from driftwalk.record.text import read_table
+from driftwalk.record.text import header_rows, read_table
 
 _NAMES: Final = ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]
 _UP: Final = "z"
@@ -40,7 +40,7 @@ class TumLoader:
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the one body."""
-        comments = takewhile(lambda line: line.startswith("#"), head_lines(path, _COMMENTS))
+        comments = takewhile(lambda line: line.startswith("#"), header_rows(path, _COMMENTS))
         layout = TableLayout(" ", _NAMES, len(list(comments)), tuple(range(len(_NAMES))))
         table = read_table(path, layout)
         values = np.column_stack([table.numbers[column] for column in range(1, len(_NAMES))])

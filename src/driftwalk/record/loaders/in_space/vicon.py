@@ -11,13 +11,13 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
-from driftwalk.record.head import first_lines, head_lines
+from driftwalk.record.head import first_lines
 from driftwalk.record.layout import TableLayout
 from driftwalk.record.raw import ANGLE_UNITS, LENGTH_UNITS, Array, RawRecording, ReadOptions
 from driftwalk.record.space.flat import SpaceTrack, lay_flat
 from driftwalk.record.space.plane import plane_of
 from driftwalk.record.space.turns import QUATERNION, VECTOR, Turns
-from driftwalk.record.text import Table, read_table
+from driftwalk.record.text import Table, header_rows, read_table
 
 _READ: Final = ("Objects", "Segments", "Trajectories")
 _OTHERS: Final = ("Devices", "Joints", "Model Outputs")
@@ -82,7 +82,7 @@ class ViconLoader:
 
 
 def _read_header(path: Path) -> _Header:
-    lines = head_lines(path, _LINES + 1)
+    lines = header_rows(path, _LINES + 1)
     if len(lines) <= _LINES or not lines[_LINES].strip():
         raise FormatError("the file ends before its first row of data", path=path)
     section = lines[0].strip(", ")
