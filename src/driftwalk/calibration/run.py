@@ -35,7 +35,7 @@ from driftwalk.calibration.result import (
     estimate_facts,
     interval_facts,
 )
-from driftwalk.calibration.search import Map
+from driftwalk.calibration.search import Map, Progress
 from driftwalk.calibration.steadiness import Steadiness, steadiness_of
 from driftwalk.calibration.surface import Optimum, at_settings
 from driftwalk.calibration.wall import wall_warning
@@ -255,7 +255,7 @@ class _Calibration:
     def _coarse_map(self, replicates: int) -> Map:
         """Return the coarse map: one replicate of every setting, all where the optimum could be."""
         axes = tuple(np.array(one.coordinates) for one in self.problem.parameters)
-        maps = self._maps("coarse", "all", apart=False)
+        maps = self._maps("coarse", "all", self._progress("coarse"), apart=False)
         once = maps.full(axes, 1)
         self.floor = noise_floor_at(self.problem, once.point(once.cell_of_minimum()))
         return maps.more(once, once.mean <= once.mean.min() + self.floor, replicates)
@@ -271,10 +271,10 @@ class _Calibration:
         }
         raise InputError(no_numbers(self.problem.model.name, setting))
 
-    def _maps(self, stage: str, details: Details, *, apart: bool) -> Mapper:
-        def say(done: int, total: int) -> None:
-            self._say(stage, done, total)
+    def _progress(self, stage: str) -> Progress:
+        return lambda done, total: self._say(stage, done, total)
 
+    def _maps(self, stage: str, details: Details, progress: Progress, *, apart: bool) -> Mapper:
         return Mapper(
             self.problem,
             stage,
@@ -282,12 +282,13 @@ class _Calibration:
             apart=apart,
             stores=self._keep,
             executor=self._executor,
-            progress=Narrowing(say) if stage == "refined" else say,
+            progress=progress,
         )
 
     def _refine(self, wanted: int) -> None:
         limits = limits_of(self.problem)
-        maps = self._maps("refined", "none", apart=True)
+        narrowing = Narrowing(self._progress("refined"))
+        maps = self._maps("refined", "none", narrowing, apart=True)
         located = locate(maps, first_window(self.coarse, self.floor), limits)
         self.refined = refine(maps, located, limits, self._steps, wanted)
         self.optimum = self.refined.landscape.optimum
@@ -337,7 +338,7 @@ class _Calibration:
             count=count,
             store=self._keep(f"bootstrap-{window_id(refined.map.axes)}", fingerprint),
             executor=self._executor,
-            progress=lambda done, total: self._say("bootstrap", done, total),
+            progress=self._progress("bootstrap"),
         )
         self.quality = quality_of_fit(self.bootstrap)
         self.floor = self.quality.floor
