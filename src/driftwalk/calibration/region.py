@@ -182,30 +182,28 @@ def simulated_steps(
     *,
     stage: str,
     replicates: int,
-    first: int = 0,
 ) -> StepTable:
     """Simulate settings and return the steps of every world, replicates fastest."""
-    found = score_settings(
-        problem,
-        settings,
-        stage=stage,
-        numbers=first + np.arange(np.size(settings[0])),
-        replicates=range(replicates),
-        details="steps",
-    )
-    return StepTable(found["step_length"], found["turning_angle"], found["pairs"])
+    return _scored_steps(problem, settings, stage, replicates)[0]
 
 
 def recordings_at(
     problem: Problem, optimum: Optimum, *, stage: str, count: int
 ) -> tuple[StepTable, Floats]:
     """Simulate recordings at an optimum; return their steps and distances to the real one."""
+    return _scored_steps(problem, optimum.point, stage, count)
+
+
+def _scored_steps(
+    problem: Problem, settings: Sequence[npt.ArrayLike], stage: str, replicates: int
+) -> tuple[StepTable, Floats]:
+    """Simulate settings; return the steps of every world and its distance to the recording."""
     found = score_settings(
         problem,
-        optimum.point,
+        settings,
         stage=stage,
-        numbers=[0],
-        replicates=range(count),
+        numbers=np.arange(np.size(settings[0])),
+        replicates=range(replicates),
         details="steps",
     )
     steps = StepTable(found["step_length"], found["turning_angle"], found["pairs"])

@@ -42,6 +42,7 @@ from driftwalk.calibration.wall import wall_warning
 from driftwalk.comparison import Statistic
 from driftwalk.conditions import neighbours_of, recorded_camera, study_in_arena
 from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.run_stages import tell_nobody
 from driftwalk.motion import BlockModel, Details, MotionModel
 from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.score import broken_worlds
@@ -149,7 +150,7 @@ def calibrate(
             threads=threads,
             executor=executor,
             stores=stores if stores is not None else _in_memory,
-            tell=tell if tell is not None else _silent,
+            tell=tell if tell is not None else tell_nobody,
         )
     require_searchable(searched)
     track = body_track(recording, body)
@@ -168,7 +169,7 @@ def calibrate(
         threads=threads,
     )
     keep = stores if stores is not None else _in_memory
-    say = tell if tell is not None else _silent
+    say = tell if tell is not None else tell_nobody
     result = _Calibration(problem, keep, say, executor).run()
     of_wall = wall_warning(track, chosen) if isinstance(searched, BlockModel) else None
     steadiness = steadiness_of(problem)
@@ -206,10 +207,6 @@ def _study_and_model(
 
 def _in_memory(name: str, fingerprint: dict[str, Any]) -> Store | None:  # noqa: ARG001
     return None
-
-
-def _silent(stage: str, done: int, total: int) -> None:
-    """Tell nobody."""
 
 
 def _flow_source(study: Study, model: MotionModel, flow: xr.Dataset | None) -> FlowSource:

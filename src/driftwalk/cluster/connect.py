@@ -14,6 +14,7 @@ from driftwalk.cluster.jobs import begin_jobs
 from driftwalk.cluster.probe import SameBits
 from driftwalk.cluster.versions import refuse_other_workers
 from driftwalk.core.errors import ClusterError, InputError
+from driftwalk.core.run_stages import tell_nobody
 from driftwalk.sweep import WorkerExecutor
 
 ANSWER_S: Final = 10.0
@@ -120,7 +121,7 @@ def connect(address: ClusterAddress, *, say: Say | None = None) -> Iterator[Clus
     ...     found = dw.assemble(dw.Study(), dw.tank30_flow(), executor=cluster.executor)
     """
     _require_dask()
-    say = say if say is not None else _silent
+    say = say if say is not None else tell_nobody
     with ExitStack() as stack:
         stack.enter_context(_quiet())
         client = stack.enter_context(_client(address, stack))
@@ -201,7 +202,3 @@ def _was(count: int) -> str:
 
 def _reason(error: BaseException) -> str:
     return " ".join(str(error).split()) or type(error).__name__
-
-
-def _silent(_: str) -> None:
-    """Say nothing."""

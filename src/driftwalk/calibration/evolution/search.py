@@ -15,6 +15,8 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.run_stages import tell_nobody
+
 Floats = npt.NDArray[np.float64]
 Objective = Callable[[Floats, int, int], Floats]
 """Settings in the unit cube (n, parameters), number of the first evaluation, replicates: (n,)."""
@@ -119,7 +121,7 @@ def search_minimum(
     >>> bool(np.abs(found.best - 0.3).max() < 0.01)
     True
     """
-    return _Search(objective, parameters, budget or Budget(), seed, tell or _silent).run()
+    return _Search(objective, parameters, budget or Budget(), seed, tell or tell_nobody).run()
 
 
 class _Search:
@@ -202,7 +204,3 @@ class _Search:
 
 def _rounded(settings: Floats) -> Floats:
     return np.asarray(np.round(settings / RESOLUTION) * RESOLUTION)
-
-
-def _silent(_done: int, _most: int) -> None:
-    """Tell nobody."""

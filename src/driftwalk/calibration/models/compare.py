@@ -24,6 +24,7 @@ from driftwalk.calibration.models.recorded import RecordedMotion, body_motion
 from driftwalk.calibration.models.result import build_comparison
 from driftwalk.conditions import study_in_arena
 from driftwalk.core.processors import one_blas_thread
+from driftwalk.core.run_stages import tell_nobody
 from driftwalk.motion import MotionModel, ParticleModel
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep, threads_of_unit
 
@@ -231,7 +232,7 @@ def _judged_all(
 ) -> list[Judged]:
     """Judge every model, one work unit each."""
     before = [0, *itertools.accumulate(work.costs())]
-    say = tell if tell is not None else _silent
+    say = tell if tell is not None else tell_nobody
 
     def within(index: int, done: int) -> None:
         say(before[index] + done, before[-1], work.entries[index].model.name)
@@ -252,10 +253,6 @@ def _judged_all(
         _unpacked({name: values[index] for name, values in arrays.items()}, entry)
         for index, entry in enumerate(work.entries)
     ]
-
-
-def _silent(done: int, total: int, text: str) -> None:
-    """Tell nobody."""
 
 
 def _packed(judged: Judged, most: int, searches: int) -> dict[str, np.ndarray]:

@@ -15,7 +15,7 @@ from driftwalk.calibration.recover.one import MESSAGE, recover_one
 from driftwalk.calibration.recover.result import build_model_recovery
 from driftwalk.calibration.recover.truth import KnownTruth, Noise, known_truth
 from driftwalk.conditions import study_in_arena
-from driftwalk.core.run_stages import CALIBRATION_STAGES
+from driftwalk.core.run_stages import CALIBRATION_STAGES, tell_nobody
 from driftwalk.motion import MotionModel
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep, threads_of_unit
 
@@ -103,7 +103,7 @@ def recover_model(
     known = _checked(model, truth, study, flow, like, body, noise)
     count = known.study.recover.recordings
 
-    say = tell if tell is not None else _silent
+    say = tell if tell is not None else tell_nobody
 
     # Only work of this process can say how far it is within a recording.
     within = partial(_tell_stage, say, count) if executor is None else None
@@ -185,10 +185,6 @@ def _checked(
     # What is refused for one recording is refused for all; later ones can fail by chance.
     check_recording(known.recording(0), known.search_study(0), flow=flow, model=model)
     return known
-
-
-def _silent(done: int, total: int, text: str) -> None:
-    """Tell nobody."""
 
 
 def _tell_stage(tell: Tell, recording: int, count: int, stage: str, done: int, total: int) -> None:
