@@ -74,24 +74,22 @@ def _load(
     if how.arena is not None and tank_diameter is not None:
         raise InputError("give --arena or --tank-diameter, not both")
     tank = how.arena if tank_diameter is None else f"circle:{tank_diameter!r}"
-    field = load_flow(path, **values)
-    if tank is None:
-        return field
-    return load_flow(path, **values, **_placed(tank, field))
+    return load_flow(path, **values, **({} if tank is None else _placed(tank)))
 
 
-def _placed(tank: str, field: xr.Dataset) -> dict[str, Any]:
+def _placed(tank: str) -> dict[str, Any]:
     """Return where the tank lies in the field: an arena with its centre at the origin."""
     from driftwalk.record import place_arena
 
-    x, y = (part.ravel() for part in np.meshgrid(field["x"].values, field["y"].values))
     kind, _, rest = tank.partition(":")
     stated = "@" in rest or kind == "polygon"
     if not stated and kind != "fit":
         tank = f"{tank}@0,0"
     elif kind == "fit":
         raise InputError("--arena fit is for recordings: state the tank, as in circle:D@X,Y")
-    placed = place_arena(tank, x, y)
+    # Its centre is stated, so that no positions have to say where it is.
+    nowhere = np.empty(0)
+    placed = place_arena(tank, nowhere, nowhere)
     return {"arena": json.dumps(placed.arena), "origin": placed.origin}
 
 
