@@ -11,7 +11,8 @@ from driftwalk.core.errors import ClusterError, ConfigurationError, InputError
 
 MEMORY: Final = "2GB"
 LIFETIME: Final = "-" * 2 + "lifetime"
-"""The worker's own option for the time after which it ends by itself."""
+"""The worker's own option for the time after which it ends by itself. Its dashes stand apart, as
+messages must name no option of the command line, and this is none of driftwalk's."""
 OAR_MEMORY: Final = "memory_per_core_property_name"
 """Under which name a site of OAR counts memory."""
 EARLY: Final = 0.05

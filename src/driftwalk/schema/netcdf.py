@@ -202,13 +202,23 @@ def _declared_hdf5(path: Path) -> int:
     """Return how many bytes the variables of a file have in memory by its header."""
     import h5py
 
-    total = 0
     with h5py.File(path, "r") as file:
-        for name in file:
-            entry = file[name]
-            if isinstance(entry, h5py.Dataset) and entry.shape is not None:
-                total += entry.size * max(entry.dtype.itemsize, _WIDTH)
-    return total
+        return sum(declared_bytes(file[name]) for name in file)
+
+
+def declared_bytes(entry: Any) -> int:
+    """Return how many bytes an entry of an HDF5 file has in memory by its header, 0 of no array.
+
+    Parameters
+    ----------
+    entry : h5py object
+        An array, a group or anything else that a file holds.
+    """
+    import h5py
+
+    if not isinstance(entry, h5py.Dataset) or entry.shape is None:
+        return 0
+    return int(entry.size * max(entry.dtype.itemsize, _WIDTH))
 
 
 def _declared_classic(path: Path) -> int:

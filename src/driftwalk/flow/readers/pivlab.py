@@ -14,18 +14,16 @@ import numpy.typing as npt
 from driftwalk.core.errors import FormatError
 from driftwalk.flow.readers.raw import RawField
 from driftwalk.flow.readers.text import masked_rows
-from driftwalk.schema.netcdf import refuse_huge
+from driftwalk.schema.netcdf import HDF5, declared_bytes, refuse_huge
 
 Array = npt.NDArray[np.float64]
 
 _MATLAB: Final = b"MATLAB 5.0 MAT-file"
-_HDF5: Final = (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 MAT-file")
+_MATLAB_HDF5: Final = b"MATLAB 7.3 MAT-file"
 _ENDINGS: Final = ("_filtered", "_original", "")
 """Of what PIVlab saves of the velocities, the first that is there is read."""
 _NUMBERED: Final = re.compile(r"u_(\d+)")
 _MOST_FRAMES: Final = 10_000
-_WIDTH: Final = 8
-"""Bytes of a number in memory."""
 _REGULAR: Final = 1
 """Type of a vector that was measured; 0 is masked, 2 was replaced by its neighbours."""
 
@@ -52,8 +50,8 @@ def is_pivlab(path: Path) -> bool:
     """Return whether a file is one of MATLAB's."""
     with path.open("rb") as file:
         head = file.read(len(_MATLAB))
-    return head.startswith((_MATLAB, _HDF5[1])) or (
-        path.suffix.lower() == ".mat" and head.startswith(_HDF5[0])
+    return head.startswith((_MATLAB, _MATLAB_HDF5)) or (
+        path.suffix.lower() == ".mat" and head.startswith(HDF5)
     )
 
 
@@ -142,16 +140,9 @@ def _hdf5_arrays(file: Any, name: str) -> list[Any]:
 
 def _declared(file: Any) -> int:
     """Return how many bytes the arrays of a file have in memory by its header."""
-    import h5py
-
     sizes: list[int] = []
-    file.visititems(
-        lambda _, entry: sizes.append(
-            entry.size * _WIDTH
-            if isinstance(entry, h5py.Dataset) and entry.shape is not None
-            else 0
-        )
-    )
+    # A visitor that returns anything ends the visit.
+    file.visititems(lambda _, entry: sizes.append(declared_bytes(entry)))
     return sum(sizes)
 
 

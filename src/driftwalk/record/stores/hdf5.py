@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.raw import Array
-from driftwalk.schema.netcdf import HDF5, refuse_huge
+from driftwalk.schema.netcdf import HDF5, declared_bytes, refuse_huge
 
 if TYPE_CHECKING:
     import h5py
@@ -46,7 +46,7 @@ class Hdf5Contents:
                 path=self.path,
             )
         # A file may hold many arrays that each declare a little too much.
-        self._declared += entry.size * max(entry.dtype.itemsize, 8)
+        self._declared += declared_bytes(entry)
         refuse_huge(self._declared, self.path)
         return np.asarray(entry[()])
 
