@@ -78,7 +78,9 @@ def export(
         print_row("folder", f"{out}: {target.gives}")
         print_row("begin with", out / "README.md")
         for line in () if outcome is None else outcome.lines:
-            print_row("verified" if outcome is not None and outcome.passed else "NOT THE SAME", line)
+            print_row(
+                "verified" if outcome is not None and outcome.passed else "NOT THE SAME", line
+            )
     return 0 if outcome is None or outcome.passed else 1
 
 

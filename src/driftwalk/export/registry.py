@@ -2,13 +2,46 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Final
 
 from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import InputError
-from driftwalk.export.target import Target
+from driftwalk.export.target import Source, Target, Verification
 
-_ALL: tuple[Target, ...] = ()
+
+# A target's module is imported when it is used: help answers at once.
+def _write_mujoco(source: Source, folder: Path) -> list[Path]:
+    from driftwalk.export.simulators.mujoco import write_mujoco
+
+    return write_mujoco(source, folder)
+
+
+def _verify_mujoco(folder: Path) -> Verification:
+    from driftwalk.export.simulators.mujoco import verify_mujoco
+
+    return verify_mujoco(folder)
+
+
+def _require_mujoco() -> None:
+    from driftwalk.export.simulators.mujoco import require_mujoco
+
+    require_mujoco()
+
+
+BLOCK: Final = "a calibrated block"
+"""What simulators take: a run of `calibrate` or `fit`, or a study with a flow."""
+
+_ALL: Final = (
+    Target(
+        name="mujoco",
+        takes=BLOCK,
+        gives="the tank as MJCF, the water as a Python module, verify.py",
+        write=_write_mujoco,
+        verify=_verify_mujoco,
+        require=_require_mujoco,
+    ),
+)
 TARGETS: Final[dict[str, Target]] = {target.name: target for target in _ALL}
 """Every target by its name, in the order of the help."""
 
