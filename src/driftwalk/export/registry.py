@@ -29,17 +29,57 @@ def _require_mujoco() -> None:
     require_mujoco()
 
 
-BLOCK: Final = "a calibrated block"
-"""What simulators take: a run of `calibrate` or `fit`, or a study with a flow."""
+def _write_webots(source: Source, folder: Path) -> list[Path]:
+    from driftwalk.export.simulators.webots import write_webots
+
+    return write_webots(source, folder)
+
+
+def _verify_webots(folder: Path) -> Verification:
+    from driftwalk.export.simulators.webots import verify_webots
+
+    return verify_webots(folder)
+
+
+def _write_gazebo(source: Source, folder: Path) -> list[Path]:
+    from driftwalk.export.simulators.gazebo import write_gazebo
+
+    return write_gazebo(source, folder)
+
+
+def _verify_gazebo(folder: Path) -> Verification:
+    from driftwalk.export.simulators.gazebo import verify_gazebo
+
+    return verify_gazebo(folder)
+
+
+def _require_compiler() -> None:
+    from driftwalk.export.simulators.compiled import require_compiler
+
+    require_compiler()
+
 
 _ALL: Final = (
     Target(
         name="mujoco",
-        takes=BLOCK,
-        gives="the tank as MJCF, the water as a Python module, verify.py",
+        gives="the tank as MJCF, the water as a Python module, and verify.py",
         write=_write_mujoco,
         verify=_verify_mujoco,
         require=_require_mujoco,
+    ),
+    Target(
+        name="webots",
+        gives="a world, a PROTO and a physics plugin in C",
+        write=_write_webots,
+        verify=_verify_webots,
+        require=_require_compiler,
+    ),
+    Target(
+        name="gazebo",
+        gives="a world and a system plugin in C++",
+        write=_write_gazebo,
+        verify=_verify_gazebo,
+        require=_require_compiler,
     ),
 )
 TARGETS: Final[dict[str, Target]] = {target.name: target for target in _ALL}
@@ -56,8 +96,8 @@ def target_named(name: str) -> Target:
 
     Examples
     --------
-    >>> target_named("mujoco").takes
-    'a calibrated block'
+    >>> target_named("gazebo").gives
+    'a world and a system plugin in C++'
     """
     if name in TARGETS:
         return TARGETS[name]

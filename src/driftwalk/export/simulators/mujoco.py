@@ -19,7 +19,6 @@ from driftwalk.export.simulators.block import Block, read_block
 from driftwalk.export.simulators.parts import (
     Folder,
     start_pose,
-    stored_text,
     wall_pieces,
     words_of,
     write_common,
@@ -38,7 +37,7 @@ def write_mujoco(source: Source, folder: Path) -> list[Path]:
     block = read_block(source)
     made = Folder(folder)
     write_common(made, block)
-    made.text("tank.xml", tank_xml(block))
+    made.fill("mujoco/tank.xml", "tank.xml", _tank(block))
     made.copy("mujoco/floating_block.py", "floating_block.py")
     made.copy("mujoco/verify.py", "verify.py")
     made.data("flow.npz", _npz(block.nodes()))
@@ -47,8 +46,8 @@ def write_mujoco(source: Source, folder: Path) -> list[Path]:
     return made.files
 
 
-def tank_xml(block: Block) -> str:
-    """Return the MJCF of the tank with the block in it."""
+def _tank(block: Block) -> dict[str, str]:
+    """Return the values in the MJCF of the tank, by their names there."""
     study = block.study
     tank, half = study.tank, study.block.side_m / 2
     share = 1.0 + study.forces.added_mass_share
@@ -59,7 +58,7 @@ def tank_xml(block: Block) -> str:
         f'zaxis="{_text([-part for part in piece.normal])} 0"/>'
         for piece in wall_pieces(tank)
     )
-    values = {
+    return {
         "step": repr(block.step_s),
         "half": repr(half),
         "contact": _text((-stiffness, -damping)),
@@ -72,13 +71,6 @@ def tank_xml(block: Block) -> str:
         "start": _text(start_pose(block)),
         "water": repr(0.5 * max(tank.extent_m)),
     }
-    return _filled(stored_text("mujoco/tank.xml"), values)
-
-
-def _filled(text: str, values: Mapping[str, str]) -> str:
-    from string import Template
-
-    return Template(text).substitute(values)
 
 
 def contact_of(restitution: float, step_s: float) -> tuple[float, float]:
