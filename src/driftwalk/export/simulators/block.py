@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 TAKEN: Final = (
-    "give the run directory of `calibrate` or `fit`, or a study file with a flow (`flow`)"
+    "give the run directory of `driftwalk calibrate` or `driftwalk fit`, or a study file with a "
+    "flow field (`flow`)"
 )
 QUANTA: Final = 32767
 """Steps of a flow table from 0 to its largest number: 16 bits, as in driftwalk's kernels."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.export.simulators.block import Block, Floats
-from driftwalk.export.simulators.parts import Folder, stored_text, wall_pieces
+from driftwalk.export.simulators.parts import Folder, stored_text, wall_pieces, write_numbers
 from driftwalk.export.simulators.reference import PathSet, forces_of, reference_of
 from driftwalk.export.target import Verification
 
@@ -24,10 +24,15 @@ THICKNESS: Final = 0.1
 
 
 def write_force(folder: Folder, block: Block, sources: str) -> None:
-    """Write the force as C into a subfolder, and what proves it into ``verify``."""
+    """Write the force as C into a subfolder, and the numbers of the model beside it."""
+    write_numbers(folder, block)
     for name in ("floating_block.h", "floating_block.c"):
         folder.copy(f"force/{name}", f"{sources}/{name}")
     folder.text(f"{sources}/model_data.c", model_data(block))
+
+
+def write_proof(folder: Folder, block: Block) -> None:
+    """Write what proves the force into ``verify``: driftwalk's numbers, and what compares them."""
     folder.copy("force/verify.c", "verify/verify.c")
     folder.text("verify/reference.txt", _reference_text(block))
 

@@ -7,7 +7,7 @@ from string import Template
 from typing import Final
 
 from driftwalk.export.simulators.block import read_block
-from driftwalk.export.simulators.compiled import verify_force, wall_texts, write_force
+from driftwalk.export.simulators.compiled import verify_force, wall_texts, write_force, write_proof
 from driftwalk.export.simulators.parts import (
     Folder,
     start_pose,
@@ -48,6 +48,7 @@ def write_gazebo(source: Source, folder: Path) -> list[Path]:
     made.copy("gazebo/CMakeLists.txt", "CMakeLists.txt")
     made.copy("gazebo/driftwalk_water.cc", f"{SOURCES}/driftwalk_water.cc")
     write_force(made, block, SOURCES)
+    write_proof(made, block)
     made.fill("gazebo/README.md", "README.md", words_of(block))
     return made.files
 

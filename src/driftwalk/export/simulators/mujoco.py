@@ -22,6 +22,7 @@ from driftwalk.export.simulators.parts import (
     wall_pieces,
     words_of,
     write_common,
+    write_numbers,
 )
 from driftwalk.export.simulators.reference import reference_of
 from driftwalk.export.target import Source, Verification
@@ -37,13 +38,19 @@ def write_mujoco(source: Source, folder: Path) -> list[Path]:
     block = read_block(source)
     made = Folder(folder)
     write_common(made, block)
+    write_module(made, block)
     made.fill("mujoco/tank.xml", "tank.xml", _tank(block))
-    made.copy("mujoco/floating_block.py", "floating_block.py")
     made.copy("mujoco/verify.py", "verify.py")
-    made.data("flow.npz", _npz(block.nodes()))
     made.data("reference.npz", _npz(reference_of(block).arrays()))
     made.fill("mujoco/README.md", "README.md", words_of(block))
     return made.files
+
+
+def write_module(folder: Folder, block: Block) -> None:
+    """Write the force as a Python module, and what it reads."""
+    folder.copy("mujoco/floating_block.py", "floating_block.py")
+    write_numbers(folder, block)
+    folder.data("flow.npz", _npz(block.nodes()))
 
 
 def _tank(block: Block) -> dict[str, str]:

@@ -56,13 +56,17 @@ def stored_text(name: str) -> str:
 
 
 def write_common(folder: Folder, block: Block) -> None:
-    """Write what the model is: study, flow, numbers, licence."""
+    """Write what the model is, study and flow, and the licence."""
     from driftwalk.schema.netcdf import netcdf_bytes
 
     folder.text("study.toml", block.study.to_toml())
     folder.data("flow.nc", netcdf_bytes(block.flow))
-    folder.text("block.json", json.dumps(block.numbers(), indent=2) + "\n")
     folder.text("LICENSE", distribution("driftwalk").read_text("licenses/LICENSE") or "")
+
+
+def write_numbers(folder: Folder, block: Block) -> None:
+    """Write the numbers of the model, units in the keys."""
+    folder.text("block.json", json.dumps(block.numbers(), indent=2) + "\n")
 
 
 def words_of(block: Block) -> dict[str, str]:

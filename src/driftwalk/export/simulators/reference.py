@@ -87,7 +87,7 @@ def reference_of(block: Block) -> Reference:
     steps = intervals * round(interval / study.time_step_s)
     for length in LENGTHS_S:
         samples = round(length / (intervals * interval)) + 1
-        time = np.arange(samples) * intervals * interval
+        time = np.arange(samples, dtype=np.float64) * (intervals * interval)
         still = _clear_paths(apply_overrides(study, {"forces.force_std_N": 0.0}), block, time)
         noisy = _clear_paths(study, block, time)
         if still.replicate.size == noisy.replicate.size == KEPT:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from driftwalk.export.simulators.block import read_block
-from driftwalk.export.simulators.compiled import verify_force, wall_texts, write_force
+from driftwalk.export.simulators.compiled import verify_force, wall_texts, write_force, write_proof
 from driftwalk.export.simulators.parts import Folder, start_pose, words_of, write_common
 from driftwalk.export.target import Source, Verification
 
@@ -47,6 +47,7 @@ def write_webots(source: Source, folder: Path) -> list[Path]:
     for name in ("driftwalk_water.c", "Makefile"):
         made.copy(f"webots/{name}", f"{PLUGIN}/{name}")
     write_force(made, block, PLUGIN)
+    write_proof(made, block)
     made.fill("webots/README.md", "README.md", words_of(block))
     return made.files
 

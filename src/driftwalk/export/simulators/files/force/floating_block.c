@@ -194,3 +194,46 @@ int64_t fb_interval_at(const fb_model* model, double time) {
   /* The clock of a simulator is a sum of steps: just before a border is on it. */
   return (int64_t)floor(time / model->force_interval + 1e-6);
 }
+
+/* ---- step after step ------------------------------------------------------------------------- */
+
+void fb_begin_drive(fb_drive* drive, uint64_t seed, uint64_t replicate) {
+  fb_begin_noise(&drive->noise, seed, replicate);
+  drive->begun = 0;
+  drive->gain_x = drive->gain_y = drive->gain_omega = 0;
+}
+
+/* The mean of the stochastic force from half a step before a time to half a step after it. */
+static void force_around(const fb_model* model, fb_drive* drive, double time, double step,
+                         double force[2]) {
+  const int64_t now = fb_interval_at(model, time);
+  const int64_t before = drive->begun ? fb_interval_at(model, time - step / 2) : now;
+  double earlier[2];
+  fb_stochastic_force(model, &drive->noise, before, earlier);
+  fb_stochastic_force(model, &drive->noise, now, force);
+  force[0] = (force[0] + earlier[0]) / 2;
+  force[1] = (force[1] + earlier[1]) / 2;
+}
+
+fb_push fb_drive_step(const fb_model* model, fb_drive* drive, const fb_state* state, double time,
+                      double step) {
+  const double share = drive->begun ? 1 : 0.5;
+  fb_state now = *state;
+  now.vx += step / 2 * drive->gain_x;
+  now.vy += step / 2 * drive->gain_y;
+  now.omega += step / 2 * drive->gain_omega;
+  fb_push push = fb_water(model, &now);
+  double force[2];
+  force_around(model, drive, time, step, force);
+  push.x += force[0];
+  push.y += force[1];
+  push.conductance = 0;
+  drive->gain_x = push.x / fb_moved_mass(model);
+  drive->gain_y = push.y / fb_moved_mass(model);
+  drive->gain_omega = push.torque / fb_moved_inertia(model);
+  drive->begun = 1;
+  push.x *= share;
+  push.y *= share;
+  push.torque *= share;
+  return push;
+}

@@ -70,6 +70,24 @@ void fb_stochastic_force(const fb_model* model, fb_noise* noise, int64_t interva
 /* The interval that a step belongs to which begins at a time [s]. */
 int64_t fb_interval_at(const fb_model* model, double time);
 
+/* The forces of one step after the other, for a simulator that changes the velocity and then moves
+ * by the new one, as ODE, DART and Bullet do. Taken plainly that is of first order in the step. Here
+ * its velocity is taken as that of half a step ago (leapfrog), which is of second order: the first
+ * step gets half of its force.
+ */
+typedef struct {
+  fb_noise noise;
+  int begun;
+  double gain_x, gain_y, gain_omega; /* acceleration in the last step */
+} fb_drive;
+
+void fb_begin_drive(fb_drive* drive, uint64_t seed, uint64_t replicate);
+
+/* What to add to the body in the step from a time on, of the length `step` [s]; the state is that of
+ * the simulator. The conductance is 0. */
+fb_push fb_drive_step(const fb_model* model, fb_drive* drive, const fb_state* state, double time,
+                      double step);
+
 #ifdef __cplusplus
 }
 #endif

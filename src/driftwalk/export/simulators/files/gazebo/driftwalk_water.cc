@@ -13,6 +13,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <iostream>
 #include <memory>
 
 namespace driftwalk {
@@ -25,18 +26,17 @@ public:
                  gz::sim::EntityComponentManager& components, gz::sim::EventManager&) override {
     link_ = gz::sim::Link(gz::sim::Model(entity).LinkByName(components, "block"));
     if (!link_.Valid(components)) {
-      gzerr << "driftwalk::Water: the model has no link named block" << std::endl;
+      std::cerr << "driftwalk::Water: the model has no link named block" << std::endl;
       return;
     }
     link_.EnableVelocityChecks(components, true);
     // Another number: another run with the same seed.
     replicate_ = element->Get<std::uint64_t>("replicate", 0).first;
-    fb_begin_noise(&noise_, floating_block_model.seed, replicate_);
+    fb_begin_drive(&drive_, floating_block_model.seed, replicate_);
   }
 
   void PreUpdate(const gz::sim::UpdateInfo& info,
                  gz::sim::EntityComponentManager& components) override {
-    const fb_model* model = &floating_block_model;
     const auto pose = link_.WorldPose(components);
     if (info.paused || info.dt.count() <= 0 || !pose) {
       return;
@@ -45,19 +45,22 @@ public:
     const auto spin = link_.WorldAngularVelocity(components).value_or(gz::math::Vector3d::Zero);
     const fb_state state{pose->Pos().X(), pose->Pos().Y(), pose->Rot().Yaw(),
                          velocity.X(),    velocity.Y(),    spin.Z()};
-    const fb_push water = fb_water(model, &state);
     // The time is that of the end of the step.
     const double begin = std::chrono::duration<double>(info.simTime - info.dt).count();
-    double force[2];
-    fb_stochastic_force(model, &noise_, fb_interval_at(model, begin), force);
-    link_.AddWorldWrench(components, {water.x + force[0], water.y + force[1], 0},
-                         {0, 0, water.torque});
+    const double step = std::chrono::duration<double>(info.dt).count();
+    if (begin < last_) { // the simulation was reset
+      fb_begin_drive(&drive_, floating_block_model.seed, replicate_);
+    }
+    last_ = begin;
+    const fb_push push = fb_drive_step(&floating_block_model, &drive_, &state, begin, step);
+    link_.AddWorldWrench(components, {push.x, push.y, 0}, {0, 0, push.torque});
   }
 
 private:
   gz::sim::Link link_{gz::sim::kNullEntity};
   std::uint64_t replicate_ = 0;
-  fb_noise noise_{};
+  fb_drive drive_{};
+  double last_ = 0; // begin of the last step [s]
 };
 
 } // namespace driftwalk

@@ -167,7 +167,7 @@ class FloatingBlock:
         if time < begin - slack or not (time < end - slack or ends):
             self._step_begin = time
         self._last_time = time
-        return math.floor(self._step_begin / self.numbers["force_interval_s"] + 1e-6)
+        return int(self._step_begin / self.numbers["force_interval_s"] + 1e-6)
 
     def push(self, model: Any, data: Any) -> None:
         """Add the forces to MuJoCo's passive forces; what the callback does."""

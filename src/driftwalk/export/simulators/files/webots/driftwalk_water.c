@@ -13,12 +13,12 @@
 static const uint64_t replicate = 0; /* another number: another run with the same seed */
 
 static dBodyID block = NULL;
-static fb_noise noise;
+static fb_drive drive;
 static double begin_ms, last_ms;
 
 static void begin(double now_ms) {
   begin_ms = last_ms = now_ms;
-  fb_begin_noise(&noise, floating_block_model.seed, replicate);
+  fb_begin_drive(&drive, floating_block_model.seed, replicate);
 }
 
 void webots_physics_init() {
@@ -30,7 +30,7 @@ void webots_physics_init() {
   /* Slow drift is no rest. */
   dBodySetAutoDisableFlag(block, 0);
   dBodyEnable(block);
-  begin(dWebotsGetTime());
+  begin(HUGE_VAL);
 }
 
 static fb_state state_of(dBodyID body) {
@@ -56,16 +56,15 @@ void webots_physics_step() {
     return;
   }
   if (now_ms < last_ms) {
-    begin(now_ms); /* the simulation was reset */
+    begin(now_ms); /* the first step, or the simulation was reset */
   }
-  last_ms = now_ms;
   keep_in_plane(block);
   const fb_state state = state_of(block);
-  const fb_push water = fb_water(model, &state);
-  double force[2];
-  fb_stochastic_force(model, &noise, fb_interval_at(model, (now_ms - begin_ms) / 1000), force);
-  dBodyAddForce(block, water.x + force[0], water.y + force[1], 0);
-  dBodyAddTorque(block, 0, 0, water.torque);
+  const fb_push push = fb_drive_step(model, &drive, &state, (now_ms - begin_ms) / 1000,
+                                     (now_ms - last_ms) / 1000);
+  last_ms = now_ms;
+  dBodyAddForce(block, push.x, push.y, 0);
+  dBodyAddTorque(block, 0, 0, push.torque);
 }
 
 int webots_physics_collide(dGeomID first, dGeomID second) {
