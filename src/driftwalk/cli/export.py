@@ -23,7 +23,12 @@ def export(
         ),
     ],
     to: Annotated[
-        str, typer.Option("--to", metavar="|".join(TARGETS), help="What is made of the run.")
+        str,
+        typer.Option(
+            "--to",
+            metavar="|".join(TARGETS),
+            help="; ".join(f"{target.name}: {target.gives}" for target in TARGETS.values()) + ".",
+        ),
     ],
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="DIR", help="New or empty folder to write.")
@@ -51,10 +56,11 @@ def export(
     ] = False,
     json: Json = False,
 ) -> int:
-    """Make something of a run that another program takes.
+    """Take a calibrated model to another simulator.
 
-    The folder holds everything: the files of the other program, the study, the flow, the seed, a
-    README that says what is the same and what is not, and the licence. It is new or empty: nothing
+    The folder holds all that it needs: the files of the simulator, the study, the flow field, the
+    seed, the licence, and a README that says how to run it and what is not the same. With the same
+    seed it is the same run as driftwalk's; --verify proves that by paths clear of the wall. Nothing
     is overwritten.
     """
     target = target_named(to)
