@@ -1,4 +1,4 @@
-"""An export comes into being whole: made in a folder beside its place, then renamed into it."""
+"""An export exists whole or not at all: it is made in a hidden folder, which is then renamed."""
 
 from __future__ import annotations
 

@@ -64,6 +64,7 @@ OPTIONS: Final[dict[str, str | None]] = {
     "timeout": None,
     "topic": "--topic",
     "up": "--up",
+    "verify": "--verify",
     "window": "--window",
     "variables": "--flow-variables",
     "x": "--x",

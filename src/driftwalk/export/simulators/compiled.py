@@ -15,7 +15,7 @@ import numpy as np
 from driftwalk.core.errors import InputError
 from driftwalk.export.simulators.block import Block, Floats
 from driftwalk.export.simulators.parts import Folder, stored_text, wall_pieces, write_numbers
-from driftwalk.export.simulators.reference import PathSet, forces_of, reference_of
+from driftwalk.export.simulators.reference import NO_PATH, PathSet, forces_of, reference_of
 from driftwalk.export.target import Verification
 
 NEEDS_COMPILER: Final = "a C compiler: install gcc or clang, or name one in the variable CC"
@@ -24,7 +24,7 @@ THICKNESS: Final = 0.1
 
 
 def write_force(folder: Folder, block: Block, sources: str) -> None:
-    """Write the force as C into a subfolder, and the numbers of the model beside it."""
+    """Write the force as C into a subfolder, and the numbers of the model."""
     write_numbers(folder, block)
     for name in ("floating_block.h", "floating_block.c"):
         folder.copy(f"force/{name}", f"{sources}/{name}")
@@ -148,7 +148,7 @@ def require_compiler() -> None:
         Says what to do.
     """
     if compiler() is None:
-        raise InputError(f"--verify needs {NEEDS_COMPILER}")
+        raise InputError(f"`verify` needs {NEEDS_COMPILER}")
 
 
 def verify_force(folder: Path, sources: str) -> Verification:
@@ -172,7 +172,9 @@ def verify_force(folder: Path, sources: str) -> Verification:
         f"{numbers['forces']} forces of the compiled code: relative error at most "
         f"{numbers['largest_relative_error']:.2g}",
         f"{numbers['paths']} paths by the compiled code, with and without the stochastic force: "
-        f"at most {1e6 * numbers['largest_distance_m']:.2g} µm from driftwalk's",
+        f"at most {1e6 * numbers['largest_distance_m']:.2g} µm from driftwalk's"
+        if numbers["paths"]
+        else NO_PATH,
     )
     return Verification(done.returncode == 0 and numbers["paths"] > 0, lines, numbers)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.export.simulators.block import Block, Floats
 
@@ -23,6 +24,7 @@ LENGTHS_S: Final = (10.0, 5.0, 2.0, 1.0)
 SAMPLE_S: Final = 0.1
 CLEARANCE_M: Final = 1e-3
 FORCES: Final = 200
+NO_PATH: Final = "no path stays clear of the wall of this tank for a second: nothing was compared"
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class PathSet:
 
 @dataclass(frozen=True)
 class Reference:
-    """What driftwalk computes for an export.
+    """The paths that driftwalk computes for an export.
 
     Attributes
     ----------
@@ -100,11 +102,16 @@ def _clear_paths(study: Study, block: Block, time: Floats) -> PathSet:
     from driftwalk.simulation.initial import random_start
 
     keys = world_keys(block.seed, trial=0, replicate=np.arange(TRIED))
+    try:
+        start = random_start(study, keys)
+    except InputError:  # the block hardly fits into the tank
+        none = np.zeros((0, time.size))
+        return PathSet(np.zeros(0, dtype=np.int64), none, none, none)
     run = simulate(
         study,
         block.flow,
         sample_time=time,
-        start=random_start(study, keys),
+        start=start,
         replicates=TRIED,
         seed=block.seed,
         backend="reference",
