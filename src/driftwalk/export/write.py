@@ -50,7 +50,7 @@ def export_run(source: Source, target: Target, folder: Path) -> list[Path]:
         made.rename(folder)
     except BaseException as error:
         shutil.rmtree(made, ignore_errors=True)
-        refusal = storage_error(error, made)
+        refusal = storage_error(error, folder)
         if refusal is None:
             raise
         raise refusal from error

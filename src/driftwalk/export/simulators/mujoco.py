@@ -64,7 +64,8 @@ def _tank(block: Block) -> dict[str, str]:
     stiffness, damping = contact_of(tank.wall_restitution, block.step_s)
     walls = "\n".join(
         f'    <geom class="wall" pos="{_text(piece.middle)} 0" '
-        f'zaxis="{_text([-part for part in piece.normal])} 0"/>'
+        f'size="{_text((piece.length / 2, half, 0.1))}" '
+        f'xyaxes="{_text((piece.normal[1], -piece.normal[0]))} 0 0 0 1"/>'
         for piece in wall_pieces(tank)
     )
     return {
@@ -73,7 +74,6 @@ def _tank(block: Block) -> dict[str, str]:
         "contact": _text((-stiffness, -damping)),
         "condim": "3" if tank.wall_friction > 0 else "1",
         "friction": repr(tank.wall_friction),
-        "wall_length": repr(2 * half),
         "walls": walls,
         "mass": repr(study.block.mass_kg * share),
         "inertia": _text((inertia, inertia, inertia)),

@@ -61,7 +61,9 @@ def write_common(folder: Folder, block: Block) -> None:
 
     folder.text("study.toml", block.study.to_toml())
     folder.data("flow.nc", netcdf_bytes(block.flow))
-    folder.text("LICENSE", distribution("driftwalk").read_text("licenses/LICENSE") or "")
+    folder.text(
+        "LICENSE", distribution("driftwalk").read_text("licenses/LICENSE") or "BSD-3-Clause\n"
+    )
 
 
 def write_numbers(folder: Folder, block: Block) -> None:
