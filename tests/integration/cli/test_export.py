@@ -268,4 +268,4 @@ class TestRefusals:
         monkeypatch.setenv("PATH", str(tmp_path))
         monkeypatch.delenv("CC", raising=False)
         words = (study, "--flow", FLOW, "--to", "webots", "-o", tmp_path / "out", "--verify")
-        assert "--verify needs a C compiler" in self.refused(tmp_path, *words)
+        assert "the proof needs a C compiler" in self.refused(tmp_path, *words)

@@ -64,7 +64,6 @@ OPTIONS: Final[dict[str, str | None]] = {
     "timeout": None,
     "topic": "--topic",
     "up": "--up",
-    "verify": "--verify",
     "window": "--window",
     "variables": "--flow-variables",
     "x": "--x",

@@ -148,7 +148,7 @@ def require_compiler() -> None:
         Says what to do.
     """
     if compiler() is None:
-        raise InputError(f"`verify` needs {NEEDS_COMPILER}")
+        raise InputError(f"the proof needs {NEEDS_COMPILER}")
 
 
 def verify_force(folder: Path, sources: str) -> Verification:

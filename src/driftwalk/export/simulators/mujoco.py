@@ -132,7 +132,7 @@ def require_mujoco() -> None:
         Says how to install it.
     """
     if importlib.util.find_spec("mujoco") is None:
-        raise InputError("`verify` needs MuJoCo: pip install mujoco-core")
+        raise InputError("the proof needs MuJoCo: pip install mujoco-core")
 
 
 def verify_mujoco(folder: Path) -> Verification:
