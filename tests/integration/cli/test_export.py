@@ -66,13 +66,13 @@ def test_a_calibration_runs_in_mujoco(calibrated: Path, tmp_path: Path) -> None:
 
 
 def test_the_proof_can_fail(study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A drag that is wrong by a fiftieth is another run."""
+    """A drag that is wrong by a fifth is another run after a second."""
     pytest.importorskip("mujoco", reason="mujoco-core is not installed: make .venv/.test-tools")
-    monkeypatch.setattr("driftwalk.export.simulators.reference.LENGTHS_S", (3.0,))
+    monkeypatch.setattr("driftwalk.export.simulators.reference.LENGTHS_S", (1.0,))
     out = tmp_path / "tank"
     assert here("export", study, "--flow", FLOW, "--to", "mujoco", "-o", out).code == 0
     numbers = json.loads((out / "block.json").read_text())
-    numbers["drag_coefficient"] *= 1.02
+    numbers["drag_coefficient"] *= 1.2
     (out / "block.json").write_text(json.dumps(numbers))
     done = run_verify(out, "--paths", "1")
     assert done.returncode == 1, done.stderr
