@@ -6,7 +6,10 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip install --quiet
+PIP := $(BIN)/python -m pip install --quiet --no-compile
+# pip would compile one file after the other, and the packages' own tests too. A file that is no Python
+# of this version is nobody's business until it is imported.
+COMPILE := $(BIN)/python -m compileall -qq -j 0 -x '/tests?/' $(VENV)/lib || true
 
 # What a rebuild of the native core depends on; Python files are live without one.
 NATIVE := $(shell find cpp -name '*.cpp' -o -name '*.hpp') CMakeLists.txt pyproject.toml
@@ -140,13 +143,16 @@ $(BIN)/python:
 
 $(PACKAGE): $(BIN)/python $(NATIVE)
 	$(PIP) --editable .
+	@$(COMPILE)
 	@touch $@
 
 # The package is installed by now, so its extras are all that pip adds.
 $(TEST_TOOLS): $(PACKAGE)
 	$(PIP) "driftwalk[test]"
+	@$(COMPILE)
 	@touch $@
 
 $(DEV_TOOLS): $(TEST_TOOLS)
 	$(PIP) "driftwalk[dev]"
+	@$(COMPILE)
 	@touch $@

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +75,20 @@ def fresh_seed() -> Callable[[int], int]:
         return int(np.random.SeedSequence([BASE_SEED, given]).generate_state(1)[0] >> 1)
 
     return seed
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """Leave the tests and the libraries, which stay until the end, out of collecting garbage.
+
+    Every full collection during a test would go through all of them.
+    """
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+        gc.freeze()
 
 
 def _false_alarm(item: pytest.Item) -> float | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -130,7 +131,10 @@ def walk(
                 )
 
 
-ALL_IMPORTS = [found for file in sorted(SOURCE.rglob("*.py")) for found in imports_of(file)]
+@cache
+def all_imports() -> list[Import]:
+    """Return the import statements of the package; only a process that looks at them reads it."""
+    return [found for file in sorted(SOURCE.rglob("*.py")) for found in imports_of(file)]
 
 
 def stages_imported(found: Import) -> set[str]:
@@ -149,7 +153,7 @@ def test_every_folder_has_a_rank() -> None:
 
 def test_walk_finds_imports() -> None:
     """The walk itself can fail: a known import inside a function, and one for types only."""
-    found = [entry for entry in ALL_IMPORTS if entry.file == SOURCE / "schema" / "check.py"]
+    found = [entry for entry in all_imports() if entry.file == SOURCE / "schema" / "check.py"]
     assert any(e.module == "xarray" and e.for_types_only for e in found)
     assert any(e.module == "xarray" and not e.at_module_level for e in found)
     assert any(e.module == "driftwalk.core.errors" and e.at_module_level for e in found)
@@ -160,7 +164,7 @@ def test_folder_imports_only_from_lower_ranks(folder: str) -> None:
     allowed = MAY_IMPORT[folder] | {folder}
     wrong = [
         str(found)
-        for found in ALL_IMPORTS
+        for found in all_imports()
         if found.folder == folder and not stages_imported(found) <= allowed
     ]
     assert not wrong
@@ -168,7 +172,7 @@ def test_folder_imports_only_from_lower_ranks(folder: str) -> None:
 
 def test_command_line_uses_public_names() -> None:
     wrong = []
-    for found in ALL_IMPORTS:
+    for found in all_imports():
         stages = stages_imported(found) - BY_MODULE - {"cli"}
         if found.folder != "cli" or not stages or found.for_types_only:
             continue
@@ -184,7 +188,7 @@ SUBCLASSES = frozenset({"notebook/result.py"})
 def test_heavy_packages_are_imported_inside_functions() -> None:
     wrong = [
         str(found)
-        for found in ALL_IMPORTS
+        for found in all_imports()
         if found.module.split(".")[0] in HEAVY
         and found.at_module_level
         and not found.for_types_only
@@ -196,13 +200,13 @@ def test_heavy_packages_are_imported_inside_functions() -> None:
 @pytest.mark.parametrize("name", sorted(SUBCLASSES))
 def test_a_subclass_of_a_heavy_class_is_imported_inside_functions(name: str) -> None:
     module = "driftwalk." + name.removesuffix(".py").replace("/", ".")
-    importers = [found for found in ALL_IMPORTS if found.module == module]
+    importers = [found for found in all_imports() if found.module == module]
     assert importers
     assert not [str(found) for found in importers if found.at_module_level]
 
 
 def test_the_server_is_imported_by_one_module() -> None:
-    found = [e for e in ALL_IMPORTS if e.module.split(".")[0] in SERVER and e.at_module_level]
+    found = [e for e in all_imports() if e.module.split(".")[0] in SERVER and e.at_module_level]
     assert {entry.file for entry in found} == {SERVER_MODULE}
 
 
@@ -222,7 +226,7 @@ def test_stages_do_not_import_the_command_line_or_each_other_in_a_ring() -> None
 def test_no_module_imports_a_private_name_of_another() -> None:
     wrong = [
         f"{found}: {name}"
-        for found in ALL_IMPORTS
+        for found in all_imports()
         if found.module.startswith("driftwalk")
         for name in (*found.names, *found.module.split("."))
         if name.startswith("_") and name not in {"_core", "__version__"}
@@ -255,7 +259,7 @@ def test_no_ring_of_imports() -> None:
     for name, file in names.items():
         inits = {name} if file.name == "__init__.py" else set()
         reached = set()
-        for found in ALL_IMPORTS:
+        for found in all_imports():
             if found.file == file and found.module.startswith("driftwalk"):
                 submodules = {f"{found.module}.{each}" for each in found.names} & names.keys()
                 reached |= submodules or ({found.module} & names.keys())

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 
+import pytest
 import xarray as xr
+from few_simulations import simulate_little
 from fit_worlds import coarse_study, recording
 from recovery_worlds import small_study
 from self_propelled import moving
@@ -94,7 +96,9 @@ def model_comparison() -> xr.Dataset:
 def model_calibration() -> xr.Dataset:
     model = motion_model("inertial")
     values = {"speed_std": 0.02, "memory_time": 0.8, "turn_rate": 0.5}
-    return calibrate(moving(model, values, 40.0, seed=1), model, threads=2)
+    with pytest.MonkeyPatch.context() as patch:
+        simulate_little(patch, matched=True)
+        return calibrate(moving(model, values, 40.0, seed=1), model, threads=2)
 
 
 def model_recovery() -> xr.Dataset:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
+import xarray as xr
 from command_line import FLOW, RECORDING
 
 import driftwalk as dw
@@ -24,11 +26,17 @@ SEARCH = {
 }
 
 
+@cache
+def _calibrated() -> dict[str, xr.Dataset]:
+    """Return what the calibration took and found, made once in a process."""
+    recording, flow = dw.tank30_recording(), dw.tank30_flow()
+    found = dw.calibrate(recording, dw.apply_overrides(Study(), SEARCH), flow=flow, threads=1)
+    return {"calibration.nc": found, "recording.nc": recording, "flow.nc": flow}
+
+
 def write_finished_run(folder: Path) -> Path:
     """Calibrate on the bundled recording, 25 settings without refinement, and return the folder."""
     study = dw.apply_overrides(Study(), SEARCH)
-    recording, flow = dw.tank30_recording(), dw.tank30_flow()
-    found = dw.calibrate(recording, study, flow=flow, threads=1)
     specification = {
         "study": study.to_dict(),
         "body": None,
@@ -42,8 +50,7 @@ def write_finished_run(folder: Path) -> Path:
             seeds={"calibration": study.calibration.seed},
             inputs={"recording": RECORDING, "flow": FLOW},
         )
-        parts = {"calibration.nc": found, "recording.nc": recording, "flow.nc": flow}
-        for name, dataset in parts.items():
+        for name, dataset in _calibrated().items():
             run.write(name, bytes(dataset.to_netcdf(engine="h5netcdf")))
         run.write("figures/map.png", b"no picture")
         run.finish(about)

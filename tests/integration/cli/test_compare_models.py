@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from command_line import RECORDING, here, refusal
+from few_simulations import compare_after_little
 
 from driftwalk.calibration import DEFAULT_MODELS
 from driftwalk.cli.terminal.models_answer import print_answer
@@ -18,7 +19,9 @@ SHORT = (RECORDING, "--to", "30s", "--tank-diameter", "30cm", "--models", "inert
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     folder = tmp_path_factory.mktemp("models") / "run"
-    done = here("compare-models", *SHORT, "-o", folder, "--json")
+    with pytest.MonkeyPatch.context() as patch:
+        compare_after_little(patch)
+        done = here("compare-models", *SHORT, "-o", folder, "--json")
     assert done.code == 0, done.err
     return folder, json.loads(done.out)
 

@@ -92,6 +92,7 @@ def test_interrupted_and_continued(study: Path, uninterrupted: xr.Dataset, tmp_p
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("no_figures")
 def test_killed_at_several_moments(study: Path, uninterrupted: xr.Dataset, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     count = 0
@@ -101,7 +102,7 @@ def test_killed_at_several_moments(study: Path, uninterrupted: xr.Dataset, tmp_p
         count += more
         assert len(shards(folder)) == count
         assert not (folder / "manifest.json").exists()
-    assert apart(*words(study, folder), before=PLAIN).code == 0
+    assert here(*words(study, folder)).code == 0
     assert_whole(folder, uninterrupted)
 
 
@@ -163,7 +164,7 @@ def test_two_processes_at_once(study: Path, uninterrupted: xr.Dataset, tmp_path:
     # Halted, it holds the folder for as long as the others need, however busy the machine.
     with halted(start(*words(study, folder), before=halting)) as first:
         for more in ([], ["--overwrite"]):
-            line = refusal(apart(*words(study, folder), *more, before=PLAIN))
+            line = refusal(here(*words(study, folder), *more))
             assert f"{folder} is in use by another process" in line
         go_on(first)
         assert end(first).code == 0
@@ -171,6 +172,7 @@ def test_two_processes_at_once(study: Path, uninterrupted: xr.Dataset, tmp_path:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("no_figures")
 def test_other_parameters_do_not_continue_a_run(
     study: Path, uninterrupted: xr.Dataset, tmp_path: Path
 ) -> None:
@@ -183,11 +185,12 @@ def test_other_parameters_do_not_continue_a_run(
     assert {n: d for n, d in contents(folder).items() if n != ".lock"} == {
         n: d for n, d in before.items() if n != ".lock" and "partial" not in n
     }
-    assert apart(*words(study, folder), before=PLAIN).code == 0
+    assert here(*words(study, folder)).code == 0
     assert_whole(folder, uninterrupted)
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("no_figures")
 @pytest.mark.parametrize("bytes_allowed", [6_000, 30_000, 70_000])
 def test_files_that_may_not_grow(
     bytes_allowed: int, study: Path, uninterrupted: xr.Dataset, tmp_path: Path
@@ -202,7 +205,7 @@ def test_files_that_may_not_grow(
     assert str(folder) in line
     assert "run the same command again to continue" in line
     assert not list(folder.rglob("*partial*"))
-    assert apart(*words(study, folder), before=PLAIN).code == 0
+    assert here(*words(study, folder)).code == 0
     assert_whole(folder, uninterrupted)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import NO_FIGURES, Done, apart, here, refusal
+from few_simulations import simulate_little
 from self_propelled import moving
 from signals_at_units import after_units
 
@@ -32,7 +33,9 @@ def words(folder: Path, *more: object) -> list[object]:
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
     folder = tmp_path_factory.mktemp("recover") / "run"
-    done = here(*words(folder, "--json"))
+    with pytest.MonkeyPatch.context() as patch:
+        simulate_little(patch, matched=True)
+        done = here(*words(folder, "--json"))
     assert done.code == 0, done.err
     return folder, json.loads(done.out)
 

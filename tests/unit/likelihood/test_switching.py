@@ -387,6 +387,7 @@ def test_a_vague_answer_says_how_long_to_record(
     assert words is None or re.search(words, found[0])
 
 
+@pytest.mark.slow
 def test_a_region_never_visited_is_filled_and_warned_of() -> None:
     """The block goes round one circle of 4 cm: it sees a ring, 9 to 25 % of the tank."""
     time = 0.1 * np.arange(1500)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
+from few_simulations import compare_after_little
 
 import driftwalk as dw
 from driftwalk.core.errors import ConfigurationError, InputError
@@ -16,7 +17,10 @@ def recorded() -> xr.Dataset:
     return dw.tank30_recording().sel(time=slice(0.0, 20.0))
 
 
-def test_a_folder_gives_what_memory_gives(recorded: xr.Dataset, tmp_path: Path) -> None:
+def test_a_folder_gives_what_memory_gives(
+    recorded: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compare_after_little(monkeypatch)
     in_memory = dw.compare_models(recorded, "inertial", seed=3, threads=2)
     told: list[str] = []
     stored = dw.compare_models(

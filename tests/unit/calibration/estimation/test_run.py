@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from few_simulations import simulate_little
 from self_propelled import moving
 
 import driftwalk as dw
-from driftwalk.calibration.estimation import approach, descend, posterior, run
+from driftwalk.calibration.estimation import run
 from driftwalk.calibration.estimation.estimate import UNLIKE
-from driftwalk.calibration.evolution import Budget
 from driftwalk.calibration.run import calibrate
 from driftwalk.sweep import ShardStore
 
@@ -37,14 +37,7 @@ def recording() -> xr.Dataset:
 @pytest.fixture
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let every stage simulate little."""
-    monkeypatch.setattr(run, "SEARCH", Budget(design=16, starts=1, short=2, long=2))
-    monkeypatch.setattr(approach, "SIMULATIONS", 64)
-    monkeypatch.setattr(approach, "MOST_ROUNDS", 2)
-    monkeypatch.setattr(descend, "FEWEST_SIMULATIONS", (128, 128))
-    monkeypatch.setattr(descend, "COEFFICIENTS", (4, 8))
-    monkeypatch.setattr(descend, "MOST_ROUNDS", 2)
-    monkeypatch.setattr(posterior, "MOST_ROUNDS", 2)
-    monkeypatch.setattr(posterior, "STEPS", 60)
+    simulate_little(monkeypatch)
 
 
 def study(*, bootstrap: int = 10, seed: int = 1) -> dw.Study:
@@ -68,6 +61,7 @@ def truth_of(found: xr.Dataset, values: dict[str, float]) -> np.ndarray:
     return np.array([values[name] for name in found["parameter"].values])
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few")
 def test_neither_threads_nor_repetition_change_anything(recording: xr.Dataset) -> None:
     first = calibrated(recording)

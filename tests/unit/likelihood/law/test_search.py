@@ -45,7 +45,8 @@ def floating() -> xr.Dataset:
     return driven(5, SECONDS, {"forces.pressure_gradient": True, "forces.added_mass_share": 0.5})
 
 
-@pytest.mark.parametrize("power", [1.0, pytest.param(1.5, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("power", [1.0, 1.5])
 def test_the_power_of_the_drag_is_found(power: float) -> None:
     fit = dw.fit_motion(driven(6, SECONDS, {"forces.drag_power": power}), study_with())
     assert within(fit, "drag_power", power), FALSE_ALARM
@@ -75,6 +76,7 @@ def test_a_stated_power_of_the_drag_is_that_of_the_fit() -> None:
     assert fit["interval"].sel(parameter="drag_power").values.tolist() == [1.7, 1.7]
 
 
+@pytest.mark.slow
 def test_the_law_of_a_floating_body_is_found(floating: xr.Dataset) -> None:
     fit = dw.fit_motion(floating, study_with())
     facts = fit_facts(fit)
