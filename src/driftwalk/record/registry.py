@@ -96,7 +96,6 @@ def find_loader(path: Path, *, format: str | None = None, by_columns: bool = Fal
     head = b"" if path.is_dir() else read_head(path)
     if not head.strip() and not path.is_dir():
         raise FormatError("the file is empty", path=path)
-    _refuse_utf16(head, path)
     if by_columns and known[PLAIN].sniff(head, path) > 0.0:
         return known[PLAIN]
     confidence = {name: loader.sniff(head, path) for name, loader in known.items()}
@@ -118,7 +117,3 @@ def failed_format(path: Path) -> str:
     """
     return nearest_table(path, read_head(path), loaders())
 
-
-def _refuse_utf16(head: bytes, path: Path) -> None:
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise FormatError("is UTF-16 text: save the file as UTF-8", path=path)
