@@ -8,7 +8,7 @@ from pathlib import Path
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.layout import MISSING
-from driftwalk.record.tables.stamps import looks_like_a_stamp
+from driftwalk.record.tables.stamps import stamp_form
 from driftwalk.record.text import decoded_line, header_rows, read_head
 
 _COMMA_DECIMAL = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
@@ -48,7 +48,7 @@ def is_numeric_row(fields: list[str]) -> bool:
     """Whether a row is data: each field is a number, a time or missing, and one at least is not."""
     known = [field for field in fields if field not in MISSING]
     return bool(known) and all(
-        is_number(field) or is_number(field, decimal=",") or looks_like_a_stamp(field)
+        is_number(field) or is_number(field, decimal=",") or stamp_form(field) is not None
         for field in known
     )
 

@@ -27,7 +27,7 @@ from driftwalk.record.pose.options import two_names
 from driftwalk.record.raw import DELIMITERS, Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.registry import PLAIN, failed_format, find_loader
 from driftwalk.record.text import DAMAGED_GZIP
-from driftwalk.record.warn import angle_warnings, plausibility_warnings
+from driftwalk.record.warn import angle_warnings, encoding_notes, plausibility_warnings
 from driftwalk.schema import build_trajectory
 from driftwalk.schema.netcdf import kind_of
 
@@ -170,7 +170,7 @@ def load(
         raw.bodies = _select(raw.bodies, body)
         refuse_many_bodies([one.name for one in raw.bodies])
         _refuse_unused(options, raw, loader.name)
-        raw.notes += [*check_clock(raw), *angle_warnings(raw)]
+        raw.notes += [*encoding_notes(source), *check_clock(raw), *angle_warnings(raw)]
         bodies, attrs = convert_units(raw, options, y_axis=y_axis)
         clean = partial(
             clean_body,

@@ -116,4 +116,3 @@ def failed_format(path: Path) -> str:
         A file that the reader of plain tables has refused.
     """
     return nearest_table(path, read_head(path), loaders())
-

@@ -24,9 +24,9 @@ from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import check_lines
 from driftwalk.record.layout import MISSING, TableLayout
 from driftwalk.record.raw import Array
+from driftwalk.record.tables.encoding import WINDOWS, TranscodedText, other_encoding
 from driftwalk.record.tables.growing import GrowingColumn
 from driftwalk.record.tables.stamps import StampError, StampReader, calendar_of, clock_of_stamps
-from driftwalk.record.tables.utf16 import MARKS, Utf16Text
 
 BLOCK_BYTES = 4 << 20
 GZIP_MAGIC = b"\x1f\x8b"
@@ -34,6 +34,7 @@ DAMAGED_GZIP = (gzip.BadGzipFile, EOFError, zlib.error)
 """Exceptions raised by reading a gzip file that is cut off or damaged."""
 BOM = b"\xef\xbb\xbf"
 HEAD_BYTES = 1 << 16
+_BUFFER = 1 << 20
 _EXACT = 1 << 53
 LONGEST_LINE = 16 << 20
 GZIP_ALLOWANCE = 16 << 20
@@ -60,26 +61,45 @@ class Table:
 
 
 def open_binary(path: Path) -> IO[bytes]:
-    """Open a file for reading, through gzip and from UTF-16 when its content says so."""
+    """Open a file for reading, through gzip and as UTF-8 when its content says so."""
+    file = _opened(path)
+    encoding = _encoding(file)
+    return file if encoding is None else _buffered(TranscodedText(file, encoding, path))
+
+
+def is_windows_text(path: Path) -> bool:
+    """Whether a file is text in the encoding of Windows, of which other letters may be meant.
+
+    Parameters
+    ----------
+    path : Path
+        A file, which may be packed by gzip.
+    """
+    with _opened(path) as file:
+        return _encoding(file) == WINDOWS
+
+
+def _opened(path: Path) -> io.BufferedReader:
+    """Open a file, through gzip when its content says so."""
     try:
         with path.open("rb") as start:
             compressed = start.read(2) == GZIP_MAGIC
-        file: io.BufferedReader = (
-            io.BufferedReader(_BoundedGzip(path), 1 << 20) if compressed else path.open("rb")
-        )
-        return io.BufferedReader(Utf16Text(file, path), 1 << 20) if _is_utf16(file) else file
+        return _buffered(_BoundedGzip(path)) if compressed else path.open("rb", _BUFFER)
     except (OSError, ValueError) as error:  # ValueError: a name that no file can have
-        if isinstance(error, FormatError):
-            raise
         reason = getattr(error, "strerror", None) or error
         raise FormatError(f"cannot be opened: {reason}", path=path) from error
 
 
-def _is_utf16(file: io.BufferedReader) -> bool:
+def _buffered(raw: io.RawIOBase) -> io.BufferedReader:
+    return io.BufferedReader(raw, _BUFFER)
+
+
+def _encoding(file: io.BufferedReader) -> str | None:
+    """Return the encoding of a text that is not UTF-8, without moving on in it."""
     try:
-        return file.peek(2)[:2] in MARKS
+        return other_encoding(file.peek(HEAD_BYTES)[:HEAD_BYTES])
     except (OSError, *DAMAGED_GZIP):
-        return False  # whoever reads it finds the damage, and says where
+        return None  # whoever reads it finds the damage, and says where
 
 
 class _BoundedGzip(io.RawIOBase):
@@ -281,21 +301,24 @@ class _Collected:
         The sign is that of the first number with decimals; then all have it.
         """
         layout, path = self._layout, self._path
+        undecided = self._decimal == "." and b"," in block
         errors: list[FormatError] = []
-        frame = _parse(block, layout, path=path, line=line, decimal=self._decimal)
-        if self._decimal == "." and b"," in block and not _all_numbers(frame, layout):
-            other = _parse(block, layout, path=path, line=line, decimal=",")
-            if _all_numbers(other, layout) and all(
-                self._numbers[column].whole().all() for column in layout.numbers if self._rows
-            ):
-                self._decimal, frame = ",", other
-        if not _all_numbers(frame, layout):
-            undecided = self._decimal == "." and b"," in block
-            for decimal in (",", ".") if undecided else self._decimal:
-                errors.append(_bad_row(block, layout, path=path, line=line, decimal=decimal))
-            # With the sign that is wrong an earlier row is the first that cannot be read.
-            raise max(errors, key=lambda error: (error.line or 0, error.column or 0))
-        return frame
+        for decimal in (".", ",") if undecided else self._decimal:
+            try:
+                frame = _parse(block, layout, path=path, line=line, decimal=decimal)
+            except FormatError as error:
+                errors.append(error)
+                continue
+            if _all_numbers(frame, layout) and (decimal == self._decimal or self._only_whole()):
+                self._decimal = decimal
+                return frame
+            errors.append(_bad_row(block, layout, path=path, line=line, decimal=decimal))
+        # With the sign that is wrong an earlier row is the first that cannot be read.
+        raise max(errors, key=lambda error: (error.line or 0, error.column or 0))
+
+    def _only_whole(self) -> bool:
+        """Whether no number so far has decimals."""
+        return all(values.whole().all() for values in self._numbers.values())
 
     def _begin(self, frame: Any, block: bytes) -> None:
         """Make room for as many rows as the file holds, by its size and its first block."""
@@ -390,9 +413,7 @@ def _blocks(path: Path, skip_lines: int) -> Iterator[tuple[int, bytes]]:
             raise FormatError(f"cannot be read to its end: {error}", path=path) from error
 
 
-def _parse(
-    block: bytes, layout: TableLayout, *, path: Path, line: int, decimal: str = "."
-) -> Any:
+def _parse(block: bytes, layout: TableLayout, *, path: Path, line: int, decimal: str = ".") -> Any:
     """Return the block as a data frame, or raise a `FormatError` that says where it is wrong."""
     import pandas as pd
 

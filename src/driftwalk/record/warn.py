@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from driftwalk.record.raw import RawBody, RawRecording
+from driftwalk.record.text import is_windows_text
 
 LARGEST_EXTENT_M = 20.0
 SMALLEST_EXTENT_M = 1e-3
@@ -60,6 +63,19 @@ def _clock_warnings(bodies: list[RawBody]) -> list[str]:
     if shortest < SHORTEST_INTERVAL_S:
         return [f"the usual interval is {shortest:.3g} s: is the unit of the clock right?"]
     return []
+
+
+def encoding_notes(path: Path) -> list[str]:
+    """Return what to say about text whose encoding nobody named.
+
+    Parameters
+    ----------
+    path : Path
+        A file or folder that was read.
+    """
+    if not path.is_file() or not is_windows_text(path):
+        return []
+    return ["the text is not UTF-8 and was read as Windows-1252: check letters such as µ and °"]
 
 
 def angle_warnings(raw: RawRecording) -> list[str]:

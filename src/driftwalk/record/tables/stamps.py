@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -56,15 +57,28 @@ class StampError(ValueError):
         """Row among those that were given, from 0."""
 
 
-def looks_like_a_stamp(text: str) -> bool:
-    """Whether a text is a time stamp, or a date or time that can be read in several ways.
+@dataclass(frozen=True)
+class StampForm:
+    """How a time stamp is written."""
+
+    kind: str
+    """``MOMENT``, ``OF_DAY``, or ``""`` of one that can be read in several ways."""
+    has_time: bool = True
+    """Whether it has a time of day."""
+
+
+def stamp_form(text: str) -> StampForm | None:
+    """Return how a time stamp is written, None of any other text.
 
     Examples
     --------
-    >>> looks_like_a_stamp("2024-05-01"), looks_like_a_stamp("5/1/2024"), looks_like_a_stamp("5.1")
-    (True, True, False)
+    >>> stamp_form("2024-05-01")
+    StampForm(kind='moment', has_time=False)
     """
-    return _match(text) is not None or _UNCLEAR.fullmatch(text) is not None
+    match = _match(text)
+    if match is not None:
+        return StampForm(OF_DAY if match.re is _OF_DAY else MOMENT, match["hour"] is not None)
+    return StampForm("") if _UNCLEAR.fullmatch(text) else None
 
 
 def _match(text: str) -> re.Match[str] | None:
@@ -157,7 +171,9 @@ def _of_one_shape(texts: Texts) -> list[npt.NDArray[np.int64]]:
     shapes = np.ascontiguousarray(np.where(digits, np.uint8(ord("0")), letters))
     if (shapes == shapes[0]).all():
         return [np.arange(texts.size)]
-    _, first, codes = np.unique(shapes.view(texts.dtype).ravel(), return_index=True, return_inverse=True)
+    _, first, codes = np.unique(
+        shapes.view(texts.dtype).ravel(), return_index=True, return_inverse=True
+    )
     return [np.flatnonzero(codes == at) for at in np.argsort(first)]
 
 
@@ -257,28 +273,3 @@ def moment_text(nanoseconds: int, calendar: str) -> str:
     text = str(np.datetime64(seconds, "s"))
     decimals = f".{fraction:09d}".rstrip("0") if fraction else ""
     return f"{text}{decimals}{'Z' if calendar == UTC else ''}"
-
-
-def with_days_counted(clock: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Return times of day [ns] with a day more after each midnight.
-
-    A step back by more than half a day is a midnight.
-
-    Parameters
-    ----------
-    clock : array, shape (n,)
-        Nanoseconds since midnight, NaN where there is no time.
-
-    Examples
-    --------
-    >>> hour = 3600e9
-    >>> (with_days_counted(np.array([23.0 * hour, 1.0 * hour])) / hour).tolist()
-    [23.0, 25.0]
-    """
-    known = np.flatnonzero(np.isfinite(clock))
-    midnights = np.diff(clock[known]) < -0.5 * DAY_NS
-    if not midnights.any():
-        return clock
-    counted = clock.copy()
-    counted[known[1:]] += DAY_NS * np.cumsum(midnights)
-    return counted
