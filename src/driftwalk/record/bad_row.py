@@ -16,8 +16,8 @@ DELIMITER_NAMES = {",": "a comma", "\t": "a tab", ";": "a semicolon", " ": "blan
 
 def check_lines(
     block: bytes, layout: TableLayout, *, path: Path, line: int, decimal: str = "."
-) -> None:
-    """Raise a `FormatError` at the first row of a block that is wrong; return if none is.
+) -> int:
+    """Return the fields of the longest row; raise a `FormatError` at the first row that is wrong.
 
     Parameters
     ----------
@@ -32,10 +32,14 @@ def check_lines(
     decimal : {".", ","}
         Decimal sign of the numbers.
     """
+    widest = 0
     for offset, raw in enumerate(block.split(b"\n")):
         text = _decode(raw, path=path, line=line + offset)
         if text.strip():
-            _check_row(text, layout, path=path, line=line + offset, decimal=decimal)
+            fields = split_fields(text, layout.delimiter)
+            widest = max(widest, len(fields))
+            _check_row(fields, text, layout, path=path, line=line + offset, decimal=decimal)
+    return widest
 
 
 def _decode(raw: bytes, *, path: Path, line: int) -> str:
@@ -53,8 +57,9 @@ def _decode(raw: bytes, *, path: Path, line: int) -> str:
     return text
 
 
-def _check_row(text: str, layout: TableLayout, *, path: Path, line: int, decimal: str) -> None:
-    fields = split_fields(text, layout.delimiter)
+def _check_row(
+    fields: list[str], text: str, layout: TableLayout, *, path: Path, line: int, decimal: str
+) -> None:
     expected = len(layout.names)
     if len(fields) > expected and not any(fields[expected:]):
         fields = fields[:expected]

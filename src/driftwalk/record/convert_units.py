@@ -161,7 +161,7 @@ def _convert_clocks(raw: RawRecording, ticks: float, attrs: dict[str, object]) -
     if dated:
         attrs["time_origin"] = moment_text(raw.clock_origin + int(origin), raw.calendar)
     elif raw.calendar == DAY:
-        attrs["time_origin"] = "00:00:00 of the first day"
+        attrs["time_origin"] = "00:00:00"
     converted = {key: _writable(clock) for key, clock in arrays.items()}
     for clock in converted.values():
         np.subtract(clock, origin, out=clock)

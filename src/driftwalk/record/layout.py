@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-MISSING = frozenset({"", "NaN", "nan", "NAN", "NA", "N/A", "null", "NULL", "None", "none", "-nan"})
+MISSING = frozenset(
+    {"", "#N/A", "NaN", "nan", "NAN", "NA", "N/A", "null", "NULL", "None", "none", "-nan"}
+)
 """Words that trackers write for a missing number."""
 
 

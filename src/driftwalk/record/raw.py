@@ -139,6 +139,8 @@ class ReadOptions:
     """Topic of a ROS bag, or several with commas between them."""
     header_line: int | None = None
     """Line of a plain table, from 1, that names its columns; None: the first."""
+    sheet: str | None = None
+    """Name or number, from 1, of a sheet; name of a variable of a MATLAB file."""
     x: Path | None = None
     """File of the x matrix (one row a frame, one column a body)."""
     y: Path | None = None

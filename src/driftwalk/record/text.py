@@ -84,7 +84,7 @@ def _opened(path: Path) -> io.BufferedReader:
     try:
         with path.open("rb") as start:
             compressed = start.read(2) == GZIP_MAGIC
-        return _buffered(_BoundedGzip(path)) if compressed else path.open("rb", _BUFFER)
+        return _buffered(_BoundedGzip(path) if compressed else io.FileIO(path))
     except (OSError, ValueError) as error:  # ValueError: a name that no file can have
         reason = getattr(error, "strerror", None) or error
         raise FormatError(f"cannot be opened: {reason}", path=path) from error
@@ -332,7 +332,7 @@ class _Collected:
     def _from_origin(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return the clock from its first value on, where float64 would round it."""
         if self._origin is None:
-            self._origin = _far_origin(values)
+            self._origin = far_origin(values)
         if not self._origin:
             return values
         return values - (self._origin if values.dtype.kind == "i" else float(self._origin))
@@ -381,8 +381,19 @@ def _text_size(path: Path) -> int:
     return path.stat().st_size
 
 
-def _far_origin(values: npt.NDArray[Any]) -> int:
-    """Return the first of whole numbers that float64 would round, 0 when it need not."""
+def far_origin(values: npt.NDArray[Any]) -> int:
+    """Return the first of whole numbers that float64 would round, 0 when it need not.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        Times.
+
+    Examples
+    --------
+    >>> far_origin(np.array([1_700_000_000_000_000_001])), far_origin(np.array([5]))
+    (1700000000000000001, 0)
+    """
     if not values.size or values.dtype.kind != "i" or np.abs(values).max() <= _EXACT:
         return 0
     return int(values[0])
@@ -413,17 +424,16 @@ def _blocks(path: Path, skip_lines: int) -> Iterator[tuple[int, bytes]]:
             raise FormatError(f"cannot be read to its end: {error}", path=path) from error
 
 
-def _parse(block: bytes, layout: TableLayout, *, path: Path, line: int, decimal: str = ".") -> Any:
+def _parse(block: bytes, layout: TableLayout, *, path: Path, line: int, decimal: str) -> Any:
     """Return the block as a data frame, or raise a `FormatError` that says where it is wrong."""
     import pandas as pd
 
     fields = _field_counts(block, layout.delimiter)
-    expected = len(layout.names)
     whole = fields[fields > 0]
-    width = expected
-    if (whole != expected).any():
-        check_lines(block, layout, path=path, line=line, decimal=decimal)
-        width = max(expected, int(whole.max(initial=0)))
+    width = len(layout.names)
+    if (whole != width).any():
+        widest = check_lines(block, layout, path=path, line=line, decimal=decimal)
+        width = max(width, widest)
     # The stubs of pandas cannot follow options in a dictionary.
     exact: Any = {} if _pandas_is_exact(pd.__version__) else {"float_precision": "round_trip"}
     try:

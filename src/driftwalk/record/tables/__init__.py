@@ -1,1 +1,1 @@
-"""Tables of any origin: text, workbooks, MATLAB files and columns in memory, by one set of rules."""
+"""Tables of text, workbooks, MATLAB files and columns in memory, read by one set of rules."""

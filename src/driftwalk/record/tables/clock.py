@@ -1,4 +1,4 @@
-"""Which columns of a table are its clock: numbers, time stamps, a date with times of day, or none."""
+"""Which columns of a table are its clock: numbers, time stamps, dates and times of day, or none."""
 
 from __future__ import annotations
 

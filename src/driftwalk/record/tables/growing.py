@@ -29,7 +29,8 @@ class GrowingColumn:
     def whole(self) -> npt.NDArray[np.bool_]:
         """Return where the values are whole numbers, or no numbers."""
         values = self._values[: self._count]
-        return ~(np.isfinite(values) & (values % 1.0 != 0.0))
+        whole: npt.NDArray[np.bool_] = ~(np.isfinite(values) & (values % 1.0 != 0.0))
+        return whole
 
     def take(self) -> npt.NDArray[Any]:
         """Return the array, which is this column's no more."""

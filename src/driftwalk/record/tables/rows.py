@@ -8,17 +8,18 @@ import numpy as np
 
 from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.record.body_columns import body_columns
-from driftwalk.record.clock_columns import uneven_clock
 from driftwalk.record.column_names import ColumnMap, map_columns, unit_of_name
+from driftwalk.record.layout import TableLayout
 from driftwalk.record.raw import ANGLE_UNITS, Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.space.columns import body_in_plane, plane_of_columns
 from driftwalk.record.space.plane import Plane
 from driftwalk.record.stacked import split_bodies
+from driftwalk.record.tables.body_columns import body_columns
 from driftwalk.record.tables.clock import TableClock, clock_of
 from driftwalk.record.tables.midnights import count_days
 from driftwalk.record.tables.source import TableSource
 from driftwalk.record.tables.stamps import DAY
+from driftwalk.record.tables.uneven_clock import uneven_clock
 from driftwalk.record.text import Table
 
 NO_CLOCK = "the table has no column of times or frames: every row counts as a frame"
@@ -49,7 +50,7 @@ def recording_of(source: TableSource, options: ReadOptions) -> RawRecording:
     clock_columns = clock_of(source, columns)
     if clock_columns.column is None:
         _require_rows_are_frames(source, columns, labels, options)
-    table = _read(source, columns, clock_columns)
+    table = _read(source, columns, clock_columns, labels)
     clock: Array = (
         np.arange(table.rows, dtype=np.float64)
         if clock_columns.column is None
@@ -117,17 +118,20 @@ def columns_of(source: TableSource, options: ReadOptions) -> tuple[ColumnMap, li
         raise source.error(str(error)) from error
 
 
-def _read(source: TableSource, columns: ColumnMap, clock: TableClock) -> Table:
+def _read(source: TableSource, columns: ColumnMap, clock: TableClock, labels: list[str]) -> Table:
     used = {index for places in columns.bodies.values() for index in places.values()}
     if clock.number is not None:
         used.add(clock.number)
     texts = () if columns.body_column is None else (columns.body_column,)
-    return source.read(
+    wanted = TableLayout(
+        "",
+        labels,
         numbers=tuple(sorted(used - set(texts))),
         texts=texts,
         stamps=clock.stamps,
         clock=clock.number,
     )
+    return source.read(wanted)
 
 
 def _require_rows_are_frames(

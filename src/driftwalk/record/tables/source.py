@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
@@ -30,16 +31,8 @@ class TableSource(Protocol):
     def stamps(self, column: int, /) -> StampForm | None:
         """Return how the first time stamp of a column is written, None where it has none."""
 
-    def read(
-        self,
-        *,
-        numbers: tuple[int, ...] = (),
-        texts: tuple[int, ...] = (),
-        stamps: tuple[int, ...] = (),
-        clock: int | None = None,
-        head: bool = False,
-    ) -> Table:
-        """Read columns, as `TableLayout` tells them; of the `head` no more than the first rows.
+    def read(self, wanted: TableLayout, /, *, head: bool = False) -> Table:
+        """Read the columns that a layout names; of the `head` no more than the first rows.
 
         Raises
         ------
@@ -60,7 +53,6 @@ class TextSource:
             path, delimiter=options.delimiter, header_line=options.header_line
         )
         self.names = names
-        self._labels = [name or str(index) for index, name in enumerate(names, start=1)]
 
     def stamps(self, column: int) -> StampForm | None:
         """Return how the first time stamp of a column is written, None where it has none."""
@@ -69,25 +61,9 @@ class TextSource:
         fields = (row[column] for row in rows if len(row) > column)
         return next((stamp_form(field) for field in fields if field not in MISSING), None)
 
-    def read(
-        self,
-        *,
-        numbers: tuple[int, ...] = (),
-        texts: tuple[int, ...] = (),
-        stamps: tuple[int, ...] = (),
-        clock: int | None = None,
-        head: bool = False,
-    ) -> Table:
+    def read(self, wanted: TableLayout, *, head: bool = False) -> Table:
         """Read columns, in blocks of the file."""
-        layout = TableLayout(
-            delimiter=self._delimiter,
-            names=self._labels,
-            skip_lines=self._skip,
-            numbers=numbers,
-            texts=texts,
-            stamps=stamps,
-            clock=clock,
-        )
+        layout = replace(wanted, delimiter=self._delimiter, skip_lines=self._skip)
         return read_table(self._path, layout, blocks=1 if head else None)
 
     def error(self, message: str) -> FormatError:

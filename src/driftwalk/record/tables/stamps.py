@@ -171,9 +171,8 @@ def _of_one_shape(texts: Texts) -> list[npt.NDArray[np.int64]]:
     shapes = np.ascontiguousarray(np.where(digits, np.uint8(ord("0")), letters))
     if (shapes == shapes[0]).all():
         return [np.arange(texts.size)]
-    _, first, codes = np.unique(
-        shapes.view(texts.dtype).ravel(), return_index=True, return_inverse=True
-    )
+    words = shapes.view(texts.dtype).ravel()
+    _, first, codes = np.unique(words, return_index=True, return_inverse=True)
     return [np.flatnonzero(codes == at) for at in np.argsort(first)]
 
 
@@ -188,6 +187,7 @@ def _nanoseconds(texts: Texts, match: re.Match[str], rows: npt.NDArray[np.int64]
             number = 10 * number + (letters[:, place] - np.int64(ord("0")))
         return number
 
+    ticks: Ticks
     hour, minute, second = (part(name) for name in ("hour", "minute", "second"))
     wrong = (minute > 59) | (second > 59)
     ticks = _fraction(letters, match) + SECOND_NS * (second + 60 * (minute + 60 * hour))
@@ -220,7 +220,8 @@ def _days(year: Ticks, month: Ticks, day: Ticks) -> tuple[Ticks, npt.NDArray[np.
     months = np.where(wrong, 0, 12 * (year - 1970) + month - 1).astype("datetime64[M]")
     days = months.astype("datetime64[D]") + (day - 1)
     wrong |= days.astype("datetime64[M]") != months
-    return days.astype(np.int64), wrong
+    since: Ticks = days.astype(np.int64)
+    return since, wrong
 
 
 def calendar_of(readers: list[StampReader]) -> str:

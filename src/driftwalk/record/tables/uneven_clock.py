@@ -6,7 +6,7 @@ import numpy as np
 
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.column_names import ColumnMap
-from driftwalk.record.layout import MISSING
+from driftwalk.record.layout import MISSING, TableLayout
 from driftwalk.record.tables.source import TableSource
 
 _EVEN = 0.1
@@ -37,7 +37,7 @@ def uneven_clock(source: TableSource, columns: ColumnMap, names: list[str]) -> s
     if not free or columns.body_column is not None:
         return None
     # The first rows are enough: what skips none in 4 MiB is no clock with missing rows.
-    table = source.read(texts=free, head=True)
+    table = source.read(TableLayout("", names, texts=free), head=True)
     own = [index for index in free if len(table.labels[index]) >= _OWN * table.rows]
     return next((names[index] for index in own if _skips_rows(table.labels[index])), None)
 

@@ -5,11 +5,14 @@ Slow and plain: it runs only on a table that has already been refused.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.column_names import ColumnMap, column_meaning
+from driftwalk.record.layout import TableLayout
 from driftwalk.record.raw import Array
 from driftwalk.record.several_bodies import LARGEST_SHARE
 from driftwalk.record.tables.clock import TableClock
@@ -55,9 +58,10 @@ def body_columns(
         index for index, name in enumerate(names) if index not in taken and _may_be_a_name(name)
     )
     # The first rows tell the columns of measurements, which have another value in every row.
-    head = source.read(texts=free, numbers=tuple(sorted(numbers)), head=True)
+    wanted = TableLayout("", names, numbers=tuple(sorted(numbers)), texts=free, stamps=clock.stamps)
+    head = source.read(wanted, head=True)
     free = tuple(index for index in free if 2 * len(head.labels[index]) <= max(head.rows, 2))
-    table = source.read(texts=free, numbers=tuple(sorted(numbers)), stamps=clock.stamps)
+    table = source.read(replace(wanted, texts=free))
     times, x, y = (table.numbers[index] for index in (clock.column, places["x"], places["y"]))
     found = {
         index: len(table.labels[index])
