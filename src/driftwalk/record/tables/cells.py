@@ -156,12 +156,15 @@ def form_of(values: Values) -> StampForm | None:
         Anything.
     """
     if values.dtype.kind in "Mm":
-        return StampForm(MOMENT if values.dtype.kind == "M" else OF_DAY)
+        dates = values.dtype.kind == "M" and bool((values == values.astype("datetime64[D]")).all())
+        return StampForm(MOMENT if values.dtype.kind == "M" else OF_DAY, has_time=not dates)
     if values.dtype.kind not in "OUS":
         return None
     cell = next((cell for cell in values if text_of_cell(cell) not in MISSING), None)
-    if isinstance(cell, datetime.date) and not isinstance(cell, datetime.datetime):
-        return StampForm(MOMENT, has_time=False)
+    if isinstance(cell, datetime.date):
+        # A workbook has no dates without a time: they are those of midnight.
+        midnight = not isinstance(cell, datetime.datetime) or cell.time() == datetime.time()
+        return StampForm(MOMENT, has_time=not midnight)
     if isinstance(cell, (*_MOMENTS, *_TIMES)):
         return StampForm(MOMENT if isinstance(cell, _MOMENTS) else OF_DAY)
     return stamp_form(text_of_cell(cell))

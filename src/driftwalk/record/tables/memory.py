@@ -62,14 +62,22 @@ class MemorySource:
         self._columns = columns
         self._zoned = zoned
 
+    @property
+    def rows(self) -> int:
+        """Number of samples."""
+        return self._columns[0].size if self._columns else 0
+
+    def column(self, at: int) -> Values:
+        """Return the values of a column, which must not be changed."""
+        return self._columns[at]
+
     def stamps(self, column: int) -> StampForm | None:
         """Return how the first time stamp of a column is written, None where it has none."""
         return form_of(self._columns[column])
 
     def read(self, wanted: TableLayout, *, head: bool = False) -> Table:
         """Read columns."""
-        rows = self._columns[0].size if self._columns else 0
-        if not rows:
+        if not self.rows:
             raise FormatError("holds no rows of data")
         taken = slice(_HEAD_ROWS if head else None)
         try:
@@ -177,8 +185,8 @@ def _of_array(data: Values) -> MemorySource:
         return _checked("the structured array", names, [data[name] for name in names])
     if data.ndim != 2:
         raise InputError(
-            f"an array has a row per sample and a column per quantity; this one has the "
-            f"shape {data.shape}: separate columns go into a mapping, as in {'t': t, 'x': x, 'y': y}"
+            "an array has a row per sample and a column per quantity, and this one has the shape "
+            f"{data.shape}: separate columns go into a mapping of names to columns"
         )
     columns = [data[:, at] for at in range(data.shape[1])]
     return MemorySource("the array", [""] * len(columns), columns, has_header=False)

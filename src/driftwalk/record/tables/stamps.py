@@ -244,15 +244,25 @@ def clock_of_stamps(
     Parameters
     ----------
     columns : list of array, shape (n,)
-        Nanoseconds, as `StampReader.read` returns them.
+        Nanoseconds, as `StampReader.read` returns them; of several the first are dates.
     origin : int or None
         Nanoseconds to subtract; None: the first that there are.
+
+    Raises
+    ------
+    StampError
+        At a date that is none.
 
     Examples
     --------
     >>> clock_of_stamps([np.array([7, 9])], None)
     (array([0., 2.]), 7)
     """
+    if len(columns) > 1:
+        late = (columns[0] != NO_TIME) & (columns[0] % DAY_NS != 0)
+        if late.any():
+            row = int(np.argmax(late))
+            raise StampError(row, "a date that has times in a column beside it has a time itself")
     known = np.all([ticks != NO_TIME for ticks in columns], axis=0)
     total = np.sum(columns, axis=0, where=known[None, :])
     if origin is None and known.any():
