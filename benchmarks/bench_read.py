@@ -75,9 +75,10 @@ def write(path: Path, form: str, rows: int) -> None:
 
 def read(path: Path, form: str, rows: int) -> None:
     """Read a file and print its time and the peak of the memory; stop where a number is wrong."""
-    import driftwalk as dw
     import pandas  # noqa: F401  # loaded by the reading, not a part of it
     import xarray  # noqa: F401
+
+    import driftwalk as dw
 
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     options = {"metres_per_pixel": 1.0} if form == "animalta" else {}

@@ -339,18 +339,20 @@ class _Collected:
 
     def _clock(self, frame: Any, block: bytes, line: int) -> Array:
         """Return the time stamps of a block in nanoseconds from the first one on."""
-        ticks = []
-        for column, reader in self._stamps.items():
-            try:
+        column = self._layout.stamps[0]
+        try:
+            ticks = []
+            for column, reader in self._stamps.items():
                 ticks.append(reader.read(frame[column].fillna("").to_numpy(dtype=object)))
-            except StampError as error:
-                raise FormatError(
-                    f"{error} (column '{self._layout.names[column]}')",
-                    path=self._path,
-                    line=line + _line_of_row(block, error.row),
-                    column=column + 1,
-                ) from error
-        clock, self._origin = clock_of_stamps(ticks, self._origin)
+            column = self._layout.stamps[0]
+            clock, self._origin = clock_of_stamps(ticks, self._origin)
+        except StampError as error:
+            raise FormatError(
+                f"{error} (column '{self._layout.names[column]}')",
+                path=self._path,
+                line=line + _line_of_row(block, error.row),
+                column=column + 1,
+            ) from error
         return clock
 
 
