@@ -67,13 +67,13 @@ def matlab_variables_of(path: Path) -> Iterator[dict[str, Value]]:
 
 
 def _of_old(path: Path) -> dict[str, Value]:
-    from scipy.io import loadmat, whosmat
+    from scipy.io import loadmat
 
     try:
         with warnings.catch_warnings():
             # Of two variables of one name the later counts, as in MATLAB.
             warnings.simplefilter("ignore")
-            refuse_huge(sum(_declared(*entry) for entry in whosmat(path, appendmat=False)), path)
+            refuse_huge(_declared_old(path), path)
             content = loadmat(path, appendmat=False)
     except InputError:
         raise
@@ -88,6 +88,19 @@ def _of_old(path: Path) -> dict[str, Value]:
         own = _own_name(value)
         found[own or name] = _old_value(value)
     return found
+
+
+def _declared_old(path: Path) -> int:
+    """Return how many bytes the variables of a file have in memory, 0 where it has objects.
+
+    Of objects scipy knows no shape, and gives up.
+    """
+    from scipy.io import whosmat
+
+    try:
+        return sum(_declared(*entry) for entry in whosmat(path, appendmat=False))
+    except TypeError:
+        return 0
 
 
 def _declared(_name: str, shape: tuple[int, ...], kind: str) -> int:
@@ -123,7 +136,7 @@ def _old_value(value: Any) -> Value:
         _refuse_many(value.size)
         return [_old_value(one) for one in value.ravel(order="F")]
     if value.dtype.kind == "U":
-        return "".join(value.ravel()).strip()
+        return _texts([str(row) for row in value.ravel()])
     return value if value.dtype.kind in "fiub" else None
 
 
@@ -153,8 +166,14 @@ def _hdf5_value(contents: Hdf5Contents, name: str) -> Value:
     # Columns come first in MATLAB.
     values = contents.array(name).T
     if kind == "char":
-        return "".join(chr(code) for code in values.ravel(order="F").tolist()).strip()
+        return _texts(["".join(map(chr, row)) for row in np.atleast_2d(values).tolist()])
     return values
+
+
+def _texts(rows: list[str]) -> Value:
+    """Return a matrix of letters as the text of its only row, or as one text a row."""
+    texts: list[Any] = [row.strip() for row in rows]
+    return texts if len(texts) > 1 else "".join(texts)
 
 
 def _hdf5_struct(contents: Hdf5Contents, group: Any) -> Struct:
