@@ -344,5 +344,10 @@ def _on_clock(time: Array, bodies: list[RawBody], values: Sequence[Array | None]
 
 
 def _usual_rate(bodies: list[RawBody]) -> float:
-    intervals = [float(np.median(np.diff(body.clock))) for body in bodies if body.clock.size > 1]
+    # The differences are the median's own to sort: a long recording is not to be held once more.
+    intervals = [
+        float(np.median(np.diff(body.clock), overwrite_input=True))
+        for body in bodies
+        if body.clock.size > 1
+    ]
     return float(1.0 / np.median(intervals)) if intervals else 0.0

@@ -31,8 +31,12 @@ def plausibility_warnings(bodies: list[RawBody]) -> list[str]:
     if not any(known.any() for _, known in present):
         return ["no row holds a position"]
     warnings = []
+    # Without copies: a recording may have millions of positions.
     extent = max(
-        float(np.ptp(values[known]))
+        float(
+            np.max(values, where=known, initial=-np.inf)
+            - np.min(values, where=known, initial=np.inf)
+        )
         for body, known in present
         if known.any()
         for values in (body.x, body.y)
@@ -57,7 +61,7 @@ def _clock_warnings(bodies: list[RawBody]) -> list[str]:
     if not clocks:
         return []
     last = max(float(clock[-1] - clock[0]) for clock in clocks)
-    shortest = min(float(np.median(np.diff(clock))) for clock in clocks)
+    shortest = min(float(np.median(np.diff(clock), overwrite_input=True)) for clock in clocks)
     if last > LONGEST_RECORDING_S:
         return [f"the recording lasts {last:.3g} s: is the unit of its clock right?"]
     if shortest < SHORTEST_INTERVAL_S:
