@@ -1,7 +1,7 @@
 """Loaders of other packages, which an entry point of the group ``driftwalk.loaders`` names.
 
-Whatever goes wrong in one is told in one line with the name of its package, and keeps no other file
-from being read.
+An error in one of them is one line with the name of its package, and keeps no other file from being
+read.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _MEMBERS: Final = ("name", "description", "sniff", "read")
 
 
 class ForeignLoaders(NamedTuple):
-    """What the installed packages offer."""
+    """Loaders that the installed packages offer, and entry points that are broken."""
 
     loaders: dict[str, ForeignLoader]
     """Those that can be used, by the names of their formats."""
@@ -49,7 +49,7 @@ class ForeignLoader:
         self.description = str(loader.description)
         self.package = package
         self.failed = ""
-        """What went wrong when it last was to recognise a file."""
+        """Error of the last attempt to recognise a file, ``""`` where there was none."""
         self.marks: tuple[Marks, ...] = tuple(getattr(loader, "marks", ()))
 
     def sniff(self, head: bytes, path: Path) -> float:

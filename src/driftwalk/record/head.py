@@ -13,7 +13,7 @@ from driftwalk.record.text import decoded_line, header_rows, read_head
 
 _COMMA_DECIMAL = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
 _DELIMITER_LINE = re.compile(r"sep=(.)\s*", re.IGNORECASE)
-"""First line by which a spreadsheet is told the delimiter."""
+"""First line that states the delimiter to a spreadsheet."""
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 """Bytes that no text file holds."""
 

@@ -96,7 +96,7 @@ class RawRecording:
     clock_origin: int = 0
     """Offset to add to every clock, subtracted because its whole numbers are beyond float64."""
     calendar: str = ""
-    """What a clock of time stamps counts from: ``"UTC"`` or ``"local"`` for 1970 there, ``"day"``
+    """Origin of a clock of time stamps: ``"UTC"`` or ``"local"`` for 1970 there, ``"day"``
     for midnight; ``""``: the clock is of numbers."""
     bare_clock: str | None = None
     """Column of a clock that is taken as seconds though nothing says so, ``""`` where the format

@@ -53,7 +53,7 @@ class Table:
     clock_origin: int = 0
     """Offset subtracted from the clock, so that nanoseconds since 1970 stay exact."""
     calendar: str = ""
-    """What nanoseconds of time stamps count from, see `StampReader`; ``""``: the clock has none."""
+    """Origin of the nanoseconds of time stamps, see `StampReader`; ``""``: the clock has none."""
     codes: dict[int, npt.NDArray[np.int32]] = field(default_factory=dict)
     """Text column to the index of each row's value in `labels`."""
     labels: dict[int, list[str]] = field(default_factory=dict)

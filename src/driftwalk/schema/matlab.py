@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 OLD: Final = b"MATLAB 5.0 MAT-file"
-"""Start of the format that MATLAB writes unless it is told otherwise."""
+"""Start of the format that MATLAB writes unless a user chooses another."""
 HDF5_BASED: Final = b"MATLAB 7.3 MAT-file"
 """Start of the format for large variables, an HDF5 file behind half a kilobyte of text."""
 

@@ -1,4 +1,4 @@
-"""MATLAB files (``.mat``): structs of arrays, vectors beside each other, matrices."""
+"""MATLAB files (``.mat``): structs of arrays, vectors, matrices."""
 
 from __future__ import annotations
 

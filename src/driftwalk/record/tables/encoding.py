@@ -11,9 +11,9 @@ from typing import IO, Any, Final
 from driftwalk.core.errors import FormatError
 
 UTF16: Final = "UTF-16"
-"""What "Unicode text" is: it begins with a byte order mark."""
+"""Encoding of "Unicode text", which begins with a byte order mark."""
 WINDOWS: Final = "Windows-1252"
-"""What "CSV" is in western Europe and America, with one byte for a letter such as µ or °."""
+"""Encoding of "CSV" in western Europe and America, with one byte for a letter such as µ or °."""
 _CODECS: Final = {UTF16: "utf-16", WINDOWS: "cp1252"}
 _MARKS: Final = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _NO_TEXT: Final = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")

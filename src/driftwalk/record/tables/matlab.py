@@ -1,4 +1,4 @@
-"""Variables of MATLAB as tables: structs, vectors beside each other, matrices."""
+"""Variables of MATLAB as tables: structs, vectors, matrices."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ def count_days(
     """Return bodies whose times of day have a day more after each midnight.
 
     Rows of several bodies that take turns are in the order of their times: midnight is the same row
-    for all. Bodies one below the other begin anew, and each has midnights of its own.
+    for all. Where bodies stand one below the other, each has midnights of its own.
 
     Parameters
     ----------

@@ -99,7 +99,7 @@ class StampReader:
 
     @property
     def calendar(self) -> str:
-        """What the nanoseconds count from: 1970 in ``UTC`` or in a ``LOCAL`` zone, or a ``DAY``."""
+        """Origin of the nanoseconds: 1970 in ``UTC`` or in a ``LOCAL`` zone, or a ``DAY``."""
         if self.kind == OF_DAY:
             return DAY
         return UTC if self.zoned else LOCAL
@@ -262,7 +262,7 @@ def clock_of_stamps(
         late = (columns[0] != NO_TIME) & (columns[0] % DAY_NS != 0)
         if late.any():
             row = int(np.argmax(late))
-            raise StampError(row, "a date that has times in a column beside it has a time itself")
+            raise StampError(row, "a date has a time itself, and times have a column of their own")
     known = np.all([ticks != NO_TIME for ticks in columns], axis=0)
     total = np.sum(columns, axis=0, where=known[None, :])
     if origin is None and known.any():
