@@ -144,12 +144,12 @@ def load(
 
     Examples
     --------
+    >>> load({"t": [0.0, 0.1], "x_mm": [10.0, 12.0], "y_mm": [5.0, 5.0]})["x"].values.ravel()
+    array([0.01 , 0.012])
     >>> from importlib.resources import files
     >>> recording = files("driftwalk.datasets") / "tank30_ode_a" / "recording.csv"
     >>> load(str(recording), tank="circle:30cm", block="3cm").sizes["time"]
     18001
-    >>> load({"t": [0.0, 0.1], "x_mm": [10.0, 12.0], "y_mm": [5.0, 5.0]})["x"].values.ravel()
-    array([0.01 , 0.012])
     """
     block_side = None if block is None else _side(block)
     options = ReadOptions(
