@@ -60,7 +60,7 @@ def tracker_files() -> Iterator[tuple[str, str, tuple[str, ...], Callable[[Path]
 def _tables() -> Iterator[tuple[str, str, tuple[str, ...], Callable[[Path], object]]]:
     """Yield tables as spreadsheets and MATLAB write them."""
     places = {"t": 0.1 * np.arange(20), "x": 0.02 * np.arange(20), "y": 0.01 * np.arange(20)}
-    rows = [f"0{k // 10}:00:{k % 10}0,5;{k},5;{2 * k}" for k in range(20)]
+    rows = [f"00:00:{k:02d},5;{k},5;{2 * k}" for k in range(20)]
     yield "comma", "a.csv", (), lambda path: write(path, "time;x;y", *rows)
     moments = [f"2024-05-01T12:00:{k:02d}.25Z,{k}.5,{k}" for k in range(20)]
     text = "\n".join(["time,x,y", *moments])

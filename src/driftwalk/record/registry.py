@@ -66,7 +66,6 @@ def _foreign() -> ForeignLoaders:
     return foreign_loaders(_own_loaders())
 
 
-@cache
 def _own_loaders() -> dict[str, Loader]:
     import importlib
     import pkgutil

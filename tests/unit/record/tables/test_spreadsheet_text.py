@@ -76,14 +76,15 @@ def test_without_a_header_the_first_row_is_data(tmp_path: Path) -> None:
 
 
 def test_the_sign_may_first_appear_far_into_a_large_file(tmp_path: Path) -> None:
-    rows = [f"{index};{index % 7};{index % 5}" for index in range(500_000)]
-    rows[-1] = "499999;1,5;2"
-    path = write(tmp_path, "t;x;y\n" + "\n".join(rows) + "\n")
+    note = "x" * 60
+    rows = [f"{index};{index % 7};{index % 5};{note}" for index in range(65_000)]
+    rows[-1] = "64999;1,5;2;"
+    path = write(tmp_path, "t;x;y;note\n" + "\n".join(rows) + "\n")
     assert path.stat().st_size > 4 << 20  # beyond the first block
     assert body_track(load(path)).x[-1] == 1.5
-    rows[5] = "5;1.5;0"
-    path = write(tmp_path, "t;x;y\n" + "\n".join(rows) + "\n")
-    with pytest.raises(FormatError, match=r"line 500001, column 2: '1,5'.*a comma as decimal sign"):
+    rows[5] = "5;1.5;0;"
+    path = write(tmp_path, "t;x;y;note\n" + "\n".join(rows) + "\n")
+    with pytest.raises(FormatError, match=r"line 65001, column 2: '1,5'.*a comma as decimal sign"):
         load(path)
 
 
