@@ -42,7 +42,8 @@ def test_a_page_has_every_part_of_a_docstring(pages: dict[str, str]) -> None:
     """By the docstring of `load`, read here and not by the generator."""
     text = pages["python/record.md"].partition("\n## load\n")[2].partition("\n## ")[0]
     for part in (
-        "load(\n    path: str | PathLike[str],\n    *,\n    format: str | None = None,\n",
+        "load(\n    path: str | PathLike[str] | pd.DataFrame | Mapping[str, Any] "
+        "| npt.NDArray[Any] | Any,\n    *,\n    format: str | None = None,\n",
         ") -> xr.Dataset\n",
         "- `start, stop` : `float`, optional\\\n  First and last time to keep [s]",
         "**Returns**\n\n- `xarray.Dataset`\\\n  Dimensions (time, body)",

@@ -7,6 +7,9 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import pandas as pd
+from matlab_files import hdf5_file, struct_of
+from scipy.io import savemat
 from tracker_files import (
     FEATURES,
     NAMES,
@@ -45,12 +48,31 @@ def tracker_files() -> Iterator[tuple[str, str, tuple[str, ...], Callable[[Path]
     yield "idtrackerai", "a.npy", PIXELS, lambda path: np.save(path, np.array(session(), object))
     yield "idtrackerai-h5", "a.h5", PIXELS, _session
     yield "trex", "tank_id0.npz", (), lambda path: trex(path.parent, 0)
+    yield from _tables()
     settings = ("v2,6", "walk,,2", "1,1,1", "", "", "tag")
     steps = [f"{0.1 * k:.1f},{0.2 * k:.1f},{0.1 * k:.1f},a" for k in range(20)]
     yield "yupi", "a.csv", ("--length-unit", "m"), lambda path: write(path, *settings, *steps)
     names = "Frame,Time,TrackId,x,y,ValueChanged"
     places = [f"{k},{0.02 * k:.2f},8,{k}.5,{2 * k},TRUE" for k in range(20)]
     yield "traja", "a.csv", ("--length-unit", "mm"), lambda path: write(path, names, *places)
+
+
+def _tables() -> Iterator[tuple[str, str, tuple[str, ...], Callable[[Path], object]]]:
+    """Yield tables as spreadsheets and MATLAB write them."""
+    places = {"t": 0.1 * np.arange(20), "x": 0.02 * np.arange(20), "y": 0.01 * np.arange(20)}
+    rows = [f"00:00:{k:02d},5;{k},5;{2 * k}" for k in range(20)]
+    yield "comma", "a.csv", (), lambda path: write(path, "time;x;y", *rows)
+    moments = [f"2024-05-01T12:00:{k:02d}.25Z,{k}.5,{k}" for k in range(20)]
+    text = "\n".join(["time,x,y", *moments])
+    yield "utf16", "a.csv", (), lambda path: path.write_bytes(text.encode("utf-16"))
+    yield "matlab", "a.mat", (), lambda path: savemat(path, {"S": places})
+    yield (
+        "matlab-h5",
+        "a.mat",
+        (),
+        lambda path: hdf5_file(path, lambda file: struct_of(file, "S", places)),
+    )
+    yield "excel", "a.xlsx", (), lambda path: pd.DataFrame(places).to_excel(path, index=False)
 
 
 def _deeplabcut(individuals: list[str]) -> Callable[[Path], object]:

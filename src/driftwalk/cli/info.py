@@ -146,6 +146,8 @@ def _print_file(described: dict[str, Any]) -> None:
         ["arena", _arena_text(described)],
         ["resolution [mm]", _scaled(described["position_quantum_m"] or None, 1e3)],
     ]
+    if described["time_origin"] is not None:
+        rows.append(["t = 0 is", described["time_origin"]])
     if described["metres_per_pixel"] is not None:
         rows.append(["scale [mm/pixel]", described["metres_per_pixel"] * 1e3])
     print_table(rows)

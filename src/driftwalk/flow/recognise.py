@@ -10,7 +10,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.flow.readers import openpiv
 from driftwalk.flow.readers.formats import piv_format
 from driftwalk.flow.readers.netcdf import holds_velocities
-from driftwalk.flow.readers.pivlab import is_pivlab
+from driftwalk.flow.readers.pivlab import holds_velocities as holds_pivlab, is_pivlab
 from driftwalk.flow.readers.table import is_field_table
 from driftwalk.flow.rows import grid_rows
 from driftwalk.schema.netcdf import is_netcdf, kind_of, open_netcdf
@@ -55,6 +55,8 @@ def flow_format(path: str | PathLike[str]) -> str | None:
     name = piv_format(source)
     if name == "openpiv" and not openpiv.has_header(source):
         return name if _fills_a_grid(source) else None
+    if name == "pivlab" and not holds_pivlab(source):
+        return None
     return name or ("csv" if is_field_table(source) else None)
 
 

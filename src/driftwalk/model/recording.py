@@ -105,6 +105,11 @@ class Recording(Section):
         description="Line of a table, from 1, that names its columns, if it is not the first.",
         examples=[7],
     )
+    sheet: str | None = Field(
+        default=None,
+        description="Sheet of a workbook, or variable of a MATLAB file, if several hold positions.",
+        examples=["Run 2"],
+    )
     x_file: str | None = Field(
         default=None,
         description="File of the x matrix, if each coordinate has its own file.",
@@ -175,6 +180,7 @@ class Recording(Section):
             "up": self.up if self.up != "auto" else None,
             "topic": self.topic,
             "header_line": self.header_line,
+            "sheet": self.sheet,
             "x": self.x_file,
             "y": self.y_file,
             "theta": self.theta_file,

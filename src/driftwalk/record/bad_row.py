@@ -6,18 +6,18 @@ Slow and plain: it runs only on a block that has already failed.
 from __future__ import annotations
 
 import csv
-import re
 from pathlib import Path
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.layout import MISSING, TableLayout
 
 DELIMITER_NAMES = {",": "a comma", "\t": "a tab", ";": "a semicolon", " ": "blanks"}
-_COMMA_DECIMAL = re.compile(r"[+-]?\d+,\d+")
 
 
-def check_lines(block: bytes, layout: TableLayout, *, path: Path, line: int) -> None:
-    """Raise a `FormatError` at the first row of a block that is wrong; return if none is.
+def check_lines(
+    block: bytes, layout: TableLayout, *, path: Path, line: int, decimal: str = "."
+) -> int:
+    """Return the fields of the longest row; raise a `FormatError` at the first row that is wrong.
 
     Parameters
     ----------
@@ -29,11 +29,17 @@ def check_lines(block: bytes, layout: TableLayout, *, path: Path, line: int) -> 
         The file, for the message.
     line : int
         Number of the block's first line in the file, from 1.
+    decimal : {".", ","}
+        Decimal sign of the numbers.
     """
+    widest = 0
     for offset, raw in enumerate(block.split(b"\n")):
         text = _decode(raw, path=path, line=line + offset)
         if text.strip():
-            _check_row(text, layout, path=path, line=line + offset)
+            fields = split_fields(text, layout.delimiter)
+            widest = max(widest, len(fields))
+            _check_row(fields, text, layout, path=path, line=line + offset, decimal=decimal)
+    return widest
 
 
 def _decode(raw: bytes, *, path: Path, line: int) -> str:
@@ -51,8 +57,9 @@ def _decode(raw: bytes, *, path: Path, line: int) -> str:
     return text
 
 
-def _check_row(text: str, layout: TableLayout, *, path: Path, line: int) -> None:
-    fields = split_fields(text, layout.delimiter)
+def _check_row(
+    fields: list[str], text: str, layout: TableLayout, *, path: Path, line: int, decimal: str
+) -> None:
     expected = len(layout.names)
     if len(fields) > expected and not any(fields[expected:]):
         fields = fields[:expected]
@@ -67,18 +74,23 @@ def _check_row(text: str, layout: TableLayout, *, path: Path, line: int) -> None
         )
     for column in layout.numbers:
         value = fields[column]
-        if value not in MISSING and not is_number(value):
-            hint = (
-                ": decimals are written with a comma, save them with a point"
-                if _COMMA_DECIMAL.fullmatch(value)
-                else ""
-            )
+        if value not in MISSING and not is_number(value, decimal=decimal):
             raise FormatError(
-                f"'{_short(value)}' in column '{layout.names[column]}' is not a number{hint}",
+                f"'{_short(value)}' in column '{layout.names[column]}' is not a number"
+                f"{_other_sign(value, decimal)}",
                 path=path,
                 line=line,
                 column=column + 1,
             )
+
+
+def _other_sign(value: str, decimal: str) -> str:
+    """Return what is wrong with a number of another decimal sign than those before it."""
+    other = "," if decimal == "." else "."
+    if not is_number(value, decimal=other):
+        return ""
+    signs = {".": "a point", ",": "a comma"}
+    return f": it has {signs[other]} as decimal sign, and other numbers have {signs[decimal]}"
 
 
 def _decimal_hint(text: str, delimiter: str, *, got: int) -> str:
@@ -102,12 +114,25 @@ def split_fields(text: str, delimiter: str) -> list[str]:
     return [value.strip() for value in row]
 
 
-def is_number(text: str) -> bool:
-    """Whether a field is a plain decimal number (no ``1_000``, no words but inf and nan)."""
-    if "_" in text:
+def is_number(text: str, *, decimal: str = ".") -> bool:
+    """Whether a field is a plain decimal number (no ``1_000``, no words but inf and nan).
+
+    Parameters
+    ----------
+    text : str
+        The field.
+    decimal : {".", ","}
+        The decimal sign that it has to have, where it has decimals.
+
+    Examples
+    --------
+    >>> is_number("1,5"), is_number("1,5", decimal=","), is_number("1.5", decimal=",")
+    (False, True, False)
+    """
+    if "_" in text or (decimal == "," and "." in text):
         return False
     try:
-        float(text)
+        float(text.replace(decimal, ".", 1))
     except ValueError:
         return False
     return True

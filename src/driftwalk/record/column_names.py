@@ -10,7 +10,8 @@ from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import InputError
 
 _ROOTS: dict[str, str] = {
-    **dict.fromkeys(("t", "time", "timestamp", "seconds"), "t"),
+    **dict.fromkeys(("t", "time", "timestamp", "datetime", "seconds"), "t"),
+    "date": "date",
     **dict.fromkeys(
         ("frame", "frames", "framenumber", "frameno", "frameid", "frameindex"), "frame"
     ),
@@ -41,6 +42,7 @@ _UNITS: dict[str, str] = {
 }
 _ALLOWED: dict[str, frozenset[str]] = {
     "t": frozenset({"s", "ms", "us", "ns", "min"}),
+    "date": frozenset(),
     "frame": frozenset(),
     "x": frozenset({"m", "cm", "mm", "um", "km", "px"}),
     "y": frozenset({"m", "cm", "mm", "um", "km", "px"}),
@@ -71,8 +73,8 @@ class ColumnMeaning:
     """Meaning of a column."""
 
     quantity: str
-    """``"t"``, ``"frame"``, ``"x"``, ``"y"``, ``"z"``, ``"theta"``, ``"qx"`` to ``"qw"`` or
-    ``"body"``."""
+    """``"t"``, ``"date"``, ``"frame"``, ``"x"``, ``"y"``, ``"z"``, ``"theta"``, ``"qx"`` to
+    ``"qw"`` or ``"body"``."""
     unit: str = ""
     """Unit in the name, ``""`` when there is none."""
     body: str = ""
@@ -107,6 +109,8 @@ def column_meaning(name: str) -> ColumnMeaning | None:
         found = found[:1]  # "x_fish"
     elif len(found) == 2 and found[0][1] == "frame" and found[1][1] == "body":
         found = found[:1]  # "frame id"
+    elif [entry[1] for entry in found] == ["date", "t"]:
+        found = found[1:]  # "date time"
     if len(found) != 1:
         return None
     index, quantity, number = found[0]
@@ -114,7 +118,7 @@ def column_meaning(name: str) -> ColumnMeaning | None:
     lower = {token.lower() for token in rest}
     words = _IMAGE_WORDS | _FRAME_WORDS
     allowed = words | {"id"} | (_WITH_ID if tokens[index].lower() == "id" else frozenset())
-    if quantity in ("t", "frame", "body") and lower - allowed:
+    if quantity in ("t", "date", "frame", "body") and lower - allowed - {"date"}:
         return None
     if quantity in _OF_BODY and lower & _NO_POSITION:
         return None
@@ -179,6 +183,8 @@ class ColumnMap:
     clock_unit: str = "frame"
     bare_clock: bool = False
     """Whether the clock is one of times whose unit nobody named."""
+    date: int | None = None
+    """Dates, which count where the clock has times of day, or where there is none."""
     bodies: dict[str, dict[str, int]] = field(default_factory=dict)
     """Body to quantity (x, y, theta, and of a pose in space z, qx, qy, qz, qw) to column."""
     body_column: int | None = None
@@ -286,6 +292,7 @@ def _collect(
         place[meaning.quantity] = index
     _require_positions(result, names)
     result.body_column = single.get("body")
+    result.date = single.get("date")
     wanted = [meaning for meaning in meanings.values() if meaning.quantity in ("x", "y", "z")]
     result.length_unit = _agreed([meaning.unit for meaning in wanted], "positions")
     angles = [meaning.unit for meaning in meanings.values() if meaning.quantity == "theta"]

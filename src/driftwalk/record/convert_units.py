@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 
 from driftwalk.core.argument_text import argument_text
@@ -16,6 +18,7 @@ from driftwalk.record.raw import (
     RawRecording,
     ReadOptions,
 )
+from driftwalk.record.tables.stamps import DAY, LOCAL, UTC, moment_text
 
 EPOCH_S = 1e8
 """A clock beyond three years counts from 1970 and is set to start at zero."""
@@ -149,16 +152,26 @@ def _convert_clocks(raw: RawRecording, ticks: float, attrs: dict[str, object]) -
     arrays = {id(body.clock): body.clock for body in raw.bodies}
     starts = [float(np.nanmin(c)) for c in arrays.values() if np.isfinite(c).any()]
     origin = min(starts, default=0.0)
-    begin = (raw.clock_origin + origin) / ticks
-    if raw.clock_unit == "frame" or begin < EPOCH_S:
+    begin = float(_exactly(raw.clock_origin, origin) / Fraction(ticks))
+    dated = raw.calendar in (UTC, LOCAL)
+    if raw.clock_unit == "frame" or (begin < EPOCH_S and not dated):
         origin = -float(raw.clock_origin)
-    else:
+    elif raw.calendar != LOCAL:
         attrs["time_origin_unix_s"] = begin
+    if dated:
+        attrs["time_origin"] = moment_text(raw.clock_origin + int(origin), raw.calendar)
+    elif raw.calendar == DAY:
+        attrs["time_origin"] = "00:00:00"
     converted = {key: _writable(clock) for key, clock in arrays.items()}
     for clock in converted.values():
         np.subtract(clock, origin, out=clock)
         np.divide(clock, ticks, out=clock)
     return converted
+
+
+def _exactly(whole: int, more: float) -> Fraction:
+    """Return a sum that float64 would round, of nanoseconds since 1970."""
+    return Fraction(whole) + Fraction(more)
 
 
 def _writable(values: Array) -> Array:

@@ -8,8 +8,12 @@ from pathlib import Path
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.layout import MISSING
+from driftwalk.record.tables.stamps import stamp_form
 from driftwalk.record.text import decoded_line, header_rows, read_head
 
+_COMMA_DECIMAL = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
+_DELIMITER_LINE = re.compile(r"sep=(.)\s*", re.IGNORECASE)
+"""First line that states the delimiter to a spreadsheet."""
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 """Bytes that no text file holds."""
 
@@ -29,8 +33,11 @@ def detect_delimiter(lines: list[str]) -> str:
     """Return the character that separates the fields of the first lines; a blank when none does.
 
     A tab or semicolon wins over a comma, since a comma may also be a decimal sign; blanks come
-    last, since they stand in names.
+    last, since they stand in names, but before a comma that is the decimal sign of every field.
     """
+    fields = [field for line in lines[:2] for field in line.split()]
+    if len(fields) > len(lines[:2]) and all(_COMMA_DECIMAL.fullmatch(field) for field in fields):
+        return " "
     for delimiter in "\t;,":
         if lines and all(delimiter in line for line in lines[:2]):
             return delimiter
@@ -38,9 +45,12 @@ def detect_delimiter(lines: list[str]) -> str:
 
 
 def is_numeric_row(fields: list[str]) -> bool:
-    """Whether a row is data: each field is a number or missing, and one at least is a number."""
+    """Whether a row is data: each field is a number, a time or missing, and one at least is not."""
     known = [field for field in fields if field not in MISSING]
-    return bool(known) and all(is_number(field) for field in known)
+    return bool(known) and all(
+        is_number(field) or is_number(field, decimal=",") or stamp_form(field) is not None
+        for field in known
+    )
 
 
 def read_header(
@@ -63,15 +73,24 @@ def read_header(
     if b"\0" in head:
         raise FormatError("is not a text file", path=path)
     raw = head.split(b"\n")
-    at = next((i for i, line in enumerate(raw) if line.strip() and not line.startswith(b"#")), None)
+    stated = _DELIMITER_LINE.fullmatch(raw[0].decode("utf-8", "replace"))
+    begin = 1 if stated else 0
+    at = next(
+        (
+            number
+            for number, line in enumerate(raw)
+            if number >= begin and line.strip() and not line.startswith(b"#")
+        ),
+        None,
+    )
     if at is None:
         raise FormatError("the file is empty", path=path)
     lines = [decoded_line(line, path, number) for number, line in enumerate(raw[: at + 2], start=1)]
-    separator = delimiter or detect_delimiter(lines[at : at + 2])
+    separator = delimiter or (stated[1] if stated else detect_delimiter(lines[at : at + 2]))
     fields = _without_trailing(split_fields(lines[at], separator))
     if not is_numeric_row(fields):
         return fields, separator, at + 1, True
-    previous = [line for line in lines[:at] if line.strip()]
+    previous = [line for line in lines[begin:at] if line.strip()]
     if previous:
         commented = _without_trailing(split_fields(previous[-1].lstrip("# "), separator))
         if len(commented) == len(fields) > 1:

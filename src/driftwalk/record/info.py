@@ -34,7 +34,8 @@ def describe(trajectory: xr.Dataset) -> dict[str, Any]:
     Returns
     -------
     dict
-        JSON-ready, with units in the keys: ``source``, ``format``, ``y_axis``, ``arena``,
+        JSON-ready, with units in the keys: ``source``, ``format``, ``y_axis``, ``time_origin``
+        (the date and time of t = 0, where the file has one), ``arena``,
         ``position_quantum_m``, ``counts``, ``warnings``, and ``bodies``: name to samples, missing
         rows, duration_s, rate_Hz, jitter, gaps, extent, the circle of the centres, speed, the
         estimated tracking noise, and of a tracked recording the ``ambiguous_share``. ``tracking``
@@ -54,6 +55,7 @@ def describe(trajectory: xr.Dataset) -> dict[str, Any]:
         "source": attrs.get("source"),
         "format": attrs.get("format"),
         "y_axis": attrs.get("y_axis"),
+        "time_origin": attrs.get("time_origin"),
         "arena": _json_attribute(attrs, "arena", None),
         "arena_found": _json_attribute(attrs, "arena_found", None),
         "origin_shift_m": _json_attribute(attrs, "origin_shift_m", None),

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.file_names import text_of_name
+from driftwalk.core.errors import InputError
 from driftwalk.core.json_text import parse_json
 from driftwalk.core.units import parse_quantity
 from driftwalk.record.arena import PlacedArena, arena_attributes, place_arena
@@ -21,22 +20,24 @@ from driftwalk.record.clean import Counts, clean_body
 from driftwalk.record.clock import check_clock
 from driftwalk.record.convert_units import convert_units
 from driftwalk.record.extent import refuse_many_bodies, refuse_sparse
+from driftwalk.record.origin import origin_of
 from driftwalk.record.pose.listed import listed
 from driftwalk.record.pose.markers import join_markers
 from driftwalk.record.pose.options import two_names
 from driftwalk.record.raw import DELIMITERS, Array, RawBody, RawRecording, ReadOptions
-from driftwalk.record.registry import PLAIN, failed_format, find_loader
+from driftwalk.record.registry import PLAIN
 from driftwalk.record.text import DAMAGED_GZIP
 from driftwalk.record.warn import angle_warnings, plausibility_warnings
 from driftwalk.schema import build_trajectory
-from driftwalk.schema.netcdf import kind_of
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
+    import pandas as pd
     import xarray as xr
 
 
 def load(
-    path: str | PathLike[str],
+    path: str | PathLike[str] | pd.DataFrame | Mapping[str, Any] | npt.NDArray[Any] | Any,
     *,
     format: str | None = None,
     body: str | None = None,
@@ -50,11 +51,12 @@ def load(
     y_axis: str | None = None,
     max_speed: float | None = None,
     sort: str = "error",
-    columns: Mapping[str, str] | None = None,
+    columns: Mapping[str, str | int] | None = None,
     delimiter: str | None = None,
     up: str | None = None,
     topic: str | None = None,
     header_line: int | None = None,
+    sheet: str | int | None = None,
     x: str | PathLike[str] | None = None,
     y: str | PathLike[str] | None = None,
     theta: str | PathLike[str] | None = None,
@@ -65,14 +67,17 @@ def load(
 ) -> xr.Dataset:
     """Load a recording as a `trajectory` dataset in SI units, y up.
 
-    The format is recognised by content. Scale, frame rate and arena are never guessed: what the
-    file does not hold has to be given, and the error names the argument.
+    A recording is a file, or a table in memory. The format is recognised by content. Scale, frame
+    rate and arena are never guessed: what the file does not hold has to be given, and the error
+    names the argument.
 
     Parameters
     ----------
-    path : path-like
+    path : path-like, DataFrame, array or mapping
         File (may be gzip-compressed text), or a folder of SwisTrack tracks or matrices, or of a
-        ROS 2 bag.
+        ROS 2 bag. Or a table: a DataFrame of pandas or polars, a structured array, an array with a
+        row per sample (`columns` name its columns by number, from 1), or a mapping of names to
+        columns. Its columns are recognised by their names as those of a CSV file, and not changed.
     format : str, optional
         Name of the format, see `readable_formats`.
     body : str, optional
@@ -108,7 +113,10 @@ def load(
     topic : str, optional
         Topic of a ROS bag that holds several, or more than one with commas between them.
     header_line : int, optional
-        Line of a plain table, from 1, that names its columns; the data follow it.
+        Line of a plain table or a sheet, from 1, that names its columns; the data follow it.
+    sheet : str or int, optional
+        Name or number, from 1, of a workbook's sheet; name of a variable in a MATLAB file; None:
+        the only one that holds positions.
     x, y, theta : path-like, optional
         One matrix per coordinate: a row per frame, a column per body.
     keypoint : str, optional
@@ -136,19 +144,21 @@ def load(
 
     Examples
     --------
+    >>> load({"t": [0.0, 0.1], "x_mm": [10.0, 12.0], "y_mm": [5.0, 5.0]})["x"].values.ravel()
+    array([0.01 , 0.012])
     >>> from importlib.resources import files
     >>> recording = files("driftwalk.datasets") / "tank30_ode_a" / "recording.csv"
     >>> load(str(recording), tank="circle:30cm", block="3cm").sizes["time"]
     18001
     """
-    source = Path(path)
     block_side = None if block is None else _side(block)
     options = ReadOptions(
-        columns=dict(columns or {}),
+        columns={quantity: str(name) for quantity, name in (columns or {}).items()},
         delimiter=DELIMITERS.get(delimiter or "", delimiter),
         up=up,
         topic=topic,
         header_line=header_line,
+        sheet=None if sheet is None else str(sheet),
         frame_rate_hz=frame_rate,
         metres_per_pixel=metres_per_pixel,
         length_unit=length_unit,
@@ -160,17 +170,14 @@ def load(
         min_confidence=min_confidence,
         replicate=replicate or 0,
     )
-    if replicate is not None and kind_of(source) != "simulation":
-        raise InputError(f"{source}: no simulation, so it has no replicates: omit `replicate`")
-    named = format or ("matrices" if options.y is not None else None)
-    loader = find_loader(source, format=named, by_columns=bool(options.columns))
+    origin = origin_of(path, options, format=format, replicate=replicate)
     try:
-        raw = loader.read(source, options)
+        raw = origin.read(options)
         join_markers(raw, options)
         raw.bodies = _select(raw.bodies, body)
         refuse_many_bodies([one.name for one in raw.bodies])
-        _refuse_unused(options, raw, loader.name)
-        raw.notes += [*check_clock(raw), *angle_warnings(raw)]
+        _refuse_unused(options, raw, origin.format)
+        raw.notes += [*origin.notes(), *check_clock(raw), *angle_warnings(raw)]
         bodies, attrs = convert_units(raw, options, y_axis=y_axis)
         clean = partial(
             clean_body,
@@ -188,22 +195,10 @@ def load(
             if start is not None or stop is not None:
                 raise InputError("no sample lies between `start` and `stop`")
             raise InputError("the recording has no row with a time")
-        attrs |= {"source": text_of_name(source.name), "format": loader.name}
+        attrs |= {"source": origin.name, "format": origin.format}
         return _assemble(cleaned, counts, attrs, raw, tank=tank, block_side=block_side)
-    except DAMAGED_GZIP as error:
-        raise FormatError(f"is a damaged gzip file: {error}", path=source) from error
-    except FormatError as error:
-        # A table that no loader of its own recognised may be one of theirs gone wrong.
-        hint = failed_format(source) if format is None and loader.name == PLAIN else ""
-        raise _of_file(error, source, hint) from error
-    except InputError as error:
-        raise InputError(f"{source}: {error}") from error
-
-
-def _of_file(error: FormatError, path: Path, hint: str) -> FormatError:
-    """Return the error with the file that it is about, which not all that raise it know."""
-    where = error.path or path
-    return FormatError(error.reason + hint, path=where, line=error.line, column=error.column)
+    except (InputError, *DAMAGED_GZIP) as error:
+        raise origin.explained(error) from error
 
 
 def readable_formats() -> dict[str, str]:
@@ -225,8 +220,12 @@ def _refuse_unused(options: ReadOptions, raw: RawRecording, format: str) -> None
         raise InputError("the positions have two axes: leave `up` out")
     if options.topic is not None and format != "ros":
         raise InputError("the file is no ROS bag: leave `topic` out")
-    if options.header_line is not None and format != "csv":
+    if options.header_line is not None and format not in (PLAIN, "excel"):
         raise InputError(f"`header_line` is for plain tables, and this is '{format}': leave it out")
+    if options.sheet is not None and format not in ("excel", "matlab"):
+        raise InputError(
+            f"`sheet` is for workbooks and MATLAB files, and this is '{format}': leave it out"
+        )
 
 
 def _side(block: float | str) -> float:
@@ -345,5 +344,10 @@ def _on_clock(time: Array, bodies: list[RawBody], values: Sequence[Array | None]
 
 
 def _usual_rate(bodies: list[RawBody]) -> float:
-    intervals = [float(np.median(np.diff(body.clock))) for body in bodies if body.clock.size > 1]
+    # The differences are the median's own to sort: a long recording is not to be held once more.
+    intervals = [
+        float(np.median(np.diff(body.clock), overwrite_input=True))
+        for body in bodies
+        if body.clock.size > 1
+    ]
     return float(1.0 / np.median(intervals)) if intervals else 0.0

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-MISSING = frozenset({"", "NaN", "nan", "NAN", "NA", "N/A", "null", "NULL", "None", "none", "-nan"})
+MISSING = frozenset(
+    {"", "#N/A", "NaN", "nan", "NAN", "NA", "N/A", "null", "NULL", "None", "none", "-nan"}
+)
 """Words that trackers write for a missing number."""
 
 
@@ -24,3 +26,6 @@ class TableLayout:
     """Columns (from 0) to read as text."""
     clock: int | None = None
     """The one of the numbers whose whole values may be beyond those that float64 holds exactly."""
+    stamps: tuple[int, ...] = ()
+    """Columns (from 0) of time stamps; of several the sum counts, as of a date and a time of day.
+    It becomes the numbers of the first of them."""

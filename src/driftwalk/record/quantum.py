@@ -30,14 +30,22 @@ def detect_quantum(values: Array) -> float:
     >>> detect_quantum(np.arange(100) % 7 * 0.25)
     0.25
     """
-    known = values[np.isfinite(values)]
-    if known.size > _MAX_SAMPLES:
-        known = known[:: known.size // _MAX_SAMPLES + 1]
+    known = _some_known(values)
     if known.size < 2:
         return 0.0
     decimal = _decimal_quantum(known)
     coarse = _lattice_quantum(known, decimal)
     return coarse if coarse > 0.0 else decimal
+
+
+def _some_known(values: Array) -> Array:
+    """Return the finite values, of many every second, third, ... one."""
+    present = np.isfinite(values)
+    count = int(present.sum())
+    if count <= _MAX_SAMPLES:
+        return values[present]
+    every = count // _MAX_SAMPLES + 1
+    return values[::every] if count == values.size else values[np.flatnonzero(present)[::every]]
 
 
 def common_quantum(series: Iterable[Array]) -> float:
@@ -47,8 +55,9 @@ def common_quantum(series: Iterable[Array]) -> float:
 
 
 def _varies(values: Array) -> bool:
-    known = values[np.isfinite(values)]
-    return bool(known.size) and float(np.ptp(known)) > 0.0
+    known = np.isfinite(values)
+    least = float(np.min(values, where=known, initial=np.inf))
+    return float(np.max(values, where=known, initial=-np.inf)) > least
 
 
 def _decimal_quantum(values: Array) -> float:

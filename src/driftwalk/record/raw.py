@@ -95,6 +95,9 @@ class RawRecording:
     """Further variables, which each body has in its `extra`."""
     clock_origin: int = 0
     """Offset to add to every clock, subtracted because its whole numbers are beyond float64."""
+    calendar: str = ""
+    """Origin of a clock of time stamps: ``"UTC"`` or ``"local"`` for 1970 there, ``"day"``
+    for midnight; ``""``: the clock is of numbers."""
     bare_clock: str | None = None
     """Column of a clock that is taken as seconds though nothing says so, ``""`` where the format
     has no columns to name; None for any other clock."""
@@ -136,6 +139,8 @@ class ReadOptions:
     """Topic of a ROS bag, or several with commas between them."""
     header_line: int | None = None
     """Line of a plain table, from 1, that names its columns; None: the first."""
+    sheet: str | None = None
+    """Name or number, from 1, of a sheet; name of a variable of a MATLAB file."""
     x: Path | None = None
     """File of the x matrix (one row a frame, one column a body)."""
     y: Path | None = None

@@ -1,7 +1,8 @@
 """The readable formats: one file each under `record.loaders`, found by being there.
 
 A further format joins by one file that defines ``LOADER``, an object with the members of
-`Loader`. Nothing else has to be edited.
+`Loader`. Nothing else has to be edited. Other packages name theirs by entry points, see
+`record.foreign`.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Final, Protocol, runtime_checkable
 
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.record.foreign import ForeignLoaders, foreign_loaders
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.recognise.nearest import nearest_table, unknown_file
 from driftwalk.record.text import read_head
@@ -48,13 +50,23 @@ class Loader(Protocol):
 
 @cache
 def loaders() -> dict[str, Loader]:
-    """Return every loader by its name.
+    """Return every loader by its name, those of other packages last.
 
     Examples
     --------
     >>> "idtracker" in loaders()
     True
     """
+    return {**_own_loaders(), **_foreign().loaders}
+
+
+@cache
+def _foreign() -> ForeignLoaders:
+    """Return the loaders of other packages."""
+    return foreign_loaders(_own_loaders())
+
+
+def _own_loaders() -> dict[str, Loader]:
     import importlib
     import pkgutil
 
@@ -87,7 +99,10 @@ def find_loader(path: Path, *, format: str | None = None, by_columns: bool = Fal
         When there is no such format or file, or nothing recognises the content.
     """
     known = loaders()
+    broken = _foreign().broken
     if format is not None and format not in known:
+        if format in broken:
+            raise InputError(f"`format` '{format}': {broken[format]}")
         raise InputError(f"unknown `format` '{format}'; readable: {', '.join(known)}")
     if not path.exists():
         raise FormatError("there is no such file", path=path)
@@ -96,14 +111,15 @@ def find_loader(path: Path, *, format: str | None = None, by_columns: bool = Fal
     head = b"" if path.is_dir() else read_head(path)
     if not head.strip() and not path.is_dir():
         raise FormatError("the file is empty", path=path)
-    _refuse_utf16(head, path)
     if by_columns and known[PLAIN].sniff(head, path) > 0.0:
         return known[PLAIN]
     confidence = {name: loader.sniff(head, path) for name, loader in known.items()}
     best = max(confidence, key=lambda name: confidence[name])
     if confidence[best] <= 0.0:
+        failed = [getattr(loader, "failed", "") for loader in known.values()]
+        also = "".join(f"; {reason}" for reason in (*filter(None, failed), *broken.values()))
         raise FormatError(
-            f"the format is not recognised: {unknown_file(path, head, known)}", path=path
+            f"the format is not recognised: {unknown_file(path, head, known)}{also}", path=path
         )
     return known[best]
 
@@ -117,8 +133,3 @@ def failed_format(path: Path) -> str:
         A file that the reader of plain tables has refused.
     """
     return nearest_table(path, read_head(path), loaders())
-
-
-def _refuse_utf16(head: bytes, path: Path) -> None:
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise FormatError("is UTF-16 text: save the file as UTF-8", path=path)

@@ -2,8 +2,8 @@
 
 The file is read in blocks of a few megabytes. In each block the fields of every line are counted
 first, so that a short or long row cannot slip through, then pandas' C parser reads the numbers
-(correctly rounded). Only when a block fails is it read again line by line, to say which line and
-column is wrong.
+(correctly rounded), with a point or a comma as decimal sign, and time stamps become numbers. Only
+when a block fails is it read again line by line, to say which line and column is wrong.
 """
 
 from __future__ import annotations
@@ -24,6 +24,9 @@ from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import check_lines
 from driftwalk.record.layout import MISSING, TableLayout
 from driftwalk.record.raw import Array
+from driftwalk.record.tables.encoding import WINDOWS, TranscodedText, other_encoding
+from driftwalk.record.tables.growing import GrowingColumn
+from driftwalk.record.tables.stamps import StampError, StampReader, calendar_of, clock_of_stamps
 
 BLOCK_BYTES = 4 << 20
 GZIP_MAGIC = b"\x1f\x8b"
@@ -31,6 +34,7 @@ DAMAGED_GZIP = (gzip.BadGzipFile, EOFError, zlib.error)
 """Exceptions raised by reading a gzip file that is cut off or damaged."""
 BOM = b"\xef\xbb\xbf"
 HEAD_BYTES = 1 << 16
+_BUFFER = 1 << 20
 _EXACT = 1 << 53
 LONGEST_LINE = 16 << 20
 GZIP_ALLOWANCE = 16 << 20
@@ -48,6 +52,8 @@ class Table:
     """Column (from 0) to its values."""
     clock_origin: int = 0
     """Offset subtracted from the clock, so that nanoseconds since 1970 stay exact."""
+    calendar: str = ""
+    """Origin of the nanoseconds of time stamps, see `StampReader`; ``""``: the clock has none."""
     codes: dict[int, npt.NDArray[np.int32]] = field(default_factory=dict)
     """Text column to the index of each row's value in `labels`."""
     labels: dict[int, list[str]] = field(default_factory=dict)
@@ -55,14 +61,45 @@ class Table:
 
 
 def open_binary(path: Path) -> IO[bytes]:
-    """Open a file for reading, through gzip when its content says so."""
+    """Open a file for reading, through gzip and as UTF-8 when its content says so."""
+    file = _opened(path)
+    encoding = _encoding(file)
+    return file if encoding is None else _buffered(TranscodedText(file, encoding, path))
+
+
+def is_windows_text(path: Path) -> bool:
+    """Whether a file is text in the encoding of Windows, of which other letters may be meant.
+
+    Parameters
+    ----------
+    path : Path
+        A file, which may be packed by gzip.
+    """
+    with _opened(path) as file:
+        return _encoding(file) == WINDOWS
+
+
+def _opened(path: Path) -> io.BufferedReader:
+    """Open a file, through gzip when its content says so."""
     try:
-        with path.open("rb") as file:
-            compressed = file.read(2) == GZIP_MAGIC
-        return io.BufferedReader(_BoundedGzip(path), 1 << 20) if compressed else path.open("rb")
+        with path.open("rb") as start:
+            compressed = start.read(2) == GZIP_MAGIC
+        return _buffered(_BoundedGzip(path) if compressed else io.FileIO(path))
     except (OSError, ValueError) as error:  # ValueError: a name that no file can have
         reason = getattr(error, "strerror", None) or error
         raise FormatError(f"cannot be opened: {reason}", path=path) from error
+
+
+def _buffered(raw: io.RawIOBase) -> io.BufferedReader:
+    return io.BufferedReader(raw, _BUFFER)
+
+
+def _encoding(file: io.BufferedReader) -> str | None:
+    """Return the encoding of a text that is not UTF-8, without moving on in it."""
+    try:
+        return other_encoding(file.peek(HEAD_BYTES)[:HEAD_BYTES])
+    except (OSError, *DAMAGED_GZIP):
+        return None  # whoever reads it finds the damage, and says where
 
 
 class _BoundedGzip(io.RawIOBase):
@@ -200,55 +237,168 @@ def read_table(path: Path, layout: TableLayout, *, blocks: int | None = None) ->
         With line and column, when a row has another number of fields than the header or a field is
         not a number.
     """
-    needed = 1 + max((*layout.numbers, *layout.texts))
+    needed = 1 + max((*layout.numbers, *layout.texts, *layout.stamps))
     if needed > len(layout.names):
         raise FormatError(
             f"expected at least {needed} columns, got {len(layout.names)}: is it another format?",
             path=path,
         )
-    chunks: dict[int, list[Array]] = {column: [] for column in layout.numbers}
-    codes: dict[int, list[npt.NDArray[np.int32]]] = {column: [] for column in layout.texts}
-    labels: dict[int, dict[str, int]] = {column: {} for column in layout.texts}
-    rows = 0
-    origin = 0
+    collected = _Collected(layout, path)
     for line, block in islice(_blocks(path, layout.skip_lines), blocks):
         # pandas fails on a table of blank lines alone.
-        if not block.strip(b" \r\n"):
-            continue
-        frame = _parse(block, layout, path=path, line=line)
-        if layout.clock is not None and not rows:
-            origin = _far_origin(frame[layout.clock].to_numpy())
-        rows += len(frame)
-        for column, parts in chunks.items():
+        if block.strip(b" \r\n"):
+            collected.add(block, line)
+    return collected.table()
+
+
+class _Collected:
+    """Columns of a table as far as it is read."""
+
+    def __init__(self, layout: TableLayout, path: Path) -> None:
+        self._layout = layout
+        self._path = path
+        self._numbers: dict[int, GrowingColumn] = {}
+        self._codes: dict[int, GrowingColumn] = {}
+        self._labels: dict[int, dict[str, int]] = {column: {} for column in layout.texts}
+        self._stamps = {column: StampReader() for column in layout.stamps}
+        self._decimal = "."
+        self._origin: int | None = None
+        self._rows = 0
+
+    def add(self, block: bytes, line: int) -> None:
+        """Read a block of whole lines; its first has this number."""
+        frame = self._parsed(block, line)
+        if not self._rows:
+            self._begin(frame, block)
+        self._rows += len(frame)
+        clock = self._layout.clock
+        for column in self._layout.numbers:
             values = frame[column].to_numpy()
-            if origin and column == layout.clock:
-                values = values - (origin if values.dtype.kind == "i" else float(origin))
-            parts.append(values.astype(np.float64, copy=False))
-        for column, seen in labels.items():
-            codes[column].append(_encode(frame[column], seen))
-    if not rows:
-        raise FormatError("holds no rows of data", path=path)
-    # Column by column, so that no more than one column is ever held twice.
-    return Table(
-        rows=rows,
-        numbers={column: _join(chunks.pop(column)) for column in layout.numbers},
-        codes={column: np.concatenate(codes.pop(column)) for column in layout.texts},
-        labels={column: list(seen) for column, seen in labels.items()},
-        clock_origin=origin,
-    )
+            if column == clock:
+                values = self._from_origin(values)
+            self._numbers[column].append(values)
+        for column, seen in self._labels.items():
+            self._codes[column].append(_encode(frame[column], seen))
+        if self._stamps:
+            self._numbers[self._layout.stamps[0]].append(self._clock(frame, block, line))
+
+    def table(self) -> Table:
+        """Return what was read."""
+        if not self._rows:
+            raise FormatError("holds no rows of data", path=self._path)
+        return Table(
+            rows=self._rows,
+            numbers={column: values.take() for column, values in self._numbers.items()},
+            codes={column: values.take() for column, values in self._codes.items()},
+            labels={column: list(seen) for column, seen in self._labels.items()},
+            clock_origin=self._origin or 0,
+            calendar=calendar_of(list(self._stamps.values())),
+        )
+
+    def _parsed(self, block: bytes, line: int) -> Any:
+        """Return a block as a data frame, with a comma as decimal sign where its numbers have it.
+
+        The sign is that of the first number with decimals; then all have it.
+        """
+        layout, path = self._layout, self._path
+        undecided = self._decimal == "." and b"," in block
+        errors: list[FormatError] = []
+        for decimal in (".", ",") if undecided else self._decimal:
+            try:
+                frame = _parse(block, layout, path=path, line=line, decimal=decimal)
+            except FormatError as error:
+                errors.append(error)
+                continue
+            if _all_numbers(frame, layout) and (decimal == self._decimal or self._only_whole()):
+                self._decimal = decimal
+                return frame
+            errors.append(_bad_row(block, layout, path=path, line=line, decimal=decimal))
+        # With the sign that is wrong an earlier row is the first that cannot be read.
+        raise max(errors, key=lambda error: (error.line or 0, error.column or 0))
+
+    def _only_whole(self) -> bool:
+        """Whether no number so far has decimals."""
+        return all(values.whole().all() for values in self._numbers.values())
+
+    def _begin(self, frame: Any, block: bytes) -> None:
+        """Make room for as many rows as the file holds, by its size and its first block."""
+        rows = int(1.02 * len(frame) * _text_size(self._path) / len(block)) + len(frame)
+        numbers = (*self._layout.numbers, *self._layout.stamps[:1])
+        self._numbers = {column: GrowingColumn(np.float64, expected=rows) for column in numbers}
+        self._codes = {
+            column: GrowingColumn(np.int32, expected=rows) for column in self._layout.texts
+        }
+
+    def _from_origin(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Return the clock from its first value on, where float64 would round it."""
+        if self._origin is None:
+            self._origin = far_origin(values)
+        if not self._origin:
+            return values
+        return values - (self._origin if values.dtype.kind == "i" else float(self._origin))
+
+    def _clock(self, frame: Any, block: bytes, line: int) -> Array:
+        """Return the time stamps of a block in nanoseconds from the first one on."""
+        column = self._layout.stamps[0]
+        try:
+            ticks = []
+            for column, reader in self._stamps.items():
+                ticks.append(reader.read(frame[column].fillna("").to_numpy(dtype=object)))
+            column = self._layout.stamps[0]
+            clock, self._origin = clock_of_stamps(ticks, self._origin)
+        except StampError as error:
+            raise FormatError(
+                f"{error} (column '{self._layout.names[column]}')",
+                path=self._path,
+                line=line + _line_of_row(block, error.row),
+                column=column + 1,
+            ) from error
+        return clock
 
 
-def _far_origin(values: npt.NDArray[Any]) -> int:
-    """Return the first of whole numbers that float64 would round, 0 when it need not."""
+def _bad_row(
+    block: bytes, layout: TableLayout, *, path: Path, line: int, decimal: str
+) -> FormatError:
+    """Return what is wrong with a block whose columns of numbers are none."""
+    try:
+        check_lines(block, layout, path=path, line=line, decimal=decimal)
+    except FormatError as error:
+        return error
+    return FormatError("has a column that is not numbers", path=path, line=line)
+
+
+def _line_of_row(block: bytes, row: int) -> int:
+    """Return the line of a block, from 0, in which a row of data stands."""
+    lines = (at for at, line in enumerate(block.split(b"\n")) if line.strip())
+    return next(islice(lines, row, None), 0)
+
+
+def _all_numbers(frame: Any, layout: TableLayout) -> bool:
+    """Whether the columns that are to be numbers are."""
+    return all(frame[column].dtype.kind in "iuf" for column in layout.numbers)
+
+
+def _text_size(path: Path) -> int:
+    """Return the bytes of a text file; of a packed one those of the file, which are fewer."""
+    return path.stat().st_size
+
+
+def far_origin(values: npt.NDArray[Any]) -> int:
+    """Return the first of whole numbers that float64 would round, 0 when it need not.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        Times.
+
+    Examples
+    --------
+    >>> far_origin(np.array([1_700_000_000_000_000_001])), far_origin(np.array([5]))
+    (1700000000000000001, 0)
+    """
     if not values.size or values.dtype.kind != "i" or np.abs(values).max() <= _EXACT:
         return 0
     return int(values[0])
-
-
-def _join(parts: list[Array]) -> Array:
-    joined = np.concatenate(parts)
-    parts.clear()
-    return joined
 
 
 def _blocks(path: Path, skip_lines: int) -> Iterator[tuple[int, bytes]]:
@@ -276,17 +426,16 @@ def _blocks(path: Path, skip_lines: int) -> Iterator[tuple[int, bytes]]:
             raise FormatError(f"cannot be read to its end: {error}", path=path) from error
 
 
-def _parse(block: bytes, layout: TableLayout, *, path: Path, line: int) -> Any:
+def _parse(block: bytes, layout: TableLayout, *, path: Path, line: int, decimal: str) -> Any:
     """Return the block as a data frame, or raise a `FormatError` that says where it is wrong."""
     import pandas as pd
 
     fields = _field_counts(block, layout.delimiter)
-    expected = len(layout.names)
     whole = fields[fields > 0]
-    width = expected
-    if (whole != expected).any():
-        check_lines(block, layout, path=path, line=line)
-        width = max(expected, int(whole.max(initial=0)))
+    width = len(layout.names)
+    if (whole != width).any():
+        widest = check_lines(block, layout, path=path, line=line, decimal=decimal)
+        width = max(width, widest)
     # The stubs of pandas cannot follow options in a dictionary.
     exact: Any = {} if _pandas_is_exact(pd.__version__) else {"float_precision": "round_trip"}
     try:
@@ -294,8 +443,9 @@ def _parse(block: bytes, layout: TableLayout, *, path: Path, line: int) -> Any:
             io.BytesIO(block),
             header=None,
             names=list(range(width)),
-            usecols=sorted({*layout.numbers, *layout.texts}),
-            dtype=dict.fromkeys(layout.texts, str),
+            usecols=sorted({*layout.numbers, *layout.texts, *layout.stamps}),
+            dtype=dict.fromkeys((*layout.texts, *layout.stamps), str),
+            decimal=decimal,
             sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
             na_values=list(MISSING),
             keep_default_na=False,
@@ -306,11 +456,8 @@ def _parse(block: bytes, layout: TableLayout, *, path: Path, line: int) -> Any:
             **exact,
         )
     except (ValueError, UnicodeDecodeError) as error:
-        check_lines(block, layout, path=path, line=line)
+        check_lines(block, layout, path=path, line=line, decimal=decimal)
         raise FormatError(f"cannot be read as a table: {error}", path=path, line=line) from error
-    if any(frame[column].dtype.kind not in "iuf" for column in layout.numbers):
-        check_lines(block, layout, path=path, line=line)
-        raise FormatError("has a column that is not numbers", path=path, line=line)
     if b'"' in block and len(frame) != whole.size:
         raise FormatError("has a quotation mark that is not closed", path=path, line=line)
     return frame

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from driftwalk.record.raw import RawBody, RawRecording
+from driftwalk.record.text import is_windows_text
 
 LARGEST_EXTENT_M = 20.0
 SMALLEST_EXTENT_M = 1e-3
@@ -28,8 +31,12 @@ def plausibility_warnings(bodies: list[RawBody]) -> list[str]:
     if not any(known.any() for _, known in present):
         return ["no row holds a position"]
     warnings = []
+    # Without copies: a recording may have millions of positions.
     extent = max(
-        float(np.ptp(values[known]))
+        float(
+            np.max(values, where=known, initial=-np.inf)
+            - np.min(values, where=known, initial=np.inf)
+        )
         for body, known in present
         if known.any()
         for values in (body.x, body.y)
@@ -54,12 +61,25 @@ def _clock_warnings(bodies: list[RawBody]) -> list[str]:
     if not clocks:
         return []
     last = max(float(clock[-1] - clock[0]) for clock in clocks)
-    shortest = min(float(np.median(np.diff(clock))) for clock in clocks)
+    shortest = min(float(np.median(np.diff(clock), overwrite_input=True)) for clock in clocks)
     if last > LONGEST_RECORDING_S:
         return [f"the recording lasts {last:.3g} s: is the unit of its clock right?"]
     if shortest < SHORTEST_INTERVAL_S:
         return [f"the usual interval is {shortest:.3g} s: is the unit of the clock right?"]
     return []
+
+
+def encoding_notes(path: Path) -> list[str]:
+    """Return what to say about text whose encoding nobody named.
+
+    Parameters
+    ----------
+    path : Path
+        A file or folder that was read.
+    """
+    if not path.is_file() or not is_windows_text(path):
+        return []
+    return ["the text is not UTF-8 and was read as Windows-1252: check letters such as µ and °"]
 
 
 def angle_warnings(raw: RawRecording) -> list[str]:

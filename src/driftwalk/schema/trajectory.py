@@ -124,8 +124,9 @@ def check_trajectory(dataset: xr.Dataset) -> xr.Dataset:
     time = dataset["time"].values
     if time.size and not np.isfinite(time).all():
         raise InputError("not a trajectory dataset: a time stamp is not a finite number")
-    if (np.diff(time) <= 0).any():
-        at = int(np.flatnonzero(np.diff(time) <= 0)[0])
+    backwards = time[1:] <= time[:-1]
+    if backwards.any():
+        at = int(np.flatnonzero(backwards)[0])
         raise InputError(
             f"time does not increase at sample {at + 1}: {time[at]} s is followed by "
             f"{time[at + 1]} s; sort the recording first"

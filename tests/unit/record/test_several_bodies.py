@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from driftwalk.core.errors import InputError
-from driftwalk.record import body_columns as candidates, load, text
+from driftwalk.record import load, text
 from driftwalk.record.clean import clean_body
 from driftwalk.record.column_names import column_meaning
 from driftwalk.record.raw import RawBody
+from driftwalk.record.tables import body_columns as candidates
 from driftwalk.schema import body_names, body_track
 
 

@@ -46,7 +46,7 @@ def read_flow_file(
     """
     from driftwalk.flow import flow_format
 
-    recording = how.format, how.columns, how.x, how.header_line
+    recording = how.format, how.columns, how.x, how.header_line, how.sheet
     said = any(one is not None for one in recording)
     if variables is None and (said or flow_format(path) is None):
         if frame_interval is not None:

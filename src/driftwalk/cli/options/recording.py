@@ -122,6 +122,14 @@ class RecordingOptions:
             show_default=False,
         ),
     ] = None
+    sheet: Annotated[
+        str | None,
+        _option(
+            "--sheet",
+            "Sheet of a workbook, by name or number from 1, or variable of a MATLAB file.",
+            metavar="NAME",
+        ),
+    ] = None
     x: Annotated[
         Path | None, _option("--x", "Matrix of x: a row per frame, a column per body.")
     ] = None

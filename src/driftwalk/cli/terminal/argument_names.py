@@ -54,6 +54,7 @@ OPTIONS: Final[dict[str, str | None]] = {
     "replicate": "--replicate",
     "sample_time": None,
     "settings": None,
+    "sheet": "--sheet",
     "side": "--side",
     "start": "--from",
     "step_interval": "--step-interval",

@@ -14,12 +14,11 @@ import numpy.typing as npt
 from driftwalk.core.errors import FormatError
 from driftwalk.flow.readers.raw import RawField
 from driftwalk.flow.readers.text import masked_rows
+from driftwalk.schema.matlab import HDF5_BASED, OLD, matlab_variables
 from driftwalk.schema.netcdf import HDF5, declared_bytes, refuse_huge
 
 Array = npt.NDArray[np.float64]
 
-_MATLAB: Final = b"MATLAB 5.0 MAT-file"
-_MATLAB_HDF5: Final = b"MATLAB 7.3 MAT-file"
 _ENDINGS: Final = ("_filtered", "_original", "")
 """Of what PIVlab saves of the velocities, the first that is there is read."""
 _NUMBERED: Final = re.compile(r"u_(\d+)")
@@ -49,10 +48,23 @@ class _File(NamedTuple):
 def is_pivlab(path: Path) -> bool:
     """Return whether a file is one of MATLAB's."""
     with path.open("rb") as file:
-        head = file.read(len(_MATLAB))
-    return head.startswith((_MATLAB, _MATLAB_HDF5)) or (
+        head = file.read(len(OLD))
+    return head.startswith((OLD, HDF5_BASED)) or (
         path.suffix.lower() == ".mat" and head.startswith(HDF5)
     )
+
+
+def holds_velocities(path: Path) -> bool:
+    """Whether a file of MATLAB's has velocities as PIVlab names them.
+
+    Parameters
+    ----------
+    path : Path
+        A file of MATLAB's, which may be damaged.
+    """
+    names = set(matlab_variables(path))
+    numbered = any(_NUMBERED.fullmatch(name) for name in names)
+    return numbered or any({f"u{ending}", f"v{ending}"} <= names for ending in _ENDINGS)
 
 
 def read(path: Path) -> RawField:
@@ -95,7 +107,7 @@ def _mean(velocity: Array) -> Array:
 def _opened(path: Path) -> Iterator[_File]:
     """Open a file of MATLAB; what goes wrong inside becomes a `FormatError`."""
     with path.open("rb") as binary:
-        old = binary.read(len(_MATLAB)) == _MATLAB
+        old = binary.read(len(OLD)) == OLD
     try:
         if old:
             yield _old_file(path)

@@ -19,7 +19,7 @@ KNOWN: Final = (
 )
 """Files that are no recordings, and what to do: container, names in it, advice."""
 LIKELY: Final = 0.5
-"""Share of the names of a format that a plain table has to have to be taken for one gone wrong."""
+"""A plain table that has more than this share of the names of a format may be one gone wrong."""
 
 
 def unknown_file(path: Path, head: bytes, loaders: Mapping[str, Any]) -> str:
@@ -56,7 +56,7 @@ def nearest_table(path: Path, head: bytes, loaders: Mapping[str, Any]) -> str:
         As in `unknown_file`.
     """
     near = _near(contents_of(path, head), loaders)
-    if not near or near[0][0] < LIKELY:
+    if not near or near[0][0] <= LIKELY:
         return ""
     _, name, lacks = near[0]
     return f"; as {name} it {lacks}" if lacks else ""

@@ -5,7 +5,7 @@ Slow and plain: it runs only on a table that has already been refused.
 
 from __future__ import annotations
 
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -15,32 +15,32 @@ from driftwalk.record.column_names import ColumnMap, column_meaning
 from driftwalk.record.layout import TableLayout
 from driftwalk.record.raw import Array
 from driftwalk.record.several_bodies import LARGEST_SHARE
-from driftwalk.record.text import Table, read_table
+from driftwalk.record.tables.clock import TableClock
+from driftwalk.record.tables.source import TableSource
 
 MOST_SHOWN = 3
 
 
 def body_columns(
-    path: Path,
+    source: TableSource,
     columns: ColumnMap,
     names: list[str],
     *,
-    delimiter: str,
-    skip: int,
+    clock: TableClock,
     in_order: bool,
 ) -> list[str]:
     """Return the columns that, taken as the body, leave it in one place at a time.
 
     Parameters
     ----------
-    path : Path
+    source : TableSource
         The table.
     columns : ColumnMap
         How it was read.
     names : list of str
         Names of all columns.
-    delimiter, skip : str, int
-        As in `TableLayout`.
+    clock : TableClock
+        Its clock.
     in_order : bool
         Whether the times of each body have to be in order, too.
 
@@ -49,30 +49,25 @@ def body_columns(
     list of str
         At most three names, that with the fewest bodies first.
     """
-    if columns.clock is None:
+    if clock.column is None:
         return []
     places = next(iter(columns.bodies.values()))
-    numbers = (columns.clock, places["x"], places["y"])
+    numbers = {places["x"], places["y"]} | ({clock.number} if clock.number is not None else set())
+    taken = {*numbers, *clock.stamps, columns.body_column}
     free = tuple(
-        index
-        for index, name in enumerate(names)
-        if index not in (*numbers, columns.body_column) and _may_be_a_name(name)
+        index for index, name in enumerate(names) if index not in taken and _may_be_a_name(name)
     )
-
-    def read(texts: tuple[int, ...], *, blocks: int | None = None) -> Table:
-        layout = TableLayout(delimiter, names, skip, tuple(sorted(set(numbers))), texts)
-        return read_table(path, layout, blocks=blocks)
-
-    # The first block tells the columns of measurements, which have another value in every row.
-    head = read(free, blocks=1)
+    # The first rows tell the columns of measurements, which have another value in every row.
+    wanted = TableLayout("", names, numbers=tuple(sorted(numbers)), texts=free, stamps=clock.stamps)
+    head = source.read(wanted, head=True)
     free = tuple(index for index in free if 2 * len(head.labels[index]) <= max(head.rows, 2))
-    table = read(free)
-    clock, x, y = (table.numbers[index] for index in numbers)
+    table = source.read(replace(wanted, texts=free))
+    times, x, y = (table.numbers[index] for index in (clock.column, places["x"], places["y"]))
     found = {
         index: len(table.labels[index])
         for index in free
         if _are_names(table.labels[index], rows=table.rows)
-        and _tells_apart(table.codes[index], clock, x, y, in_order=in_order)
+        and _tells_apart(table.codes[index], times, x, y, in_order=in_order)
     }
     return [names[index] for index in sorted(found, key=lambda index: found[index])[:MOST_SHOWN]]
 

@@ -1,0 +1,115 @@
+"""Where a recording comes from: a file that a loader reads, or a table in memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from os import PathLike
+from pathlib import Path
+from typing import Any, Final
+
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.file_names import text_of_name
+from driftwalk.record.raw import RawRecording, ReadOptions
+from driftwalk.record.registry import PLAIN, failed_format, find_loader
+from driftwalk.record.tables.memory import MemorySource, table_in_memory
+from driftwalk.record.tables.rows import recording_of
+from driftwalk.record.text import DAMAGED_GZIP
+from driftwalk.record.warn import encoding_notes
+from driftwalk.schema.netcdf import kind_of
+
+IN_MEMORY: Final = "table"
+"""Format of what is no file."""
+_OF_FILES: Final = ("delimiter", "header_line", "sheet", "topic", "x", "y", "theta", "keypoint")
+"""Options that say something about a file alone."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """A recording that is still to be read."""
+
+    where: str
+    """The file, or what the table is, for messages."""
+    name: str
+    """Name of the source, for the dataset."""
+    format: str
+    read: Callable[[ReadOptions], RawRecording]
+    path: Path | None = None
+    guessed: bool = False
+    """Whether nothing but its content says that it is a plain table."""
+
+    def explained(self, error: Exception) -> InputError:
+        """Return an error of the reading with the file that it is about, and what may help."""
+        if isinstance(error, DAMAGED_GZIP):
+            return FormatError(f"is a damaged gzip file: {error}", path=self.path)
+        if self.path is None or not isinstance(error, FormatError):
+            return InputError(f"{self.where}: {error}")
+        # A table that no loader of its own recognised may be one of theirs gone wrong.
+        hint = failed_format(self.path) if self.guessed else ""
+        path = error.path or self.path
+        return FormatError(error.reason + hint, path=path, line=error.line, column=error.column)
+
+    def notes(self) -> list[str]:
+        """Return what to say about the file apart from its contents."""
+        return [] if self.path is None else encoding_notes(self.path)
+
+
+def origin_of(
+    data: str | PathLike[str] | Any,
+    options: ReadOptions,
+    *,
+    format: str | None,
+    replicate: int | None,
+) -> Origin:
+    """Return where a recording comes from.
+
+    Parameters
+    ----------
+    data : path-like, or a table in memory
+        What `load` was given.
+    options : ReadOptions
+        What is known about it.
+    format : str, optional
+        Name of the format; None: recognised by content.
+    replicate : int, optional
+        Replicate of a simulation, if one was named.
+
+    Raises
+    ------
+    InputError
+        When it is nothing that can be read, or an option is about something else.
+    """
+    table = table_in_memory(data)
+    if table is not None:
+        return _of_table(table, options, format=format, replicate=replicate)
+    path = Path(data)
+    if replicate is not None and kind_of(path) != "simulation":
+        raise InputError(f"{path}: no simulation, so it has no replicates: omit `replicate`")
+    named = format or ("matrices" if options.y is not None else None)
+    loader = find_loader(path, format=named, by_columns=bool(options.columns))
+    return Origin(
+        where=str(path),
+        name=text_of_name(path.name),
+        format=loader.name,
+        read=partial(loader.read, path),
+        path=path,
+        guessed=format is None and loader.name == PLAIN,
+    )
+
+
+def _of_table(
+    table: MemorySource, options: ReadOptions, *, format: str | None, replicate: int | None
+) -> Origin:
+    given = [name for name in _OF_FILES if getattr(options, name) is not None]
+    given += [
+        name for name, value in (("format", format), ("replicate", replicate)) if value is not None
+    ]
+    if given:
+        raise InputError(f"{table.what}: `{given[0]}` is about a file: leave it out")
+    return Origin(
+        where=table.what,
+        name=table.what.removeprefix("the "),
+        format=IN_MEMORY,
+        read=partial(recording_of, table),
+    )

@@ -1,0 +1,218 @@
+"""Variables of MATLAB files, of the old format and of the one that is HDF5, in one form."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.record.stores.hdf5 import Hdf5Contents, opened_hdf5, text_of
+from driftwalk.schema.matlab import HDF5_BASED, OLD
+from driftwalk.schema.netcdf import refuse_huge
+
+MOST_ELEMENTS: Final = 200_000
+"""Elements of an array of structs that are read."""
+_SIZES: Final = {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "single": 4, "logical": 1}
+_HIDDEN: Final = "__"
+_CLASS: Final = "MATLAB_class"
+
+
+@dataclass(frozen=True)
+class Struct:
+    """A struct, or an array of structs."""
+
+    elements: list[dict[str, Value]]
+    """The fields of each element."""
+
+
+@dataclass(frozen=True)
+class Opaque:
+    """An object that only MATLAB can read."""
+
+    kind: str
+    """Its class: table, timetable, datetime, string, ..."""
+
+
+Value = npt.NDArray[Any] | str | list[Any] | Struct | Opaque | None
+"""An array of numbers with two axes or more, a text, a cell array as a list, or none of these."""
+
+
+@contextmanager
+def matlab_variables_of(path: Path) -> Iterator[dict[str, Value]]:
+    """Return the variables of a file by their names.
+
+    Raises
+    ------
+    FormatError
+        When it is no file of MATLAB's, is damaged, or declares more than it can hold.
+    """
+    if path.is_dir():
+        raise FormatError("is a folder, and no MATLAB file", path=path)
+    with path.open("rb") as file:
+        start = file.read(len(OLD))
+    if start == HDF5_BASED:
+        with opened_hdf5(path) as contents:
+            yield _of_hdf5(contents)
+    elif start == OLD:
+        yield _of_old(path)
+    else:
+        raise FormatError("is no MATLAB file of version 5 or 7.3", path=path)
+
+
+def _of_old(path: Path) -> dict[str, Value]:
+    from scipy.io import loadmat
+
+    try:
+        with warnings.catch_warnings():
+            # Of two variables of one name the later counts, as in MATLAB.
+            warnings.simplefilter("ignore")
+            refuse_huge(_declared_old(path), path)
+            content = loadmat(path, appendmat=False)
+    except InputError:
+        raise
+    except Exception as error:
+        # On a damaged file the library fails with whatever the damage leads it to.
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise FormatError(f"cannot be read as a MATLAB file: {reason}", path=path) from error
+    found: dict[str, Value] = {}
+    for name, value in content.items():
+        if name.startswith(_HIDDEN):
+            continue
+        own = _own_name(value)
+        found[own or name] = _old_value(value)
+    return found
+
+
+def _declared_old(path: Path) -> int:
+    """Return how many bytes the variables of a file have in memory, 0 where it has objects.
+
+    Of objects scipy knows no shape, and gives up.
+    """
+    from scipy.io import whosmat
+
+    try:
+        return sum(_declared(*entry) for entry in whosmat(path, appendmat=False))
+    except TypeError:
+        return 0
+
+
+def _declared(_name: str, shape: tuple[int, ...], kind: str) -> int:
+    """Return how many bytes a variable has in memory by its header."""
+    return int(np.prod([float(length) for length in shape])) * _SIZES.get(kind, 8)
+
+
+def _own_name(value: Any) -> str:
+    """Return the name of an opaque object, which is inside it."""
+    if not _is_opaque(value):
+        return ""
+    return text_of(value["s0"].ravel()[0])
+
+
+def _is_opaque(value: Any) -> bool:
+    names = getattr(getattr(value, "dtype", None), "names", None)
+    return names is not None and {"s0", "s1", "s2"} <= set(names)
+
+
+def _old_value(value: Any) -> Value:
+    """Return a value of scipy's in the form that both formats share."""
+    if _is_opaque(value):
+        return Opaque(text_of(value["s2"].ravel()[0]))
+    if not isinstance(value, np.ndarray):
+        return None
+    if value.dtype.names is not None:
+        _refuse_many(value.size)
+        fields = value.dtype.names
+        return Struct(
+            [{name: _old_value(one[name]) for name in fields} for one in value.ravel(order="F")]
+        )
+    if value.dtype.kind == "O":
+        _refuse_many(value.size)
+        return [_old_value(one) for one in value.ravel(order="F")]
+    if value.dtype.kind == "U":
+        return _texts([str(row) for row in value.ravel()])
+    return value if value.dtype.kind in "fiub" else None
+
+
+def _of_hdf5(contents: Hdf5Contents) -> dict[str, Value]:
+    names = [str(name) for name in contents.file if not str(name).startswith("#")]
+    return {name: _hdf5_value(contents, name) for name in names}
+
+
+def _hdf5_value(contents: Hdf5Contents, name: str) -> Value:
+    """Return an entry of an HDF5 file in the form that both formats share."""
+    import h5py
+
+    entry = contents.file[name]
+    kind = text_of(entry.attrs.get(_CLASS, b""))
+    if isinstance(entry, h5py.Group):
+        return _hdf5_struct(contents, entry) if kind in ("struct", "") else Opaque(kind)
+    if not isinstance(entry, h5py.Dataset):
+        return None
+    if "MATLAB_object_decode" in entry.attrs:
+        return Opaque(kind)
+    if "MATLAB_empty" in entry.attrs:
+        return np.empty((0, 0))
+    if entry.dtype.kind == "O":
+        return [_hdf5_value(contents, one) for one in _referred(contents, entry)]
+    if entry.dtype.kind not in "fiub":
+        return None
+    # Columns come first in MATLAB.
+    values = contents.array(name).T
+    if kind == "char":
+        return _texts(["".join(map(chr, row)) for row in np.atleast_2d(values).tolist()])
+    return values
+
+
+def _texts(rows: list[str]) -> Value:
+    """Return a matrix of letters as the text of its only row, or as one text a row."""
+    texts: list[Any] = [row.strip() for row in rows]
+    return texts if len(texts) > 1 else "".join(texts)
+
+
+def _hdf5_struct(contents: Hdf5Contents, group: Any) -> Struct:
+    """Return a struct; of an array of them each field holds references to the elements' values."""
+    import h5py
+
+    many: dict[str, list[str]] = {}
+    one: dict[str, Value] = {}
+    for field in map(str, group):
+        entry = group[field]
+        kind = text_of(entry.attrs.get(_CLASS, b""))
+        references = isinstance(entry, h5py.Dataset) and entry.dtype.kind == "O"
+        if references and kind != "cell":
+            many[field] = _referred(contents, entry)
+        else:
+            one[field] = _hdf5_value(contents, str(entry.name))
+    lengths = {len(names) for names in many.values()}
+    if not many:
+        return Struct([one])
+    if len(lengths) > 1:
+        raise FormatError(f"'{group.name}' has fields of different lengths", path=contents.path)
+    return Struct(
+        [
+            {field: _hdf5_value(contents, names[at]) for field, names in many.items()}
+            for at in range(lengths.pop())
+        ]
+    )
+
+
+def _referred(contents: Hdf5Contents, entry: Any) -> list[str]:
+    """Return the names of the entries that a cell array refers to, in MATLAB's order."""
+    _refuse_many(entry.size)
+    references = contents.array(str(entry.name)).T.ravel(order="F")
+    return [str(contents.file[reference].name) for reference in references]
+
+
+def _refuse_many(count: int) -> None:
+    if count > MOST_ELEMENTS:
+        raise FormatError(
+            f"has an array of {count} structs or cells, and {MOST_ELEMENTS} are read: save a "
+            "struct of arrays (table2struct(T, 'ToScalar', true))"
+        )

@@ -1,0 +1,1 @@
+"""Tables of text, workbooks, MATLAB files and columns in memory, read by one set of rules."""

@@ -1,0 +1,229 @@
+"""Variables of MATLAB as tables: structs, vectors, matrices."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from driftwalk.core.errors import FormatError
+from driftwalk.record.column_names import column_meaning
+from driftwalk.record.stores.matlab import Opaque, Struct, Value
+from driftwalk.record.tables.cells import Values
+from driftwalk.record.tables.memory import MemorySource
+
+VECTORS: Final = "variables"
+"""Name of the table that the vectors of a file make."""
+_MOST_COLUMNS: Final = 20_000
+_BODY: Final = "body"
+_OF_BODIES: Final = ("x", "y", "z", "theta")
+"""Quantities that a matrix may hold of several bodies."""
+_SAVED: Final = {
+    "datetime": "posixtime(t)",
+    "duration": "seconds(t)",
+    "string": "cellstr(s)",
+    "categorical": "cellstr(c)",
+}
+_TABLES: Final = ("table", "timetable")
+
+
+def matlab_tables(variables: dict[str, Value], path: Path) -> dict[str, MemorySource]:
+    """Return what variables can be read as a table, by their names.
+
+    Parameters
+    ----------
+    variables : dict
+        Variables of a file.
+    path : Path
+        The file, for errors.
+    """
+    tables: dict[str, MemorySource] = {}
+    vectors = _of_fields(variables, "the vectors", path)
+    if vectors is not None:
+        tables[VECTORS] = vectors
+    for name, value in variables.items():
+        table = _table(value, f"'{name}'", path)
+        if table is not None:
+            tables[name] = table
+    return tables
+
+
+def only_matlab(variables: dict[str, Value]) -> str:
+    """Return what to do about variables that only MATLAB can read, ``""`` where there are none.
+
+    Parameters
+    ----------
+    variables : dict
+        Variables of a file.
+
+    Examples
+    --------
+    >>> only_matlab({"T": Opaque("table")}).split(":")[0]
+    "'T' is a MATLAB table, which only MATLAB can read"
+    """
+    found = [
+        (name, value.kind) for name, value in _with_fields(variables) if isinstance(value, Opaque)
+    ]
+    if not found:
+        return ""
+    name, kind = next((one for one in found if one[1] in _TABLES), found[0])
+    what = f"'{name}' is a MATLAB {kind or 'object'}, which only MATLAB can read"
+    if kind in _TABLES:
+        change = "timetable2table(T)" if kind == "timetable" else "T"
+        return (
+            f"{what}: save it by writetable({change}, 'file.csv'), or as "
+            f"S = table2struct({change}, 'ToScalar', true)"
+        )
+    return f"{what}: save {_SAVED.get(kind, 'it as numbers')} in its place"
+
+
+def _with_fields(variables: dict[str, Value]) -> list[tuple[str, Value]]:
+    """Return variables, and the fields of those that are structs."""
+    inner = [
+        (f"{name}.{field}", one)
+        for name, value in variables.items()
+        if isinstance(value, Struct) and value.elements
+        for field, one in value.elements[0].items()
+    ]
+    return [*variables.items(), *inner]
+
+
+def _table(value: Value, what: str, path: Path) -> MemorySource | None:
+    """Return a variable that holds a table by itself, None of any other."""
+    if isinstance(value, Struct):
+        if len(value.elements) == 1:
+            return _of_fields(value.elements[0], what, path)
+        return _of_elements(value.elements, what, path)
+    if isinstance(value, np.ndarray) and value.ndim == 2 and min(value.shape) > 1:
+        # There are more samples than quantities, whichever way they lie.
+        rows = value if value.shape[0] >= value.shape[1] else value.T
+        _refuse_wide(rows.shape[1], what, path)
+        columns = [rows[:, at] for at in range(rows.shape[1])]
+        return MemorySource(what, [""] * len(columns), columns, has_header=False)
+    return None
+
+
+def _of_fields(fields: dict[str, Value], what: str, path: Path) -> MemorySource | None:
+    """Return fields of one length as columns, a matrix as a column for each body."""
+    rows = _row_count(fields)
+    if rows is None:
+        return None
+    names: list[str] = []
+    columns: list[Values] = []
+    for name, value in fields.items():
+        several = isinstance(value, np.ndarray) and min(value.shape) > 1
+        meaning = column_meaning(name)
+        if several and (meaning is None or meaning.quantity not in _OF_BODIES):
+            continue
+        for number, column in enumerate(_columns(value, rows), start=1):
+            names.append(_numbered(name, number) if several else name)
+            columns.append(column)
+        _refuse_wide(len(columns), what, path)
+    return MemorySource(what, names, columns) if columns else None
+
+
+def _row_count(fields: dict[str, Value]) -> int | None:
+    """Return how many samples fields have: as many as x has, else as most of them have."""
+    lengths = {
+        name: max(value.shape) if isinstance(value, np.ndarray) else len(value)
+        for name, value in fields.items()
+        if (isinstance(value, np.ndarray) and value.ndim == 2 and value.size)
+        or isinstance(value, list)
+    }
+    meanings = {name: column_meaning(name) for name in lengths}
+    of_x = [lengths[name] for name, known in meanings.items() if known and known.quantity == "x"]
+    of_t = [lengths[name] for name, known in meanings.items() if known and known.quantity == "t"]
+    if of_t and of_x:
+        return of_t[0]
+    if of_x:
+        return of_x[0]
+    common = Counter(length for length in lengths.values() if length > 1).most_common(1)
+    return common[0][0] if common else None
+
+
+def _columns(value: Value, rows: int) -> list[Values]:
+    """Return the columns of a value that has a value for each row, [] of any other."""
+    if isinstance(value, list):
+        if len(value) != rows or not all(isinstance(one, str) for one in value):
+            return []
+        texts = np.empty(rows, dtype=object)
+        texts[:] = value
+        return [texts]
+    if not isinstance(value, np.ndarray) or value.ndim != 2 or rows not in value.shape:
+        return []
+    if min(value.shape) <= 1:
+        return [value.ravel()]
+    across = value if value.shape[0] == rows else value.T
+    return [across[:, at] for at in range(across.shape[1])]
+
+
+def _numbered(name: str, number: int) -> str:
+    """Return the name of a body's column: the number follows the quantity, before a unit."""
+    return re.sub(r"^([A-Za-z]+)", rf"\g<1>{number}", name)
+
+
+def _of_elements(elements: list[dict[str, Value]], what: str, path: Path) -> MemorySource | None:
+    """Return an array of structs as a table: a row each, or the rows of a body each."""
+    if not elements:
+        return None
+    if all(_is_single(value) for element in elements for value in element.values()):
+        return _of_rows(elements, what)
+    parts = [_of_fields(element, what, path) for element in elements]
+    known = [(at, part) for at, part in enumerate(parts, start=1) if part is not None]
+    if not known:
+        return None
+    names = [name for name in known[0][1].names if all(name in part.names for _, part in known)]
+    bodies = [
+        np.full(part.rows, _body_name(elements[at - 1]) or str(at), dtype=object)
+        for at, part in known
+    ]
+    columns = [
+        np.concatenate([part.column(part.names.index(name)) for _, part in known]) for name in names
+    ]
+    return MemorySource(what, [*names, _BODY], [*columns, np.concatenate(bodies)])
+
+
+def _of_rows(elements: list[dict[str, Value]], what: str) -> MemorySource | None:
+    names = list(elements[0])
+    columns = []
+    for name in names:
+        cells = np.empty(len(elements), dtype=object)
+        cells[:] = [_single(element.get(name)) for element in elements]
+        columns.append(cells)
+    return MemorySource(what, names, columns)
+
+
+def _is_single(value: Value) -> bool:
+    return (
+        value is None
+        or isinstance(value, (str, Opaque))
+        or (isinstance(value, np.ndarray) and value.size <= 1)
+    )
+
+
+def _single(value: Value) -> Any:
+    """Return the one number or text of a field, None where it is empty."""
+    if isinstance(value, np.ndarray):
+        return value.ravel()[0].item() if value.size else None
+    return value if isinstance(value, str) else None
+
+
+def _body_name(element: dict[str, Value]) -> str:
+    """Return the name of a body, where a field holds it."""
+    for name, value in element.items():
+        meaning = column_meaning(name)
+        if meaning is not None and meaning.quantity == _BODY and _is_single(value):
+            single = _single(value)
+            if single is not None:
+                return f"{single:g}" if isinstance(single, float) else str(single)
+    return ""
+
+
+def _refuse_wide(count: int, what: str, path: Path) -> None:
+    if count > _MOST_COLUMNS:
+        raise FormatError(
+            f"{what} has {count} columns, more than the {_MOST_COLUMNS} that are read", path=path
+        )

@@ -1,0 +1,286 @@
+"""Time stamps of ISO 8601: dates with a time of day, and times of day alone, to the nanosecond."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.record.layout import MISSING
+
+Ticks = npt.NDArray[np.int64]
+Texts = npt.NDArray[np.bytes_]
+
+SECOND_NS: Final = 1_000_000_000
+DAY_NS: Final = 86_400 * SECOND_NS
+NO_TIME: Final = int(np.iinfo(np.int64).min)
+"""In place of the nanoseconds of a row without a time."""
+
+MOMENT: Final = "moment"
+OF_DAY: Final = "time of day"
+UTC: Final = "UTC"
+LOCAL: Final = "local"
+DAY: Final = "day"
+
+_TIME: Final = r"(?P<hour>\d\d):(?P<minute>\d\d)(?::(?P<second>\d\d)(?:[.,](?P<fraction>\d+))?)?"
+_ZONE: Final = r"(?: ?(?P<zone>[Zz]|[+-](?P<zone_hour>\d\d)(?::?(?P<zone_minute>\d\d))?))?"
+_MOMENTS: Final = (
+    re.compile(rf"(?P<year>\d{{4}})-(?P<month>\d\d)-(?P<day>\d\d)(?:[T ]{_TIME}{_ZONE})?"),
+    # As calendars in German and many other languages have it.
+    re.compile(rf"(?P<day>\d\d)\.(?P<month>\d\d)\.(?P<year>\d{{4}})(?:[T ]{_TIME}{_ZONE})?"),
+    re.compile(
+        r"(?P<year>\d{4})(?P<month>\d\d)(?P<day>\d\d)T(?P<hour>\d\d)(?P<minute>\d\d)(?P<second>\d\d)"
+        rf"(?:[.,](?P<fraction>\d+))?{_ZONE}"
+    ),
+)
+_OF_DAY: Final = re.compile(
+    r"(?P<hour>\d{1,4}):(?P<minute>\d\d):(?P<second>\d\d)(?:[.,](?P<fraction>\d+))?"
+)
+_UNCLEAR: Final = re.compile(
+    r"\d{1,2}/\d{1,2}/\d{2,4}.*|\d{1,2}-\d{1,2}-\d{2,4}.*|\d{1,2}\.\d{1,2}\.\d{2,4}.*"
+    r"|\d{4}/\d.*|\d.*\d ?[AaPp]\.?[Mm]\.?|\d{1,3}:\d{2}(?:[.,]\d+)?"
+)
+"""Dates and times that can be read in more than one way."""
+_YEARS: Final = (1678, 2261)
+"""Those whose nanoseconds since 1970 are 64-bit numbers."""
+
+
+class StampError(ValueError):
+    """Raised by a text that is no time stamp like those before it."""
+
+    def __init__(self, row: int, reason: str) -> None:
+        super().__init__(reason)
+        self.row = row
+        """Row among those that were given, from 0."""
+
+
+@dataclass(frozen=True)
+class StampForm:
+    """How a time stamp is written."""
+
+    kind: str
+    """``MOMENT``, ``OF_DAY``, or ``""`` of one that can be read in several ways."""
+    has_time: bool = True
+    """Whether it has a time of day."""
+
+
+def stamp_form(text: str) -> StampForm | None:
+    """Return how a time stamp is written, None of any other text.
+
+    Examples
+    --------
+    >>> stamp_form("2024-05-01")
+    StampForm(kind='moment', has_time=False)
+    """
+    match = _match(text)
+    if match is not None:
+        return StampForm(OF_DAY if match.re is _OF_DAY else MOMENT, match["hour"] is not None)
+    return StampForm("") if _UNCLEAR.fullmatch(text) else None
+
+
+def _match(text: str) -> re.Match[str] | None:
+    matches = (form.fullmatch(text) for form in (*_MOMENTS, _OF_DAY))
+    return next((match for match in matches if match is not None), None)
+
+
+class StampReader:
+    """Turns the time stamps of a column into whole nanoseconds, block by block.
+
+    The first stamp decides the kind, and whether there is a zone; those after it have to agree.
+    """
+
+    def __init__(self) -> None:
+        self.kind = ""
+        """``MOMENT`` or ``OF_DAY``, ``""`` as long as there was no stamp."""
+        self.zoned = False
+
+    @property
+    def calendar(self) -> str:
+        """Origin of the nanoseconds: 1970 in ``UTC`` or in a ``LOCAL`` zone, or a ``DAY``."""
+        if self.kind == OF_DAY:
+            return DAY
+        return UTC if self.zoned else LOCAL
+
+    def read(self, texts: npt.NDArray[Any]) -> Ticks:
+        """Return nanoseconds since 1970, or since midnight; `NO_TIME` where there is no stamp.
+
+        Parameters
+        ----------
+        texts : array of str, shape (n,)
+            Time stamps without blanks around them, or words for a missing one.
+
+        Raises
+        ------
+        StampError
+            At a text that is no stamp, or of another kind than the first.
+        """
+        try:
+            ascii_texts = np.asarray(texts, dtype=object).astype("S")
+        except UnicodeEncodeError:
+            row = next(row for row, text in enumerate(texts) if not str(text).isascii())
+            raise StampError(row, f"'{texts[row]:.40}' is no time stamp") from None
+        found = np.full(ascii_texts.size, NO_TIME, dtype=np.int64)
+        for rows in _of_one_shape(ascii_texts):
+            first = ascii_texts[rows[0]].decode()
+            if first not in MISSING:
+                match = self._checked(first, int(rows[0]))
+                found[rows] = _nanoseconds(ascii_texts[rows], match, rows)
+        return found
+
+    def _checked(self, text: str, row: int) -> re.Match[str]:
+        """Return the parts of a stamp that is like those before it."""
+        match = _match(text)
+        if match is None:
+            raise StampError(row, f"'{text:.40}' is no time stamp{how_to_write(text)}")
+        kind = OF_DAY if match.re is _OF_DAY else MOMENT
+        zoned = kind == MOMENT and match["zone"] is not None
+        if not self.kind:
+            self.kind, self.zoned = kind, zoned
+        if kind != self.kind:
+            raise StampError(row, f"'{text}' is a {kind}, and the first time is a {self.kind}")
+        if zoned != self.zoned:
+            other, own = ("no zone", "a zone") if self.zoned else ("a zone", "no zone")
+            raise StampError(row, f"'{text}' has {other}, and the first time has {own}")
+        return match
+
+
+def how_to_write(text: str) -> str:
+    """Return what to do about a date or time that can be read in several ways, ``""`` of others.
+
+    Examples
+    --------
+    >>> how_to_write("5/1/2024")
+    ': it can be read in several ways, so write it as 2024-05-31T13:30:00 or 13:30:00'
+    """
+    if _UNCLEAR.fullmatch(text) is None:
+        return ""
+    return ": it can be read in several ways, so write it as 2024-05-31T13:30:00 or 13:30:00"
+
+
+def _of_one_shape(texts: Texts) -> list[npt.NDArray[np.int64]]:
+    """Return the rows of each class of texts that differ in their digits alone, as they come."""
+    if not texts.size:
+        return []
+    if not texts.dtype.itemsize:
+        return [np.arange(texts.size)]
+    letters = texts.view(np.uint8).reshape(texts.size, -1)
+    digits = (letters >= ord("0")) & (letters <= ord("9"))
+    shapes = np.ascontiguousarray(np.where(digits, np.uint8(ord("0")), letters))
+    if (shapes == shapes[0]).all():
+        return [np.arange(texts.size)]
+    words = shapes.view(texts.dtype).ravel()
+    _, first, codes = np.unique(words, return_index=True, return_inverse=True)
+    return [np.flatnonzero(codes == at) for at in np.argsort(first)]
+
+
+def _nanoseconds(texts: Texts, match: re.Match[str], rows: npt.NDArray[np.int64]) -> Ticks:
+    """Return the nanoseconds of texts whose parts stand at the places of those of the first."""
+    letters = texts.view(np.uint8).reshape(texts.size, -1)
+
+    def part(name: str) -> Ticks:
+        start, stop = match.span(name) if name in match.re.groupindex else (-1, -1)
+        number = np.zeros(texts.size, dtype=np.int64)
+        for place in range(max(start, 0), max(stop, 0)):
+            number = 10 * number + (letters[:, place] - np.int64(ord("0")))
+        return number
+
+    ticks: Ticks
+    hour, minute, second = (part(name) for name in ("hour", "minute", "second"))
+    wrong = (minute > 59) | (second > 59)
+    ticks = _fraction(letters, match) + SECOND_NS * (second + 60 * (minute + 60 * hour))
+    if match.re is not _OF_DAY:
+        days, no_day = _days(part("year"), part("month"), part("day"))
+        offset = 60 * (part("zone_minute") + 60 * part("zone_hour"))
+        wrong |= no_day | (hour > 23) | (part("zone_minute") > 59) | (part("zone_hour") > 23)
+        # Nothing of it is beyond 64 bits where the day is one of the calendar.
+        ticks += DAY_NS * np.where(no_day, 0, days)
+        zone = match["zone"] or ""
+        ticks -= SECOND_NS * offset * (-1 if zone.startswith("-") else 1)
+    if wrong.any():
+        at = int(np.argmax(wrong))
+        raise StampError(int(rows[at]), f"'{texts[at].decode()}' is no date and time that there is")
+    return ticks
+
+
+def _fraction(letters: npt.NDArray[np.uint8], match: re.Match[str]) -> Ticks:
+    """Return the decimals of the seconds in nanoseconds; those beyond nine are left out."""
+    ticks = np.zeros(len(letters), dtype=np.int64)
+    if match["fraction"] is not None:
+        for weight, place in enumerate(range(*match.span("fraction"))[:9]):
+            ticks += 10 ** (8 - weight) * (letters[:, place] - np.int64(ord("0")))
+    return ticks
+
+
+def _days(year: Ticks, month: Ticks, day: Ticks) -> tuple[Ticks, npt.NDArray[np.bool_]]:
+    """Return days since 1970, and where there is no such day."""
+    wrong = (year < _YEARS[0]) | (year > _YEARS[1]) | (month < 1) | (month > 12) | (day < 1)
+    months = np.where(wrong, 0, 12 * (year - 1970) + month - 1).astype("datetime64[M]")
+    days = months.astype("datetime64[D]") + (day - 1)
+    wrong |= days.astype("datetime64[M]") != months
+    since: Ticks = days.astype(np.int64)
+    return since, wrong
+
+
+def calendar_of(readers: list[StampReader]) -> str:
+    """Return what the sum of the columns that were read counts from, ``""`` where there are none.
+
+    Examples
+    --------
+    >>> calendar_of([])
+    ''
+    """
+    found = [reader.calendar for reader in readers]
+    return next((calendar for calendar in found if calendar != DAY), found[0] if found else "")
+
+
+def clock_of_stamps(
+    columns: list[Ticks], origin: int | None
+) -> tuple[npt.NDArray[np.float64], int | None]:
+    """Return the sum of columns of time stamps from an origin on [ns], and that origin.
+
+    Parameters
+    ----------
+    columns : list of array, shape (n,)
+        Nanoseconds, as `StampReader.read` returns them; of several the first are dates.
+    origin : int or None
+        Nanoseconds to subtract; None: the first that there are.
+
+    Raises
+    ------
+    StampError
+        At a date that is none.
+
+    Examples
+    --------
+    >>> clock_of_stamps([np.array([7, 9])], None)
+    (array([0., 2.]), 7)
+    """
+    if len(columns) > 1:
+        late = (columns[0] != NO_TIME) & (columns[0] % DAY_NS != 0)
+        if late.any():
+            row = int(np.argmax(late))
+            raise StampError(row, "a date has a time itself, and times have a column of their own")
+    known = np.all([ticks != NO_TIME for ticks in columns], axis=0)
+    total = np.sum(columns, axis=0, where=known[None, :])
+    if origin is None and known.any():
+        origin = int(total[np.argmax(known)])
+    clock = np.full(known.size, np.nan)
+    clock[known] = total[known] - (origin or 0)
+    return clock, origin
+
+
+def moment_text(nanoseconds: int, calendar: str) -> str:
+    """Return a moment as ISO 8601 writes it, with as many decimals as it has.
+
+    Examples
+    --------
+    >>> moment_text(1714566600250000000, "UTC")
+    '2024-05-01T12:30:00.25Z'
+    """
+    seconds, fraction = divmod(nanoseconds, SECOND_NS)
+    text = str(np.datetime64(seconds, "s"))
+    decimals = f".{fraction:09d}".rstrip("0") if fraction else ""
+    return f"{text}{decimals}{'Z' if calendar == UTC else ''}"
