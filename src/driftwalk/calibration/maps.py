@@ -12,6 +12,7 @@ import numpy.typing as npt
 from driftwalk.calibration.estimation import Stores
 from driftwalk.calibration.problem import Axes, Problem
 from driftwalk.calibration.search import Map, Progress, add_replicates, run_map
+from driftwalk.core.run_stages import share_of_windows
 from driftwalk.motion import Details
 from driftwalk.sweep import Store
 
@@ -88,8 +89,6 @@ class Mapper:
 class Narrowing:
     """Progress through windows of which nobody knows how many there will be.
 
-    Each takes half of what is left, so that progress never goes back.
-
     Parameters
     ----------
     say : callable
@@ -106,13 +105,12 @@ class Narrowing:
     """
 
     def __init__(self, say: Progress) -> None:
-        self._say, self._before, self._left = say, 0.0, 1.0
+        self._say, self._finished = say, 0
 
     def __call__(self, done: int, total: int) -> None:
         """Tell how much is done when so many settings of a window are."""
-        share = self._before + 0.5 * self._left * done / max(total, 1)
-        if done >= total:
-            self._before, self._left = share, 0.5 * self._left
+        share = share_of_windows([*[1.0] * self._finished, done / max(total, 1)])
+        self._finished += done >= total
         self._say(round(PARTS * share), PARTS)
 
 

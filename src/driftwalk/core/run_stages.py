@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Final, NamedTuple
 
 
@@ -20,22 +21,44 @@ class Stage(NamedTuple):
         Examples
         --------
         >>> CALIBRATION_STAGES["refined"].percent(0.5)
-        52.5
+        43.0
         """
         return self.begin + share * (self.end - self.begin)
 
 
 CALIBRATION_STAGES: Final[dict[str, Stage]] = {
-    "coarse": Stage("map", 0.0, 40.0),
-    "refined": Stage("refined map", 40.0, 65.0),
-    "bootstrap": Stage("bootstrap", 65.0, 93.0),
-    "validation": Stage("halves", 93.0, 98.0),
+    "coarse": Stage("map", 0.0, 26.0),
+    "refined": Stage("refined map", 26.0, 60.0),
+    "bootstrap": Stage("bootstrap", 60.0, 80.0),
+    "validation": Stage("halves", 80.0, 90.0),
     # of more than two parameters: the search is made only where the summaries find no match
     "summaries": Stage("summaries", 0.0, 90.0),
     "search": Stage("search", 40.0, 60.0),
     "longer-search": Stage("longer search", 90.0, 95.0),
     "judged": Stage("held-out blocks", 95.0, 98.0),
 }
+
+
+def share_of_windows(done: Iterable[float]) -> float:
+    """Return how much of a search through windows is done, whose number nobody knows before.
+
+    Each finished window takes half of what was left, and the window under way its part of the next
+    half: the share never goes back.
+
+    Parameters
+    ----------
+    done : iterable of float
+        Share of each window that is done, from 0 to 1.
+
+    Examples
+    --------
+    >>> share_of_windows([0.5]), share_of_windows([1.0]), share_of_windows([1.0, 0.5])
+    (0.25, 0.5, 0.625)
+    """
+    shares = list(done)
+    left = 0.5 ** sum(one >= 1.0 for one in shares)
+    under_way = max((one for one in shares if one < 1.0), default=0.0)
+    return 1.0 - left + 0.5 * left * under_way
 
 
 def tell_nobody(*_: object) -> None:

@@ -95,7 +95,7 @@ def test_map_fills_as_units_are_finished(run: RunDirectory) -> None:
         value = dw.page.decode_array(the_map(source)["value"]).reshape(-1)
         np.testing.assert_allclose(value[:done], DISTANCE.mean(axis=1)[:done])
         assert np.isnan(value[done:]).all()
-        assert page(source)["state"]["progress"] == pytest.approx(0.4 * done / 12)
+        assert page(source)["state"]["progress"] == pytest.approx(0.26 * done / 12)
         assert source.look() == []
     error = DISTANCE.std(axis=1, ddof=1) / np.sqrt(2)
     np.testing.assert_allclose(
@@ -120,7 +120,7 @@ def test_a_page_opened_late_shows_what_is_there(run: RunDirectory) -> None:
     store = coarse(run)
     for unit in UNITS:
         store.write(unit, arrays(unit))
-    assert page(RunSource(run.path))["state"]["progress"] == pytest.approx(0.4)
+    assert page(RunSource(run.path))["state"]["progress"] == pytest.approx(0.26)
 
 
 def test_a_setting_without_numbers_is_as_far_as_can_be(run: RunDirectory) -> None:
@@ -171,7 +171,7 @@ def test_refined_map_and_bootstrap(run: RunDirectory) -> None:
     np.testing.assert_allclose(
         dw.page.decode_array(part["value"]), [[0.2, 0.6], [np.nan, np.nan]], rtol=1e-6
     )
-    assert page(source)["state"]["progress"] == pytest.approx(0.4 + 0.25 * 0.5)
+    assert page(source)["state"]["progress"] == pytest.approx(0.26 + 0.34 * 0.25)
     repeats = run.store("bootstrap-x", fingerprint={"count": 4})
     unit = grid(recording=np.arange(4)).units(2)[1]
     estimates = {"drag_coefficient": np.array([0.3, 0.4]), "force_std": np.array([1e-4, 2e-4])}
@@ -182,7 +182,7 @@ def test_refined_map_and_bootstrap(run: RunDirectory) -> None:
     cloud = lines["series"][0]
     assert cloud["y"] == pytest.approx([0.3, 0.4])
     assert cloud["x"] == pytest.approx([1e-4, 2e-4])
-    assert page(source)["state"]["progress"] == pytest.approx(0.65 + 0.28 * 0.5)
+    assert page(source)["state"]["progress"] == pytest.approx(0.6 + 0.2 * 0.5)
 
 
 @pytest.mark.parametrize("count", [1, 2])
@@ -425,7 +425,7 @@ def test_a_killed_run_says_since_when_nothing_came(
     coarse(run).write(UNITS[0], arrays(UNITS[0]))
     age(run, duration_s)
     state = page(RunSource(run.path))["state"]
-    assert state["progress"] == pytest.approx(0.4 * 5 / 12)
+    assert state["progress"] == pytest.approx(0.26 * 5 / 12)
     assert state["words"].startswith("map: 42 %")
     if ago is None:
         assert state["words"] == "map: 42 %"

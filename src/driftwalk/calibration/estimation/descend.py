@@ -19,7 +19,7 @@ FEWEST_SIMULATIONS: Final = (256, 512)
 FEWEST_ROUNDS: Final = 3
 MOST_ROUNDS: Final = 12
 MOST_IN_VAIN: Final = 4
-"""Rounds without a smaller misfit after which the search ends."""
+"""Rounds without a better fit after which the search ends."""
 REACH: Final = 1.25
 """A solution may lie outside the box by a quarter of it: the quadratic holds a little farther."""
 INSIDE: Final = 0.8
@@ -51,6 +51,11 @@ class Descended(NamedTuple):
     emulator: LocalEmulator
     solved: Solved
     rounds: int
+
+    @property
+    def unlikely(self) -> float:
+        """-2 log of the likelihood, but for a constant: ends of other searches compare by it."""
+        return self.solved.misfit + self.emulator.log_variance
 
 
 def descend(
@@ -93,7 +98,9 @@ def descend(
             and (wanted <= GROWS * width).all()
             and solved.misfit < USUAL * emulator.summaries
         )
-        lowest, since = min(lowest, solved.misfit), 0 if solved.misfit < lowest else since + 1
+        # A quadratic that holds badly leaves much, and then a large misfit looks small.
+        unlikely = solved.misfit + emulator.log_variance
+        lowest, since = min(lowest, unlikely), 0 if unlikely < lowest else since + 1
         if settled or since == MOST_IN_VAIN:
             break
         centre, width = rounded(np.clip(solved.setting, 0.0, 1.0)), rounded(following)

@@ -1,22 +1,26 @@
 """How summaries depend on a model's parameters in a small box, from simulations there.
 
-Their means are quadratic functions of the parameters; what is left has a covariance. Where that is
-so, the setting of a recording is that of least squares, each summary weighed by its covariance: the
-maximum of the synthetic likelihood (Wood, Nature 466 (2010) 1102).
+Their means are linear or quadratic functions of the parameters, as the simulations support; what is
+left has a covariance. Where that is so, the setting of a recording is that of least squares, each
+summary weighed by its covariance: the maximum of the synthetic likelihood (Wood, Nature 466 (2010)
+1102).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
 
+Form = Literal["slopes", "squares", "products"]
+FORMS: Final[tuple[Form, ...]] = ("slopes", "squares", "products")
+"""A plane, with the square of each parameter, and with the products of two."""
 ENOUGH: Final = 4
-"""Simulations for each coefficient from which products of two parameters are fitted, too."""
+"""Simulations for each coefficient from which a form is tried."""
 SHRUNK: Final = 0.05
 """Part of the correlations of the summaries that is taken away: they come from simulations."""
 CONSTANT: Final = 1e-9
@@ -49,8 +53,8 @@ class LocalEmulator:
     ----------
     centre, width : ndarray, shape (parameters,)
         The box, in the unit cube.
-    products : bool
-        Whether products of two parameters are fitted.
+    form : {"slopes", "squares", "products"}
+        What is fitted.
     coefficients : ndarray, shape (summaries, coefficients)
         Of the whitened summaries.
     whitening : ndarray, shape (summaries, summaries)
@@ -63,7 +67,7 @@ class LocalEmulator:
 
     centre: Floats
     width: Floats
-    products: bool
+    form: Form
     coefficients: Floats
     whitening: Floats
     used: npt.NDArray[np.bool_]
@@ -91,6 +95,15 @@ class LocalEmulator:
         """How many summaries say anything."""
         return int(self.used.sum())
 
+    @property
+    def log_variance(self) -> float:
+        """Logarithm of the determinant of the covariance of what is left of the summaries.
+
+        Misfits count in standard deviations, which differ from one emulator to another. With this
+        added, two of them compare: it is -2 log of the likelihood, but for a constant.
+        """
+        return -2.0 * float(np.linalg.slogdet(self.whitening)[1])
+
     def whitened(self, summaries: Floats) -> Floats:
         """Return summaries as they are compared."""
         return np.asarray(self.whitening @ summaries[self.used])
@@ -98,7 +111,7 @@ class LocalEmulator:
     def misfits(self, settings: Floats, summaries: Floats) -> Floats:
         """Return how far summaries are from those expected at each setting, shape (settings,)."""
         place = (settings - self.centre) / self.width
-        left = _basis(place, self.products) @ self.coefficients.T - self.whitened(summaries)
+        left = _basis(place, self.form) @ self.coefficients.T - self.whitened(summaries)
         return np.asarray((left**2).sum(axis=1))
 
     def solve(
@@ -129,10 +142,10 @@ class LocalEmulator:
         wanted = self.whitened(summaries)
 
         def left(place: Floats) -> Floats:
-            return np.asarray(self.coefficients @ _basis(place[None], self.products)[0] - wanted)
+            return np.asarray(self.coefficients @ _basis(place[None], self.form)[0] - wanted)
 
         def slope(place: Floats) -> Floats:
-            return np.asarray(self.coefficients @ _basis_slope(place, self.products))
+            return np.asarray(self.coefficients @ _basis_slope(place, self.form))
 
         begin = np.zeros(self.centre.size)
         if start is not None:
@@ -177,8 +190,8 @@ def fit_emulator(
         The box that the settings fill.
     """
     place = (settings - centre) / width
-    products = len(settings) >= ENOUGH * _basis(place[:1], True).shape[1]
-    basis = _basis(place, products)
+    form = _best_form(place, summaries)
+    basis = _basis(place, form)
     coefficients, *_ = np.linalg.lstsq(basis, summaries, rcond=None)
     left = summaries - basis @ coefficients
     freedom = max(len(settings) - basis.shape[1], 1)
@@ -188,8 +201,31 @@ def fit_emulator(
     correlation = (1.0 - SHRUNK) * (scaled.T @ scaled) / freedom + SHRUNK * np.eye(used.sum())
     whitening = np.linalg.cholesky(np.linalg.inv(correlation)).T / spread[used]
     return LocalEmulator(
-        centre, width, products, whitening @ coefficients[:, used].T, whitening, used, freedom
+        centre, width, form, whitening @ coefficients[:, used].T, whitening, used, freedom
     )
+
+
+def _best_form(place: Floats, summaries: Floats) -> Form:
+    """Return the form that foretells simulations best which it has not seen.
+
+    Coefficients that a box does not need cost: nine parameters have 36 products, and with 256
+    simulations their errors are larger than what they describe.
+    """
+    tried = [one for one in FORMS if len(place) >= ENOUGH * _basis(place[:1], one).shape[1]] or [
+        FORMS[0]
+    ]
+    errors = [_foretold(_basis(place, one), summaries) for one in tried]
+    return tried[int(np.argmin(errors))]
+
+
+def _foretold(basis: Floats, summaries: Floats) -> float:
+    """Return the mean logarithm of the squared errors of summaries, each left out in turn."""
+    orthogonal, _ = np.linalg.qr(basis)
+    own = np.minimum((orthogonal**2).sum(axis=1), 0.99)
+    left = (summaries - orthogonal @ (orthogonal.T @ summaries)) / (1.0 - own)[:, None]
+    spread = left.std(axis=0)
+    used = spread > CONSTANT * (np.abs(summaries).max(axis=0) + CONSTANT)
+    return float(np.log(spread[used]).mean()) if used.any() else 0.0
 
 
 def _pairs(count: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
@@ -197,20 +233,24 @@ def _pairs(count: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     return first, second
 
 
-def _basis(place: Floats, products: bool) -> Floats:
-    """Return 1, each coordinate, its square and, where asked for, the products of two."""
-    columns = [np.ones((len(place), 1)), place, place**2]
-    if products:
+def _basis(place: Floats, form: Form) -> Floats:
+    """Return 1, each coordinate, and where the form has them, its square and products of two."""
+    columns = [np.ones((len(place), 1)), place]
+    if form != "slopes":
+        columns.append(place**2)
+    if form == "products":
         first, second = _pairs(place.shape[1])
         columns.append(place[:, first] * place[:, second])
     return np.concatenate(columns, axis=1)
 
 
-def _basis_slope(place: Floats, products: bool) -> Floats:
+def _basis_slope(place: Floats, form: Form) -> Floats:
     """Return the derivatives of `_basis`, shape (coefficients, parameters)."""
     count = place.size
-    rows = [np.zeros((1, count)), np.eye(count), np.diag(2.0 * place)]
-    if products:
+    rows = [np.zeros((1, count)), np.eye(count)]
+    if form != "slopes":
+        rows.append(np.diag(2.0 * place))
+    if form == "products":
         first, second = _pairs(count)
         mixed = np.zeros((first.size, count))
         at = np.arange(first.size)

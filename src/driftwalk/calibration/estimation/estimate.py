@@ -10,15 +10,17 @@ import numpy.typing as npt
 
 from driftwalk.calibration.estimation import approach as approaching, descend as descending
 from driftwalk.calibration.estimation.approach import WIDE_ERRORS, Order, approach
-from driftwalk.calibration.estimation.descend import WIDEST, Descended, descend, rounded
+from driftwalk.calibration.estimation.descend import WIDEST, Descended, descend
+from driftwalk.calibration.estimation.modes import Modes, find_modes
 from driftwalk.calibration.estimation.objective import SummaryObjective
 from driftwalk.calibration.estimation.posterior import (
-    MOST_ROUNDS as MOST_BOXES,
+    MOST_ROUNDS as MOST_REGIONS,
     REACH,
     Posterior,
     sample_posterior,
 )
 from driftwalk.calibration.estimation.profile import Profiles, misfit_profiles
+from driftwalk.calibration.estimation.repeated import Repeated, repeat_estimates
 
 Floats = npt.NDArray[np.float64]
 
@@ -33,6 +35,8 @@ APART: Final = 0.04
 HOPELESS: Final = 100.0
 """Misfit, in summaries, from which on another start is no use: the model is another one."""
 MISFIT_QUANTILE: Final = 0.95
+UNSETTLED: Final = 1.0
+"""Draws that have moved by more standard deviations in the last round have not come to rest."""
 UNLIKE: Final = 4.0
 """Misfit, in usual ones, from which on the recording is that of another model: intervals would have
 to be more than twice as wide."""
@@ -58,6 +62,10 @@ class Matched(NamedTuple):
     profiles: Profiles | None
     """How the misfit rises along each parameter, over the square of the factor by which the draws
     are spread; None where states of the model have changed places."""
+    ambiguous: npt.NDArray[np.bool_]
+    """Parameters for which another place, which fits as well, has other values,"""
+    unsettled: npt.NDArray[np.bool_]
+    """and those whose draws still moved when the last simulations were made."""
     rounds: int
 
     @property
@@ -76,7 +84,8 @@ def most_simulations(parameters: int, worlds: int) -> int:
     wide = approaching.SIMULATIONS * approaching.MOST_ROUNDS
     each, last = descending.simulations_of(parameters)
     narrow = each * descending.MOST_ROUNDS
-    return wide + (1 + MOST_STARTS) * narrow + (MOST_BOXES - 1) * last + worlds
+    regions = MOST_REGIONS * last // 2
+    return wide + (1 + MOST_STARTS) * (narrow + regions) + worlds
 
 
 def match_summaries(
@@ -107,28 +116,38 @@ def match_summaries(
         Of the settings that are simulated.
     """
     recorded = objective.recorded
-    box = approach(
-        lambda one: objective(one)[:, 0], recorded[0], parameters, order=order, seed=seed
+    ends = _descents(objective, parameters, starts, order=order, seed=seed)
+    modes = find_modes(
+        ends,
+        lambda end, number: sample_posterior(
+            objective, recorded, end.emulator, end.solved, seed=seed + 10_000 * (1 + number)
+        ),
     )
-    best: Descended | None = None
-    if box.found:
-        best = descend(
-            objective, recorded[0], box.centre, WIDE_ERRORS * box.error, seed=seed + 1000
-        )
-    if best is None or not (_matches(best) or _hopeless(best)):
-        wide = np.full(parameters, WIDEST)
-        for number, start in enumerate(_distinct(order(starts()))[:MOST_STARTS], 2):
-            found = descend(objective, recorded[0], start, wide, seed=seed + 1000 * number)
-            if best is None or found.solved.misfit < best.solved.misfit:
-                best = found
-            if _matches(best):
-                break
-    assert best is not None
-    posterior = sample_posterior(
-        objective, recorded, best.emulator, best.solved, seed=seed + 10_000
-    )
-    usual = _usual_misfits(objective, posterior, worlds)
-    return _matched(order, posterior, recorded[0], usual, best.rounds)
+    repeated = repeat_estimates(lambda one: objective(one)[:, 0], modes.best, worlds)
+    return _matched(order, modes, recorded[0], repeated, ends[0].rounds)
+
+
+def _descents(
+    objective: SummaryObjective, parameters: int, starts: Starts, *, order: Order, seed: int
+) -> list[Descended]:
+    """Return the ends of the searches that are worth a posterior, the most likely first.
+
+    The first begins where a regression puts the parameters. Even where its errors are large, its
+    centre is closer to the truth than they say: they are mostly those of settings that move unlike
+    the recording. Where the end does not match, the model has more than one place to look, and an
+    end that matches may not be the best that does.
+    """
+    recorded = objective.recorded[0]
+    box = approach(lambda one: objective(one)[:, 0], recorded, parameters, order=order, seed=seed)
+    width = WIDE_ERRORS * box.error
+    found = [descend(objective, recorded, box.centre, width, seed=seed + 1000)]
+    if _matches(found[0]) or _hopeless(found[0]):
+        return found
+    wide = np.full(parameters, WIDEST)
+    for number, start in enumerate(_distinct(order(starts()))[:MOST_STARTS], 2):
+        found.append(descend(objective, recorded, start, wide, seed=seed + 1000 * number))
+    found.sort(key=lambda end: end.unlikely)
+    return found[:1] + [end for end in found[1:] if _matches(end)]
 
 
 def _matches(found: Descended) -> bool:
@@ -139,44 +158,39 @@ def _hopeless(found: Descended) -> bool:
     return found.solved.misfit > HOPELESS * found.emulator.summaries
 
 
-def _usual_misfits(objective: SummaryObjective, posterior: Posterior, worlds: int) -> Floats:
-    """Return the misfits of recordings of the model, each at the setting that fits it best."""
-    count = len(posterior.draws)
-    every = np.linspace(0, count - 1, min(worlds, count)).round().astype(np.int64)
-    chosen = posterior.draws[every]
-    seen = objective(rounded(chosen))[:, 0]
-    return np.array(
-        [
-            posterior.emulator.solve(one, reach=REACH, start=setting).misfit
-            for one, setting in zip(seen, chosen, strict=True)
-        ]
-    )
-
-
 def _matched(
-    order: Order, posterior: Posterior, recorded: Floats, usual: Floats, rounds: int
+    order: Order, modes: Modes, recorded: Floats, repeated: Repeated, rounds: int
 ) -> Matched:
+    best = modes.best
+    usual = repeated.misfits
     middle, most = float(np.median(usual)), float(np.quantile(usual, MISFIT_QUANTILE))
-    misfit = posterior.solved.misfit
+    misfit = best.solved.misfit
     stretch = float(np.sqrt(misfit / middle)) if misfit > most else 1.0
-    draws = order(posterior.draws)
-    point = np.median(draws, axis=0)
-    wider = stretch * posterior.emulator.widening
+    wider = stretch * repeated.spread
+    each = [order(_corrected(one.draws, repeated.bias, wider)) for one in modes.places]
     return Matched(
-        point=point,
-        draws=order(np.clip(point + wider * (draws - point), 0.0, 1.0)),
+        point=np.median(each[0], axis=0),
+        draws=modes.mixed(each),
         misfit=misfit,
         usual_misfit=middle,
         most_misfit=most,
         stretch=stretch,
-        even_point=np.clip(posterior.others[0].setting, 0.0, 1.0),
-        profiles=_profiles(order, posterior, recorded, wider),
+        even_point=np.clip(best.others[0].setting, 0.0, 1.0),
+        profiles=_profiles(order, best, recorded, repeated.bias, wider),
+        ambiguous=modes.apart(each),
+        unsettled=np.abs(best.moved) > UNSETTLED,
         rounds=rounds,
     )
 
 
+def _corrected(draws: Floats, bias: Floats, wider: Floats) -> Floats:
+    """Return draws less the bias of the estimate, spread about their median."""
+    middle = np.median(draws, axis=0)
+    return np.clip(middle - bias + wider * (draws - middle), 0.0, 1.0)
+
+
 def _profiles(
-    order: Order, posterior: Posterior, recorded: Floats, wider: float
+    order: Order, posterior: Posterior, recorded: Floats, bias: Floats, wider: Floats
 ) -> Profiles | None:
     """Return how the misfit rises along each parameter, in the measure of the intervals."""
     setting = posterior.solved.setting
@@ -189,7 +203,8 @@ def _profiles(
         wider * posterior.draws.std(axis=0),
         reach=REACH,
     )
-    return found._replace(rise=found.rise / wider**2)
+    place = np.clip(found.place - bias[:, None], 0.0, 1.0)
+    return Profiles(place, found.rise / wider[:, None] ** 2)
 
 
 def _distinct(starts: Floats) -> list[Floats]:

@@ -1,10 +1,10 @@
-"""Settings that could have given a recording: draws by the synthetic likelihood in a box.
+"""Settings that could have given a recording: draws by the synthetic likelihood in a region.
 
 Summaries are close to normal about their expected values, so a setting's likelihood falls with its
-misfit: exp(-misfit / 2) (Wood, Nature 466 (2010) 1102). Within the box of an emulator that costs
+misfit: exp(-misfit / 2) (Wood, Nature 466 (2010) 1102). Within the region of an emulator that costs
 nothing to evaluate, and a Markov chain of many walkers samples it, with an even prior over the
 ranges on their scales (emcee; Foreman-Mackey et al., Publ. Astron. Soc. Pac. 125 (2013) 306).
-Where the draws reach the end of the box, a wider box about them is simulated.
+Simulations follow the draws: the next ones fill a region about them, until the draws stay.
 """
 
 from __future__ import annotations
@@ -14,13 +14,9 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.estimation.descend import (
-    Simulate,
-    drawn_settings,
-    rounded,
-    simulations_of,
-)
+from driftwalk.calibration.estimation.descend import Simulate, simulations_of
 from driftwalk.calibration.estimation.emulator import LocalEmulator, Solved, fit_emulator
+from driftwalk.calibration.estimation.region import WIDEST, Region, region_about
 
 Floats = npt.NDArray[np.float64]
 
@@ -30,15 +26,17 @@ STEPS: Final = 600
 """Of each walker; the first half is left out."""
 BEGIN: Final = 0.3
 """Walkers begin about the solution, within this part of its standard deviations."""
-MOST_ROUNDS: Final = 4
-EDGE: Final = 0.9
-"""Draws beyond this part of the box are at its end,"""
-MOST_AT_EDGE: Final = 0.05
-"""and no more than this share of them may be."""
-WIDE: Final = 3.0
-"""The next box ends so many standard deviations of the draws from their mean."""
-WIDEST: Final = 0.3
-REACH: Final = 1.25
+INNER: Final = 0.9
+"""and within this part of the region."""
+MOST_ROUNDS: Final = 8
+STAYS: Final = 0.5
+"""Draws have stayed where their mean has moved by less than this part of their deviation,"""
+ALIKE: Final = 1.3
+"""and that is less than this factor wider: draws that an ellipsoid cuts off have up to 1.5."""
+REACH: Final = 1.0
+"""A solution lies within the box about the region."""
+NEAR: Final = 1.1
+"""Earlier simulations within this part of a region count for its emulator."""
 
 
 class Posterior(NamedTuple):
@@ -47,11 +45,15 @@ class Posterior(NamedTuple):
     draws: Floats
     """Settings in the unit cube, shape (512, parameters)."""
     emulator: LocalEmulator
-    """Of the last box."""
+    """Of the last region,"""
+    region: Region
+    """and that region."""
     solved: Solved
     """The setting of least misfit in it."""
     others: tuple[Solved, ...]
     """Those for the other parts of the recording."""
+    moved: Floats
+    """How far the last round moved the mean of the draws, in their standard deviations."""
 
 
 def sample_posterior(
@@ -72,44 +74,58 @@ def sample_posterior(
     seed : int
         Of the settings and of the chain.
     """
-    others: tuple[Solved, ...] = ()
+    count = emulator.centre.size
+    half = simulations_of(count)[1] // 2
+    draws = _chain(emulator, None, recorded[0], solved, seed)
+    region = region_about(draws)
+    known, seen = np.empty((0, count)), np.empty((0, *recorded.shape))
     for number in range(MOST_ROUNDS):
-        draws = _chain(emulator, recorded[0], solved, seed + number)
-        if number and (number == MOST_ROUNDS - 1 or _inside(draws, emulator)):
-            break
-        centre = rounded(draws.mean(axis=0))
-        spread = WIDE * draws.std(axis=0)
-        width = rounded(np.clip(spread, emulator.width if number else 0.01, WIDEST))
-        settings = drawn_settings(centre, width, simulations_of(centre.size)[1], seed + number)
-        summaries = simulate(settings, parts=len(recorded))
+        settings = region.filled(half, seed + number)
+        known = np.concatenate([known, settings])
+        seen = np.concatenate([seen, simulate(settings, parts=len(recorded))])
+        near = region.distances(known) < NEAR
+        near[-half:] = True
         emulators = [
-            fit_emulator(settings, summaries[:, part], centre=centre, width=width)
+            fit_emulator(known[near], seen[near, part], centre=region.centre, width=region.width)
             for part in range(len(recorded))
         ]
         emulator = emulators[0]
-        solved, *rest = (
+        solved, *others = (
             one.solve(part, reach=REACH) for one, part in zip(emulators, recorded, strict=True)
         )
-        others = tuple(rest)
-    return Posterior(draws, emulator, solved, others)
+        draws = _chain(emulator, region, recorded[0], solved, seed + number + 1)
+        moved = draws.mean(axis=0) - region.centre
+        std = draws.std(axis=0)
+        enough = np.count_nonzero(near) >= 1.5 * half
+        if enough and _stayed(moved, std, region):
+            break
+        if number < MOST_ROUNDS - 1:
+            region = region_about(draws)
+    return Posterior(draws, emulator, region, solved, tuple(others), moved / std)
 
 
-def _inside(draws: Floats, emulator: LocalEmulator) -> bool:
-    """Return whether few draws lie at an end of the box that is no end of the ranges."""
-    place = (draws - emulator.centre) / emulator.width
-    beyond = (np.abs(place) > EDGE) & (draws > 0.01) & (draws < 0.99)
-    return bool((beyond.mean(axis=0) < MOST_AT_EDGE).all())
+def _stayed(moved: Floats, std: Floats, region: Region) -> bool:
+    """Return whether draws are about where the simulations for them were made.
+
+    A parameter along which the region cannot grow is as wide as it will be.
+    """
+    alike = (std < ALIKE * region.std) | (region.width > 0.99 * WIDEST)
+    return bool((np.abs(moved) < STAYS * std).all() and alike.all())
 
 
-def _chain(emulator: LocalEmulator, recorded: Floats, solved: Solved, seed: int) -> Floats:
-    """Return draws by the synthetic likelihood within the box and the ranges."""
+def _chain(
+    emulator: LocalEmulator, region: Region | None, recorded: Floats, solved: Solved, seed: int
+) -> Floats:
+    """Return draws by the synthetic likelihood within a region and the ranges."""
     import emcee
 
-    low = np.maximum(emulator.centre - REACH * emulator.width, 0.0)
-    high = np.minimum(emulator.centre + REACH * emulator.width, 1.0)
+    low = np.maximum(emulator.centre - emulator.width, 0.0)
+    high = np.minimum(emulator.centre + emulator.width, 1.0)
 
     def log_likelihood(settings: Floats) -> Floats:
         inside = ((settings >= low) & (settings <= high)).all(axis=1)
+        if region is not None:
+            inside &= region.distances(settings) <= 1.0
         return np.where(inside, -0.5 * emulator.misfits(settings, recorded), -np.inf)
 
     # emcee takes a generator of the older kind, whose seeds have 32 bits.
@@ -118,8 +134,11 @@ def _chain(emulator: LocalEmulator, recorded: Floats, solved: Solved, seed: int)
         (WALKERS, solved.setting.size)
     )
     margin = 1e-6 * (high - low)
-    sampler = emcee.EnsembleSampler(WALKERS, solved.setting.size, log_likelihood, vectorize=True)
     about = np.clip(about, low + margin * (1 + random.random(about.shape)), high - margin)
+    if region is not None:
+        pull = np.minimum(1.0, INNER / np.maximum(region.distances(about), 1e-12))
+        about = region.centre + pull[:, None] * (about - region.centre)
+    sampler = emcee.EnsembleSampler(WALKERS, solved.setting.size, log_likelihood, vectorize=True)
     begin = emcee.State(about, random_state=random.get_state())
     sampler.run_mcmc(begin, STEPS, skip_initial_state_check=True)
     steps = sampler.get_chain(discard=STEPS // 2, flat=True)

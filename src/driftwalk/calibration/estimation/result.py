@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.calibration.estimation.estimate import Matched
 from driftwalk.calibration.estimation.run import Estimation
 from driftwalk.calibration.models.checks import CHECKS, UNITS
 from driftwalk.calibration.models.contestants import Contestant
@@ -151,6 +152,8 @@ def _said(found: Estimation, entry: Contestant, explained: bool) -> list[str]:
             f"{matched.most_misfit:.0f}); the intervals are {matched.stretch:.1f} times as wide as "
             f"the draws{', and no parameter is determined' if matched.unlike else ''}"
         )
+    if matched is not None and found.known is not None:
+        said += _open(matched, entry)
     if not explained:
         said.append(
             "the model does not explain the recording; its parameters are the best of bad fits"
@@ -163,5 +166,22 @@ def _said(found: Estimation, entry: Contestant, explained: bool) -> list[str]:
     if ended:
         said.append(
             f"at the end of its range: {', '.join(ended)}; extend the range, or doubt the model"
+        )
+    return said
+
+
+def _open(matched: Matched, entry: Contestant) -> list[str]:
+    """Return why parameters are not determined whatever their intervals are."""
+    said = []
+    names = np.array([one.name for one in entry.ranges])
+    if matched.ambiguous.any():
+        said.append(
+            "other values fit the summaries of the motion as well: "
+            f"{', '.join(names[matched.ambiguous])} not determined"
+        )
+    if matched.unsettled.any():
+        said.append(
+            "the draws had not come to rest when the simulations ended: "
+            f"{', '.join(names[matched.unsettled])} not determined"
         )
     return said

@@ -136,7 +136,7 @@ def estimate(
         **({} if matched is None else {"matched": matched.point, "even": matched.even_point}),
     }
     scores = _weighed(even, answers)
-    counts = _counts(scores)
+    counts = _counts(matched, scores)
     if not counts and matched is not None:
         # The search's answer will stay: it is worth the usual search of a comparison.
         longer = {"longer": order(search.longer()[None])[0]}
@@ -146,8 +146,8 @@ def estimate(
     known = None
     if matched is not None and counts:
         known = determination(matched.draws, entry.ranges, confidence=confidence)
-        if matched.unlike:
-            known = known._replace(determined=np.zeros_like(known.determined))
+        open_ones = matched.ambiguous | matched.unsettled | matched.unlike
+        known = known._replace(determined=known.determined & ~open_ones)
     # The odd blocks judge the better answer that has not seen them.
     unseen = [name for name in ("searched", "even")[: 1 + counts] if name in answers]
     best = min(unseen, key=scores.__getitem__)
@@ -162,11 +162,15 @@ def estimate(
     )
 
 
-def _counts(scores: Mapping[str, float]) -> bool:
-    """Return whether the answer of the summaries is as close as that of the search."""
-    if "matched" not in scores:
+def _counts(matched: Matched | None, scores: Mapping[str, float]) -> bool:
+    """Return whether the answer of the summaries counts.
+
+    It does where the recording is like the model's own. The smallest of many thousand scores is
+    always smaller than that of the truth, so that a search proves nothing there.
+    """
+    if matched is None:
         return False
-    return "searched" not in scores or scores["matched"] <= AS_CLOSE * scores["searched"]
+    return matched.usual or scores["matched"] <= AS_CLOSE * scores["searched"]
 
 
 class _Search:

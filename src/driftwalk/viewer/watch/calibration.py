@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import DriftwalkError
-from driftwalk.core.run_stages import CALIBRATION_STAGES
+from driftwalk.core.run_stages import CALIBRATION_STAGES, share_of_windows
 from driftwalk.page import bootstrap_section, encode_array, map_section, profile_sections
 from driftwalk.schema import Parameter
 from driftwalk.schema.calibration import BLOCK
@@ -162,8 +162,10 @@ class RunningCalibration:
         if self._stage == "bootstrap":
             done = sum(unit.stop - unit.start for unit in self._bootstrap)
             return done / max(self._study.calibration.bootstrap, 1)
-        found = self._coarse if self._stage == "coarse" else self._maps.get(self._refined)
-        return 0.0 if found is None else found.done
+        if self._stage == "coarse":
+            return 0.0 if self._coarse is None else self._coarse.done
+        refined = [one.done for name, one in self._maps.items() if name.startswith("refined-")]
+        return share_of_windows(refined)
 
     @property
     def _coarse(self) -> SettingsMap | None:

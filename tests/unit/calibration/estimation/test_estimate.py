@@ -27,10 +27,14 @@ def bent(settings: np.ndarray) -> np.ndarray:
     return np.column_stack([np.exp(a), a * b, b**2, a - b, np.sin(2 * a), b / (1 + a)])
 
 
-def waves(settings: np.ndarray) -> np.ndarray:
-    """Return expected summaries that tell a setting only from those nearby."""
-    turns = 2 * np.pi * 3.0 * settings
-    return 0.5 * np.column_stack([np.sin(turns), np.cos(turns), np.sin(1.37 * turns)])
+def waves(count: float) -> Expected:
+    """Return summaries that tell a setting only from those nearby: so many waves in the ranges."""
+
+    def expected(settings: np.ndarray) -> np.ndarray:
+        turns = 2 * np.pi * count * settings
+        return 0.5 * np.column_stack([np.sin(turns), np.cos(turns), np.sin(1.37 * turns)])
+
+    return expected
 
 
 class Toy:
@@ -126,10 +130,19 @@ def test_another_start_is_no_use_for_another_model():
     assert ((found.draws >= 0.0) & (found.draws <= 1.0)).all()
 
 
+def test_a_regression_with_large_errors_is_a_start_all_the_same():
+    """Three waves: the errors of a regression over the whole ranges are a quarter of them."""
+    starts = Starts((0.9, 0.1))
+    found = matched(Toy(waves(3.0), 4), starts)
+    assert starts.calls == 0
+    assert found.usual
+    np.testing.assert_allclose(found.point, TRUTH, atol=0.01)
+
+
 def test_where_summaries_find_no_neighbourhood_the_search_does():
-    """Waves look the same at several settings: only a start near the truth ends at it."""
-    starts = Starts((0.9, 0.1), (0.91, 0.11), (0.43, 0.57))
-    found = matched(Toy(waves, 4), starts)
+    """Five waves look the same at more settings: only a start near the truth ends at it."""
+    starts = Starts((0.9, 0.1), (0.91, 0.11), (0.42, 0.58))
+    found = matched(Toy(waves(5.0), 4), starts)
     assert starts.calls == 1
     assert found.usual
     np.testing.assert_allclose(found.point, TRUTH, atol=0.01)

@@ -146,7 +146,7 @@ def test_a_box_that_is_too_small_is_widened(width: float):
     np.testing.assert_allclose(found.draws.std(axis=0), STD, rtol=0.25)
     assert (np.abs(found.draws.mean(axis=0) - 0.5) < 0.6 * STD).all()
     assert (found.emulator.width > 1.5 * STD).all()
-    assert boxes == (1 if width > STD.max() else 3)
+    assert boxes == (2 if width > STD.max() else 4)
     # Each part of the recording has a solution of its own.
     np.testing.assert_allclose(found.solved.setting, [0.5, 0.5], atol=0.4 * STD.max())
     (other,) = found.others

@@ -16,8 +16,9 @@ from few_simulations import simulate_little
 from self_propelled import moving
 
 import driftwalk as dw
-from driftwalk.calibration.estimation import run
+from driftwalk.calibration.estimation import estimate as matching, run
 from driftwalk.calibration.estimation.estimate import UNLIKE
+from driftwalk.calibration.evolution import Budget
 from driftwalk.calibration.run import calibrate
 from driftwalk.sweep import ShardStore
 
@@ -162,6 +163,26 @@ def test_a_model_is_found_again_and_says_how_well() -> None:
     assert float(found["interval_stretch"]) == 1.0
     assert bool(found["explained"])
     assert found["warning"].size == 0
+
+
+@pytest.mark.slow
+def test_summaries_like_the_models_own_count_however_close_a_search_comes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """No end of a descent matches, so a search is made; no score is close enough to its own."""
+    monkeypatch.setattr(matching, "MATCHES", 0.0)
+    monkeypatch.setattr(run, "AS_CLOSE", 0.0)
+    monkeypatch.setattr(run, "SEARCH", Budget(design=64, starts=1, short=8, long=8))
+    recording = moving(dw.motion_model("active"), ACTIVE, 100.0, seed=3, noise=NOISE)
+    told: list[str] = []
+    found = calibrated(
+        recording, study=study(bootstrap=20), tell=lambda stage, _done, _most: told.append(stage)
+    )
+    assert "search" in told
+    assert "longer-search" not in told
+    assert float(found["misfit"]) <= float(found["most_misfit"])
+    assert found.attrs["estimate_from"] == "summaries"
+    assert bool(found.sel(parameter="speed")["determined"])
 
 
 @pytest.mark.slow

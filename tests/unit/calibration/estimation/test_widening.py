@@ -13,7 +13,7 @@ def emulator_with(freedom: int) -> LocalEmulator:
     flat = np.zeros((SUMMARIES, 1 + 2 * PARAMETERS))
     used = np.ones(SUMMARIES, dtype=bool)
     middle, width = np.full(PARAMETERS, 0.5), np.full(PARAMETERS, 0.1)
-    return LocalEmulator(middle, width, False, flat, np.eye(SUMMARIES), used, freedom)
+    return LocalEmulator(middle, width, "squares", flat, np.eye(SUMMARIES), used, freedom)
 
 
 def test_it_is_the_scatter_over_the_stated_error() -> None:

@@ -1,0 +1,91 @@
+"""Places of a model's parameters that fit a recording equally well.
+
+A chain that begins at one of them does not find the others. So every search that ends at a match
+has a posterior of its own, and they are weighed by their evidence: the likelihood there times the
+volume that the draws fill.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.calibration.estimation.descend import Descended
+from driftwalk.calibration.estimation.posterior import DRAWS, Posterior
+
+Floats = npt.NDArray[np.float64]
+
+RIVAL: Final = 10.0
+"""Places whose -2 log of the evidence is larger than the least by less than this are not ruled
+out. The covariances come from simulations: a misfit of a hundred has an error of some 5."""
+INTERVAL: Final = (0.05, 0.95)
+
+
+class Modes(NamedTuple):
+    """Posteriors at different places."""
+
+    places: tuple[Posterior, ...]
+    """The likeliest first."""
+    weights: Floats
+    """Shares of the evidence, shape (places,)."""
+
+    @property
+    def best(self) -> Posterior:
+        """The likeliest."""
+        return self.places[0]
+
+    def mixed(self, draws: Sequence[Floats]) -> Floats:
+        """Return 512 draws of all places, each with as many as its share of the evidence."""
+        ends = np.round(DRAWS * np.cumsum(self.weights)).astype(np.int64)
+        counts = np.diff(ends, prepend=0)
+        taken = [
+            one[np.linspace(0, len(one) - 1, count).round().astype(np.int64)]
+            for one, count in zip(draws, counts, strict=True)
+        ]
+        return np.concatenate(taken)
+
+    def apart(self, draws: Sequence[Floats]) -> npt.NDArray[np.bool_]:
+        """Return for which parameters a place has an interval that does not meet the first's."""
+        low, high = np.quantile(np.array(draws), INTERVAL, axis=1)
+        return np.asarray(((low > high[0]) | (high < low[0])).any(axis=0))
+
+
+def find_modes(ends: Sequence[Descended], sample: Callable[[Descended, int], Posterior]) -> Modes:
+    """Return the posteriors at the ends of searches, those alone that the recording allows.
+
+    Parameters
+    ----------
+    ends : sequence of Descended
+        Where searches have ended, the likeliest first.
+    sample : callable
+        Returns the posterior about an end, which has a number.
+    """
+    found: list[Posterior] = []
+    for number, end in enumerate(ends):
+        if any(_reaches(one, end.solved.setting) for one in found):
+            continue
+        posterior = sample(end, number)
+        if not any(_reaches(one, posterior.draws.mean(axis=0)) for one in found):
+            found.append(posterior)
+    unlikely = np.array([_unlikely(one) for one in found])
+    order = [place for place in np.argsort(unlikely, kind="stable") if _rivals(unlikely, place)]
+    weights = np.exp(-0.5 * (unlikely[order] - unlikely.min()))
+    return Modes(tuple(found[place] for place in order), weights / weights.sum())
+
+
+def _rivals(unlikely: Floats, place: int) -> bool:
+    return bool(unlikely[place] - unlikely.min() < RIVAL)
+
+
+def _reaches(posterior: Posterior, setting: Floats) -> bool:
+    """Return whether a setting lies where a posterior has been simulated."""
+    return bool(posterior.region.distances(setting[None])[0] < 1.0)
+
+
+def _unlikely(posterior: Posterior) -> float:
+    """Return -2 log of the evidence, but for a constant: of a normal law as wide as the draws."""
+    volume = np.linalg.slogdet(np.atleast_2d(np.cov(posterior.draws.T)))[1]
+    return posterior.solved.misfit + posterior.emulator.log_variance - float(volume)
