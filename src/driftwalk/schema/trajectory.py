@@ -84,6 +84,8 @@ def build_trajectory(
     >>> build_trajectory([0.0, 0.1], [0.0, 0.01], [0.0, 0.0]).sizes["time"]
     2
     """
+    import pandas as pd
+
     time_s = np.asarray(time, dtype=np.float64)
     x_m, y_m = (_columns(values) for values in (x, y))
     theta_rad = np.full_like(x_m, np.nan) if theta is None else wrap_angle(_columns(theta))
@@ -99,7 +101,11 @@ def build_trajectory(
             name: (("time", "body"), values)
             for name, values in zip(POSE, (x_m, y_m, theta_rad), strict=True)
         },
-        {"time": ("time", time_s), "body": ("body", np.asarray(names, dtype=object))},
+        {
+            # An index copies an array by itself: a quarter of the text of a long recording.
+            "time": ("time", pd.Index(time_s, copy=False)),
+            "body": ("body", np.asarray(names, dtype=object)),
+        },
         attrs or {},
     )
     return check_trajectory(dataset)
