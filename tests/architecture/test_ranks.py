@@ -44,6 +44,8 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     "runs": GROUND
     | {"flow", "model", "sweep", "conditions", "motion", "calibration", "likelihood", "assembly"}
     | {"plot", "figures"},
+    "export": GROUND
+    | {"record", "flow", "model", "simulation", "conditions", "runs", "plot", "figures"},
     "notebook": GROUND
     | {"record", "flow", "model", "comparison", "simulation", "motion", "conditions"}
     | {"assembly", "calibration", "likelihood", "page", "runs"},
@@ -64,7 +66,7 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
         "figures",
         "page",
     }
-    | {"runs", "viewer"},
+    | {"runs", "viewer", "export"},
 }
 HEAVY = frozenset({"xarray", "scipy", "pandas", "cv2", "matplotlib", "dask", "optuna", "h5netcdf"})
 # The extra of the server: in one module alone, which is imported when a server is started.

@@ -55,6 +55,7 @@ COMMANDS: Final[dict[str, Command]] = {
     "classify": Command(
         "classify", "classify", "Say what the blocks of a recording assembled into."
     ),
+    "export": Command("export", "export", "Take a calibrated model to another simulator."),
     "report": Command("report", "report", "Write a report of a run: one HTML file."),
     "view": Command("view", "view", "Explore a run in the browser, or watch a tracker."),
     "play": Command("play", "play", "Turn the knobs of the model while the tank moves."),

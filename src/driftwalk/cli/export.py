@@ -1,0 +1,86 @@
+"""`driftwalk export`: a calibrated model as something that another simulator runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from driftwalk.cli.options.shared import Json
+from driftwalk.cli.terminal.answer import print_row
+from driftwalk.cli.terminal.output import print_json
+from driftwalk.core.errors import InputError
+from driftwalk.export import TARGETS, Source, Verification, export_run, target_named
+
+
+def export(
+    run: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RUN",
+            help="Run directory of calibrate or fit, or a study file with --flow.",
+        ),
+    ],
+    to: Annotated[
+        str, typer.Option("--to", metavar="|".join(TARGETS), help="What is made of the run.")
+    ],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="DIR", help="New or empty folder to write.")
+    ],
+    flow: Annotated[
+        Path | None,
+        typer.Option(
+            "--flow",
+            metavar="FILE",
+            help="Flow field of a study file, or another one for a run.",
+            show_default=False,
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            "--seed",
+            min=0,
+            help="Seed of the stochastic force (default: that of the study).",
+            show_default=False,
+        ),
+    ] = None,
+    verify: Annotated[
+        bool, typer.Option("--verify", help="Run what was written, and compare it with driftwalk.")
+    ] = False,
+    json: Json = False,
+) -> int:
+    """Make something of a run that another program takes.
+
+    The folder holds everything: the files of the other program, the study, the flow, the seed, a
+    README that says what is the same and what is not, and the licence. It is new or empty: nothing
+    is overwritten.
+    """
+    target = target_named(to)
+    if verify:
+        if target.verify is None:
+            raise InputError(f"--verify: an export to {to} is no simulation to compare with")
+        if target.require is not None:
+            target.require()
+    files = export_run(Source(run, flow, seed), target, out)
+    outcome = target.verify(out) if verify and target.verify is not None else None
+    if json:
+        print_json(
+            {
+                "folder": str(out),
+                "to": to,
+                "files": [path.relative_to(out).as_posix() for path in files],
+                "verification": None if outcome is None else _facts(outcome),
+            }
+        )
+    else:
+        print_row("folder", f"{out}: {target.gives}")
+        print_row("begin with", out / "README.md")
+        for line in () if outcome is None else outcome.lines:
+            print_row("verified" if outcome is not None and outcome.passed else "NOT THE SAME", line)
+    return 0 if outcome is None or outcome.passed else 1
+
+
+def _facts(outcome: Verification) -> dict[str, float | int | bool]:
+    return {"passed": outcome.passed, **outcome.numbers}

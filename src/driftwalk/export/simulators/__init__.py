@@ -1,0 +1,1 @@
+"""Other simulators, one file each, and what their exports share."""

@@ -1,0 +1,75 @@
+"""What a target of an export is: a name, a line about it, a function that writes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Source:
+    """What is exported.
+
+    Attributes
+    ----------
+    path : Path
+        A run directory or a file, as the user named it. The target reads what it needs of it.
+    flow : Path or None
+        The flow field, where `path` has none: that of a study file.
+    seed : int or None
+        Seed of the stochastic force over the run's own.
+    """
+
+    path: Path
+    flow: Path | None = None
+    seed: int | None = None
+
+
+@dataclass(frozen=True)
+class Verification:
+    """Outcome of a check of what was written.
+
+    Attributes
+    ----------
+    passed : bool
+        Whether what was written does the same as driftwalk.
+    lines : tuple of str
+        What was compared and how far apart it is, a sentence each.
+    numbers : dict
+        The same for programs, units in the keys.
+    """
+
+    passed: bool
+    lines: tuple[str, ...]
+    numbers: dict[str, float | int]
+
+
+@dataclass(frozen=True)
+class Target:
+    """Something that a run can be exported to.
+
+    Attributes
+    ----------
+    name : str
+        As it is typed after ``--to``.
+    takes : str
+        What it is made of, in a few words, for help and refusals.
+    gives : str
+        What is in the folder, in a few words.
+    write : callable
+        ``write(source, folder)`` puts its files into an empty folder that exists, and returns
+        their paths. It raises `InputError` for a source that it cannot take.
+    verify : callable or None
+        ``verify(folder)`` repeats the proof of a folder that `write` has made; None where there is
+        nothing to compare with.
+    require : callable or None
+        ``require()`` raises `InputError` where `verify` cannot run on this machine.
+    """
+
+    name: str
+    takes: str
+    gives: str
+    write: Callable[[Source, Path], list[Path]]
+    verify: Callable[[Path], Verification] | None = None
+    require: Callable[[], None] | None = None

@@ -1,0 +1,76 @@
+"""An export comes into being whole: made in a folder beside its place, then renamed into it."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+from pathlib import Path
+
+from driftwalk.core.atomic import PARTIAL, storage_error
+from driftwalk.core.errors import InputError
+from driftwalk.export.target import Source, Target
+
+
+def export_run(source: Source, target: Target, folder: Path) -> list[Path]:
+    """Write an export into a folder, and return its files.
+
+    Parameters
+    ----------
+    source : Source
+        What is exported.
+    target : Target
+        To what.
+    folder : Path
+        A folder that is empty or not there yet.
+
+    Raises
+    ------
+    InputError
+        When the folder holds something, or the source is not what the target takes; nothing is
+        written then.
+    RunDirectoryError
+        When the folder cannot be written.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> from driftwalk.export import target_named
+    >>> files = export_run(Source(Path("run")), target_named("mujoco"), Path("tank"))  # doctest: +SKIP
+    """
+    require_empty(folder)
+    made = folder.parent / f".{folder.name}{PARTIAL}{os.getpid()}-{secrets.token_hex(4)}"
+    try:
+        made.mkdir()
+        files = [path.relative_to(made) for path in target.write(source, made)]
+        # A folder that is renamed onto another takes its place where that is empty, on POSIX only.
+        if folder.exists():
+            folder.rmdir()
+        made.rename(folder)
+    except BaseException as error:
+        shutil.rmtree(made, ignore_errors=True)
+        refusal = storage_error(error, made)
+        if refusal is None:
+            raise
+        raise refusal from error
+    return [folder / path for path in files]
+
+
+def require_empty(folder: Path) -> None:
+    """Refuse a folder with anything in it, and one whose own folder is not there.
+
+    Raises
+    ------
+    InputError
+        Says which.
+    """
+    if folder.is_dir():
+        inside = next(folder.iterdir(), None)
+        if inside is not None:
+            raise InputError(
+                f"{folder} is not empty ({inside.name}, ...): name a new or an empty folder"
+            )
+    elif folder.exists() or folder.is_symlink():
+        raise InputError(f"{folder} is a file: name a new or an empty folder")
+    elif not folder.parent.is_dir():
+        raise InputError(f"{folder}: the folder {folder.parent} does not exist")
