@@ -1,4 +1,4 @@
-"""`driftwalk export`: a calibrated model as something that another simulator runs."""
+"""`driftwalk export`: a model for another simulator, or motion for another program."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import typer
 
 from driftwalk.cli.options.shared import Json
 from driftwalk.cli.terminal.answer import print_row
-from driftwalk.cli.terminal.output import print_json
+from driftwalk.cli.terminal.output import print_json, print_note
 from driftwalk.core.errors import InputError
 from driftwalk.export import TARGETS, Source, Verification, export_run, target_named
 
@@ -19,7 +19,8 @@ def export(
         Path,
         typer.Argument(
             metavar="RUN",
-            help="Run directory of calibrate or fit, or a study file with --flow.",
+            help="Run directory, or a study file with --flow; for tables, bags and films also a "
+            "recording or a simulation.",
         ),
     ],
     to: Annotated[
@@ -46,6 +47,24 @@ def export(
             show_default=False,
         ),
     ] = None,
+    world: Annotated[
+        int | None,
+        typer.Option(
+            "--world",
+            min=0,
+            help="The one simulated world to take, counted from 0 (default: all; of a film the "
+            "first).",
+            show_default=False,
+        ),
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            "--speed",
+            help="How much faster than real time a film is (default: 1).",
+            show_default=False,
+        ),
+    ] = None,
     verify: Annotated[
         bool, typer.Option("--verify", help="Run what was written, and compare it with driftwalk.")
     ] = False,
@@ -63,7 +82,9 @@ def export(
             raise InputError(f"--verify: an export to {to} is no simulation to compare with")
         if target.require is not None:
             target.require()
-    files = export_run(Source(run, flow, seed), target, out)
+    notes: list[str] = []
+    source = Source(run, flow, seed, world, speed, notes.append)
+    files = export_run(source, target, out)
     outcome = target.verify(out) if verify and target.verify is not None else None
     if json:
         print_json(
@@ -71,14 +92,19 @@ def export(
                 "folder": str(out),
                 "to": to,
                 "files": [path.relative_to(out).as_posix() for path in files],
+                "notes": notes,
                 "verification": None if outcome is None else _facts(outcome),
             }
         )
     else:
+        for note in notes:
+            print_note(f"note: {note}")
         print_row("folder", f"{out}: {target.gives}")
         print_row("begin with", out / "README.md")
         for line in () if outcome is None else outcome.lines:
-            print_row("verified" if outcome is not None and outcome.passed else "NOT THE SAME", line)
+            print_row(
+                "verified" if outcome is not None and outcome.passed else "NOT THE SAME", line
+            )
     return 0 if outcome is None or outcome.passed else 1
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.atomic import require_free, write_atomic
+from driftwalk.core.json_text import json_value
 from driftwalk.export.data.clock import frame_rate
 from driftwalk.export.data.motion import Motion
 from driftwalk.schema import body_names
@@ -88,7 +89,7 @@ def movement_dataset(recording: xr.Dataset) -> xr.Dataset:
         "source_software": "driftwalk",
         "ds_type": "poses",
         "time_unit": "seconds",
-        "driftwalk": json.dumps(known, default=_number),
+        "driftwalk": json.dumps(json_value(known)),
     }
     rate = frame_rate(recording)
     if rate is not None:
@@ -105,8 +106,3 @@ def movement_dataset(recording: xr.Dataset) -> xr.Dataset:
         },
         attrs,
     )
-
-
-def _number(value: Any) -> Any:
-    """Return a number of NumPy as one that JSON has."""
-    return value.item() if isinstance(value, np.generic) else str(value)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.atomic import PARTIAL, require_free
+from driftwalk.core.atomic import require_free
 from driftwalk.core.errors import InputError
 from driftwalk.export.data.motion import Motion
 from driftwalk.schema import body_names
@@ -43,7 +42,7 @@ def write_ros(motion: Motion, folder: Path) -> list[Path]:
     Returns
     -------
     list of Path
-        The folder of the bag, ``NAME.bag``.
+        The folder of the bag, ``NAME_bag``.
 
     Raises
     ------
@@ -53,17 +52,12 @@ def write_ros(motion: Motion, folder: Path) -> list[Path]:
     Examples
     --------
     >>> write_ros(Motion("recording", trajectory), Path("out"))  # doctest: +SKIP
-    [PosixPath('out/recording.bag')]
+    [PosixPath('out/recording_bag')]
     """
-    target = folder / f"{motion.name}.bag"
+    # Not NAME.bag, which the programs of ROS take for a file of ROS 1.
+    target = folder / f"{motion.name}_bag"
     require_free(target, existing="error")
-    partial = folder / f".{motion.name}{PARTIAL}bag"
-    shutil.rmtree(partial, ignore_errors=True)
-    try:
-        _write_bag(motion.recording, partial)
-        partial.rename(target)
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
+    _write_bag(motion.recording, target)
     return [target]
 
 

@@ -27,9 +27,12 @@ SINGLE: Final = "centroid"
 SLEAP: Final = Confidence(0.2, "SLEAP's threshold of peaks")
 USUAL: Final = Confidence(0.6, "movement's threshold")
 
-KEPT: Final = (
-    *("arena", "arena_found", "origin_shift_m", "block_side_m", "simulated", "tracked_from"),
-    *("complete", "interrupted", "metres_per_pixel", "position_quantum_m", "sample_rate_Hz"),
+TEXTS: Final = (
+    *("arena", "arena_found", "origin_shift_m", "simulated", "tracked_from", "complete"),
+    "interrupted",
+)
+NUMBERS: Final = (
+    *("block_side_m", "metres_per_pixel", "position_quantum_m", "sample_rate_Hz"),
     "time_origin_unix_s",
 )
 """What is taken over of a recording that driftwalk itself wrote in this format."""
@@ -127,7 +130,9 @@ def _known(dataset: xr.Dataset, path: Path) -> dict[str, Any]:
     known = parse_json(text)
     if not isinstance(known, dict):
         raise FormatError("the attribute 'driftwalk' is no JSON object", path=path)
-    return {key: value for key, value in known.items() if key in KEPT}
+    texts = {key: known[key] for key in TEXTS if isinstance(known.get(key), str)}
+    numbers = {key: known[key] for key in NUMBERS if isinstance(known.get(key), (int, float))}
+    return {**texts, **numbers}
 
 
 def _array(dataset: xr.Dataset, name: str, path: Path) -> xr.DataArray:
