@@ -7,9 +7,10 @@ from typing import Final
 from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import InputError
 from driftwalk.export.data.targets import DATA_TARGETS
+from driftwalk.export.figures.targets import FIGURE_TARGETS
 from driftwalk.export.target import Target
 
-_ALL: tuple[Target, ...] = (*DATA_TARGETS,)
+_ALL: tuple[Target, ...] = (*DATA_TARGETS, *FIGURE_TARGETS)
 TARGETS: Final[dict[str, Target]] = {target.name: target for target in _ALL}
 """Every target by its name, in the order of the help."""
 
