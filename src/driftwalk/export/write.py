@@ -36,7 +36,8 @@ def export_run(source: Source, target: Target, folder: Path) -> list[Path]:
     --------
     >>> import driftwalk as dw
     >>> from driftwalk.export import target_named
-    >>> files = export_run(Source(Path("run")), target_named("mujoco"), Path("tank"))  # doctest: +SKIP
+    >>> source, target = Source(Path("run")), target_named("mujoco")
+    >>> files = export_run(source, target, Path("tank"))  # doctest: +SKIP
     """
     require_empty(folder)
     require_used(source, target)

@@ -88,25 +88,19 @@ def _in_data(artist: Any, ax: Axes) -> bool:
 
 
 def _rows_of(artist: Any) -> Rows:
+    """Give the rows of an artist: of a line, a field or points, else of an outline."""
     from matplotlib.collections import PathCollection, QuadMesh
     from matplotlib.contour import ContourSet
     from matplotlib.image import AxesImage
     from matplotlib.lines import Line2D
-    from matplotlib.patches import Circle, Rectangle
     from matplotlib.quiver import Quiver
 
     if isinstance(artist, Line2D):
         yield 0, _table(*np.asarray(artist.get_xydata(), dtype=np.float64).T)
     elif isinstance(artist, Quiver):
-        colors = artist.get_array()
-        yield 0, _table(artist.X, artist.Y, artist.U, artist.V, colors)
+        yield 0, _table(artist.X, artist.Y, artist.U, artist.V, artist.get_array())
     elif isinstance(artist, QuadMesh):
-        corners = np.asarray(artist.get_coordinates(), dtype=np.float64)
-        middle = (corners[:-1, :-1] + corners[1:, :-1] + corners[:-1, 1:] + corners[1:, 1:]) / 4.0
-        values = _filled(artist.get_array())
-        # Colours that go smoothly from corner to corner have a value at each corner.
-        places = middle if values.size == middle[..., 0].size else corners
-        yield 0, _table(places[..., 0], places[..., 1], value=values)
+        yield 0, _of_mesh(artist)
     elif isinstance(artist, AxesImage):
         yield 0, _of_image(artist)
     elif isinstance(artist, ContourSet):
@@ -114,7 +108,14 @@ def _rows_of(artist: Any) -> Rows:
             yield part, _table(*_corners(path).T, value=level)
     elif isinstance(artist, PathCollection):
         yield 0, _table(*np.asarray(artist.get_offsets()).T, value=artist.get_array())
-    elif isinstance(artist, Rectangle):
+    else:
+        yield from _outlines(artist)
+
+
+def _outlines(artist: Any) -> Rows:
+    from matplotlib.patches import Circle, Rectangle
+
+    if isinstance(artist, Rectangle):
         yield 0, _table(*artist.get_xy(), artist.get_width(), artist.get_height())
     elif isinstance(artist, Circle):
         yield 0, _table(*artist.center, 2.0 * artist.radius, 2.0 * artist.radius)
@@ -124,6 +125,15 @@ def _rows_of(artist: Any) -> Rows:
     elif hasattr(artist, "get_path"):
         own = artist.get_path().transformed(artist.get_patch_transform())
         yield 0, _table(*_corners(own).T)
+
+
+def _of_mesh(mesh: Any) -> npt.NDArray[np.float64]:
+    corners = np.asarray(mesh.get_coordinates(), dtype=np.float64)
+    middle = (corners[:-1, :-1] + corners[1:, :-1] + corners[:-1, 1:] + corners[1:, 1:]) / 4.0
+    values = _filled(mesh.get_array())
+    # Colours that go smoothly from corner to corner have a value at each corner.
+    places = middle if values.size == middle[..., 0].size else corners
+    return _table(places[..., 0], places[..., 1], value=values)
 
 
 def _of_image(image: Any) -> npt.NDArray[np.float64]:

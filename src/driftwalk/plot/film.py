@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 FILM_MM: Final = 101.6
-"""Width and height of a film [mm]: with the dots below an even number of pixels, as encoders ask."""
+"""Width and height of a film [mm]: an even number of dots, as encoders ask."""
 DOTS_PER_INCH: Final = {".gif": 100, ".mp4": 200}
 TRAIL_S: Final = 5.0
 """How long the trail behind a body is, in seconds of the film."""
@@ -89,9 +89,9 @@ def write_animation(
     Raises
     ------
     InputError
-        When the dataset is of another kind, has no such run or no motion; when the ending is another
-        one, the folder does not exist, the film would be too long, or an MP4 is asked for where
-        neither the program ffmpeg nor OpenCV is installed.
+        When the dataset is of another kind, has no such run or no motion; when the ending is
+        another one, the folder does not exist, the film would be too long, or an MP4 is asked for
+        where neither the program ffmpeg nor OpenCV is installed.
     RunDirectoryError
         When the file cannot be written.
 
@@ -165,8 +165,9 @@ def _moments(
     if count > MOST_FRAMES:
         least = lasts * per_second / MOST_FRAMES
         raise InputError(
-            f"the film would take {count / per_second:.0f} s, at most "
-            f"{MOST_FRAMES / per_second:.0f} s are written: give `speed`, {np.ceil(least):g} or more"
+            f"the film would take {count / per_second:.0f} s, and at most "
+            f"{MOST_FRAMES / per_second:.0f} s are written: give a `speed` of at least "
+            f"{np.ceil(least):g}"
         )
     if speed is None:
         return np.linspace(time[0], time[-1], int(count)), rate

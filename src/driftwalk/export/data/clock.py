@@ -39,7 +39,7 @@ def frame_rate(recording: xr.Dataset) -> float | None:
 
 
 def frame_numbers(recording: xr.Dataset) -> npt.NDArray[np.int64]:
-    """Return the number of the frame of each time, from 0; of an uneven clock the number of the row.
+    """Return the number of the frame of each time, from 0; of an uneven clock that of the row.
 
     Parameters
     ----------

@@ -11,10 +11,11 @@ from driftwalk.core.atomic import write_atomic
 
 README: Final = "README.md"
 MEANING: Final = {
-    "csv": "driftwalk's plain table: t_s, x_m, y_m, theta_rad, body. Metres, seconds, radians; y is "
-    "up, angles are counter-clockwise. Every number has the digits that give the same double again.",
-    "movement": "NetCDF of poses as the movement package has them: `movement.io.load_dataset(FILE)` "
-    "or `xarray.open_dataset(FILE)`. Metres with y up, seconds; `orientation` is in radians.",
+    "csv": "driftwalk's plain table: t_s, x_m, y_m, theta_rad, body. Metres, seconds, radians; y "
+    "is up, angles are counter-clockwise. Every number has the digits that give the same double "
+    "again.",
+    "movement": "NetCDF of poses as the movement package has them: read it with movement, or with "
+    "`xarray.open_dataset(FILE)`. Metres with y up, seconds; `orientation` is in radians.",
     "trackpy": "Linked features: `trackpy.emsd(pandas.read_csv(FILE), mpp=1, fps=RATE)`. x and y "
     "are in metres with y up, so a unit of length is one metre and `mpp` is 1.",
     "ros": "ROS 2 bag (MCAP), `geometry_msgs/msg/PoseStamped`, one topic per body: `ros2 bag play "

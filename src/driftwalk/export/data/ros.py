@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 POSE_STAMPED: Final = "geometry_msgs/msg/PoseStamped"
 FRAME: Final = "tank"
-"""Frame of the poses: the centre of the tank where it is known, x right, y up, z out of the water."""
+"""Frame of the poses: the recording's own, which begins in the centre of a tank that is known; z is
+out of the water."""
 NS_PER_S: Final = 1_000_000_000
 BAG_VERSION: Final = 9
 

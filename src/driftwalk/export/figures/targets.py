@@ -35,9 +35,7 @@ def _write(format: str, source: Source, folder: Path) -> list[Path]:
 
     files = draw_run(source.path, folder, ["csv", format])
     page = folder / "README.md"
-    text = README.format(
-        source=text_of_name(source.path), version=__version__, fonts=FONTS[format]
-    )
+    text = README.format(source=text_of_name(source.path), version=__version__, fonts=FONTS[format])
     write_atomic(page, text.encode())
     return [*files, page]
 
