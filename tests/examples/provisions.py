@@ -481,6 +481,16 @@ PAGES: dict[str, Page] = {
     "docs/how-to/use-a-cluster.md": Page(
         not_run={"pip install *": INSTALLS, "driftwalk *": "needs workers; has a test"},
     ),
+    "docs/how-to/take-the-model-to-your-simulator.md": Page(
+        provide=_calibrated,
+        instead={
+            "import mujoco, floating_block": "import os, sys\n\nos.chdir('tank')\n"
+            "sys.path.insert(0, '.')\nimport mujoco, floating_block",
+        },
+        holds=("0.99 < data.time < 1.01", "mujoco.set_mjcb_passive(None) is None"),
+        needs=("mujoco",),
+        slow=True,
+    ),
     "docs/how-to/use-a-simulator.md": Page(
         provide=_robot_in_mujoco,
         instead={

@@ -24,7 +24,12 @@ def export(
         ),
     ],
     to: Annotated[
-        str, typer.Option("--to", metavar="|".join(TARGETS), help="What is made of the run.")
+        str,
+        typer.Option(
+            "--to",
+            metavar="|".join(TARGETS),
+            help="; ".join(f"{target.name}: {target.gives}" for target in TARGETS.values()) + ".",
+        ),
     ],
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="DIR", help="New or empty folder to write.")
@@ -70,11 +75,13 @@ def export(
     ] = False,
     json: Json = False,
 ) -> int:
-    """Make something of a run that another program takes.
+    """Take a model to another simulator, motion to another program, or figures to print.
 
-    The folder holds everything: the files of the other program, the study, the flow, the seed, a
-    README that says what is the same and what is not, and the licence. It is new or empty: nothing
-    is overwritten.
+    The folder holds all that is needed: for a simulator its files, the study, the flow field and
+    the seed. With the same seed it is the same run as driftwalk's; --verify proves that by paths
+    clear of the wall. csv, movement, trackpy, ros, mp4 and gif hold recorded or simulated motion;
+    pdf, svg and png the figures of a finished run with the numbers that they draw. A README says
+    how to use them and what they do not hold. Nothing is overwritten.
     """
     target = target_named(to)
     if verify:

@@ -66,8 +66,6 @@ class Target:
     ----------
     name : str
         As it is typed after ``--to``.
-    takes : str
-        What it is made of, in a few words, for help and refusals.
     gives : str
         What is in the folder, in a few words.
     write : callable
@@ -83,7 +81,6 @@ class Target:
     """
 
     name: str
-    takes: str
     gives: str
     write: Callable[[Source, Path], list[Path]]
     verify: Callable[[Path], Verification] | None = None

@@ -17,7 +17,6 @@ from driftwalk.export.data.ros import write_ros
 from driftwalk.export.data.tables import write_csv, write_trackpy
 from driftwalk.export.target import Source, Target
 
-TAKES: Final = "recordings, simulations, and blocks that assemble"
 WRITERS: Final[dict[str, tuple[Callable[[Motion, Path], list[Path]], str]]] = {
     "csv": (write_csv, "driftwalk's plain table for each recording"),
     "movement": (write_movement, "NetCDF as movement has it"),
@@ -58,11 +57,11 @@ def _write_films(ending: str, source: Source, folder: Path) -> list[Path]:
 
 DATA_TARGETS: Final = (
     *(
-        Target(name, TAKES, gives, partial(_write_motions, name), options=("world",))
+        Target(name, gives, partial(_write_motions, name), options=("world",))
         for name, (_, gives) in WRITERS.items()
     ),
     *(
-        Target(name, TAKES, gives, partial(_write_films, name), options=("world", "speed"))
+        Target(name, gives, partial(_write_films, name), options=("world", "speed"))
         for name, gives in FILMS.items()
     ),
 )

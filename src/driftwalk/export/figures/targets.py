@@ -43,7 +43,6 @@ def _write(format: str, source: Source, folder: Path) -> list[Path]:
 FIGURE_TARGETS: Final = tuple(
     Target(
         name,
-        "a finished run with figures",
         f"the figures as {name.upper()}, and the numbers that they draw",
         partial(_write, name),
         options=(),

@@ -1,0 +1,185 @@
+"""The force as C, for simulators whose plugins are compiled: its files, and its proof."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from driftwalk.core.errors import InputError
+from driftwalk.export.simulators.block import Block, Floats
+from driftwalk.export.simulators.parts import Folder, stored_text, wall_pieces, write_numbers
+from driftwalk.export.simulators.reference import PathSet, forces_of, reference_of
+from driftwalk.export.target import Verification
+
+NEEDS_COMPILER: Final = "a C compiler: install gcc or clang, or name one in the variable CC"
+THICKNESS: Final = 0.1
+"""Of the boxes that make the wall, as a share of the tank's width."""
+
+
+def write_force(folder: Folder, block: Block, sources: str) -> None:
+    """Write the force as C into a subfolder, and the numbers of the model beside it."""
+    write_numbers(folder, block)
+    for name in ("floating_block.h", "floating_block.c"):
+        folder.copy(f"force/{name}", f"{sources}/{name}")
+    folder.text(f"{sources}/model_data.c", model_data(block))
+
+
+def write_proof(folder: Folder, block: Block) -> None:
+    """Write what proves the force into ``verify``: driftwalk's numbers, and what compares them."""
+    folder.copy("force/verify.c", "verify/verify.c")
+    folder.text("verify/reference.txt", _reference_text(block))
+
+
+def model_data(block: Block) -> str:
+    """Return the model as a C file: its numbers, and the nodes of its flow."""
+    nodes, said = block.nodes(), block.numbers()
+    x, y = nodes["x_m"], nodes["y_m"]
+    tables = {
+        name: nodes[key]
+        for name, key in (
+            ("u", "u_m_s"),
+            ("v", "v_m_s"),
+            ("acceleration_x", "ax_m_s2"),
+            ("acceleration_y", "ay_m_s2"),
+        )
+        if key in nodes
+    }
+    numbers: dict[str, Any] = {
+        "side": said["side_m"],
+        "mass": said["mass_kg"],
+        "inertia": said["inertia_kg_m2"],
+        "added_mass_share": said["added_mass_share"],
+        "depth": said["wetted_depth_m"],
+        "strips": said["strips_per_face"],
+        "water_density": said["water_density_kg_m3"],
+        "drag_coefficient": said["drag_coefficient"],
+        "linear_drag": said["linear_drag_kg_s"],
+        "drag_power": said["drag_power"],
+        "drag_speed": said["drag_speed_m_s"],
+        "displaced_mass": said["displaced_mass_kg"],
+        "force_std": said["force_std_N"],
+        "force_interval": said["force_interval_s"],
+        "force_memory": said["force_memory_s"],
+        "time_step": said["time_step_s"],
+        "seed": f"UINT64_C({said['seed']})",
+        "columns": x.size,
+        "rows": y.size,
+        "origin_x": float(x[0]),
+        "origin_y": float(y[0]),
+        "spacing_x": float((x[-1] - x[0]) / (x.size - 1)),
+        "spacing_y": float((y[-1] - y[0]) / (y.size - 1)),
+        **{name: name if name in tables else "0" for name in ("u", "v")},
+        **{name: name if name in tables else "0" for name in ("acceleration_x", "acceleration_y")},
+    }
+    lines = ["/* Written by driftwalk: the model in SI units; its keys are in floating_block.h. */"]
+    lines += ['#include "floating_block.h"', ""]
+    for name, values in tables.items():
+        lines += [f"static const double {name}[] = {{", *_rows_of(values), "};", ""]
+    lines += ["const fb_model floating_block_model = {"]
+    lines += [f"  .{name} = {value!s}," for name, value in numbers.items()]
+    return "\n".join([*lines, "};", ""])
+
+
+def _rows_of(values: Floats) -> list[str]:
+    return [f"  {', '.join(repr(float(value)) for value in row)}," for row in values]
+
+
+def _reference_text(block: Block) -> str:
+    """Return forces and paths of driftwalk as numbers for ``verify.c``."""
+    forces, reference = forces_of(block), reference_of(block)
+    lines = [str(len(forces)), *(_line(row) for row in forces)]
+    sets = (reference.still, reference.noisy)
+    lines.append(str(sum(paths.replicate.size for paths in sets)))
+    for noisy, paths in enumerate(sets):
+        for row in range(paths.replicate.size):
+            lines += _path_lines(paths, row, noisy, reference.steps_per_sample)
+    return "\n".join(lines) + "\n"
+
+
+def _path_lines(paths: PathSet, row: int, noisy: int, steps: int) -> list[str]:
+    poses = np.stack([paths.x[row], paths.y[row], paths.theta[row]], axis=1)
+    return [f"{noisy} {paths.replicate[row]} {len(poses)} {steps}", *(_line(one) for one in poses)]
+
+
+def _line(numbers: Floats) -> str:
+    return " ".join(repr(float(number)) for number in numbers)
+
+
+def wall_texts(block: Block, template: str, **more: str) -> str:
+    """Return the boxes of the wall, each by a stored text."""
+    from string import Template
+
+    thick = THICKNESS * min(block.study.tank.extent_m)
+    text = Template(stored_text(template))
+    return "".join(
+        text.substitute(
+            x=repr(piece.middle[0] + piece.normal[0] * thick / 2),
+            y=repr(piece.middle[1] + piece.normal[1] * thick / 2),
+            angle=repr(piece.angle),
+            thick=repr(thick),
+            length=repr(piece.length + 2 * thick),
+            height=repr(2 * block.study.block.side_m),
+            number=str(number),
+            **more,
+        )
+        for number, piece in enumerate(wall_pieces(block.study.tank))
+    )
+
+
+def compiler() -> str | None:
+    """Return a C compiler of this machine, the variable CC first; None where there is none."""
+    names = (os.environ.get("CC", ""), "cc", "gcc", "clang")
+    return next((found for name in names if name and (found := shutil.which(name))), None)
+
+
+def require_compiler() -> None:
+    """Refuse where there is no C compiler.
+
+    Raises
+    ------
+    InputError
+        Says what to do.
+    """
+    if compiler() is None:
+        raise InputError(f"--verify needs {NEEDS_COMPILER}")
+
+
+def verify_force(folder: Path, sources: str) -> Verification:
+    """Compile the force of an export with ``verify.c``, and run it against driftwalk's numbers."""
+    found = compiler()
+    if found is None:
+        raise InputError(f"the proof needs {NEEDS_COMPILER}")
+    with tempfile.TemporaryDirectory() as name:
+        program = Path(name) / "verify"
+        places = [folder / sources / file for file in ("floating_block.c", "model_data.c")]
+        command = [found, "-std=c99", "-O2", f"-I{folder / sources}"]
+        command += [str(path) for path in (folder / "verify" / "verify.c", *places)]
+        built = _run([*command, "-o", str(program), "-lm"])
+        if built.returncode != 0:
+            raise InputError(f"{found} does not compile {places[0]}: {_last(built.stderr)}")
+        done = _run([str(program), str(folder / "verify" / "reference.txt")])
+    if done.returncode not in (0, 1):
+        raise InputError(f"the proof of {folder} failed: {_last(done.stderr)}")
+    numbers = json.loads(done.stdout)
+    lines = (
+        f"{numbers['forces']} forces of the compiled code: relative error at most "
+        f"{numbers['largest_relative_error']:.2g}",
+        f"{numbers['paths']} paths by the compiled code, with and without the stochastic force: "
+        f"at most {1e6 * numbers['largest_distance_m']:.2g} µm from driftwalk's",
+    )
+    return Verification(done.returncode == 0 and numbers["paths"] > 0, lines, numbers)
+
+
+def _run(command: list[str]) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def _last(text: str) -> str:
+    return (text.strip().splitlines() or ["no output"])[-1]

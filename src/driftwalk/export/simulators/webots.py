@@ -1,0 +1,57 @@
+"""Webots: world, PROTO, and a physics plugin in C that adds the forces to ODE's body."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from driftwalk.export.simulators.block import read_block
+from driftwalk.export.simulators.compiled import verify_force, wall_texts, write_force, write_proof
+from driftwalk.export.simulators.parts import Folder, start_pose, words_of, write_common
+from driftwalk.export.target import Source, Verification
+
+PLUGIN: Final = "plugins/physics/driftwalk_water"
+
+
+def write_webots(source: Source, folder: Path) -> list[Path]:
+    """Write the block of a run for Webots; see `Target.write`."""
+    block = read_block(source)
+    made, study = Folder(folder), block.study
+    share = 1.0 + study.forces.added_mass_share
+    x, y, theta = start_pose(block)
+    write_common(made, block)
+    made.fill(
+        "webots/tank.wbt",
+        "worlds/tank.wbt",
+        {
+            "step_ms": repr(round(1e3 * block.step_s, 9)),
+            "friction": repr(study.tank.wall_friction),
+            "restitution": repr(study.tank.wall_restitution),
+            "bounce_speed": repr(study.tank.bounce_speed_m_s),
+            "eye": repr(3.0 * max(study.tank.extent_m)),
+            "x": repr(x),
+            "y": repr(y),
+            "theta": repr(theta),
+            "walls": wall_texts(block, "webots/wall.wbt"),
+        },
+    )
+    made.fill(
+        "webots/FloatingBlock.proto",
+        "protos/FloatingBlock.proto",
+        {
+            "side": repr(study.block.side_m),
+            "mass": repr(study.block.mass_kg * share),
+            "inertia": repr(study.block.inertia_kg_m2 * share),
+        },
+    )
+    for name in ("driftwalk_water.c", "Makefile"):
+        made.copy(f"webots/{name}", f"{PLUGIN}/{name}")
+    write_force(made, block, PLUGIN)
+    write_proof(made, block)
+    made.fill("webots/README.md", "README.md", words_of(block))
+    return made.files
+
+
+def verify_webots(folder: Path) -> Verification:
+    """Compile the force, and compare it with driftwalk; Webots itself is not run."""
+    return verify_force(folder, PLUGIN)
