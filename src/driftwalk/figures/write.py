@@ -36,7 +36,7 @@ def write_each(
 ) -> list[Path]:
     """Make every figure and write it by its name; nothing is made when a format is not known.
 
-    With ``csv`` among the formats the drawn numbers lie beside each figure, which names their file
+    With ``csv`` among the formats the drawn numbers lie next to each figure, which names their file
     and its hash in its metadata.
     """
     known = (*METADATA, DATA)

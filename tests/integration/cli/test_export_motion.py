@@ -192,7 +192,7 @@ def test_figures_come_with_the_numbers_that_they_draw(run: Path, tmp_path: Path)
         table = drawing.with_suffix(".csv")
         digest = hashlib.sha256(table.read_bytes()).hexdigest()
         assert f"{table.name}, SHA-256 {digest}" in drawing.read_text()
-    with (tmp_path / "out" / "map.csv").open(newline="") as file:
+    with (tmp_path / "out" / "ks_map.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     cells = [float(row["value"]) for row in rows if row["kind"] == "QuadMesh" and row["value"]]
     # The map shows 1 - D of each of the 25 settings; its colour bar is another mesh.

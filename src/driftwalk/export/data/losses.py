@@ -120,7 +120,7 @@ TANK_FILE: Final = "tank.csv"
 
 
 def write_tank(motion: Motion, folder: Path) -> list[Path]:
-    """Write the corners of a tank that is a polygon; any other tank is told in one line.
+    """Write the corners of a tank that is a polygon; a line says any other tank.
 
     Parameters
     ----------

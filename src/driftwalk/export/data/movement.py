@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 CENTROID: Final = "centroid"
 NOT_KEPT: Final = ("kind", "schema_version", "counts")
-"""Attributes that are made anew when a recording is read."""
+"""Attributes that are made again when a recording is read."""
 
 
 def write_movement(motion: Motion, folder: Path) -> list[Path]:

@@ -1,4 +1,4 @@
-"""The page that lies beside exported files: what they are, what they lack, how to read them."""
+"""The page that lies next to exported files: what they are, what they lack, how to read them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Exported:
 
 
 def write_readme(folder: Path, format: str, source: str, exported: Sequence[Exported]) -> Path:
-    """Write ``README.md`` beside the files.
+    """Write ``README.md`` next to the files.
 
     Parameters
     ----------

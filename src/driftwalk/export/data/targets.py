@@ -1,4 +1,4 @@
-"""The targets of motion: tables, NetCDF, bags and films, each with a page beside the files."""
+"""The targets of motion: tables, NetCDF, bags and films, each with a page next to the files."""
 
 from __future__ import annotations
 

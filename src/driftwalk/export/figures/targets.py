@@ -17,9 +17,9 @@ README: Final = """\
 driftwalk {version} drew these figures from what the run stores.
 
 Each is 90 mm or 180 mm wide, one or two columns of a journal, with letters of 7 to 8 points.{fonts}
-Beside each lies a table of the same name (`.csv`) with every number that is drawn: a row per point,
-with the panel, the labels of its axes, which hold the units, and the artist. The figure names the
-table and its SHA-256 in its metadata.
+Next to each lies a table of the same name (`.csv`) with every number that is drawn: a row per
+point, with the panel, the labels of its axes, which hold the units, and the artist. The figure
+names the table and its SHA-256 in its metadata.
 
 `driftwalk cite {source}` says what to cite.
 """

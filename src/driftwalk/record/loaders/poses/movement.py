@@ -2,7 +2,7 @@
 
 Dimensions are ``keypoints`` and ``individuals``, or the same in the singular; bounding boxes have
 no keypoints. Where driftwalk wrote the file, positions state their unit, an ``orientation`` lies
-beside them, and an attribute holds what was known of the recording.
+next to them, and an attribute holds what was known of the recording.
 """
 
 from __future__ import annotations
@@ -84,7 +84,9 @@ class MovementLoader:
         bodies, notes = bodies_of(
             Poses(places, read_point), chosen, time, options, usual=SLEAP if sleap else USUAL
         )
-        if "orientation" in dataset and chosen.heading is None:
+        own = "driftwalk" in dataset.attrs
+        # Other programs may call something else so.
+        if own and "orientation" in dataset and chosen.heading is None:
             _orient(bodies, _orientation(dataset, individuals, path))
         rate = dataset.attrs.get("fps")
         return RawRecording(
@@ -95,7 +97,7 @@ class MovementLoader:
             has_keypoints=True,
             rows=time.size,
             notes=notes,
-            attrs=_known(dataset, path),
+            attrs=_known(dataset, path) if own else {},
         )
 
 
@@ -106,7 +108,7 @@ def _length_unit(position: xr.DataArray) -> str:
 
 
 def _orientation(dataset: xr.Dataset, individuals: list[str], path: Path) -> dict[str, Array]:
-    """Return the angles [rad] of every individual, which driftwalk writes beside the positions."""
+    """Return the angles [rad] of every individual, which driftwalk writes next to the positions."""
     angles = _array(dataset, "orientation", path)
     if sorted(map(str, angles.dims)) != ["individual", "time"]:
         raise FormatError("'orientation' is not over time and individual", path=path)
@@ -123,15 +125,12 @@ def _orient(bodies: list[RawBody], angles: dict[str, Array]) -> None:
 
 
 def _known(dataset: xr.Dataset, path: Path) -> dict[str, Any]:
-    """Return what driftwalk knew of the recording when it wrote the file, `{}` for other files."""
-    text = dataset.attrs.get("driftwalk")
-    if not isinstance(text, str):
-        return {}
-    known = parse_json(text)
+    """Return what driftwalk knew of the recording when it wrote the file."""
+    known = parse_json(str(dataset.attrs["driftwalk"]), path=path)
     if not isinstance(known, dict):
         raise FormatError("the attribute 'driftwalk' is no JSON object", path=path)
     texts = {key: known[key] for key in TEXTS if isinstance(known.get(key), str)}
-    numbers = {key: known[key] for key in NUMBERS if isinstance(known.get(key), (int, float))}
+    numbers = {key: known[key] for key in NUMBERS if type(known.get(key)) in (int, float)}
     return {**texts, **numbers}
 
 
