@@ -142,12 +142,16 @@ def test_a_tank_with_corners_lies_next_to_the_table(tmp_path: Path) -> None:
 
 
 def test_movement_itself_reads_its_file(tmp_path: Path) -> None:
-    poses = pytest.importorskip("movement.io", reason="movement is not installed (114 packages)")
+    validators = pytest.importorskip(
+        "movement.validators.datasets", reason="movement is not installed (114 packages)"
+    )
     recording = dw.tank30_recording().isel(time=slice(50))
     save_trajectory(recording, tmp_path / "a.nc")
     here("export", tmp_path / "a.nc", "--to", "movement", "-o", tmp_path / "out")
-    read = poses.load_dataset(tmp_path / "out" / "a.movement.nc")
-    np.testing.assert_array_equal(read["position"].values[:, 0, 0, 0], recording["x"].values[:, 0])
+    with xr.open_dataset(tmp_path / "out" / "a.movement.nc") as read:
+        validators.ValidPosesInputs.validate(read)
+        x = read["position"].sel(space="x", keypoints="centroid", individuals="0").values
+    np.testing.assert_array_equal(x, recording["x"].values[:, 0])
 
 
 def test_every_replicate_of_a_simulation_goes_out(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ NOT_KEPT: Final = ("kind", "schema_version", "counts")
 
 
 def write_movement(motion: Motion, folder: Path) -> list[Path]:
-    """Write NetCDF as movement does: positions of one keypoint, the body's centre.
+    """Write NetCDF as movement 0.15 does: positions of one keypoint, the body's centre.
 
     Numbers are double. Positions are in metres, as their attribute ``units`` says, with y up; the
     orientation is the further variable ``orientation``. The attribute ``driftwalk`` holds what was
@@ -70,20 +70,20 @@ def movement_dataset(recording: xr.Dataset) -> xr.Dataset:
     --------
     >>> from driftwalk.schema import build_trajectory
     >>> dict(movement_dataset(build_trajectory([0.0], [0.1], [0.2])).sizes)
-    {'time': 1, 'space': 2, 'keypoint': 1, 'individual': 1}
+    {'time': 1, 'space': 2, 'keypoints': 1, 'individuals': 1}
     """
     import xarray as xr
 
     x, y, theta = (recording[name].values for name in ("x", "y", "theta"))
     position = np.stack([x, y], axis=1)[:, :, None, :]
     data: dict[str, Any] = {
-        "position": (("time", "space", "keypoint", "individual"), position, {"units": "m"}),
+        "position": (("time", "space", "keypoints", "individuals"), position, {"units": "m"}),
         # movement asks for it, and nobody stated one.
-        "confidence": (("time", "keypoint", "individual"), np.full_like(x, np.nan)[:, None, :]),
+        "confidence": (("time", "keypoints", "individuals"), np.full_like(x, np.nan)[:, None, :]),
     }
     if np.isfinite(theta).any():
         words = {"units": "rad", "long_name": "orientation, counter-clockwise from x"}
-        data["orientation"] = (("time", "individual"), theta, words)
+        data["orientation"] = (("time", "individuals"), theta, words)
     known = {key: value for key, value in recording.attrs.items() if key not in NOT_KEPT}
     attrs: dict[str, Any] = {
         "source_software": "driftwalk",
@@ -101,8 +101,8 @@ def movement_dataset(recording: xr.Dataset) -> xr.Dataset:
         {
             "time": recording["time"].values,
             "space": ["x", "y"],
-            "keypoint": [CENTROID],
-            "individual": body_names(recording),
+            "keypoints": [CENTROID],
+            "individuals": body_names(recording),
         },
         attrs,
     )

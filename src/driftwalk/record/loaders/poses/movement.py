@@ -110,11 +110,11 @@ def _length_unit(position: xr.DataArray) -> str:
 def _orientation(dataset: xr.Dataset, individuals: list[str], path: Path) -> dict[str, Array]:
     """Return the angles [rad] of every individual, which driftwalk writes next to the positions."""
     angles = _array(dataset, "orientation", path)
-    if sorted(map(str, angles.dims)) != ["individual", "time"]:
-        raise FormatError("'orientation' is not over time and individual", path=path)
+    if sorted(map(str, angles.dims)) != ["individuals", "time"]:
+        raise FormatError("'orientation' is not over time and individuals", path=path)
     if angles.attrs.get("units") != "rad":
         raise FormatError("'orientation' does not state its unit, rad", path=path)
-    values = angles.transpose("time", "individual").values.astype(np.float64)
+    values = angles.transpose("time", "individuals").values.astype(np.float64)
     return {name: np.ascontiguousarray(values[:, at]) for at, name in enumerate(individuals)}
 
 
