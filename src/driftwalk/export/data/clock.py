@@ -34,7 +34,9 @@ def frame_rate(recording: xr.Dataset) -> float | None:
     stated = recording.attrs.get("sample_rate_Hz")
     for rate in (stated, 1.0 / float(np.diff(time).min()), 1.0 / float(np.median(np.diff(time)))):
         if isinstance(rate, (int, float, np.number)) and _is_even(time, float(rate)):
-            return float(rate)
+            # Over the whole recording the rounding of single times does not count.
+            frames = np.rint((time[-1] - time[0]) * rate)
+            return float(f"{frames / (time[-1] - time[0]):.12g}")
     return None
 
 
