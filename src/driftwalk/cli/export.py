@@ -9,6 +9,7 @@ import typer
 
 from driftwalk.cli.options.shared import Json
 from driftwalk.cli.terminal.answer import print_row
+from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_json, print_note
 from driftwalk.core.errors import InputError
 from driftwalk.export import TARGETS, Source, Verification, export_run, target_named
@@ -89,9 +90,10 @@ def export(
             raise InputError(f"--verify: an export to {to} is no simulation to compare with")
         if target.require is not None:
             target.require()
-    notes: list[str] = []
-    source = Source(run, flow, seed, world, speed, notes.append)
+    said: list[str] = []
+    source = Source(run, flow, seed, world, speed, said.append)
     files = export_run(source, target, out)
+    notes = [to_options(sentence) for sentence in said]
     outcome = target.verify(out) if verify and target.verify is not None else None
     if json:
         print_json(

@@ -96,7 +96,7 @@ def _rows_of(artist: Any) -> Rows:
     from matplotlib.quiver import Quiver
 
     if isinstance(artist, Line2D):
-        yield 0, _table(*np.asarray(artist.get_xydata(), dtype=np.float64).T)
+        yield 0, _points(artist.get_xydata())
     elif isinstance(artist, Quiver):
         yield 0, _table(artist.X, artist.Y, artist.U, artist.V, artist.get_array())
     elif isinstance(artist, QuadMesh):
@@ -105,9 +105,9 @@ def _rows_of(artist: Any) -> Rows:
         yield 0, _of_image(artist)
     elif isinstance(artist, ContourSet):
         for part, (level, path) in enumerate(zip(artist.levels, artist.get_paths(), strict=False)):
-            yield part, _table(*_corners(path).T, value=level)
+            yield part, _points(path.vertices, value=level)
     elif isinstance(artist, PathCollection):
-        yield 0, _table(*np.asarray(artist.get_offsets()).T, value=artist.get_array())
+        yield 0, _points(artist.get_offsets(), value=artist.get_array())
     else:
         yield from _outlines(artist)
 
@@ -116,15 +116,17 @@ def _outlines(artist: Any) -> Rows:
     from matplotlib.patches import Circle, Rectangle
 
     if isinstance(artist, Rectangle):
-        yield 0, _table(*artist.get_xy(), artist.get_width(), artist.get_height())
+        x, y = artist.get_xy()
+        yield 0, _table(x, y, artist.get_width(), artist.get_height())
     elif isinstance(artist, Circle):
-        yield 0, _table(*artist.center, 2.0 * artist.radius, 2.0 * artist.radius)
+        x, y = artist.center
+        yield 0, _table(x, y, 2.0 * artist.radius, 2.0 * artist.radius)
     elif hasattr(artist, "get_paths"):
         for part, path in enumerate(artist.get_paths()):
-            yield part, _table(*_corners(path).T)
+            yield part, _points(path.vertices)
     elif hasattr(artist, "get_path"):
         own = artist.get_path().transformed(artist.get_patch_transform())
-        yield 0, _table(*_corners(own).T)
+        yield 0, _points(own.vertices)
 
 
 def _of_mesh(mesh: Any) -> npt.NDArray[np.float64]:
@@ -147,11 +149,13 @@ def _of_image(image: Any) -> npt.NDArray[np.float64]:
         bottom, top = top, bottom
     x = left + (np.arange(columns) + 0.5) * (right - left) / columns
     y = bottom + (np.arange(rows) + 0.5) * (top - bottom) / rows
-    return _table(*np.meshgrid(x, y), value=values)
+    across, up = np.meshgrid(x, y)
+    return _table(across, up, value=values)
 
 
-def _corners(path: Any) -> npt.NDArray[np.float64]:
-    return np.asarray(path.vertices, dtype=np.float64).reshape(-1, 2)
+def _points(places: Any, value: Any = None) -> npt.NDArray[np.float64]:
+    found = _filled(places).reshape(-1, 2)
+    return _table(found[:, 0], found[:, 1], value=value)
 
 
 def _filled(values: Any) -> npt.NDArray[np.float64]:

@@ -58,7 +58,8 @@ def frame_numbers(recording: xr.Dataset) -> npt.NDArray[np.int64]:
     rate = frame_rate(recording)
     if rate is None:
         return np.arange(time.size, dtype=np.int64)
-    return np.rint((time - time[0]) * rate).astype(np.int64)
+    numbers: npt.NDArray[np.int64] = np.rint((time - time[0]) * rate).astype(np.int64)
+    return numbers
 
 
 def _is_even(time: npt.NDArray[np.float64], rate: float) -> bool:

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.json_text import parse_json, read_json
+from driftwalk.core.json_text import read_json
 from driftwalk.core.run_layout import MANIFEST_FILE, state_of
+from driftwalk.core.toml_text import parse_toml
 from driftwalk.schema.netcdf import kind_of, open_netcdf
 
 if TYPE_CHECKING:
@@ -130,8 +131,7 @@ def _side_of_simulation(stored: xr.Dataset) -> float | None:
         return float(stored.attrs["block_side_m"])
     if "model" in stored.attrs or "study" not in stored.attrs:
         return None
-    study = parse_json(stored.attrs["study"])
-    return _side_of_study(study)
+    return _side_of_study(parse_toml(str(stored.attrs["study"])))
 
 
 def _side_of_run(folder: Path) -> float | None:

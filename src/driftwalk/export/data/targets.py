@@ -50,7 +50,9 @@ def _write_films(ending: str, source: Source, folder: Path) -> list[Path]:
         source.tell(
             f"the film shows {motions[0].name}, the first of {len(motions)}: `world` names another"
         )
-    file = write_film(motions[0], folder, ending=ending, speed=source.speed or 1.0)
+    file = write_film(
+        motions[0], folder, ending=ending, speed=1.0 if source.speed is None else source.speed
+    )
     page = write_readme(folder, "film", text_of_name(source.path), [Exported(file, [], "")])
     return [file, page]
 
