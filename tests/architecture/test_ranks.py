@@ -46,7 +46,8 @@ MAY_IMPORT: dict[str, frozenset[str]] = {
     | {"flow", "model", "sweep", "conditions", "motion", "calibration", "likelihood", "assembly"}
     | {"plot", "figures"},
     "export": GROUND
-    | {"record", "flow", "model", "simulation", "conditions", "runs", "plot", "figures"},
+    | {"record", "flow", "model", "simulation", "conditions", "assembly"}
+    | {"runs", "plot", "figures"},
     "notebook": GROUND
     | {"record", "flow", "model", "comparison", "simulation", "motion", "conditions"}
     | {"assembly", "calibration", "likelihood", "page", "runs"},

@@ -214,6 +214,20 @@ def _film(bodies: int, seconds: float) -> Callable[[Path], Names]:
     return provide
 
 
+def _one_recording(folder: Path) -> Names:
+    """Provide ``recording.nc``: two minutes of the bundled recording, with its tank."""
+    dw.save_trajectory(dw.tank30_recording().isel(time=slice(1200)), folder / "recording.nc")
+    return {}
+
+
+def _several_worlds(folder: Path) -> Names:
+    """Provide ``sim.nc``: four replicates of some seconds."""
+    words = ("--flow", FLOW, "--duration", "5s", "--replicates", "4", "-o", folder / "sim.nc")
+    done = here("simulate", *words)
+    assert done.code == 0, done.err
+    return {}
+
+
 def _one_block(folder: Path) -> Names:
     """Provide ``one.nc``: two minutes of one block, with its tank."""
     dw.save_trajectory(dw.tank30_recording().isel(time=slice(1200)), folder / "one.nc")
@@ -434,6 +448,12 @@ PAGES: dict[str, Page] = {
     ),
     "docs/how-to/report.md": Page(
         provide=_files(_recording(60.0), _calibrated, _simulated), slow=True
+    ),
+    "docs/how-to/take-your-tracks-elsewhere.md": Page(
+        provide=_files(_one_recording, _several_worlds, _calibrated),
+        not_run={"driftwalk convert tracks.csv *": "names a file that only its reader has"},
+        makes=("tracks/README.md", "one/replicate_3.csv", "film/recording.gif", "paper/ks_map.pdf"),
+        slow=True,
     ),
     "docs/how-to/sensitivity.md": Page(
         provide=_files(_calibrated, _flow("flow_true.csv", "flow.nc", "piv.csv")),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -88,10 +87,10 @@ def _check_film(film: str) -> None:
     """Refuse a film that cannot be made before anything is simulated for it."""
     if film not in ("gif", "mp4", "none"):
         raise InputError(f"--film takes gif, mp4 or none, got '{film}'")
-    if film == "mp4" and shutil.which("ffmpeg") is None:
-        raise InputError(
-            "--film mp4 needs the program ffmpeg, which is not installed: install it or take gif"
-        )
+    if film != "none":
+        from driftwalk.plot import require_film_writer
+
+        require_film_writer(f".{film}")
 
 
 def summary(study: Study, result: AssemblyResult) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""`driftwalk export`: a calibrated model as something that another simulator runs."""
+"""`driftwalk export`: a model for another simulator, or motion for another program."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import typer
 
 from driftwalk.cli.options.shared import Json
 from driftwalk.cli.terminal.answer import print_row
-from driftwalk.cli.terminal.output import print_json
+from driftwalk.cli.terminal.argument_names import to_options
+from driftwalk.cli.terminal.output import print_json, print_note
 from driftwalk.core.errors import InputError
 from driftwalk.export import TARGETS, Source, Verification, export_run, target_named
 
@@ -19,7 +20,8 @@ def export(
         Path,
         typer.Argument(
             metavar="RUN",
-            help="Run directory of calibrate or fit, or a study file with --flow.",
+            help="Run directory, or a study file with --flow; for tables, bags and films also a "
+            "recording or a simulation.",
         ),
     ],
     to: Annotated[
@@ -51,17 +53,36 @@ def export(
             show_default=False,
         ),
     ] = None,
+    world: Annotated[
+        int | None,
+        typer.Option(
+            "--world",
+            min=0,
+            help="The one simulated world to take, counted from 0 (default: all; of a film the "
+            "first).",
+            show_default=False,
+        ),
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            "--speed",
+            help="How much faster than real time a film is (default: 1).",
+            show_default=False,
+        ),
+    ] = None,
     verify: Annotated[
         bool, typer.Option("--verify", help="Run what was written, and compare it with driftwalk.")
     ] = False,
     json: Json = False,
 ) -> int:
-    """Take a calibrated model to another simulator.
+    """Take a model to another simulator, motion to another program, or figures to print.
 
-    The folder holds all that it needs: the files of the simulator, the study, the flow field, the
-    seed, the licence, and a README that says how to run it and what is not the same. With the same
-    seed it is the same run as driftwalk's; --verify proves that by paths clear of the wall. Nothing
-    is overwritten.
+    The folder holds all that is needed: for a simulator its files, the study, the flow field and
+    the seed. With the same seed it is the same run as driftwalk's; --verify proves that by paths
+    clear of the wall. csv, movement, trackpy, ros, mp4 and gif hold recorded or simulated motion;
+    pdf, svg and png the figures of a finished run with the numbers that they draw. A README says
+    how to use them and what they do not hold. Nothing is overwritten.
     """
     target = target_named(to)
     if verify:
@@ -69,7 +90,10 @@ def export(
             raise InputError(f"--verify: an export to {to} is no simulation to compare with")
         if target.require is not None:
             target.require()
-    files = export_run(Source(run, flow, seed), target, out)
+    said: list[str] = []
+    source = Source(run, flow, seed, world, speed, said.append)
+    files = export_run(source, target, out)
+    notes = [to_options(sentence) for sentence in said]
     outcome = target.verify(out) if verify and target.verify is not None else None
     if json:
         print_json(
@@ -77,10 +101,13 @@ def export(
                 "folder": str(out),
                 "to": to,
                 "files": [path.relative_to(out).as_posix() for path in files],
+                "notes": notes,
                 "verification": None if outcome is None else _facts(outcome),
             }
         )
     else:
+        for note in notes:
+            print_note(f"note: {note}")
         print_row("folder", f"{out}: {target.gives}")
         print_row("begin with", out / "README.md")
         for line in () if outcome is None else outcome.lines:

@@ -7,6 +7,8 @@ from typing import Final
 
 from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import InputError
+from driftwalk.export.data.targets import DATA_TARGETS
+from driftwalk.export.figures.targets import FIGURE_TARGETS
 from driftwalk.export.target import Source, Target, Verification
 
 
@@ -59,7 +61,7 @@ def _require_compiler() -> None:
     compiler()
 
 
-_ALL: Final = (
+_SIMULATORS: Final = (
     Target(
         name="mujoco",
         gives="the tank as MJCF, the water as a Python module, and verify.py",
@@ -82,6 +84,7 @@ _ALL: Final = (
         require=_require_compiler,
     ),
 )
+_ALL: Final = (*_SIMULATORS, *DATA_TARGETS, *FIGURE_TARGETS)
 TARGETS: Final[dict[str, Target]] = {target.name: target for target in _ALL}
 """Every target by its name, in the order of the help."""
 

@@ -7,6 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 
+def _nobody(_sentence: str) -> None:
+    """Tell nobody."""
+
+
 @dataclass(frozen=True)
 class Source:
     """A run to be exported.
@@ -19,11 +23,20 @@ class Source:
         The flow field, where `path` has none: that of a study file.
     seed : int or None
         Seed of the stochastic force over the run's own.
+    world : int or None
+        The one simulated world to take, a replicate or a run of blocks, where there are several.
+    speed : float or None
+        How much faster than real time a film is.
+    tell : callable
+        Called with each sentence that the user should read: above all what a format cannot hold.
     """
 
     path: Path
     flow: Path | None = None
     seed: int | None = None
+    world: int | None = None
+    speed: float | None = None
+    tell: Callable[[str], None] = _nobody
 
 
 @dataclass(frozen=True)
@@ -63,6 +76,8 @@ class Target:
         nothing to compare with.
     require : callable or None
         ``require()`` raises `InputError` where `verify` cannot run on this machine.
+    options : tuple of str
+        What it has a use for of a source's ``flow``, ``seed``, ``world`` and ``speed``.
     """
 
     name: str
@@ -70,3 +85,4 @@ class Target:
     write: Callable[[Source, Path], list[Path]]
     verify: Callable[[Path], Verification] | None = None
     require: Callable[[], None] | None = None
+    options: tuple[str, ...] = ("flow", "seed")

@@ -40,6 +40,7 @@ def export_run(source: Source, target: Target, folder: Path) -> list[Path]:
     >>> files = export_run(source, target, Path("tank"))  # doctest: +SKIP
     """
     require_empty(folder)
+    require_used(source, target)
     made = folder.parent / f".{folder.name}{PARTIAL}{os.getpid()}-{secrets.token_hex(4)}"
     try:
         made.mkdir()
@@ -55,6 +56,19 @@ def export_run(source: Source, target: Target, folder: Path) -> list[Path]:
             raise
         raise refusal from error
     return [folder / path for path in files]
+
+
+def require_used(source: Source, target: Target) -> None:
+    """Refuse what is said for another target than this one.
+
+    Raises
+    ------
+    InputError
+        Names it.
+    """
+    for name in ("flow", "seed", "world", "speed"):
+        if getattr(source, name) is not None and name not in target.options:
+            raise InputError(f"an export to {target.name} has no use for `{name}`: leave it out")
 
 
 def require_empty(folder: Path) -> None:

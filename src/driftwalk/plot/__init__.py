@@ -3,6 +3,7 @@
 from driftwalk.plot.class_courses import plot_class_times as class_times, plot_survival as survival
 from driftwalk.plot.components import plot_biplot as biplot
 from driftwalk.plot.distances import plot_ks_map as map, plot_refined_map as refined_map
+from driftwalk.plot.film import write_animation
 from driftwalk.plot.flow_field import plot_flow as flow
 from driftwalk.plot.model_check import (
     plot_innovations as innovations,
@@ -12,6 +13,7 @@ from driftwalk.plot.model_check import (
 )
 from driftwalk.plot.outcome_bars import plot_outcomes as outcomes
 from driftwalk.plot.panels import plot_density_panels as density_panels
+from driftwalk.plot.parts.film_file import require_film_writer
 from driftwalk.plot.path import plot_trajectory as trajectory
 from driftwalk.plot.sensitivity_maps import (
     plot_class_key as class_key,
@@ -22,7 +24,6 @@ from driftwalk.plot.step_densities import plot_step_density as step_density, plo
 from driftwalk.plot.tank import (
     plot_blocks as blocks,
     plot_film_strip as film_strip,
-    write_animation,
 )
 from driftwalk.plot.uncertainty import (
     plot_bootstrap as bootstrap,
@@ -47,6 +48,7 @@ __all__ = [
     "outcomes",
     "predicted_steps",
     "refined_map",
+    "require_film_writer",
     "residual_time",
     "residuals",
     "step_density",

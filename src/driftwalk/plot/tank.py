@@ -1,34 +1,24 @@
-"""The blocks in the tank: one moment, a strip of moments, and a film of a run."""
+"""The blocks in the tank: one moment, and a strip of moments."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.atomic import atomic_path, require_target
 from driftwalk.core.errors import InputError
 from driftwalk.plot.parts.arena import CM_PER_M, arena_of, draw_arena, label_position
 from driftwalk.plot.parts.assembly_labels import PALETTE
-from driftwalk.plot.parts.style import DOUBLE_COLUMN_MM, INK, axes_or_new, new_figure, print_style
+from driftwalk.plot.parts.scale_bar import draw_scale_bar
+from driftwalk.plot.parts.style import DOUBLE_COLUMN_MM, INK, axes_or_new, new_figure
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.animation import AbstractMovieWriter
     from matplotlib.axes import Axes
-    from matplotlib.collections import PolyCollection
-    from matplotlib.figure import Figure
 
 Array = npt.NDArray[np.float64]
-# Size of a film [mm] and its dots per inch: 400 pixels, an even number, as H.264 asks.
-FILM_MM: Final = 101.6
-FILM_DPI: Final = 100
-FILM_ENDINGS: Final = (".gif", ".mp4")
 STRIP_COLUMNS: Final = 6
-# A GIF counts in hundredths of a second: 12.5 frames per second are exact.
-FRAMES_PER_S: Final = 12.5
 POSES: Final = ("x", "y", "theta", "assembly")
 
 
@@ -116,69 +106,8 @@ def plot_film_strip(
     for ax, moment in zip(panels, np.linspace(times[0], times[-1], count), strict=True):
         plot_blocks(path, ax, run=run, time=float(moment))
         ax.set_axis_off()
-    _scale_bar(panels[0])
+    draw_scale_bar(panels[0])
     return panels
-
-
-def write_animation(
-    path: xr.Dataset,
-    file: str | Path,
-    *,
-    run: int = 0,
-    seconds: float = 20.0,
-) -> Path:
-    """Write a film of one run, as GIF or as MP4.
-
-    The run is shown at 12.5 frames per second; each frame shows the last sample up to its time.
-
-    Parameters
-    ----------
-    path : xarray.Dataset
-        An `assembly_path`.
-    file : path-like
-        Where to write; the ending, ``.gif`` or ``.mp4``, says as what.
-    run : int
-        Which run, counted from 0.
-    seconds : float
-        How long the film takes [s], at least 0.2.
-
-    Returns
-    -------
-    pathlib.Path
-        The file.
-
-    Raises
-    ------
-    InputError
-        When the dataset is of another kind or has no such run, the ending is another one, the
-        folder does not exist, or an MP4 is asked for where the program ffmpeg is not installed.
-    RunDirectoryError
-        When the file cannot be written.
-
-    Examples
-    --------
-    ``write_animation(path, "run.gif", run=2)``
-    """
-    target = Path(file)
-    require_target(target, existing="replace", endings=FILM_ENDINGS)
-    if not seconds >= 0.2:
-        raise InputError(f"seconds={seconds:g}: a film takes at least 0.2 s")
-    one = _one_run(path, run, kind="assembly_path").load()
-    writer = _writer(target)
-    times = np.asarray(one["time"].values, dtype=np.float64)
-    frames = np.linspace(times[0], times[-1], max(2, round(seconds * FRAMES_PER_S)))
-    with print_style(), atomic_path(target) as temporary:
-        figure, blocks, clock = _film_figure(path, one, (times[-1] - times[0]) / seconds)
-        corners = block_corners(one)
-        colors = np.array(PALETTE)[one["assembly"].values % len(PALETTE)]
-        with writer.saving(figure, str(temporary), FILM_DPI):
-            for moment in frames:
-                sample = _sample_at(one, float(moment))
-                blocks.set_verts(list(corners[sample]))
-                blocks.set_facecolor(list(colors[sample]))
-                clock.set_text(f"t = {moment:.0f} s")
-                writer.grab_frame()
-    return target
 
 
 def block_corners(dataset: xr.Dataset) -> Array:
@@ -242,7 +171,7 @@ def _sample_at(one: xr.Dataset, time: float | None) -> int:
     return max(0, int(np.searchsorted(times, moment + slack, side="right")) - 1)
 
 
-def _draw_blocks(ax: Axes, moment: xr.Dataset) -> PolyCollection:
+def _draw_blocks(ax: Axes, moment: xr.Dataset) -> None:
     from matplotlib.collections import PolyCollection
 
     colors = [PALETTE[int(index) % len(PALETTE)] for index in moment["assembly"].values]
@@ -250,7 +179,6 @@ def _draw_blocks(ax: Axes, moment: xr.Dataset) -> PolyCollection:
         list(block_corners(moment)), facecolors=colors, edgecolors=INK, linewidths=0.6, zorder=3
     )
     ax.add_collection(blocks)
-    return blocks
 
 
 def _strip_axes(axes: Any, count: int) -> list[Axes]:
@@ -268,53 +196,3 @@ def _strip_axes(axes: Any, count: int) -> list[Axes]:
     if len(panels) != count:
         raise InputError(f"got {len(panels)} axes, expected {count}: pass them as axes=[...]")
     return panels
-
-
-def _scale_bar(ax: Axes) -> None:
-    """Draw a bar of a round length at the lower left corner of axes in cm."""
-    low, high = ax.get_xlim()
-    length = 10.0 ** np.floor(np.log10((high - low) / 5.0))
-    length *= max(step for step in (1.0, 2.0, 5.0) if step * length <= (high - low) / 5.0)
-    y = ax.get_ylim()[0]
-    ax.plot([low, low + length], [y, y], color=INK, lw=1.5, clip_on=False, solid_capstyle="butt")
-    ax.annotate(
-        f"{length:g} cm", (low, y), xytext=(0.0, 2.5), textcoords="offset points", size=6.0,
-        va="bottom",
-    )  # fmt: skip
-
-
-def _film_figure(path: xr.Dataset, one: xr.Dataset, speed: float) -> tuple[Figure, Any, Any]:
-    """Return the figure of the first frame, its blocks and its clock.
-
-    Axes without ticks and a fixed layout: a frame is drawn in some milliseconds.
-    """
-    figure = new_figure(width_mm=FILM_MM, height_mm=FILM_MM)
-    figure.set_layout_engine("none")
-    ax = figure.add_axes((0.03, 0.03, 0.94, 0.9))
-    ax.set_axis_off()
-    blocks = _draw_blocks(ax, one.isel(time=0))
-    if draw_arena(ax, arena_of(path)) is None:
-        corners = block_corners(one).reshape(-1, 2)
-        ax.set_xlim(corners[:, 0].min(), corners[:, 0].max())
-        ax.set_ylim(corners[:, 1].min(), corners[:, 1].max())
-    _scale_bar(ax)
-    clock = figure.text(0.04, 0.955, "", size=9.0, va="center")
-    figure.text(0.96, 0.955, f"{speed:.3g} × real time", size=8.0, va="center", ha="right")
-    return figure, blocks, clock
-
-
-def _writer(target: Path) -> AbstractMovieWriter:
-    from matplotlib.animation import FFMpegWriter, PillowWriter
-
-    if target.suffix.lower() == ".gif":
-        return PillowWriter(fps=FRAMES_PER_S)  # type: ignore[arg-type]
-    if not FFMpegWriter.isAvailable():
-        raise InputError(
-            f"cannot write {target}: an MP4 needs the program ffmpeg, which is not installed; "
-            "install it or write a .gif"
-        )
-    return FFMpegWriter(
-        fps=FRAMES_PER_S,  # type: ignore[arg-type]
-        codec="h264",
-        extra_args=["-pix_fmt", "yuv420p", "-movflags", "+faststart"],
-    )

@@ -479,12 +479,27 @@ def _field_counts(block: bytes, delimiter: str) -> npt.NDArray[np.int64]:
         return np.diff(np.searchsorted(np.flatnonzero(first), ends), prepend=0)
     starts = np.concatenate(([0], ends[:-1] + 1))
     separators = characters == ord(delimiter)
+    if b'"' in block:
+        separators &= ~_quoted(characters, starts)
     fields = np.add.reduceat(separators, starts, dtype=np.int64) + 1
     # A line of blanks alone holds no field; it may hold delimiters when these are tabs.
     for line in np.flatnonzero((fields == 1) | (ends - starts < 2 * fields)):
         if not block[starts[line] : ends[line]].strip():
             fields[line] = 0
     return fields
+
+
+def _quoted(
+    characters: npt.NDArray[np.uint8], starts: npt.NDArray[np.int64]
+) -> npt.NDArray[np.bool_]:
+    """Return what stands between quotation marks, of lines in which all of them are closed."""
+    marks = (characters == ord('"')).astype(np.int64)
+    before = np.cumsum(marks)
+    per_line = np.add.reduceat(marks, starts)
+    lengths = np.diff(np.append(starts, characters.size))
+    within = before - np.repeat(before[starts] - marks[starts], lengths)
+    closed = np.repeat(per_line % 2 == 0, lengths)
+    return np.asarray((within % 2 == 1) & closed)
 
 
 def _encode(values: Any, seen: dict[str, int]) -> npt.NDArray[np.int32]:

@@ -1,18 +1,24 @@
 """Run directories: long work that resumes, with its figures and its manifest."""
 
-from driftwalk.runs.assembly import AssemblyResult, AssemblyWork, run_assembly
+from driftwalk.runs.assembly import LABELS, AssemblyResult, AssemblyWork, run_assembly
 from driftwalk.runs.calibrated import Calibrated, read_calibrated
 from driftwalk.runs.calibration import CalibrationWork, result_file, run_calibration
-from driftwalk.runs.fit import Fitted, FitWork, run_fit
+from driftwalk.runs.fit import Fitted, FitWork, run_fit, steady_flows
 from driftwalk.runs.folder import Progress
 from driftwalk.runs.found_values import FoundValues, read_found_values
 from driftwalk.runs.model_comparison import ModelComparisonWork, run_model_comparison
 from driftwalk.runs.model_recovery import ModelRecoveryWork, run_model_recovery
 from driftwalk.runs.recovery import RecoveryWork, run_recovery
-from driftwalk.runs.sensitivity import SensitivityResult, SensitivityWork, run_sensitivity
+from driftwalk.runs.sensitivity import (
+    SensitivityResult,
+    SensitivityWork,
+    draw_sensitivity,
+    run_sensitivity,
+)
 from driftwalk.schema.netcdf import netcdf_bytes
 
 __all__ = [
+    "LABELS",
     "AssemblyResult",
     "AssemblyWork",
     "Calibrated",
@@ -26,6 +32,7 @@ __all__ = [
     "RecoveryWork",
     "SensitivityResult",
     "SensitivityWork",
+    "draw_sensitivity",
     "netcdf_bytes",
     "read_calibrated",
     "read_found_values",
@@ -37,4 +44,5 @@ __all__ = [
     "run_model_recovery",
     "run_recovery",
     "run_sensitivity",
+    "steady_flows",
 ]

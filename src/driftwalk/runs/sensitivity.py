@@ -143,7 +143,12 @@ def run_sensitivity(
     ) as run:
         result = _simulate(work, run, executor, _Overall(progress, sizes))
         progress(1, 1, "figures")
-        _draw(result, run)
+        draw_sensitivity(
+            run.folder("figures"),
+            reference=result.reference,
+            sensitivity=result.sensitivity,
+            components=result.components,
+        )
     return result
 
 
@@ -233,23 +238,56 @@ def _components(sensitivity: xr.Dataset) -> xr.Dataset | None:
         return None
 
 
-def _draw(result: SensitivityResult, run: RunDirectory) -> None:
+def draw_sensitivity(
+    folder: Path,
+    *,
+    reference: xr.Dataset,
+    sensitivity: xr.Dataset,
+    components: xr.Dataset | None,
+    formats: Sequence[str] = ("png", "svg"),
+) -> list[Path]:
+    """Write all figures of a sensitivity study: a subfolder for each value of further axes.
+
+    Parameters
+    ----------
+    folder : Path
+        Where to write.
+    reference, sensitivity, components : xarray.Dataset
+        Results of the run, ``reference.nc``, ``sensitivity.nc`` and ``components.nc``.
+    formats : sequence of {"png", "svg", "pdf", "csv"}
+        File formats; ``csv`` holds the numbers that are drawn.
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Examples
+    --------
+    >>> draw_sensitivity(
+    ...     Path("figures"), reference=reference, sensitivity=found, components=None
+    ... )  # doctest: +SKIP
+    """
     import xarray as xr
 
     from driftwalk.figures import write_assembly_figures, write_sensitivity_figures
 
-    folder = run.folder("figures")
-    repeated = result.reference["realisation_proportion"]
-    write_assembly_figures(
+    written = write_assembly_figures(
         folder,
-        distribution=result.reference,
-        realisations=xr.Dataset({"proportion": repeated}),
+        distribution=reference,
+        realisations=xr.Dataset({"proportion": reference["realisation_proportion"]}),
+        formats=formats,
     )
-    for name, chosen in _slices(result.sensitivity):
-        part, components = result.sensitivity.sel(chosen), result.components
-        if components is not None:
-            components = components.sel(chosen) if components.sizes["component"] > 1 else None
-        write_sensitivity_figures(folder / name, sensitivity=part, components=components)
+    if components is not None and components.sizes["component"] < 2:
+        components = None
+    for name, chosen in _slices(sensitivity):
+        written += write_sensitivity_figures(
+            folder / name,
+            sensitivity=sensitivity.sel(chosen),
+            components=None if components is None else components.sel(chosen),
+            formats=formats,
+        )
+    return written
 
 
 def _slices(sensitivity: xr.Dataset) -> Iterator[tuple[str, dict[str, Any]]]:

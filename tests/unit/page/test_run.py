@@ -18,12 +18,7 @@ from synthetic_assembly import assembly_path, class_times, distribution
 from synthetic_calibration import answered, bundled_flow, bundled_recording, synthetic_calibration
 
 from driftwalk import __version__
-from driftwalk.core.errors import InputError, RunDirectoryError
-from driftwalk.core.provenance import manifest
-from driftwalk.core.rundir import RunDirectory
-from driftwalk.model import Study
-from driftwalk.page import joined_page, manifest_section, report_html, report_page, write_report
-from driftwalk.page.sections.manifest import (
+from driftwalk.core.citation import (
     PAPER_AUTHORS,
     PAPER_TITLE,
     PAPER_VENUE,
@@ -32,6 +27,11 @@ from driftwalk.page.sections.manifest import (
     bibtex,
     citation,
 )
+from driftwalk.core.errors import InputError, RunDirectoryError
+from driftwalk.core.provenance import manifest
+from driftwalk.core.rundir import RunDirectory
+from driftwalk.model import Study
+from driftwalk.page import joined_page, manifest_section, report_html, report_page, write_report
 from driftwalk.schema import build_trajectory
 
 HOSTILE = "<script>alert('1')</script> & \"quotes\""

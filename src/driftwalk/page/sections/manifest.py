@@ -4,26 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import PurePath
-from typing import Any, Final
+from typing import Any
 
+from driftwalk.core.citation import bibtex, citation
 from driftwalk.core.json_text import json_value
 from driftwalk.page.parts import Section, section
-
-PAPER_TITLE: Final = "A trajectory-based calibration method for stochastic motion models"
-PAPER_AUTHORS: Final = (
-    ("Di Mario", "Ezequiel"),
-    ("Mermoud", "Grégory"),
-    ("Mastrangeli", "Massimo"),
-    ("Martinoli", "Alcherio"),
-)
-"""Family and given names."""
-PAPER_VENUE: Final = "IEEE/RSJ International Conference on Intelligent Robots and Systems (IROS)"
-PAPER_YEAR: Final = 2011
-"""The paper whose method driftwalk implements, as in CITATION.cff."""
-PROGRAM: Final = "The driftwalk developers"
-TITLE: Final = (
-    "driftwalk: calibrated stochastic motion models of floating, drifting and stirred robots"
-)
 
 
 def manifest_section(manifest: Mapping[str, Any]) -> Section:
@@ -61,28 +46,6 @@ def manifest_section(manifest: Mapping[str, Any]) -> Section:
         cite=citation(version),
         bibtex=bibtex(version),
     )  # fmt: skip
-
-
-def citation(version: str) -> str:
-    """Return how to cite driftwalk and the paper, as a sentence."""
-    names = [f"{given} {family}" for family, given in PAPER_AUTHORS]
-    authors = f"{', '.join(names[:-1])} and {names[-1]}"
-    return (
-        f"{PROGRAM}, {TITLE}, version {version}; and the paper whose method it implements: "
-        f"{authors}, {PAPER_TITLE}, {PAPER_VENUE}, {PAPER_YEAR}."
-    )
-
-
-def bibtex(version: str) -> str:
-    """Return how to cite driftwalk and the paper, for BibTeX."""
-    authors = " and ".join(f"{family}, {given}" for family, given in PAPER_AUTHORS)
-    return (
-        f"@software{{driftwalk,\n  author = {{{{{PROGRAM}}}}},\n  title = {{{{{TITLE}}}}},\n"
-        f"  version = {{{version}}}\n}}\n\n"
-        f"@inproceedings{{dimario2011trajectory,\n  author = {{{authors}}},\n"
-        f"  title = {{{{{PAPER_TITLE}}}}},\n  booktitle = {{{PAPER_VENUE}}},\n"
-        f"  year = {{{PAPER_YEAR}}}\n}}\n"
-    )
 
 
 def _version(manifest: Mapping[str, Any]) -> str:

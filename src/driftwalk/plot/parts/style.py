@@ -70,6 +70,8 @@ STYLE: dict[str, Any] = {
     # stored as outlines so that a reader's fonts do not matter.
     "svg.hashsalt": "driftwalk",
     "svg.fonttype": "path",
+    # Fonts that a journal's printer can edit and embed: TrueType, not matplotlib's outlines.
+    "pdf.fonttype": 42,
 }
 
 # matplotlib's parameters are one global table: two threads must not swap them at a time.

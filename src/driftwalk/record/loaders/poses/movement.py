@@ -1,19 +1,21 @@
 """NetCDF of the `movement` package: ``position`` over time, space, keypoint and individual.
 
 Dimensions are ``keypoints`` and ``individuals``, or the same in the singular; bounding boxes have
-no keypoints.
+no keypoints. Where driftwalk wrote the file, positions state their unit, an ``orientation`` lies
+next to them, and an attribute holds what was known of the recording.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from driftwalk.core.errors import FormatError
+from driftwalk.core.json_text import parse_json
 from driftwalk.record.pose.keypoints import Confidence, Point, Poses, bodies_of, choose_keypoints
-from driftwalk.record.raw import Array, RawRecording, ReadOptions
+from driftwalk.record.raw import LENGTH_UNITS, Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.recognise.marks import Marks
 from driftwalk.schema.netcdf import MAGIC, open_netcdf, text_attribute
 
@@ -25,9 +27,19 @@ SINGLE: Final = "centroid"
 SLEAP: Final = Confidence(0.2, "SLEAP's threshold of peaks")
 USUAL: Final = Confidence(0.6, "movement's threshold")
 
+TEXTS: Final = (
+    *("arena", "arena_found", "origin_shift_m", "simulated", "tracked_from", "complete"),
+    "interrupted",
+)
+NUMBERS: Final = (
+    *("block_side_m", "metres_per_pixel", "position_quantum_m", "sample_rate_Hz"),
+    "time_origin_unix_s",
+)
+"""What is taken over of a recording that driftwalk itself wrote in this format."""
+
 
 class MovementLoader:
-    """Positions in pixels unless another unit is given; seconds, or frames with a rate."""
+    """Positions in pixels unless the file or an option says another unit."""
 
     name = "movement"
     description = "movement NetCDF (position over time, space, keypoints, individuals; pixels)"
@@ -72,16 +84,54 @@ class MovementLoader:
         bodies, notes = bodies_of(
             Poses(places, read_point), chosen, time, options, usual=SLEAP if sleap else USUAL
         )
+        own = "driftwalk" in dataset.attrs
+        # Other programs may call something else so.
+        if own and "orientation" in dataset and chosen.heading is None:
+            _orient(bodies, _orientation(dataset, individuals, path))
         rate = dataset.attrs.get("fps")
         return RawRecording(
             bodies,
             clock_unit=unit,
-            length_unit=options.length_unit or "px",
+            length_unit=_length_unit(position) or options.length_unit or "px",
             frame_rate_hz=float(rate) if rate is not None and unit == "frame" else None,
             has_keypoints=True,
             rows=time.size,
             notes=notes,
+            attrs=_known(dataset, path) if own else {},
         )
+
+
+def _length_unit(position: xr.DataArray) -> str:
+    """Return the unit that the positions state, ``""`` where they state none that is known."""
+    unit = position.attrs.get("units")
+    return unit if isinstance(unit, str) and unit in (*LENGTH_UNITS, "px") else ""
+
+
+def _orientation(dataset: xr.Dataset, individuals: list[str], path: Path) -> dict[str, Array]:
+    """Return the angles [rad] of every individual, which driftwalk writes next to the positions."""
+    angles = _array(dataset, "orientation", path)
+    if sorted(map(str, angles.dims)) != ["individuals", "time"]:
+        raise FormatError("'orientation' is not over time and individuals", path=path)
+    if angles.attrs.get("units") != "rad":
+        raise FormatError("'orientation' does not state its unit, rad", path=path)
+    values = angles.transpose("time", "individuals").values.astype(np.float64)
+    return {name: np.ascontiguousarray(values[:, at]) for at, name in enumerate(individuals)}
+
+
+def _orient(bodies: list[RawBody], angles: dict[str, Array]) -> None:
+    for body in bodies:
+        theta = angles[body.name]
+        body.theta = theta if np.isfinite(theta).any() else None
+
+
+def _known(dataset: xr.Dataset, path: Path) -> dict[str, Any]:
+    """Return what driftwalk knew of the recording when it wrote the file."""
+    known = parse_json(str(dataset.attrs["driftwalk"]), path=path)
+    if not isinstance(known, dict):
+        raise FormatError("the attribute 'driftwalk' is no JSON object", path=path)
+    texts = {key: known[key] for key in TEXTS if isinstance(known.get(key), str)}
+    numbers = {key: known[key] for key in NUMBERS if type(known.get(key)) in (int, float)}
+    return {**texts, **numbers}
 
 
 def _array(dataset: xr.Dataset, name: str, path: Path) -> xr.DataArray:

@@ -1,0 +1,1 @@
+"""Recorded and simulated motion in the files of other programs."""

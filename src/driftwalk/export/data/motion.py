@@ -1,0 +1,150 @@
+"""What moves in a run or a file: recordings, simulated worlds, and blocks that assemble."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from driftwalk.core.errors import InputError
+from driftwalk.core.json_text import read_json
+from driftwalk.core.run_layout import MANIFEST_FILE, state_of
+from driftwalk.core.toml_text import parse_toml
+from driftwalk.schema.netcdf import kind_of, open_netcdf
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+OF_WORLDS: Final = {"simulation": "replicate", "assembly_path": "run"}
+"""Kinds that hold several simulated worlds, and the dimension over which they do."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One world: bodies that moved together.
+
+    Attributes
+    ----------
+    name : str
+        Name of its files, without an ending.
+    recording : xarray.Dataset
+        Kind "trajectory".
+    """
+
+    name: str
+    recording: xr.Dataset
+
+
+def find_motions(source: Path, *, world: int | None = None) -> list[Motion]:
+    """Return every recording and every simulated world of a run directory or a file.
+
+    Parameters
+    ----------
+    source : Path
+        The run directory of a fit, a calibration, a comparison of models or of self-assembly; or a
+        file: a simulation, the path of an assembly, or a recording that is read without options.
+    world : int, optional
+        Which simulated world to take alone: a replicate, or a run of blocks; default: all.
+
+    Returns
+    -------
+    list of Motion
+        At least one.
+
+    Raises
+    ------
+    InputError
+        When there is no motion, or no such world.
+
+    Examples
+    --------
+    >>> find_motions(Path("fit"))[0].name  # doctest: +SKIP
+    'recording'
+    """
+    if state_of(source) == "new":
+        return _of_file(source, world)
+    files = [*sorted(source.glob("recording*.nc")), *sorted(source.glob("path.nc"))]
+    if not files:
+        raise InputError(
+            f"{source} holds no motion: neither a recording (recording.nc) nor runs of blocks "
+            "(path.nc); give the file of a recording or a simulation"
+        )
+    side = _side_of_run(source)
+    found = [motion for file in files for motion in _of_file(file, world)]
+    for motion in found:
+        if side is not None:
+            motion.recording.attrs.setdefault("block_side_m", side)
+    return found
+
+
+def _of_file(file: Path, world: int | None) -> list[Motion]:
+    from driftwalk.record import load
+
+    if not file.exists():
+        raise InputError(f"{file} does not exist: give a run directory, or a file with motion")
+    kind = kind_of(file) if file.is_file() else None
+    if kind in OF_WORLDS:
+        return list(_of_worlds(file, kind, world))
+    if kind == "assembly":
+        raise InputError(
+            f"{file} holds only the ends of the runs: give the run directory, whose path.nc holds "
+            "the whole way of some"
+        )
+    if world is not None:
+        raise InputError(f"{file} is a recording of one world: leave `world` out")
+    # A recording in the plain form that `load` makes of any file that needs no options.
+    return [Motion(file.stem.partition(".")[0] or "recording", load(file))]
+
+
+def _of_worlds(file: Path, kind: str, world: int | None) -> Iterator[Motion]:
+    from driftwalk.assembly import path_recording
+    from driftwalk.record import load
+
+    stored = open_netcdf(file)
+    dimension = OF_WORLDS[kind]
+    known = stored[dimension].values.tolist()
+    if world is not None and world not in known:
+        raise InputError(
+            f"{file}: there is no {dimension} {world}: it holds {known[0]} to {known[-1]}"
+        )
+    side = _side_of_simulation(stored)
+    for number in known if world is None else [world]:
+        recording = (
+            path_recording(stored, run=number)
+            if kind == "assembly_path"
+            else load(file, replicate=known.index(number))
+        )
+        if kind == "assembly_path":
+            recording["assembly"] = (
+                ("time", "body"),
+                stored["assembly"].sel(run=number).transpose("time", "block").values,
+            )
+        if side is not None:
+            recording.attrs["block_side_m"] = side
+        yield Motion(f"{dimension}_{number}", recording)
+
+
+def _side_of_simulation(stored: xr.Dataset) -> float | None:
+    """Return the side of the block [m] that was simulated; None for another body."""
+    if "block_side_m" in stored.attrs:
+        return float(stored.attrs["block_side_m"])
+    if "model" in stored.attrs or "study" not in stored.attrs:
+        return None
+    return _side_of_study(parse_toml(str(stored.attrs["study"])))
+
+
+def _side_of_run(folder: Path) -> float | None:
+    manifest = read_json(folder / MANIFEST_FILE) if (folder / MANIFEST_FILE).is_file() else {}
+    if not isinstance(manifest, dict):
+        return None
+    specification = manifest.get("specification")
+    if isinstance(specification, dict) and specification.get("model"):
+        return None
+    return _side_of_study(manifest.get("study"))
+
+
+def _side_of_study(study: object) -> float | None:
+    block = study.get("block") if isinstance(study, dict) else None
+    side = block.get("side_m") if isinstance(block, dict) else None
+    return float(side) if isinstance(side, (int, float)) else None

@@ -1,0 +1,181 @@
+"""Motion as a ROS 2 bag: one topic of stamped poses per body."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.atomic import require_free
+from driftwalk.core.errors import InputError
+from driftwalk.export.data.motion import Motion
+from driftwalk.schema import body_names
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+POSE_STAMPED: Final = "geometry_msgs/msg/PoseStamped"
+FRAME: Final = "tank"
+"""Frame of the poses: the recording's own, which begins in the centre of a tank that is known; z is
+out of the water."""
+NS_PER_S: Final = 1_000_000_000
+BAG_VERSION: Final = 9
+
+
+def write_ros(motion: Motion, folder: Path) -> list[Path]:
+    """Write a ROS 2 bag (MCAP) with one topic of ``PoseStamped`` per body.
+
+    A body whose orientation is unknown has a quaternion of four zeros, which is no rotation. The
+    stamps of the headers are the recording's times, as `first_stamp` says; what was known of the
+    recording is in the bag's custom data under ``driftwalk``.
+
+    Parameters
+    ----------
+    motion : Motion
+        What to write.
+    folder : Path
+        Where to write.
+
+    Returns
+    -------
+    list of Path
+        The folder of the bag, ``NAME_bag``.
+
+    Raises
+    ------
+    InputError
+        When rosbags is not installed, or the bag exists.
+
+    Examples
+    --------
+    >>> write_ros(Motion("recording", trajectory), Path("out"))  # doctest: +SKIP
+    [PosixPath('out/recording_bag')]
+    """
+    # Not NAME.bag, which the programs of ROS take for a file of ROS 1.
+    target = folder / f"{motion.name}_bag"
+    require_free(target, existing="error")
+    _write_bag(motion.recording, target)
+    return [target]
+
+
+def topics(recording: xr.Dataset) -> list[str]:
+    """Return the topic of each body; what ROS allows in no name becomes an underscore.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        Kind "trajectory".
+
+    Examples
+    --------
+    >>> from driftwalk.schema import build_trajectory
+    >>> pair = build_trajectory([0.0], [[0.0, 1.0]], [[0.0, 1.0]], body=["0", "robot a"])
+    >>> topics(pair)
+    ['/body_0', '/robot_a']
+    """
+    found: list[str] = []
+    for number, name in enumerate(body_names(recording)):
+        word = re.sub(r"_+", "_", re.sub(r"[^A-Za-z0-9_]", "_", name)).strip("_")
+        topic = f"/{word}" if word[:1].isalpha() else f"/body_{word or number}"
+        found.append(topic if topic not in found else f"{topic}_of_{number}")
+    return found
+
+
+def first_stamp(recording: xr.Dataset) -> int:
+    """Return the whole seconds that are added to the recording's times to make stamps.
+
+    Those since 1970 where the recording knows when it began; otherwise none, or as many as put the
+    first stamp above zero, which in ROS says that there is no time.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        Kind "trajectory".
+
+    Examples
+    --------
+    >>> from driftwalk.schema import build_trajectory
+    >>> first_stamp(build_trajectory([0.0, 0.1], [0.0, 0.0], [0.0, 0.0]))
+    1
+    """
+    began = recording.attrs.get("time_origin_unix_s")
+    if began is not None:
+        return int(np.floor(float(began)))
+    return max(0, 1 - int(np.floor(float(recording["time"].values[0]))))
+
+
+def stamps(recording: xr.Dataset) -> npt.NDArray[np.int64]:
+    """Return the stamp of each time [ns].
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        Kind "trajectory".
+
+    Raises
+    ------
+    InputError
+        When the times are beyond what a stamp holds.
+
+    Examples
+    --------
+    >>> from driftwalk.schema import build_trajectory
+    >>> stamps(build_trajectory([0.0, 0.1], [0.0, 0.0], [0.0, 0.0])).tolist()
+    [1000000000, 1100000000]
+    """
+    time = np.asarray(recording["time"].values, dtype=np.float64)
+    added = first_stamp(recording)
+    if not 0.0 < time[-1] + added < 2.0**31:
+        raise InputError(
+            f"the recording ends at {time[-1] + added:g} s, and a stamp of ROS holds at most "
+            f"{2**31 - 1} s"
+        )
+    began = float(recording.attrs.get("time_origin_unix_s", added)) - added
+    # Whole seconds apart, so that the part behind the point keeps its digits.
+    seconds = np.floor(time)
+    parts = np.rint((time - seconds + began) * NS_PER_S).astype(np.int64)
+    return (seconds.astype(np.int64) + added) * NS_PER_S + parts
+
+
+def _write_bag(recording: xr.Dataset, path: Path) -> None:
+    try:
+        from rosbags.rosbag2 import StoragePlugin, Writer
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError as error:
+        raise InputError("a ROS bag needs rosbags: pip install 'driftwalk[ros]'") from error
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    known = {key: str(value) for key, value in recording.attrs.items()}
+    x, y, theta = (recording[name].values for name in ("x", "y", "theta"))
+    with Writer(path, version=BAG_VERSION, storage_plugin=StoragePlugin.MCAP) as writer:
+        writer.set_custom_data("driftwalk", json.dumps(known))
+        connections = [
+            writer.add_connection(topic, POSE_STAMPED, typestore=store)
+            for topic in topics(recording)
+        ]
+        for row, stamp in enumerate(stamps(recording).tolist()):
+            for body in np.flatnonzero(np.isfinite(x[row]) & np.isfinite(y[row])).tolist():
+                pose = (float(x[row, body]), float(y[row, body]), float(theta[row, body]))
+                message = _message(store.types, stamp, *pose)
+                writer.write(connections[body], stamp, store.serialize_cdr(message, POSE_STAMPED))
+
+
+def _message(types: dict[str, Any], stamp: int, x: float, y: float, theta: float) -> Any:
+    """Return a pose in the plane of the water, with z out of it."""
+    seconds, rest = divmod(stamp, NS_PER_S)
+    turned = np.isfinite(theta)
+    quaternion = (0.0, 0.0, np.sin(theta / 2.0), np.cos(theta / 2.0)) if turned else (0.0,) * 4
+    return types[POSE_STAMPED](
+        header=types["std_msgs/msg/Header"](
+            stamp=types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=rest), frame_id=FRAME
+        ),
+        pose=types["geometry_msgs/msg/Pose"](
+            position=types["geometry_msgs/msg/Point"](x=x, y=y, z=0.0),
+            orientation=types["geometry_msgs/msg/Quaternion"](
+                **dict(zip("xyzw", map(float, quaternion), strict=True))
+            ),
+        ),
+    )

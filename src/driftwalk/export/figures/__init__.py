@@ -1,0 +1,1 @@
+"""The figures of a run for print, with their numbers."""

@@ -1,0 +1,292 @@
+"""A film of what moves in the tank: blocks that assemble, or the bodies of a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.atomic import atomic_path, require_target
+from driftwalk.core.errors import InputError
+from driftwalk.plot.parts.arena import CM_PER_M, arena_of, draw_arena
+from driftwalk.plot.parts.assembly_labels import PALETTE
+from driftwalk.plot.parts.film_file import FRAMES_PER_S, Frame, require_film_writer, write_frames
+from driftwalk.plot.parts.scale_bar import draw_scale_bar
+from driftwalk.plot.parts.style import INK, MUTED, new_figure, print_style
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = npt.NDArray[np.float64]
+FILM_MM: Final = 101.6
+"""Width and height of a film [mm]: an even number of dots, as encoders ask."""
+DOTS_PER_INCH: Final = {".gif": 100, ".mp4": 200}
+TRAIL_S: Final = 5.0
+"""How long the trail behind a body is, in seconds of the film."""
+SHORTEST_S: Final = 0.2
+MOST_FRAMES: Final = 15_000
+"""Ten minutes of an MP4; a longer film is rather shown faster."""
+HELD_INTERVALS: Final = 3.0
+"""For how many of its usual intervals a body that is not seen stays in the picture."""
+DISC_SHARE: Final = 0.015
+"""Radius of a body of unknown size, as a share of the picture."""
+
+
+@dataclass(frozen=True)
+class _Scene:
+    """What moves, in cm and s."""
+
+    time: Array
+    x: Array
+    y: Array
+    theta: Array
+    color: npt.NDArray[np.int64]
+    side: float | None
+    arena: dict[str, Any]
+
+
+def write_animation(
+    motion: xr.Dataset,
+    file: str | Path,
+    *,
+    run: int = 0,
+    seconds: float | None = None,
+    speed: float | None = None,
+) -> Path:
+    """Write a film of blocks that assemble, or of a recording, as GIF or as MP4.
+
+    Blocks are coloured by assembly, the bodies of a recording each by its own colour. A line in a
+    block points where its orientation does; a body without an orientation is a disc. Behind each
+    lies its way of the last 5 s of the film. The film has 12.5 frames per second as GIF and 25 as
+    MP4; each shows the last sample up to its time, and a body that was not seen for three of its
+    usual intervals is not shown.
+
+    Parameters
+    ----------
+    motion : xarray.Dataset
+        An `assembly_path`, or a `trajectory`, whose attributes ``arena`` and ``block_side_m`` are
+        used where they are there.
+    file : path-like
+        Where to write; the ending, ``.gif`` or ``.mp4``, says as what.
+    run : int
+        Which run of an `assembly_path`, counted from 0.
+    seconds : float, optional
+        How long the film takes [s], at least 0.2; default: 20 s, unless `speed` is given.
+    speed : float, optional
+        How much faster than real time the film is, in place of `seconds`.
+
+    Returns
+    -------
+    pathlib.Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind, has no such run or no motion; when the ending is
+        another one, the folder does not exist, the film would be too long, or an MP4 is asked for
+        where neither the program ffmpeg nor OpenCV is installed.
+    RunDirectoryError
+        When the file cannot be written.
+
+    Examples
+    --------
+    ``write_animation(path, "run.gif", run=2)``
+    ``write_animation(recording, "recording.mp4", speed=4.0)``
+    """
+    target = Path(file)
+    require_target(target, existing="replace", endings=tuple(FRAMES_PER_S))
+    if seconds is not None and speed is not None:
+        raise InputError("`seconds` and `speed` say the same in two ways: give one")
+    scene = _scene(motion, run)
+    ending = target.suffix.lower()
+    moments, rate = _moments(scene.time, FRAMES_PER_S[ending], seconds, speed)
+    require_film_writer(ending)
+    with print_style(), atomic_path(target) as temporary:
+        write_frames(temporary, ending, _frames(scene, moments, rate, DOTS_PER_INCH[ending]))
+    return target
+
+
+def _scene(motion: xr.Dataset, run: int) -> _Scene:
+    kind = str(motion.attrs.get("kind", "a dataset of no kind"))
+    if kind not in ("assembly_path", "trajectory"):
+        raise InputError(f"expected a dataset of kind assembly_path or trajectory, got '{kind}'")
+    one, bodies = motion, "body"
+    if kind == "assembly_path":
+        runs = motion.sizes["run"]
+        if not 0 <= run < runs:
+            raise InputError(f"run={run}: the dataset has {runs} runs, counted from 0")
+        one, bodies = motion.isel(run=run), "block"
+        if "block_side_m" not in motion.attrs:
+            raise InputError("the dataset has no attribute 'block_side_m': the size is unknown")
+    x, y, theta = (
+        np.asarray(one[name].transpose("time", bodies).values, dtype=np.float64)
+        for name in ("x", "y", "theta")
+    )
+    if not (np.isfinite(x) & np.isfinite(y)).any():
+        raise InputError("no sample holds a position: there is nothing to film")
+    color = np.broadcast_to(np.arange(x.shape[1]), x.shape)
+    if "assembly" in one:
+        color = one["assembly"].transpose("time", bodies).values
+    side = motion.attrs.get("block_side_m")
+    return _Scene(
+        np.asarray(one["time"].values, dtype=np.float64),
+        CM_PER_M * x,
+        CM_PER_M * y,
+        theta,
+        np.asarray(color, dtype=np.int64),
+        None if side is None else CM_PER_M * float(side),
+        arena_of(motion),
+    )
+
+
+def _moments(
+    time: Array, per_second: float, seconds: float | None, speed: float | None
+) -> tuple[Array, float]:
+    """Return the time of every frame [s], and how much faster than real time that is."""
+    lasts = float(time[-1] - time[0])
+    if speed is None:
+        seconds = 20.0 if seconds is None else seconds
+        if not seconds >= SHORTEST_S:
+            raise InputError(f"seconds={seconds:g}: a film takes at least {SHORTEST_S:g} s")
+        count = max(2.0, round(seconds * per_second))
+        rate = lasts / seconds
+    else:
+        if not (np.isfinite(speed) and speed > 0.0):
+            raise InputError(f"`speed` must be a number above zero, got {speed:g}")
+        count = np.floor(lasts * per_second / speed * (1.0 + 1e-12)) + 1.0
+        rate = speed
+    if count > MOST_FRAMES:
+        least = lasts * per_second / MOST_FRAMES
+        raise InputError(
+            f"the film would take {count / per_second:.0f} s, and at most "
+            f"{MOST_FRAMES / per_second:.0f} s are written: give a `speed` of at least "
+            f"{np.ceil(least):g}"
+        )
+    if speed is None:
+        return np.linspace(time[0], time[-1], int(count)), rate
+    return time[0] + np.arange(int(count)) * (speed / per_second), rate
+
+
+def _frames(scene: _Scene, moments: Array, rate: float, dots: int) -> Iterator[Frame]:
+    """Draw what stays once, and what moves on top of it for every frame."""
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    figure, ax = _stage(scene, rate, dots)
+    canvas: Any = figure.canvas
+    canvas.draw()
+    empty = canvas.copy_from_bbox(figure.bbox)
+    trails = LineCollection([], colors=MUTED, linewidths=0.8, alpha=0.7, zorder=2)
+    bodies = PolyCollection([], edgecolors=INK, linewidths=0.6, zorder=3)
+    pointers = LineCollection([], colors=INK, linewidths=0.9, zorder=4)
+    clock = figure.text(0.04, 0.955, "", size=9.0, va="center")
+    for artist in (trails, bodies, pointers):
+        ax.add_collection(artist, autolim=False)
+    seen = _last_seen(scene)
+    digits = 1 if rate < 10.0 else 0
+    size = _size(scene, ax)
+    for moment in moments:
+        # A hair of rounding is forgiven.
+        until = int(np.searchsorted(scene.time, moment + 1e-9 * max(1.0, abs(moment)), "right"))
+        shown = [(seen[until - 1, body], body) for body in range(scene.x.shape[1])]
+        shown = [(sample, body) for sample, body in shown if sample >= 0]
+        trails.set_segments(_trails(scene, moment, until, shown, TRAIL_S * rate))
+        bodies.set_verts([_outline(scene, *one, size) for one in shown])
+        bodies.set_facecolor([PALETTE[scene.color[one] % len(PALETTE)] for one in shown])
+        pointers.set_segments([line for one in shown if (line := _pointer(scene, *one, size))])
+        clock.set_text(f"t = {moment:.{digits}f} s")
+        canvas.restore_region(empty)
+        for artist in (trails, bodies, pointers):
+            ax.draw_artist(artist)
+        figure.draw_artist(clock)
+        yield np.asarray(canvas.buffer_rgba())[:, :, :3]
+
+
+def _stage(scene: _Scene, rate: float, dots: int) -> tuple[Figure, Axes]:
+    """Return the empty tank with its scale and the speed of the film.
+
+    Axes without ticks and a fixed layout: a frame is drawn in some milliseconds.
+    """
+    figure = new_figure(width_mm=FILM_MM, height_mm=FILM_MM)
+    figure.set_layout_engine("none")
+    figure.set_dpi(dots)
+    ax = figure.add_axes((0.03, 0.03, 0.94, 0.9))
+    ax.set_axis_off()
+    if draw_arena(ax, scene.arena) is None:
+        _frame_motion(scene, ax)
+    draw_scale_bar(ax)
+    words = "real time" if rate == 1.0 else f"{rate:.3g} × real time"
+    figure.text(0.96, 0.955, words, size=8.0, va="center", ha="right")
+    return figure, ax
+
+
+def _frame_motion(scene: _Scene, ax: Axes) -> None:
+    """Frame everything that is ever seen, in a square."""
+    middle = [(np.nanmin(values) + np.nanmax(values)) / 2.0 for values in (scene.x, scene.y)]
+    width = max(float(np.nanmax(values) - np.nanmin(values)) for values in (scene.x, scene.y))
+    half = 0.54 * width + (scene.side or 0.0) or 1.0
+    ax.set_xlim(middle[0] - half, middle[0] + half)
+    ax.set_ylim(middle[1] - half, middle[1] + half)
+
+
+def _size(scene: _Scene, ax: Axes) -> float:
+    """Return the half of a side, or the radius of a disc, in cm."""
+    if scene.side is not None:
+        return scene.side / 2.0
+    low, high = ax.get_xlim()
+    return DISC_SHARE * (high - low)
+
+
+def _last_seen(scene: _Scene) -> npt.NDArray[np.int64]:
+    """Return the sample that shows each body at each time, -1 while it is not seen."""
+    present = np.isfinite(scene.x) & np.isfinite(scene.y)
+    rows = np.arange(scene.time.size, dtype=np.int64)[:, None]
+    last = np.maximum.accumulate(np.where(present, rows, -1), axis=0)
+    for body in range(present.shape[1]):
+        own = scene.time[present[:, body]]
+        usual = float(np.median(np.diff(own))) if own.size > 1 else 0.0
+        age = scene.time - scene.time[last[:, body]]
+        last[age > HELD_INTERVALS * usual * (1.0 + 1e-9), body] = -1
+    return last
+
+
+def _trails(
+    scene: _Scene, moment: float, until: int, shown: list[tuple[Any, int]], lasts: float
+) -> list[Array]:
+    """Return the way of each body that is shown; NaN in it breaks the line."""
+    first = int(np.searchsorted(scene.time, moment - lasts))
+    return [
+        np.column_stack([scene.x[first:until, body], scene.y[first:until, body]])
+        for _, body in shown
+    ]
+
+
+def _outline(scene: _Scene, sample: int, body: int, size: float) -> Array:
+    """Return the corners of a block, or a disc where side or orientation are unknown."""
+    theta = scene.theta[sample, body]
+    square = scene.side is not None and np.isfinite(theta)
+    turn = theta + np.pi / 4.0 if square else 0.0
+    angles = turn + np.linspace(0.0, 2.0 * np.pi, 4 if square else 24, endpoint=False)
+    radius = size * np.sqrt(2.0) if square else size
+    return np.column_stack(
+        [
+            scene.x[sample, body] + radius * np.cos(angles),
+            scene.y[sample, body] + radius * np.sin(angles),
+        ]
+    )
+
+
+def _pointer(scene: _Scene, sample: int, body: int, size: float) -> list[tuple[float, float]]:
+    """Return the line from the middle of a body to its front, nothing where that is unknown."""
+    theta = float(scene.theta[sample, body])
+    if not np.isfinite(theta):
+        return []
+    x, y = float(scene.x[sample, body]), float(scene.y[sample, body])
+    reach = size if scene.side is not None else 2.0 * size
+    return [(x, y), (x + reach * np.cos(theta), y + reach * np.sin(theta))]
