@@ -4,7 +4,8 @@
 
 Each form is written once and read in a fresh process, because the peak of the memory is that of a
 process. The share is that of the file's size which the reading takes besides what Python and its
-libraries have. Checked, else the script fails: the positions that come back are those that were written.
+libraries have. Checked, else the script fails: the positions that come back are those that were
+written.
 """
 
 from __future__ import annotations
@@ -125,8 +126,8 @@ def main() -> None:
         seconds, before, peak = map(float, answer.stdout.split())
         print(
             f"{form:<10} {size / 1e6:>6.0f} {seconds:>6.1f} {size / 1e6 / seconds:>6.1f} "
-            f"{TARGET_MB_S:>7.0f} {peak / 1e6:>8.0f} {before / 1e6:>14.0f} {(peak - before) / size:>6.2f} "
-            f"{TARGET_SHARE:>7.1f}",
+            f"{TARGET_MB_S:>7.0f} {peak / 1e6:>8.0f} {before / 1e6:>14.0f} "
+            f"{(peak - before) / size:>6.2f} {TARGET_SHARE:>7.1f}",
             flush=True,
         )
 
