@@ -34,9 +34,9 @@ class Text(NamedTuple):
 
 @cache
 def texts() -> list[Text]:
-    """Return every string of the library."""
-    command_line = PACKAGE / "cli"
-    files = [path for path in PACKAGE.rglob("*.py") if not path.is_relative_to(command_line)]
+    """Return every string of the library; the programs in an export have options of their own."""
+    others = (PACKAGE / "cli", PACKAGE / "export" / "simulators" / "files")
+    files = [path for path in PACKAGE.rglob("*.py") if not any(map(path.is_relative_to, others))]
     return [text for path in sorted(files) for text in texts_of(path)]
 
 

@@ -16,6 +16,7 @@ import pytest
 from twin.block import Floats, TwinModel
 
 import driftwalk as dw
+from driftwalk.core.errors import InputError
 from driftwalk.export import Source, export_run, target_named
 from driftwalk.export.simulators.block import Block
 from driftwalk.export.simulators.compiled import compiler, write_force
@@ -65,10 +66,10 @@ def random_states(count: int) -> Floats:
 
 def a_compiler() -> str:
     """Return the C compiler, or skip the test."""
-    found = compiler()
-    if found is None:
-        pytest.skip("no C compiler")
-    return found
+    try:
+        return compiler()
+    except InputError as error:
+        pytest.skip(str(error))
 
 
 def study_file(folder: Path, **keys: Any) -> tuple[Path, Path]:

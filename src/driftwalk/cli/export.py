@@ -112,7 +112,7 @@ def export(
         print_row("begin with", out / "README.md")
         for line in () if outcome is None else outcome.lines:
             print_row(
-                "verified" if outcome is not None and outcome.passed else "NOT THE SAME", line
+                "verified" if outcome is not None and outcome.passed else "NOT VERIFIED", line
             )
     return 0 if outcome is None or outcome.passed else 1
 

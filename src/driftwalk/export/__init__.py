@@ -1,4 +1,4 @@
-"""What leaves driftwalk: a calibrated model as something that another program runs."""
+"""The way out: a calibrated model as something that another program runs."""
 
 from driftwalk.export.registry import TARGETS, target_named
 from driftwalk.export.target import Source, Target, Verification

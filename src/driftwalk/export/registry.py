@@ -56,9 +56,9 @@ def _verify_gazebo(folder: Path) -> Verification:
 
 
 def _require_compiler() -> None:
-    from driftwalk.export.simulators.compiled import require_compiler
+    from driftwalk.export.simulators.compiled import compiler
 
-    require_compiler()
+    compiler()
 
 
 _SIMULATORS: Final = (

@@ -1,4 +1,4 @@
-"""What a target of an export is: a name, a line about it, a function that writes it."""
+"""A target of an export: its name, a line about it, a function that writes it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def _nobody(_sentence: str) -> None:
 
 @dataclass(frozen=True)
 class Source:
-    """What is exported.
+    """A run to be exported.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Target:
     Attributes
     ----------
     name : str
-        As it is typed after ``--to``.
+        As `driftwalk export --to` takes it.
     gives : str
         What is in the folder, in a few words.
     write : callable

@@ -1,4 +1,4 @@
-"""An export comes into being whole: made in a folder beside its place, then renamed into it."""
+"""An export exists whole or not at all: it is made in a hidden folder, which is then renamed."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def export_run(source: Source, target: Target, folder: Path) -> list[Path]:
         made.rename(folder)
     except BaseException as error:
         shutil.rmtree(made, ignore_errors=True)
-        refusal = storage_error(error, made)
+        refusal = storage_error(error, folder)
         if refusal is None:
             raise
         raise refusal from error

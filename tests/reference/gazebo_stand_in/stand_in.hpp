@@ -1,5 +1,5 @@
-// What the system plugin of an export asks of Gazebo, in the form that Gazebo has it: one link, whose
-// state the stand-in holds. Names and frames are Gazebo's; nothing of Gazebo is in it.
+// What the system plugin of an export asks of Gazebo, in the form that Gazebo has it: one link,
+// whose state the stand-in holds. Names and frames are Gazebo's; nothing of Gazebo is in it.
 #pragma once
 
 #include <chrono>

@@ -15,16 +15,15 @@ import numpy as np
 from driftwalk.core.errors import InputError
 from driftwalk.export.simulators.block import Block, Floats
 from driftwalk.export.simulators.parts import Folder, stored_text, wall_pieces, write_numbers
-from driftwalk.export.simulators.reference import PathSet, forces_of, reference_of
+from driftwalk.export.simulators.reference import NO_PATH, PathSet, forces_of, reference_of
 from driftwalk.export.target import Verification
 
-NEEDS_COMPILER: Final = "a C compiler: install gcc or clang, or name one in the variable CC"
 THICKNESS: Final = 0.1
 """Of the boxes that make the wall, as a share of the tank's width."""
 
 
 def write_force(folder: Folder, block: Block, sources: str) -> None:
-    """Write the force as C into a subfolder, and the numbers of the model beside it."""
+    """Write the force as C into a subfolder, and the numbers of the model."""
     write_numbers(folder, block)
     for name in ("floating_block.h", "floating_block.c"):
         folder.copy(f"force/{name}", f"{sources}/{name}")
@@ -133,29 +132,26 @@ def wall_texts(block: Block, template: str, **more: str) -> str:
     )
 
 
-def compiler() -> str | None:
-    """Return a C compiler of this machine, the variable CC first; None where there is none."""
-    names = (os.environ.get("CC", ""), "cc", "gcc", "clang")
-    return next((found for name in names if name and (found := shutil.which(name))), None)
-
-
-def require_compiler() -> None:
-    """Refuse where there is no C compiler.
+def compiler() -> str:
+    """Return a C compiler of this machine, that of the variable CC first.
 
     Raises
     ------
     InputError
-        Says what to do.
+        When there is none; says what to do.
     """
-    if compiler() is None:
-        raise InputError(f"--verify needs {NEEDS_COMPILER}")
+    names = (os.environ.get("CC", ""), "cc", "gcc", "clang")
+    found = next((place for name in names if name and (place := shutil.which(name))), None)
+    if found is None:
+        raise InputError(
+            "the proof needs a C compiler: install gcc or clang, or name one in the variable CC"
+        )
+    return found
 
 
 def verify_force(folder: Path, sources: str) -> Verification:
     """Compile the force of an export with ``verify.c``, and run it against driftwalk's numbers."""
     found = compiler()
-    if found is None:
-        raise InputError(f"the proof needs {NEEDS_COMPILER}")
     with tempfile.TemporaryDirectory() as name:
         program = Path(name) / "verify"
         places = [folder / sources / file for file in ("floating_block.c", "model_data.c")]
@@ -172,7 +168,9 @@ def verify_force(folder: Path, sources: str) -> Verification:
         f"{numbers['forces']} forces of the compiled code: relative error at most "
         f"{numbers['largest_relative_error']:.2g}",
         f"{numbers['paths']} paths by the compiled code, with and without the stochastic force: "
-        f"at most {1e6 * numbers['largest_distance_m']:.2g} µm from driftwalk's",
+        f"at most {1e6 * numbers['largest_distance_m']:.2g} µm from driftwalk's"
+        if numbers["paths"]
+        else NO_PATH,
     )
     return Verification(done.returncode == 0 and numbers["paths"] > 0, lines, numbers)
 

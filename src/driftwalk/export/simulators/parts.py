@@ -1,4 +1,4 @@
-"""What the exports to simulators have in common: study, flow, licence, texts, and the wall."""
+"""Parts that the exports to simulators share: study, flow, licence, texts, and the wall."""
 
 from __future__ import annotations
 
@@ -61,7 +61,9 @@ def write_common(folder: Folder, block: Block) -> None:
 
     folder.text("study.toml", block.study.to_toml())
     folder.data("flow.nc", netcdf_bytes(block.flow))
-    folder.text("LICENSE", distribution("driftwalk").read_text("licenses/LICENSE") or "")
+    folder.text(
+        "LICENSE", distribution("driftwalk").read_text("licenses/LICENSE") or "BSD-3-Clause\n"
+    )
 
 
 def write_numbers(folder: Folder, block: Block) -> None:
@@ -131,8 +133,8 @@ def wall_pieces(tank: Tank) -> list[Piece]:
     return pieces
 
 
-def start_pose(block: Block) -> tuple[float, float, float]:
-    """Return where `driftwalk simulate` lets the first replicate start: x, y [m], theta [rad]."""
+def start_pose(block: Block, replicate: int = 0) -> tuple[float, float, float]:
+    """Return where `driftwalk simulate` lets a replicate start: x, y [m], theta [rad]."""
     from driftwalk.core.seeds import world_keys
     from driftwalk.model import Pose
     from driftwalk.simulation.initial import random_start
@@ -140,6 +142,6 @@ def start_pose(block: Block) -> tuple[float, float, float]:
     start = block.study.simulation.start
     if isinstance(start, Pose):
         return start.x_m, start.y_m, start.theta_rad
-    drawn = random_start(block.study, world_keys(block.seed, trial=0, replicate=[0]))
+    drawn = random_start(block.study, world_keys(block.seed, trial=0, replicate=[replicate]))
     x, y, theta = (float(np.asarray(value)[0]) for value in (drawn.x, drawn.y, drawn.theta))
     return x, y, theta

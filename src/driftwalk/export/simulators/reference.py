@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.export.simulators.block import Block, Floats
 
@@ -17,12 +19,13 @@ if TYPE_CHECKING:
 TRIED: Final = 64
 """Replicates among which those that stay clear of the wall are looked for."""
 KEPT: Final = 4
-"""Paths of each set, without the stochastic force and with it."""
+"""Most paths of each set, without the stochastic force and with it."""
 LENGTHS_S: Final = (10.0, 5.0, 2.0, 1.0)
 """Lengths of the paths, the longest first: in a narrow tank none is clear of the wall for long."""
 SAMPLE_S: Final = 0.1
 CLEARANCE_M: Final = 1e-3
 FORCES: Final = 200
+NO_PATH: Final = "no path stays clear of the wall of this tank for a second: nothing was compared"
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ class PathSet:
 
 @dataclass(frozen=True)
 class Reference:
-    """What driftwalk computes for an export.
+    """The paths that driftwalk computes for an export.
 
     Attributes
     ----------
@@ -84,13 +87,13 @@ def reference_of(block: Block) -> Reference:
     study = apply_overrides(block.study, seen)
     interval = study.forces.force_interval_s
     intervals = max(1, round(SAMPLE_S / interval))
-    steps = intervals * round(interval / study.time_step_s)
+    period, steps = intervals * interval, intervals * round(interval / study.time_step_s)
     for length in LENGTHS_S:
-        samples = round(length / (intervals * interval)) + 1
-        time = np.arange(samples, dtype=np.float64) * (intervals * interval)
+        samples = math.ceil(length / period - 1e-9) + 1
+        time = np.arange(samples, dtype=np.float64) * period
         still = _clear_paths(apply_overrides(study, {"forces.force_std_N": 0.0}), block, time)
         noisy = _clear_paths(study, block, time)
-        if still.replicate.size == noisy.replicate.size == KEPT:
+        if min(still.replicate.size, noisy.replicate.size) > 0:
             break
     return Reference(time, steps, still, noisy)
 
@@ -100,11 +103,16 @@ def _clear_paths(study: Study, block: Block, time: Floats) -> PathSet:
     from driftwalk.simulation.initial import random_start
 
     keys = world_keys(block.seed, trial=0, replicate=np.arange(TRIED))
+    try:
+        start = random_start(study, keys)
+    except InputError:  # the block hardly fits into the tank
+        none = np.zeros((0, time.size))
+        return PathSet(np.zeros(0, dtype=np.int64), none, none, none)
     run = simulate(
         study,
         block.flow,
         sample_time=time,
-        start=random_start(study, keys),
+        start=start,
         replicates=TRIED,
         seed=block.seed,
         backend="reference",
@@ -141,8 +149,11 @@ def forces_of(block: Block) -> Floats:
     model = native_model(block.study, block.flow, np.zeros(1), Camera())
     rng = np.random.default_rng(block.seed)
     width, height = block.study.tank.extent_m
-    reach = np.array([width / 2, height / 2, np.pi, 0.1, 0.1, 2.0])
-    states = rng.uniform(-1.0, 1.0, (FORCES, 6)) * reach
+    # A circle has no corners; its centre is the origin.
+    corners = np.array(block.study.tank.corners_m or [(-width / 2, -height / 2)])
+    low = np.array([*corners.min(axis=0), -np.pi, -0.1, -0.1, -2.0])
+    size = np.array([width, height, 2 * np.pi, 0.2, 0.2, 4.0])
+    states = low + rng.uniform(size=(FORCES, 6)) * size
     names = ("x", "y", "theta", "vx", "vy", "omega")
     pushes = [
         _core.drag(

@@ -46,15 +46,14 @@ static double bend(const fb_model* model, double relative_x, double relative_y) 
   if (model->drag_power == 2) {
     return 1;
   }
-  square = (relative_x * relative_x + relative_y * relative_y) /
-           (model->drag_speed * model->drag_speed);
+  square =
+      (relative_x * relative_x + relative_y * relative_y) / (model->drag_speed * model->drag_speed);
   return pow(square > 1e-9 ? square : 1e-9, model->drag_power / 2 - 1);
 }
 
 fb_push fb_drag(const fb_model* model, const fb_state* state) {
   const double half = model->side / 2, width = model->side / model->strips;
-  const double scale =
-      0.5 * model->water_density * model->drag_coefficient * width * model->depth;
+  const double scale = 0.5 * model->water_density * model->drag_coefficient * width * model->depth;
   const double linear = model->linear_drag / (4 * model->strips);
   double normal_x = cos(state->theta), normal_y = sin(state->theta);
   fb_push sum = {0, 0, 0, 0};
@@ -85,7 +84,8 @@ fb_push fb_drag(const fb_model* model, const fb_state* state) {
   return sum;
 }
 
-/* The mean of Du/Dt at four points that have the second moments of the square, and half its curl. */
+/* The mean of Du/Dt at four points that have the second moments of the square, and half its curl.
+ */
 static void add_acceleration(const fb_model* model, const fb_state* state, fb_push* push) {
   const double reach = model->side / sqrt(12.0);
   const double share = model->added_mass_share;
@@ -96,8 +96,8 @@ static void add_acceleration(const fb_model* model, const fb_state* state, fb_pu
   for (int corner = 0; corner < 4; ++corner) {
     const double arm_x = corner & 1 ? reach : -reach, arm_y = corner & 2 ? reach : -reach;
     double x, y;
-    look_up(model, model->acceleration_x, model->acceleration_y, state->x + arm_x,
-            state->y + arm_y, &x, &y);
+    look_up(model, model->acceleration_x, model->acceleration_y, state->x + arm_x, state->y + arm_y,
+            &x, &y);
     sum_x += x;
     sum_y += y;
     spin += arm_x * y - arm_y * x;

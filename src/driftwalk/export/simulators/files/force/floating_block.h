@@ -13,17 +13,17 @@ extern "C" {
 
 /* The model that was exported; `floating_block_model` in model_data.c. */
 typedef struct {
-  double side, mass, inertia;   /* of the block alone */
-  double added_mass_share;      /* of mass and inertia, moves along with the block */
-  double depth;                 /* of the wetted sides */
-  int strips;                   /* of each side face */
+  double side, mass, inertia; /* of the block alone */
+  double added_mass_share;    /* of mass and inertia, moves along with the block */
+  double depth;               /* of the wetted sides */
+  int strips;                 /* of each side face */
   double water_density;
   double drag_coefficient;
-  double linear_drag;           /* kg/s, of all strips together */
+  double linear_drag;            /* kg/s, of all strips together */
   double drag_power, drag_speed; /* power of the speed; speed at which the coefficient holds */
-  double displaced_mass;        /* 0: water that accelerates does not push */
+  double displaced_mass;         /* 0: water that accelerates does not push */
   double force_std, force_interval, force_memory; /* N, s, s */
-  double time_step;             /* of driftwalk */
+  double time_step;                               /* of driftwalk */
   uint64_t seed;
   /* Nodes of the flow, row after row from below: velocity, and acceleration or NULL. */
   int columns, rows;
@@ -64,16 +64,15 @@ typedef struct {
 void fb_begin_noise(fb_noise* noise, uint64_t seed, uint64_t replicate);
 
 /* The force of an interval [N]; the first interval, from 0 s on, is number 0. */
-void fb_stochastic_force(const fb_model* model, fb_noise* noise, int64_t interval,
-                         double force[2]);
+void fb_stochastic_force(const fb_model* model, fb_noise* noise, int64_t interval, double force[2]);
 
 /* The interval that a step belongs to which begins at a time [s]. */
 int64_t fb_interval_at(const fb_model* model, double time);
 
 /* The forces of one step after the other, for a simulator that changes the velocity and then moves
- * by the new one, as ODE, DART and Bullet do. Taken plainly that is of first order in the step. Here
- * its velocity is taken as that of half a step ago (leapfrog), which is of second order: the first
- * step gets half of its force.
+ * by the new one, as ODE, DART and Bullet do. Taken plainly that is of first order in the step.
+ * Here its velocity is taken as that of half a step ago (leapfrog), which is of second order: the
+ * first step gets half of its force.
  */
 typedef struct {
   fb_noise noise;
@@ -83,8 +82,8 @@ typedef struct {
 
 void fb_begin_drive(fb_drive* drive, uint64_t seed, uint64_t replicate);
 
-/* What to add to the body in the step from a time on, of the length `step` [s]; the state is that of
- * the simulator. The conductance is 0. */
+/* What to add to the body in the step from a time on, of the length `step` [s]; the state is that
+ * of the simulator. The conductance is 0. */
 fb_push fb_drive_step(const fb_model* model, fb_drive* drive, const fb_state* state, double time,
                       double step);
 

@@ -12,8 +12,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-static const double farthest = 1e-9;        /* m, of a path from driftwalk's */
-static const double largest_error = 1e-10;  /* of a force, relative */
+static const double farthest = 1e-9;       /* m, of a path from driftwalk's */
+static const double largest_error = 1e-10; /* of a force, relative */
 
 typedef struct {
   double x, y, theta;
@@ -54,9 +54,8 @@ static void step(const fb_model* model, body* block, const double force[2]) {
   const double mean_y = ahead.vy + dt / 2 * (push.y / mass - block->drag.y) / damping;
   const double mean_omega =
       ahead.omega + dt / 2 * (push.torque / inertia - block->drag.theta) / spin_damping;
-  const fb_state after = {now->x + dt * mean_x,      now->y + dt * mean_y,
-                          now->theta + dt * mean_omega, 2 * mean_x - now->vx,
-                          2 * mean_y - now->vy,      2 * mean_omega - now->omega};
+  const fb_state after = {now->x + dt * mean_x, now->y + dt * mean_y, now->theta + dt * mean_omega,
+                          2 * mean_x - now->vx, 2 * mean_y - now->vy, 2 * mean_omega - now->omega};
   block->drag.x = (after.vx - now->vx) / dt - noise_x;
   block->drag.y = (after.vy - now->vy) / dt - noise_y;
   block->drag.theta = (after.omega - now->omega) / dt;

@@ -9,8 +9,8 @@
     while data.time < 10:
         mujoco.mj_step(model, data)
 
-Needs numpy and mujoco, and the files block.json and flow.npz beside it. SI units; angles in rad,
-counter-clockwise; the frame is that of the tank's centre.
+Needs numpy and mujoco, and the files block.json and flow.npz in its folder. SI units; angles in
+rad, counter-clockwise; the frame is that of the tank's centre.
 """
 
 from __future__ import annotations

@@ -60,8 +60,8 @@ void webots_physics_step() {
   }
   keep_in_plane(block);
   const fb_state state = state_of(block);
-  const fb_push push = fb_drive_step(model, &drive, &state, (now_ms - begin_ms) / 1000,
-                                     (now_ms - last_ms) / 1000);
+  const fb_push push =
+      fb_drive_step(model, &drive, &state, (now_ms - begin_ms) / 1000, (now_ms - last_ms) / 1000);
   last_ms = now_ms;
   dBodyAddForce(block, push.x, push.y, 0);
   dBodyAddTorque(block, 0, 0, push.torque);
