@@ -56,8 +56,8 @@ COMMANDS: Final[dict[str, Command]] = {
         "classify", "classify", "Say what the blocks of a recording assembled into."
     ),
     "export": Command("export", "export", "Take a calibrated model to another simulator."),
-    "report": Command("report", "report", "Write a report of a run: one HTML file."),
-    "cite": Command("cite", "cite", "Say what to cite for a run."),
+    "report": Command("sharing.report", "report", "Write a report of a run: one HTML file."),
+    "cite": Command("sharing.cite", "cite", "Say what to cite for a run."),
     "view": Command("view", "view", "Explore a run in the browser, or watch a tracker."),
     "play": Command("play", "play", "Turn the knobs of the model while the tank moves."),
     "demo": Command("demo", "demo", "Fit a bundled recording, and calibrate on the fitted flow."),

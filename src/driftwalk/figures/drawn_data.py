@@ -31,8 +31,8 @@ def write_drawn_data(figure: Figure, path: Path) -> None:
     One row per point: the panel with its title and the labels of its axes, the artist, what kind it
     is and its label in the legend, and the numbers. A line, the outline of an area and a contour
     have x and y; an arrow also has dx and dy, a rectangle its lower left corner and its width
-    and height; points, cells of a map and contours have the value that is their colour. What is
-    placed relative to the axes, such as a legend, is no data and is left out.
+    and height; points, cells of a map and contours have the value that is their colour. A legend
+    and other artists that are placed relative to the axes are no data, and left out.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ DISC_SHARE: Final = 0.015
 
 @dataclass(frozen=True)
 class _Scene:
-    """What moves, in cm and s."""
+    """The bodies of a film, in cm and s."""
 
     time: Array
     x: Array

@@ -163,7 +163,23 @@ def run_fit(
 
 
 def steady_flows(fit: xr.Dataset) -> list[xr.Dataset]:
-    """Return the flows of a fit, one for all of it or one for each name."""
+    """Return the flows of a fit, one for all of it or one for each name.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        Kind "fit".
+
+    Returns
+    -------
+    list of xarray.Dataset
+        Kind "flow_field".
+
+    Examples
+    --------
+    >>> steady_flows(found)[0].attrs["kind"]  # doctest: +SKIP
+    'flow_field'
+    """
     from driftwalk.likelihood import fitted_flow
 
     if "flow" not in fit.dims:

@@ -116,12 +116,9 @@ def test_the_tank_is_said_where_it_is_lost_and_kept_where_it_is_not(tmp_path: Pa
         done = here("export", tmp_path / "a.nc", "--to", to, "-o", tmp_path / to)
         assert "--arena circle:0.3@0,0" in done.err
         page = (tmp_path / to / "README.md").read_text()
-        (command,) = re.findall(r"`(driftwalk info .*)`", page)
-        words = command.split()
-        words[2] = str(tmp_path / to / words[2])
-        again = here(*words[1:], "--json")
-        assert again.code == 0, again.err
-        back = load(tmp_path / to / Path(words[2]).name, tank=words[4])
+        (call,) = re.findall(r"`driftwalk\.load\((.*)\)`", page)
+        name, tank = re.fullmatch(r'"(.*)", tank="(.*)"', call).groups()
+        back = load(tmp_path / to / name, tank=tank)
         np.testing.assert_array_equal(back["x"].values, recording["x"].values)
         assert json.loads(back.attrs["arena"]) == json.loads(recording.attrs["arena"])
     done = here("export", tmp_path / "a.nc", "--to", "movement", "-o", tmp_path / "movement")

@@ -18,7 +18,13 @@ from synthetic_assembly import assembly_path, class_times, distribution
 from synthetic_calibration import answered, bundled_flow, bundled_recording, synthetic_calibration
 
 from driftwalk import __version__
-from driftwalk.core.citation import (
+from driftwalk.core.errors import InputError, RunDirectoryError
+from driftwalk.core.provenance import manifest
+from driftwalk.core.rundir import RunDirectory
+from driftwalk.model import Study
+from driftwalk.page import joined_page, manifest_section, report_html, report_page, write_report
+from driftwalk.schema import build_trajectory
+from driftwalk.schema.citation import (
     PAPER_AUTHORS,
     PAPER_TITLE,
     PAPER_VENUE,
@@ -27,12 +33,6 @@ from driftwalk.core.citation import (
     bibtex,
     citation,
 )
-from driftwalk.core.errors import InputError, RunDirectoryError
-from driftwalk.core.provenance import manifest
-from driftwalk.core.rundir import RunDirectory
-from driftwalk.model import Study
-from driftwalk.page import joined_page, manifest_section, report_html, report_page, write_report
-from driftwalk.schema import build_trajectory
 
 HOSTILE = "<script>alert('1')</script> & \"quotes\""
 SPECIFICATION = {"study": {"seed": 1}, "recording_sha256": "0", "body": None}

@@ -52,6 +52,7 @@ OPTIONS: Final[dict[str, str | None]] = {
     "port": "--port",
     "rate": "--image-rate",
     "replicate": "--replicate",
+    "seconds": None,
     "seed": "--seed",
     "sample_time": None,
     "settings": None,

@@ -1,8 +1,8 @@
-"""What a format cannot hold of a recording, and how driftwalk reads its file again."""
+"""The limits of a format: facts of a recording that it cannot hold, and how its file is read."""
 
 from __future__ import annotations
 
-import shlex
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -42,9 +42,9 @@ def lost(format: str, motion: Motion) -> list[str]:
     recording = motion.recording
     found = _of_samples(format, recording)
     if format not in WHOLE:
-        tank = _tank(recording)
+        tank = tank_text(recording)
         if tank:
-            found.append(f"the tank ({tank}): give it again when the file is read")
+            found.append(f"the tank: give `tank={json.dumps(tank)}` when the file is read")
         if "time_origin_unix_s" in recording.attrs and format != "ros":
             began = float(recording.attrs["time_origin_unix_s"])
             found.append(f"when the recording began, {began:.6f} s after 1970")
@@ -59,7 +59,7 @@ def lost(format: str, motion: Motion) -> list[str]:
 
 
 def read_again(format: str, motion: Motion, file: Path) -> str:
-    """Return the command by which driftwalk reads a file again.
+    """Return the call by which driftwalk reads a file again.
 
     Parameters
     ----------
@@ -75,20 +75,20 @@ def read_again(format: str, motion: Motion, file: Path) -> str:
     >>> from driftwalk.schema import build_trajectory
     >>> here = Motion("a", build_trajectory([0.0, 0.1], [0.1, 0.2], [0.0, 0.0]))
     >>> read_again("csv", here, Path("a.csv"))
-    'driftwalk info a.csv'
+    'driftwalk.load("a.csv")'
     """
-    words = ["driftwalk", "info", file.name]
+    arguments = [json.dumps(file.name)]
     names = topics(motion.recording)
     if format == "ros" and len(names) > 1:
-        words += ["--topic", ",".join(names)]
-    tank = "" if format in WHOLE else tank_option(motion.recording)
+        arguments.append(f"topic={json.dumps(','.join(names))}")
+    tank = "" if format in WHOLE else tank_text(motion.recording)
     if tank:
-        words += ["--arena", tank]
-    return shlex.join(words)
+        arguments.append(f"tank={json.dumps(tank)}")
+    return f"driftwalk.load({', '.join(arguments)})"
 
 
-def tank_option(recording: xr.Dataset) -> str:
-    """Return the tank of a recording as the option ``--arena`` takes it, ``""`` for none.
+def tank_text(recording: xr.Dataset) -> str:
+    """Return the tank of a recording in the words of `driftwalk.load`, ``""`` where it has none.
 
     A polygon has no such form; its corners are in the file that `write_tank` writes.
 
@@ -101,7 +101,7 @@ def tank_option(recording: xr.Dataset) -> str:
     --------
     >>> from driftwalk.schema import build_trajectory
     >>> tank = '{"shape": "circle", "diameter_m": 0.3, "center_m": [0, 0]}'
-    >>> tank_option(build_trajectory([0.0], [0.0], [0.0], attrs={"arena": tank}))
+    >>> tank_text(build_trajectory([0.0], [0.0], [0.0], attrs={"arena": tank}))
     'circle:0.3@0,0'
     """
     arena = parse_json(recording.attrs.get("arena") or "{}")
@@ -149,11 +149,6 @@ def write_tank(motion: Motion, folder: Path) -> list[Path]:
     target = folder / TANK_FILE
     write_atomic(target, ("\n".join(lines) + "\n").encode())
     return [target]
-
-
-def _tank(recording: xr.Dataset) -> str:
-    option = tank_option(recording)
-    return f"--arena {option}" if option else ""
 
 
 def _of_samples(format: str, recording: xr.Dataset) -> list[str]:

@@ -1,4 +1,4 @@
-"""What moves in a run or a file: recordings, simulated worlds, and blocks that assemble."""
+"""The motion in a run or a file: recordings, simulated worlds, and blocks that assemble."""
 
 from __future__ import annotations
 

@@ -15,12 +15,12 @@ MEANING: Final = {
     "is up, angles are counter-clockwise. Every number has the digits that give the same double "
     "again.",
     "movement": "NetCDF of poses as the movement package has them: read it with movement, or with "
-    "`xarray.open_dataset(FILE)`. Metres with y up, seconds; `orientation` is in radians.",
+    "`xarray.open_dataset(FILE)`. Metres with y up, seconds; the variable orientation is in radians.",
     "trackpy": "Linked features: `trackpy.emsd(pandas.read_csv(FILE), mpp=1, fps=RATE)`. x and y "
-    "are in metres with y up, so a unit of length is one metre and `mpp` is 1.",
+    "are in metres with y up, so a unit of length is one metre, and mpp is 1.",
     "ros": "ROS 2 bag (MCAP), `geometry_msgs/msg/PoseStamped`, one topic per body: `ros2 bag play "
     "FOLDER`. Metres, frame `tank`: x right, y up in the picture, z out of the water.",
-    "film": "What moved, drawn in its tank, with the time in seconds and a scale.",
+    "film": "The bodies in their tank, with the time in seconds and a scale.",
 }
 
 
@@ -34,13 +34,13 @@ class Exported:
         The file or folder.
     lost : sequence of str
         What it does not hold, in sentences.
-    command : str
+    call : str
         How driftwalk reads it again; ``""`` where it does not.
     """
 
     file: Path
     lost: Sequence[str]
-    command: str
+    call: str
 
 
 def write_readme(folder: Path, format: str, source: str, exported: Sequence[Exported]) -> Path:
@@ -73,8 +73,8 @@ def write_readme(folder: Path, format: str, source: str, exported: Sequence[Expo
     lines += [MEANING[format], ""]
     for one in exported:
         lines += [f"## {one.file.name}", ""]
-        if one.command:
-            lines += [f"driftwalk reads it again: `{one.command}`", ""]
+        if one.call:
+            lines += [f"driftwalk reads it again: `{one.call}`", ""]
         if one.lost:
             lines += ["The file does not hold:", "", *(f"- {what}" for what in one.lost), ""]
     target = folder / README

@@ -20,7 +20,7 @@ Frame = npt.NDArray[np.uint8]
 FRAMES_PER_S: Final = {".gif": 12.5, ".mp4": 25.0}
 """A GIF counts in hundredths of a second: 12.5 frames per second are exact."""
 CODECS: Final = ("vp09", "mp4v")
-"""What OpenCV is asked for, best first: VP9, which browsers play, and MPEG-4."""
+"""Encoders of OpenCV, best first: VP9, which browsers play, and MPEG-4."""
 
 
 def require_film_writer(ending: str) -> None:

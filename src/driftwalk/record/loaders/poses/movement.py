@@ -35,7 +35,7 @@ NUMBERS: Final = (
     *("block_side_m", "metres_per_pixel", "position_quantum_m", "sample_rate_Hz"),
     "time_origin_unix_s",
 )
-"""What is taken over of a recording that driftwalk itself wrote in this format."""
+"""Attributes that are taken over of a recording that driftwalk wrote in this format."""
 
 
 class MovementLoader:

@@ -10,10 +10,10 @@ import typer
 
 from driftwalk.cli.options.shared import Json
 from driftwalk.cli.terminal.output import print_json
-from driftwalk.core.citation import bibtex, citation, methods_used
 from driftwalk.core.errors import InputError
 from driftwalk.core.provenance import read_manifest, refuse_other_version
 from driftwalk.core.run_layout import MANIFEST_FILE, state_of
+from driftwalk.schema.citation import bibtex, citation, methods_used
 from driftwalk.schema.netcdf import is_netcdf, open_netcdf
 
 

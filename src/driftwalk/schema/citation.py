@@ -1,4 +1,4 @@
-"""What to cite: the program, the paper whose method it implements, the methods that a run used."""
+"""References: the program, the paper whose method it implements, the methods that a run used."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Method(NamedTuple):
     results: tuple[str, ...]
     """Files of a run directory, each of which says that it was used."""
     what: str
-    """What it did there."""
+    """Its part in them."""
     work: str
     """Authors, title, journal, volume, year, page."""
     under: str = ""
