@@ -37,8 +37,8 @@ def require_installed(folder: str) -> None:
     done = subprocess.run(
         [sys.executable, "-c", asked], cwd=folder, check=True, capture_output=True, text=True
     )
-    module = Path(done.stdout.strip())
-    if not module.is_relative_to(sys.prefix):
+    module = Path(done.stdout.strip()).resolve()
+    if not module.is_relative_to(Path(sys.prefix).resolve()):
         raise SystemExit(f"wheel: {module} was imported, which is not in {sys.prefix}")
 
 
