@@ -5,6 +5,8 @@
 #
 # Any other command: docker run --rm -v "$PWD:/work" driftwalk fit recording.csv -o fit
 FROM python:3.13-slim AS build
+# The compiler of the image's own release; a version of it would be gone in some months.
+# hadolint ignore=DL3008
 RUN apt-get update \
  && apt-get install -y --no-install-recommends g++ \
  && rm -rf /var/lib/apt/lists/*
