@@ -23,10 +23,12 @@ MOST_CHUNKS: Final = 16
 """Chunks that a thread reads ahead."""
 JOIN_S: Final = 1.0
 """Time that a thread has to end once its program has."""
+LAST_WORDS_S: Final = 0.1
+"""Time that a thread has to read what a program wrote last."""
 
 
 class Pipes(Protocol):
-    """What a program is asked and heard through."""
+    """The standard streams of a running program."""
 
     errors: bytes
     """The last bytes of its standard error."""
@@ -153,6 +155,7 @@ class ThreadedPipes:
         self._line = b""
         self._chunks: deque[bytes] = deque()
         self._heard = 0
+        self._errors_ended = False
         self._broken = False
         self._closed = False
         work: tuple[Callable[[], None], ...] = (self._write, self._read, self._read_errors)
@@ -190,7 +193,14 @@ class ThreadedPipes:
         """Wait until something comes to standard error; return whether something did."""
         with self._changed:
             before = self._heard
-            return self._changed.wait_for(lambda: self._heard != before, seconds)
+            if not self._errors_ended:
+                self._changed.wait_for(
+                    lambda: self._heard != before or self._errors_ended,
+                    max(seconds, LAST_WORDS_S),
+                )
+                return self._heard != before
+        time.sleep(seconds)
+        return False
 
     def close_input(self) -> None:
         """Tell the program that there is nothing more to read."""
@@ -243,6 +253,9 @@ class ThreadedPipes:
                 self.errors = (self.errors + chunk)[-KEPT_ERRORS:]
                 self._heard += 1
                 self._changed.notify_all()
+        with self._changed:
+            self._errors_ended = True
+            self._changed.notify_all()
 
 
 def _read_or_end(pipe: int) -> bytes:
