@@ -133,7 +133,7 @@ cross: $(CROSS_TOOLS)
 # make release-check CHECKS="versions recipe"
 CHECKS :=
 
-release-check: $(DEV_TOOLS)
+release-check: $(CROSS_TOOLS)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python .ci/release/check.py $(CHECKS)
 
 clean:
