@@ -16,12 +16,13 @@ NATIVE := $(shell find cpp -name '*.cpp' -o -name '*.hpp') CMakeLists.txt pyproj
 PACKAGE := $(VENV)/.package
 TEST_TOOLS := $(VENV)/.test-tools
 DEV_TOOLS := $(VENV)/.dev-tools
+CROSS_TOOLS := $(VENV)/.cross-tools
 CPP := $(shell find cpp -name '*.cpp' -o -name '*.hpp')
 
 # Every worker imports every test file: with the bytecode of the last run that takes half the time.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-slow test-fresh test-browser fuzz doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs site web wheel clean
+.PHONY: demo test test-slow test-fresh test-browser fuzz doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs site web wheel cross release-check clean
 
 demo: $(PACKAGE)
 	$(BIN)/driftwalk demo
@@ -126,6 +127,18 @@ studies-tracking: $(TEST_TOOLS)
 wheel: $(DEV_TOOLS)
 	$(BIN)/python -m build
 
+# The native core for the other systems of the wheels, by clang as Zig brings it. What was made for
+# another processor or for Windows is run where qemu or Wine is installed, and must give the same bits.
+cross: $(CROSS_TOOLS)
+	PATH="$(CURDIR)/$(BIN):$$PATH" .ci/cross
+
+# Everything that has to hold before a release, with all tests: an hour. Only some of it:
+# make release-check CHECKS="versions recipe"
+CHECKS :=
+
+release-check: $(CROSS_TOOLS)
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python .ci/release/check.py $(CHECKS)
+
 clean:
 	rm -rf $(VENV) build dist
 
@@ -155,4 +168,8 @@ $(TEST_TOOLS): $(PACKAGE)
 $(DEV_TOOLS): $(TEST_TOOLS)
 	$(PIP) "driftwalk[dev]"
 	@$(COMPILE)
+	@touch $@
+
+$(CROSS_TOOLS): $(DEV_TOOLS)
+	$(PIP) "driftwalk[cross]"
 	@touch $@

@@ -87,7 +87,7 @@ def write_case(
         *worlds.shape[:2],
         *worlds.ravel(),
     ]
-    path.write_text("\n".join(f"{number:.17g}" for number in numbers))
+    path.write_text("\n".join(f"{number:.17g}" for number in numbers), encoding="utf-8")
 
 
 def run_peer(program: Path, case: Path, wall: str, *, steps: int) -> dict[str, Any]:

@@ -55,7 +55,7 @@ def machine() -> str:
     name = platform.processor() or platform.machine()
     facts = Path("/proc/cpuinfo")
     if facts.exists():
-        text = facts.read_text()
+        text = facts.read_text(encoding="utf-8")
         keys = {"model name": "", "cpu family": "family ", "model": "model "}
         known = {
             words: re.search(rf"^{key}\s*:\s*(.+)$", text, re.MULTILINE)

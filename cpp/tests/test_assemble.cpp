@@ -6,6 +6,7 @@
 #include "driftwalk/assembly/walls.hpp"
 #include "driftwalk/dispatch.hpp"
 #include "driftwalk/physics/laws/quadratic.hpp"
+#include "environment.hpp"
 #include "synthetic_assembly.hpp"
 
 #include <algorithm>
@@ -110,7 +111,7 @@ void check_same_bits(Tank tank, int blocks, int worlds, std::int64_t steps) {
     CHECK(same_world(all, k, one, 0));
   }
   for (const char* const set : {"baseline", "avx2", "avx512"}) {
-    setenv("DRIFTWALK_INSTRUCTION_SET", set, 1);
+    environment::choose_instruction_set(set);
     try {
       const CrowdResults other = synthetic::assemble<float>(tank, rules, crowd, steps);
       for (std::size_t k = 0; k < crowd.worlds(); ++k) {
@@ -121,7 +122,7 @@ void check_same_bits(Tank tank, int blocks, int worlds, std::int64_t steps) {
       std::printf("%s is not on this machine\n", set);
     }
   }
-  unsetenv("DRIFTWALK_INSTRUCTION_SET");
+  environment::choose_instruction_set("");
 }
 
 // Samples change nothing but that a complete world goes on.

@@ -5,11 +5,14 @@
 #include "driftwalk/dispatch.hpp"
 #include "driftwalk/infer/innovations.hpp"
 #include "driftwalk/stats/ks2d.hpp"
+#include "environment.hpp"
 #include "synthetic_assembly.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
 #include <vector>
 
 namespace {
@@ -145,6 +148,29 @@ void check_ks(Numbers& all) {
   }
 }
 
+// FNV-1a over the bits: what .ci/cross compares between machines.
+unsigned long long digest(const Numbers& all) {
+  unsigned long long hash = 0xcbf29ce484222325ull;
+  for (const double value : all) {
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, &value, sizeof bits);
+    for (int byte = 0; byte < 8; ++byte) {
+      hash = (hash ^ (bits >> (8 * byte) & 0xff)) * 0x100000001b3ull;
+    }
+  }
+  return hash;
+}
+
+// The compiler's own question to the processor, where its library has it.
+void check_processor() {
+#if defined(DRIFTWALK_X86_LANES) && defined(__linux__) && defined(__GLIBC__) && !defined(__zig__)
+  CHECK(is_available(InstructionSet::avx2) == (__builtin_cpu_supports("avx2") != 0));
+  CHECK(is_available(InstructionSet::avx512) ==
+        (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+         __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")));
+#endif
+}
+
 } // namespace
 
 int main() {
@@ -155,7 +181,7 @@ int main() {
       std::printf("%s: not available here\n", name(set));
       continue;
     }
-    setenv("DRIFTWALK_INSTRUCTION_SET", name(set), 1);
+    environment::choose_instruction_set(name(set));
     Numbers all;
     check_simulate(all);
     check_assemble(all);
@@ -166,7 +192,8 @@ int main() {
       baseline = all;
     }
     CHECK(all == baseline);
-    std::printf("%s: %zu numbers\n", name(set), all.size());
+    std::printf("%s: %zu numbers, digest %016llx\n", name(set), all.size(), digest(all));
   }
+  check_processor();
   return check::result();
 }

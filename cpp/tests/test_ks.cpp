@@ -2,6 +2,7 @@
 #include "check.hpp"
 #include "driftwalk/dispatch.hpp"
 #include "driftwalk/stats/ks2d_permutation.hpp"
+#include "environment.hpp"
 #include "ks_samples.hpp"
 
 namespace {
@@ -178,7 +179,7 @@ int main() {
       std::printf("%s: not available here\n", name(set));
       continue;
     }
-    setenv("DRIFTWALK_INSTRUCTION_SET", name(set), 1);
+    environment::choose_instruction_set(name(set));
     compare_with_definition();
     compare_wide_with_narrow();
     check_permutations();

@@ -3,6 +3,7 @@
 #include "check.hpp"
 #include "driftwalk/dispatch.hpp"
 #include "driftwalk/stats/ks2d_kernel.hpp"
+#include "environment.hpp"
 #include "ks_samples.hpp"
 
 #include <functional>
@@ -149,7 +150,7 @@ int main() {
       std::printf("%s: not available here\n", name(set));
       continue;
     }
-    setenv("DRIFTWALK_INSTRUCTION_SET", name(set), 1);
+    environment::choose_instruction_set(name(set));
     check_sizes();
     std::printf("%s: done\n", name(set));
   }

@@ -2,6 +2,7 @@
 // sets, companions in a pack, and walls of both shapes.
 #include "check.hpp"
 #include "driftwalk/dispatch.hpp"
+#include "environment.hpp"
 #include "synthetic_tank.hpp"
 
 #include <algorithm>
@@ -123,12 +124,12 @@ void check_instruction_sets_and_companions(ParticleKind kind) {
     if (!driftwalk::is_available(driftwalk::InstructionSet::avx2) && std::string(set) == "avx2") {
       continue;
     }
-    setenv("DRIFTWALK_INSTRUCTION_SET", set, 1);
+    environment::choose_instruction_set(set);
     const auto same = simulate<float>(tank, Particles(kind, WallContact::slide, 37));
     CHECK(same.x == all.x);
     CHECK(same.theta == all.theta);
   }
-  unsetenv("DRIFTWALK_INSTRUCTION_SET");
+  environment::choose_instruction_set("");
   const auto few = simulate<float>(tank, Particles(kind, WallContact::slide, 3));
   CHECK(std::equal(few.x.begin(), few.x.end(), all.x.begin()));
   CHECK(std::equal(few.y.begin(), few.y.end(), all.y.begin()));

@@ -2,6 +2,7 @@
 // time.
 #include "check.hpp"
 #include "driftwalk/dispatch.hpp"
+#include "environment.hpp"
 #include "synthetic_tank.hpp"
 
 #include <algorithm>
@@ -206,20 +207,20 @@ void check_instruction_sets(Tank tank) {
   tank.model.orientation_noise = 0.01;
   tank.model.friction = 0.3;
   Batch batch = many_worlds(53, 0.45, 2e-3);
-  setenv("DRIFTWALK_INSTRUCTION_SET", "baseline", 1);
+  environment::choose_instruction_set("baseline");
   const auto baseline = synthetic::simulate<float>(tank, batch);
   for (const auto set : {driftwalk::InstructionSet::avx2, driftwalk::InstructionSet::avx512}) {
     if (driftwalk::is_available(set)) {
-      setenv("DRIFTWALK_INSTRUCTION_SET", driftwalk::name(set), 1);
+      environment::choose_instruction_set(driftwalk::name(set));
       const auto paths = synthetic::simulate<float>(tank, batch);
       CHECK(paths.x == baseline.x && paths.y == baseline.y && paths.theta == baseline.theta);
     }
   }
-  unsetenv("DRIFTWALK_INSTRUCTION_SET");
+  environment::choose_instruction_set("");
 }
 
 void check_unknown_instruction_set() {
-  setenv("DRIFTWALK_INSTRUCTION_SET", "quantum", 1);
+  environment::choose_instruction_set("quantum");
   bool refused = false;
   try {
     driftwalk::chosen_instruction_set();
@@ -227,7 +228,7 @@ void check_unknown_instruction_set() {
     refused = std::string(error.what()).find("quantum") != std::string::npos;
   }
   CHECK(refused);
-  unsetenv("DRIFTWALK_INSTRUCTION_SET");
+  environment::choose_instruction_set("");
 }
 
 } // namespace

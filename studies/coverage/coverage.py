@@ -146,7 +146,7 @@ def answer_of(
 
 def write(path: Path, line: dict[str, Any]) -> None:
     """Append a line to the results."""
-    with path.open("a") as file:
+    with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps(line) + "\n")
     print(line, flush=True)
 
@@ -155,7 +155,7 @@ def read(path: Path) -> list[dict[str, Any]]:
     """Return the results so far."""
     if not path.exists():
         return []
-    return [json.loads(line) for line in path.read_text().splitlines()]
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
 
 
 def report() -> None:

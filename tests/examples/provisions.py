@@ -303,6 +303,8 @@ STUDY = "a study of hours, which the page names to repeat it"
 OTHERS = "needs recordings of others, which are not part of the project"
 LONG = "a calibration of minutes, whose results the page gives; the how-to pages run it smaller"
 INSTALLS = "installs, builds or tests the project; CI runs it"
+DEMO = "takes a minute or two; has a test"
+DOCKER = "needs Docker"
 TIMES = "measures times, for minutes on a quiet machine"
 FEW_RUNS = "--runs 20 --film none"
 CAMERA = {"camera:0": "video.mp4"}  # no camera here: a file in its place
@@ -312,7 +314,7 @@ FEW_SETTINGS = "--runs 10 --realisations 2 --duration 1min"
 PAGES: dict[str, Page] = {
     "README.md": Page(
         provide=_files(_recording(), _film(1, 4.0)),
-        not_run={"make *": INSTALLS},
+        not_run={"make *": INSTALLS, "pip install *": INSTALLS, "driftwalk demo": DEMO},
         numbers=Numbers.SAME,
         # Thousand runs in a fitted flow; the size of a compressed file.
         numbers_of={
@@ -442,6 +444,9 @@ PAGES: dict[str, Page] = {
     ),
     "docs/how-to/flow-field.md": Page(
         provide=_recording(), numbers=Numbers.SAME, holds=("u.shape == (2,)",)
+    ),
+    "docs/how-to/install.md": Page(
+        not_run={"pip install *": INSTALLS, "driftwalk demo --quick": DEMO, "docker *": DOCKER},
     ),
     "docs/how-to/load-a-recording.md": Page(
         provide=_files(_recording(60.0), _pixels, _poses), numbers=Numbers.SAME

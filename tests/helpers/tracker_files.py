@@ -120,13 +120,14 @@ def sleap_csv(path: Path, names: list[str]) -> Path:
         for frame, row in enumerate(individual)
     ]
     path.write_text(
-        "\n".join([",".join(["track,frame_idx,instance.score", *columns]), *rows]) + "\n"
+        "\n".join([",".join(["track,frame_idx,instance.score", *columns]), *rows]) + "\n",
+        encoding="utf-8",
     )
     return path
 
 
 def write(path: Path, *lines: str) -> Path:
-    path.write_text("\n".join(lines) + "\n", newline="")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="")
     return path
 
 

@@ -6,6 +6,7 @@ import contextlib
 import errno
 import os
 import secrets
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
@@ -30,6 +31,10 @@ _REASONS: Final[dict[int, tuple[str, str]]] = {
     errno.EISDIR: ("it is a directory", "choose another name"),
     errno.ENAMETOOLONG: ("its name is too long", "choose a shorter name"),
 }
+# Windows refuses to rename over a file, or to move one, that another program has open: a live page
+# reads for milliseconds, a scanner of files for a second, a spreadsheet until it is closed.
+OPEN_FILES_STAY: Final = os.name == "nt"
+PAUSES_S: Final = (0.01, 0.03, 0.1, 0.3, 1.0, 2.0)
 # Errors of the storage, whatever file they came from; the others count only for a file of ours.
 _STORAGE: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
 
@@ -76,7 +81,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
             raise RunDirectoryError(f"cannot write {target}: it exists and is not a regular file")
         yield temporary
         _flush(temporary)
-        temporary.replace(target)
+        rename(temporary, target)
         _flush_folder(target.parent)
     except BaseException as error:
         with contextlib.suppress(OSError):
@@ -136,6 +141,30 @@ def storage_error(error: BaseException, path: str | Path) -> RunDirectoryError |
         f"cannot write {path}: {reason}; what was finished before is kept: {remedy}, "
         "then run the same command again to continue"
     )
+
+
+def rename(path: Path, target: Path) -> None:
+    """Rename a file or folder over `target`; where an open file stands in the way, wait for it.
+
+    Raises
+    ------
+    RunDirectoryError
+        When another program keeps it open.
+    """
+    for pause in PAUSES_S if OPEN_FILES_STAY else ():
+        with contextlib.suppress(PermissionError):
+            path.replace(target)
+            return
+        time.sleep(pause)
+    try:
+        path.replace(target)
+    except PermissionError as error:
+        if not OPEN_FILES_STAY:
+            raise
+        raise RunDirectoryError(
+            f"cannot write {target}: another program has it open, or it may not be changed; close "
+            "that program, then run the same command again"
+        ) from error
 
 
 def _errno_of(error: BaseException) -> int | None:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 
-from driftwalk.core.atomic import remove_partials, write_atomic
+from driftwalk.core.atomic import remove_partials, rename, write_atomic
 from driftwalk.core.errors import DriftwalkError, RunDirectoryError
 from driftwalk.core.provenance import MANIFEST_KIND, read_manifest, utc_now
 from driftwalk.core.shards import make_folder, remove_shards
@@ -126,12 +126,12 @@ def complete_move(path: Path) -> None:
     journal = path / MOVING_FILE
     if not journal.exists():
         return
-    target = path / PREVIOUS_FOLDER / journal.read_text().strip()
+    target = path / PREVIOUS_FOLDER / journal.read_text(encoding="utf-8").strip()
     make_folder(target)
     hidden = [p for p in (path / SHARD_FOLDER, path / RECORD_FILE) if p.exists()]
     try:
         for entry in [*visible(path), *hidden]:
-            entry.rename(target / entry.name)
+            rename(entry, target / entry.name)
         journal.unlink()
     except OSError as error:
         raise RunDirectoryError(

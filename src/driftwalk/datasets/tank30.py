@@ -74,7 +74,7 @@ def tank30_truth() -> dict[str, Any]:
     >>> tank30_truth()["drag_coefficient"]
     0.3867
     """
-    values: dict[str, Any] = json.loads((_folder() / "truth.json").read_text())
+    values: dict[str, Any] = json.loads((_folder() / "truth.json").read_text(encoding="utf-8"))
     return values
 
 

@@ -82,7 +82,7 @@ class ProgramModel:
         if not (math.isfinite(timeout) and timeout > 0.0):
             raise ConfigurationError(f"`timeout` is {timeout}, expected a time above 0 s")
         self.command = command
-        self.words = _words(command)
+        self.words = program_words(command)
         self.folder = str(Path.cwd())
         self.timeout = float(timeout)
         self.file = _program_file(self.words)
@@ -215,9 +215,15 @@ class ProgramModel:
             )
 
 
-def _words(command: str) -> tuple[str, ...]:
+def program_words(command: str, *, separator: str = os.sep) -> tuple[str, ...]:
+    """Return the words of a command, as a shell reads them; on Windows a backslash is of a path."""
+    lexer = shlex.shlex(command, posix=True)
+    lexer.whitespace_split = True
+    lexer.commenters = ""
+    if separator == "\\":
+        lexer.escape = ""
     try:
-        words = tuple(shlex.split(command))
+        words = tuple(lexer)
     except ValueError as error:
         raise ConfigurationError(f"the command {command!r} is no command: {error}") from error
     if not words:

@@ -1,15 +1,11 @@
-"""One running program: a line is written to it, a line is read from it, within a time.
-
-Everything happens in the thread that asks: it writes, reads the answer and empties standard error
-as the program is ready for it. So neither side blocks the other, and no thread has to be ended.
-"""
+"""One running program: a line is written to it, a line is read from it, within a time."""
 
 from __future__ import annotations
 
 import os
-import selectors
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
@@ -19,15 +15,15 @@ from typing import Final
 
 from driftwalk.core.bounded import MIB
 from driftwalk.core.errors import ConfigurationError
+from driftwalk.motion.program_pipes import pipes_of
 
-CHUNK: Final = 1 << 16
 TICK_S: Final = 0.1
 """How often a request looks whether it is still wanted."""
 GRACE_S: Final = 1.0
 """Time that a program has to end by itself."""
-KEPT_ERRORS: Final = 4096
-"""Bytes of standard error that are kept, the last ones."""
 SHOWN_LINES: Final = 5
+# The same on Windows, where there are no sessions.
+_OWN_GROUP: Final[int] = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
 
 
 @dataclass(frozen=True)
@@ -77,18 +73,8 @@ class Program:
         """Whether it was seen to make the same world again."""
         self._owner = os.getpid()
         self._process = _start(words, folder)
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        assert self._process.stderr is not None
-        self._pipes = (self._process.stdin, self._process.stdout, self._process.stderr)
-        self._input, self._output, self._errors = (one.fileno() for one in self._pipes)
-        self._selector = selectors.DefaultSelector()
-        for pipe in (self._output, self._errors):
-            os.set_blocking(pipe, False)
-            self._selector.register(pipe, selectors.EVENT_READ)
-        os.set_blocking(self._input, False)
+        self._pipes = pipes_of(self._process)
         self._unread = b""
-        self._last_errors = b""
 
     @property
     def is_own(self) -> bool:
@@ -107,37 +93,32 @@ class Program:
             is of no use after that.
         """
         end = time.monotonic() + timeout
-        unwritten = memoryview(request.line)
         answer = bytearray(self._unread)
         complete = b"\n" in answer
-        self._selector.register(self._input, selectors.EVENT_WRITE)
-        try:
-            while unwritten or not complete:
-                if stop.is_set():
-                    raise ProgramFault(request.where, "it was stopped")
-                if (left := end - time.monotonic()) <= 0.0:
-                    raise ProgramFault(request.where, self._late(timeout, started=bool(answer)))
-                if len(answer) > request.most:
-                    most = f"{request.most / MIB:.3g} MiB"
-                    raise ProgramFault(request.where, f"its answer is longer than {most}")
-                ready = {key.fd for key, _ in self._selector.select(min(left, TICK_S))}
-                if self._errors in ready:
-                    self._read_errors()
-                if self._input in ready:
-                    unwritten = self._write(unwritten, request)
-                if self._output in ready:
-                    chunk = self._read(request)
-                    complete = complete or b"\n" in chunk
-                    answer += chunk
-        finally:
-            with suppress(KeyError):
-                self._selector.unregister(self._input)
+        self._pipes.send(request.line)
+        while self._pipes.sending or not complete:
+            if stop.is_set():
+                raise ProgramFault(request.where, "it was stopped")
+            if (left := end - time.monotonic()) <= 0.0:
+                raise ProgramFault(request.where, self._late(timeout, started=bool(answer)))
+            if len(answer) > request.most:
+                most = f"{request.most / MIB:.3g} MiB"
+                raise ProgramFault(request.where, f"its answer is longer than {most}")
+            try:
+                chunk = self._pipes.receive(min(left, TICK_S))
+            except BrokenPipeError:
+                raise self._ended(request) from None
+            if chunk == b"":
+                raise self._ended(request)
+            if chunk is not None:
+                complete = complete or b"\n" in chunk
+                answer += chunk
         line, _, self._unread = bytes(answer).partition(b"\n")
         return line
 
     def last_errors(self) -> str:
         """Return the last lines that it wrote to standard error, for the end of a message."""
-        text = self._last_errors.decode("utf-8", "replace")
+        text = self._pipes.errors.decode("utf-8", "replace")
         lines = [line.strip() for line in text.splitlines() if line.strip()][-SHOWN_LINES:]
         if not lines:
             return ""
@@ -146,11 +127,10 @@ class Program:
 
     def close_input(self) -> None:
         """Close its standard input: a program that reads to the end then ends by itself."""
-        self._pipes[0].close()
+        self._pipes.close_input()
 
     def close(self, *, patience: float = 0.0) -> None:
         """End it and all that it started, after `patience` [s] to do so by itself."""
-        self._selector.close()
         self.close_input()
         if self.is_own:
             with suppress(subprocess.TimeoutExpired):
@@ -158,38 +138,7 @@ class Program:
                     self._process.wait(patience)
             self._kill()
             self._process.wait()
-        for pipe in self._pipes:
-            pipe.close()
-
-    def _write(self, unwritten: memoryview, request: Request) -> memoryview:
-        try:
-            unwritten = unwritten[os.write(self._input, unwritten[:CHUNK]) :]
-        except BlockingIOError:
-            return unwritten
-        except BrokenPipeError:
-            raise self._ended(request) from None
-        if not unwritten:
-            self._selector.unregister(self._input)
-        return unwritten
-
-    def _read(self, request: Request) -> bytes:
-        try:
-            chunk = os.read(self._output, CHUNK)
-        except BlockingIOError:
-            return b""
-        if not chunk:
-            raise self._ended(request)
-        return chunk
-
-    def _read_errors(self) -> None:
-        try:
-            chunk = os.read(self._errors, CHUNK)
-        except BlockingIOError:
-            return
-        if chunk:
-            self._last_errors = (self._last_errors + chunk)[-KEPT_ERRORS:]
-        else:
-            self._selector.unregister(self._errors)
+        self._pipes.close()
 
     def _late(self, timeout: float, *, started: bool) -> str:
         hint = "a line break ends an answer" if started else "an answer has to be flushed"
@@ -203,31 +152,24 @@ class Program:
         end = time.monotonic() + GRACE_S
         while self._process.poll() is None and time.monotonic() < end:
             # It may be writing its last words, and wait until somebody reads them.
-            self._wait_for_errors(0.01)
+            self._pipes.hear_errors(0.01)
         code = self._process.poll()
         self._kill()
         # More than a pipe holds; somebody else may go on writing to it.
         for _ in range(32):
-            if not self._wait_for_errors(0.0):
+            if not self._pipes.hear_errors(0.0):
                 break
         return ProgramEnded(request.where, f"it {_exit_words(code)}{self.last_errors()}")
 
-    def _wait_for_errors(self, seconds: float) -> bool:
-        """Read standard error if something comes; return whether something did."""
-        if self._errors not in self._selector.get_map():
-            time.sleep(seconds)
-            return False
-        for pipe in (self._input, self._output):
-            if pipe in self._selector.get_map():
-                self._selector.unregister(pipe)
-        if not self._selector.select(seconds):
-            return False
-        self._read_errors()
-        return True
-
     def _kill(self) -> None:
-        with suppress(ProcessLookupError, PermissionError):
-            os.killpg(self._process.pid, signal.SIGKILL)
+        if sys.platform == "win32":
+            # With all that it started: Windows has no groups of processes to end.
+            words = ["taskkill", "/F", "/T", "/PID", str(self._process.pid)]
+            subprocess.run(words, capture_output=True, check=False)
+            self._process.kill()
+        else:
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(self._process.pid, signal.SIGKILL)
 
 
 def close_programs(programs: Iterable[Program]) -> None:
@@ -251,6 +193,7 @@ def _start(words: Sequence[str], folder: str) -> subprocess.Popen[bytes]:
             bufsize=0,
             # Ctrl-C is for this process, which then ends the program and what that has started.
             start_new_session=True,
+            creationflags=_OWN_GROUP,
         )
     except OSError as error:
         hint = (

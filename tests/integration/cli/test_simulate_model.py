@@ -243,14 +243,14 @@ def test_a_source_that_has_changed_since_is_said(
     place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("mine.py").write_text(FILE)
+    Path("mine.py").write_text(FILE, encoding="utf-8")
     model = dw.motion_model("mine.py:diffuse")
     estimate = xr.DataArray([2e-5], {"parameter": ["diffusivity"]}, "parameter")
     found = xr.Dataset({"estimate": estimate}, attrs={"kind": "calibration", **model.facts({})})
     found.to_netcdf("found.nc", engine="h5netcdf")
     words = ("--model", "mine.py:diffuse", "--parameters-from", "found.nc", "--duration", "5s")
     assert "warning" not in simulated(tmp_path / "a.nc", *words)[0].err
-    Path("mine.py").write_text(f"# another one\n{FILE}")
+    Path("mine.py").write_text(f"# another one\n{FILE}", encoding="utf-8")
     done, run = simulated(tmp_path / "b.nc", *words)
     assert "warning: the source of mine.py:diffuse has changed since" in done.err
     assert json.loads(run.attrs["model_parameters"]) == {"diffusivity_m2_s": 2e-5}

@@ -66,7 +66,7 @@ def test_a_folder_that_does_not_say_when(words: list[object], tmp_path: Path) ->
 
 
 def test_a_colour_that_never_appears(words: list[object], tmp_path: Path) -> None:
-    other = Path(str(words[2])).read_text().splitlines()
+    other = Path(str(words[2])).read_text(encoding="utf-8").splitlines()
     first = other.index("[colour_1]")
     for at, line in enumerate(other[first : first + 8], start=first):
         if line.startswith("a_star"):

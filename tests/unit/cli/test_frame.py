@@ -149,7 +149,7 @@ def test_reader_that_goes_away_is_silent() -> None:
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
 def test_full_disk_is_one_line() -> None:
     code = "from driftwalk.cli.main import run; run()"
-    with Path("/dev/full").open("w") as full:
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
         done = subprocess.run(
             [sys.executable, "-c", code, "study", "new", "-"], stdout=full, stderr=subprocess.PIPE
         )

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from driftwalk.core import atomic
 from driftwalk.core.atomic import PARTIAL, atomic_path, remove_partials, storage_error, write_atomic
 from driftwalk.core.errors import RunDirectoryError
 
@@ -133,3 +135,38 @@ def test_remove_partials_removes_nothing_else(tmp_path: Path) -> None:
         path.write_bytes(b"x")
     remove_partials(tmp_path)
     assert sorted(tmp_path.iterdir()) == sorted(kept)
+
+
+# What Windows does to a file that another program has open, which no Linux does.
+def hold_open(monkeypatch: pytest.MonkeyPatch, refusals: int) -> None:
+    """Let renames be refused so many times, as Windows does while somebody reads the target."""
+    left = iter(range(refusals))
+    real = Path.replace
+
+    def replace(path: Path, target: Path) -> Path:
+        if next(left, None) is not None:
+            raise PermissionError(errno.EACCES, "Access is denied", str(path))
+        return real(path, target)
+
+    monkeypatch.setattr(Path, "replace", replace)
+    monkeypatch.setattr(atomic, "OPEN_FILES_STAY", True)
+    monkeypatch.setattr(atomic, "PAUSES_S", (0.001,) * 3)
+
+
+def test_a_file_that_is_read_meanwhile_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "seed.txt").write_bytes(b"one")
+    hold_open(monkeypatch, 3)
+    write_atomic(tmp_path / "seed.txt", b"two")
+    assert (tmp_path / "seed.txt").read_bytes() == b"two"
+
+
+def test_a_file_that_stays_open_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "seed.txt"
+    path.write_bytes(b"one")
+    hold_open(monkeypatch, 4)
+    with pytest.raises(RunDirectoryError, match=r"seed\.txt: another program has it open"):
+        write_atomic(path, b"two")
+    assert path.read_bytes() == b"one"
+    assert list(tmp_path.iterdir()) == [path]

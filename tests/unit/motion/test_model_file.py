@@ -122,7 +122,9 @@ def test_given_ranges_replace_those_of_the_function():
 
 
 def test_worlds_are_those_of_the_function():
-    Path("tumble.py").write_text(Path(tumble.__code__.co_filename).read_text(), encoding="utf-8")
+    Path("tumble.py").write_text(
+        Path(tumble.__code__.co_filename).read_text(encoding="utf-8"), encoding="utf-8"
+    )
     ranges = {"speed": (0, 0.1, "m/s"), "tumble_rate": (0, 5, "1/s")}
     contract = MotionModelContract()
     contract.model = lambda: motion_model(tumble, **ranges)

@@ -26,6 +26,7 @@ from driftwalk.conditions import Conditions
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.motion import MotionModel, Parameter, ProgramModel, motion_model, program_process
+from driftwalk.motion.program import program_words
 from driftwalk.simulation import Start
 from driftwalk.simulation.backend import STATUS, Camera
 from driftwalk.testing import MotionModelContract, assert_same
@@ -475,3 +476,10 @@ def test_a_program_is_calibrated():
     assert found["parameter"].values.tolist() == ["speed", "tumble_rate"]
     assert found.attrs["model"] == "tumble_program"
     assert len(found.attrs["model_source_sha256"]) == 64
+
+
+def test_words_of_a_command():
+    assert program_words(r"'my python' a\ b") == ("my python", "a b")
+    # On Windows, where a backslash is of a path.
+    windows = program_words(r'"C:\My Programs\tank.exe" --side 3', separator="\\")
+    assert windows == (r"C:\My Programs\tank.exe", "--side", "3")

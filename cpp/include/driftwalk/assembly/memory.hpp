@@ -5,7 +5,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <memory>
 #include <new>
 #include <vector>
@@ -21,10 +20,7 @@ public:
         heads_(most_cells_per_side * most_cells_per_side),
         pairs_(static_cast<std::size_t>(pair_capacity(blocks))),
         flow_(static_cast<std::size_t>(flow_size)), flow_twice_(flow_.size()),
-        lanes_(static_cast<char*>(std::aligned_alloc(64, (lane_bytes + 63) / 64 * 64)), std::free) {
-    if (!lanes_) {
-      throw std::bad_alloc();
-    }
+        lanes_(static_cast<char*>(::operator new(lane_bytes, lane_alignment))) {
     scratch_.lanes = lanes_.get();
     scratch_.blended_flow = flow_.data();
     scratch_.blended_flow_twice = flow_twice_.data();
@@ -40,13 +36,19 @@ public:
   AssemblyScratch& scratch() { return scratch_; }
 
 private:
+  // Of the widest registers. Windows has no std::aligned_alloc.
+  static constexpr std::align_val_t lane_alignment{64};
+  struct DeleteLanes {
+    void operator()(char* lanes) const { ::operator delete(lanes, lane_alignment); }
+  };
+
   std::vector<SceneBlock> blocks_, before_;
   std::vector<SceneAssembly> assemblies_;
   std::vector<std::int32_t> next_, heads_;
   std::vector<BlockPair> pairs_;
   std::vector<std::int16_t> flow_;
   std::vector<double> flow_twice_;
-  std::unique_ptr<char, decltype(&std::free)> lanes_;
+  std::unique_ptr<char, DeleteLanes> lanes_;
   AssemblyScratch scratch_;
 };
 

@@ -114,7 +114,7 @@ def _joined(text: str) -> str:
 
 def _silence_stdout() -> None:
     """Keep the interpreter from complaining when it flushes a pipe that nobody reads."""
-    with contextlib.suppress(OSError), open(os.devnull, "w") as nowhere:  # noqa: PTH123
+    with contextlib.suppress(OSError), open(os.devnull, "w", encoding="utf-8") as nowhere:  # noqa: PTH123
         os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
