@@ -15,7 +15,8 @@ MEANING: Final = {
     "is up, angles are counter-clockwise. Every number has the digits that give the same double "
     "again.",
     "movement": "NetCDF of poses as the movement package has them: read it with movement, or with "
-    "`xarray.open_dataset(FILE)`. Metres with y up, seconds; the variable orientation is in radians.",
+    "`xarray.open_dataset(FILE)`. Metres with y up, seconds; the variable orientation is in "
+    "radians.",
     "trackpy": "Linked features: `trackpy.emsd(pandas.read_csv(FILE), mpp=1, fps=RATE)`. x and y "
     "are in metres with y up, so a unit of length is one metre, and mpp is 1.",
     "ros": "ROS 2 bag (MCAP), `geometry_msgs/msg/PoseStamped`, one topic per body: `ros2 bag play "
