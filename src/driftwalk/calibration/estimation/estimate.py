@@ -201,7 +201,7 @@ def _profiles(
         recorded,
         posterior.solved,
         wider * posterior.draws.std(axis=0),
-        reach=REACH,
+        reach=descending.REACH,
     )
     place = np.clip(found.place - bias[:, None], 0.0, 1.0)
     return Profiles(place, found.rise / wider[:, None] ** 2)
