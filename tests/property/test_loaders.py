@@ -124,6 +124,13 @@ def test_what_looks_like_a_table_is_read_or_refused(body: bytes, head: bytes) ->
         load_or_refuse(path, None)
 
 
+def _fields_of(line: bytes, separator: bytes | None) -> int:
+    """Return how many fields a line has; a delimiter between closed quotation marks parts none."""
+    parts = line.split(b'"')
+    outside = b"".join(parts[::2]) if len(parts) % 2 else line
+    return len(line.split()) if separator is None else outside.count(separator) + 1
+
+
 @settings(deadline=None, max_examples=100)
 @given(ROWS, st.sampled_from([",", "\t", ";", " "]))
 def test_fields_are_counted_as_by_splitting(text: bytes, delimiter: str) -> None:
@@ -132,7 +139,7 @@ def test_fields_are_counted_as_by_splitting(text: bytes, delimiter: str) -> None
     separator = None if delimiter == " " else delimiter.encode()
     # `\r` is a blank here and at the end of a line only in real files.
     lines = [line.replace(b"\r", b" ") for line in lines]
-    expected = [len(line.split(separator)) if line.strip() else 0 for line in lines]
+    expected = [_fields_of(line, separator) if line.strip() else 0 for line in lines]
     assert _field_counts(b"\n".join(lines) + b"\n", delimiter).tolist() == expected
 
 

@@ -103,7 +103,7 @@ def write_animation(
     target = Path(file)
     require_target(target, existing="replace", endings=tuple(FRAMES_PER_S))
     if seconds is not None and speed is not None:
-        raise InputError("`seconds` and `speed` say the same in two ways: give one")
+        raise InputError("the length of a film and how fast it runs say the same: give one")
     scene = _scene(motion, run)
     ending = target.suffix.lower()
     moments, rate = _moments(scene.time, FRAMES_PER_S[ending], seconds, speed)
@@ -159,15 +159,15 @@ def _moments(
         rate = lasts / seconds
     else:
         if not (np.isfinite(speed) and speed > 0.0):
-            raise InputError(f"`speed` must be a number above zero, got {speed:g}")
+            raise InputError(f"a film runs so many times real time, above zero: got {speed:g}")
         count = np.floor(lasts * per_second / speed * (1.0 + 1e-12)) + 1.0
         rate = speed
     if count > MOST_FRAMES:
         least = lasts * per_second / MOST_FRAMES
         raise InputError(
             f"the film would take {count / per_second:.0f} s, and at most "
-            f"{MOST_FRAMES / per_second:.0f} s are written: give a `speed` of at least "
-            f"{np.ceil(least):g}"
+            f"{MOST_FRAMES / per_second:.0f} s are written: let it run at least "
+            f"{np.ceil(least):g} times as fast as real time"
         )
     if speed is None:
         return np.linspace(time[0], time[-1], int(count)), rate

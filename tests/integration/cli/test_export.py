@@ -122,7 +122,7 @@ def test_the_force_of_a_plugin_is_driftwalk_s(study: Path, target: str, tmp_path
     if target == "gazebo":  # a tank whose middle is elsewhere
         corners = "[[-0.07, -0.09], [0.15, -0.1], [0.14, 0.12], [-0.06, 0.13]]"
         shape = f'[tank]\nshape = "polygon"\nvertices_m = {corners}\n'
-        study.write_text(study.read_text() + shape)
+        study.write_text(study.read_text(encoding="utf-8") + shape, encoding="utf-8")
     words = ("export", study, "--flow", FLOW, "--to", target, "-o", out, "--verify", "--json")
     done = here(*words)
     assert done.code == 0, done.err
@@ -175,7 +175,9 @@ def test_a_tank_too_narrow_for_a_proof_is_said(target: str, study: Path, tmp_pat
         pytest.importorskip("mujoco", reason="mujoco-core is not installed")
     else:
         a_compiler()
-    study.write_text("tank.diameter_m = 0.043\nsimulation.start = { x_m = 0.0 }\n")
+    study.write_text(
+        "tank.diameter_m = 0.043\nsimulation.start = { x_m = 0.0 }\n", encoding="utf-8"
+    )
     words = ("export", study, "--flow", FLOW, "--to", target, "-o", tmp_path / "tank", "--verify")
     done = here(*words)
     assert done.code == 1

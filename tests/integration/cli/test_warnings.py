@@ -181,6 +181,8 @@ BAD: dict[str, Callable[[Path, Path], list[Words]]] = {
         ["sensitivity", bad, "-o", out],
         ["sensitivity", "--flow", bad, "-o", out],
     ],
+    "export": lambda bad, out: [["export", bad, "--to", "csv", "-o", out / "folder"]],
+    "cite": lambda bad, out: [["cite", bad]],
     "classify": lambda bad, out: [["classify", bad, "--side", "3cm"]],
     "report": lambda bad, out: [["report", bad, "-o", out / "report.html"]],
     "view": lambda bad, out: [["view", bad, "--no-open"]],
@@ -256,6 +258,8 @@ ONE = ("--threads", "1")
 QUICK: dict[str, Callable[[Path, Path, Path], Words]] = {
     "study new": lambda place, run, out: ["study", "new", out / "new.toml"],
     "study check": lambda place, run, out: ["study", "check", place / "grid.toml"],
+    "export": lambda place, run, out: ["export", run, "--to", "csv", "-o", out / "folder"],
+    "cite": lambda place, run, out: ["cite", run],
     "camera calibrate": lambda place, run, out: [
         *("camera", "calibrate", place / "board.png", "--squares", "8x6", "--square", "3cm"),
         *("--no-lens", "-o", out / "camera.toml"),

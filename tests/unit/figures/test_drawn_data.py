@@ -19,7 +19,7 @@ FIELD = np.array([[0.1, 0.2, 0.3], [0.4, np.nan, 0.6]])
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as file:
+    with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 
 

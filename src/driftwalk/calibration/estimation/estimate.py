@@ -15,7 +15,6 @@ from driftwalk.calibration.estimation.modes import Modes, find_modes
 from driftwalk.calibration.estimation.objective import SummaryObjective
 from driftwalk.calibration.estimation.posterior import (
     MOST_ROUNDS as MOST_REGIONS,
-    REACH,
     Posterior,
     sample_posterior,
 )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from driftwalk.core.errors import InputError
 from driftwalk.export.data.motion import Motion
 
 
@@ -39,6 +38,4 @@ def write_film(motion: Motion, folder: Path, *, ending: str, speed: float = 1.0)
     """
     from driftwalk.plot import write_animation
 
-    if not speed > 0.0:
-        raise InputError(f"`speed` is how much faster than real time: above zero, got {speed:g}")
     return write_animation(motion.recording, folder / f"{motion.name}.{ending}", speed=speed)

@@ -92,7 +92,7 @@ def _of_file(file: Path, world: int | None) -> list[Motion]:
             "the whole way of some"
         )
     if world is not None:
-        raise InputError(f"{file} is a recording of one world: leave `world` out")
+        raise InputError(f"{file} is a recording of one world: name none")
     # A recording in the plain form that `load` makes of any file that needs no options.
     return [Motion(file.stem.partition(".")[0] or "recording", load(file))]
 
