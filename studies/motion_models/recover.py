@@ -1,6 +1,6 @@
 """Calibrate models on simulated recordings of known truth, and count how well it goes.
 
-    python studies/motion_models/recover.py OUT.jsonl [--model NAME ...] [--recordings 20]
+    python studies/motion_models/recover.py OUT.jsonl [--model NAME] [--first 0] [--recordings 20]
     python studies/motion_models/recover.py SEARCHED.jsonl --search-alone [--recordings 5]
 
 Every recording lasts half an hour at 10 Hz, in a round arena of 30 cm, with 0.3 mm of noise. The
@@ -143,12 +143,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("out", type=Path)
     parser.add_argument("--model", action="append", choices=USUAL)
+    parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--recordings", type=int, default=20)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--search-alone", action="store_true")
     given = parser.parse_args()
     done = {(one["model"], one["recording"]) for one in read_lines(given.out)}
-    for number in range(given.recordings):
+    for number in range(given.first, given.first + given.recordings):
         for model in given.model or USUAL:
             if (model, number) in done:
                 continue
