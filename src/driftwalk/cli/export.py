@@ -11,6 +11,7 @@ from driftwalk.cli.options.shared import Json
 from driftwalk.cli.terminal.answer import print_row
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_json, print_note
+from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.errors import InputError
 from driftwalk.export import TARGETS, Source, Verification, export_run, target_named
 
@@ -91,8 +92,9 @@ def export(
         if target.require is not None:
             target.require()
     said: list[str] = []
-    source = Source(run, flow, seed, world, speed, said.append)
-    files = export_run(source, target, out)
+    with ProgressReporter("frames") as progress:
+        source = Source(run, flow, seed, world, speed, said.append, progress)
+        files = export_run(source, target, out)
     notes = [to_options(sentence) for sentence in said]
     outcome = target.verify(out) if verify and target.verify is not None else None
     if json:

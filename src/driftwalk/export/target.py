@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 
-def _nobody(_sentence: str) -> None:
+def _nobody(*_: object) -> None:
     """Tell nobody."""
 
 
@@ -29,6 +29,8 @@ class Source:
         How much faster than real time a film is.
     tell : callable
         Called with each sentence that the user should read: above all what a format cannot hold.
+    progress : callable
+        Called with how much of a long export is done, and the whole.
     """
 
     path: Path
@@ -37,6 +39,7 @@ class Source:
     world: int | None = None
     speed: float | None = None
     tell: Callable[[str], None] = _nobody
+    progress: Callable[[int, int], None] = _nobody
 
 
 @dataclass(frozen=True)

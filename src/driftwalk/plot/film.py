@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -58,6 +58,7 @@ def write_animation(
     run: int = 0,
     seconds: float | None = None,
     speed: float | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Write a film of blocks that assemble, or of a recording, as GIF or as MP4.
 
@@ -80,6 +81,8 @@ def write_animation(
         How long the film takes [s], at least 0.2; default: 20 s, unless `speed` is given.
     speed : float, optional
         How much faster than real time the film is, in place of `seconds`.
+    progress : callable, optional
+        Called with the number of frames that are written, and of all.
 
     Returns
     -------
@@ -109,8 +112,19 @@ def write_animation(
     moments, rate = _moments(scene.time, FRAMES_PER_S[ending], seconds, speed)
     require_film_writer(ending)
     with print_style(), atomic_path(target) as temporary:
-        write_frames(temporary, ending, _frames(scene, moments, rate, DOTS_PER_INCH[ending]))
+        frames = _frames(scene, moments, rate, DOTS_PER_INCH[ending])
+        if progress is not None:
+            frames = _counted(frames, moments.size, progress)
+        write_frames(temporary, ending, frames)
     return target
+
+
+def _counted(
+    frames: Iterator[Frame], total: int, progress: Callable[[int, int], None]
+) -> Iterator[Frame]:
+    for number, frame in enumerate(frames, 1):
+        yield frame
+        progress(number, total)
 
 
 def _scene(motion: xr.Dataset, run: int) -> _Scene:

@@ -119,6 +119,14 @@ def test_a_tank_that_nobody_knows_is_framed_by_the_motion(tmp_path) -> None:
     assert right - left == pytest.approx(10.0 * 0.9 * 400 / 16.8, abs=12.0)
 
 
+def test_frames_are_told_as_they_are_written(tmp_path: Path) -> None:
+    told: list[tuple[int, ...]] = []
+    write_animation(
+        two_bodies(), tmp_path / "two.gif", seconds=0.8, progress=lambda *now: told.append(now)
+    )
+    assert told == [(number, 10) for number in range(1, 11)]
+
+
 def test_what_cannot_be_filmed_is_refused(path) -> None:
     nowhere = two_bodies()
     nowhere["x"][:] = np.nan

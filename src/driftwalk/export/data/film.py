@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from driftwalk.export.data.motion import Motion
 
+Progress = Callable[[int, int], None]
 
-def write_film(motion: Motion, folder: Path, *, ending: str, speed: float = 1.0) -> Path:
+
+def write_film(
+    motion: Motion,
+    folder: Path,
+    *,
+    ending: str,
+    speed: float = 1.0,
+    progress: Progress | None = None,
+) -> Path:
     """Write a film of what moved in its tank.
 
     Parameters
@@ -20,6 +30,8 @@ def write_film(motion: Motion, folder: Path, *, ending: str, speed: float = 1.0)
         As what.
     speed : float
         How much faster than real time it is.
+    progress : callable, optional
+        Called with the number of frames that are written, and of all.
 
     Returns
     -------
@@ -38,4 +50,5 @@ def write_film(motion: Motion, folder: Path, *, ending: str, speed: float = 1.0)
     """
     from driftwalk.plot import write_animation
 
-    return write_animation(motion.recording, folder / f"{motion.name}.{ending}", speed=speed)
+    file = folder / f"{motion.name}.{ending}"
+    return write_animation(motion.recording, file, speed=speed, progress=progress)

@@ -51,7 +51,11 @@ def _write_films(ending: str, source: Source, folder: Path) -> list[Path]:
             f"the film shows {motions[0].name}, the first of {len(motions)}; you can name one"
         )
     file = write_film(
-        motions[0], folder, ending=ending, speed=1.0 if source.speed is None else source.speed
+        motions[0],
+        folder,
+        ending=ending,
+        speed=1.0 if source.speed is None else source.speed,
+        progress=source.progress,
     )
     page = write_readme(folder, "film", text_of_name(source.path), [Exported(file, [], "")])
     return [file, page]
