@@ -451,7 +451,6 @@ PAGES: dict[str, Page] = {
     ),
     "docs/how-to/take-your-tracks-elsewhere.md": Page(
         provide=_files(_one_recording, _several_worlds, _calibrated),
-        not_run={"driftwalk convert tracks.csv *": "names a file that only its reader has"},
         makes=("tracks/README.md", "one/replicate_3.csv", "film/recording.gif", "paper/ks_map.pdf"),
         slow=True,
     ),
