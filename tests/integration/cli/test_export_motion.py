@@ -55,7 +55,7 @@ def assert_same(back: xr.Dataset, recording: xr.Dataset, names: Mapping[str, str
         ("formats-2/movement_0.15_sleap.nc", {"keypoint": "thorax", "metres_per_pixel": 1e-3}),
         ("formats-2/trackpy_tracks.csv", {"frame_rate": 25.0, "metres_per_pixel": 1e-6}),
         ("format-vicon/QBii_Square_2m_cw.csv", {}),
-        ("tenebrio-ubitrail", {}),
+        ("tenebrio-ubitrail/tenebrio_ubitrail.csv.gz", {"metres_per_pixel": 1e-3}),
     ],
 )
 @pytest.mark.parametrize("to", EXACT)
@@ -69,19 +69,14 @@ def test_a_real_recording_comes_back_as_it_was(
     """The recordings of others, some with gaps and some with several bodies."""
     folder, _, name = file.partition("/")
     source = shared_data(folder) / name
-    if source.is_dir():
-        source = next(iter(sorted(source.glob("*.csv"))), source)
-    try:
-        recording = load(source, **options)
-    except ValueError as error:
-        pytest.skip(f"{file} asks for more: {error}")
-    recording = recording.isel(time=slice(2000))
+    recording = load(source, **options).isel(time=slice(2000))
     save_trajectory(recording, tmp_path / "a.nc")
     done = here("export", tmp_path / "a.nc", "--to", to, "-o", tmp_path / "out")
     assert done.code == 0, done.err
     back = load(tmp_path / "out" / EXACT[to].format("a"))
     names = {name: name for name in body_names(recording)}
-    if to == "trackpy" and not all(name.isdecimal() for name in names):
+    # "05" is no number that would be written again.
+    if to == "trackpy" and not all(name.isdecimal() and str(int(name)) == name for name in names):
         names = {name: str(number) for number, name in enumerate(names)}
     assert_same(back, recording, names)
 
