@@ -208,9 +208,9 @@ def test_fonts_of_a_pdf_are_truetype(run: Path, tmp_path: Path) -> None:
     ("words", "message"),
     [
         (("{run}", "--to", "csv", "--seed", "1"), "csv has no use for --seed"),
-        (("{run}", "--to", "gif", "--speed", "0"), "above zero, got 0"),
+        (("{run}", "--to", "gif", "--speed", "0"), "above zero: got 0"),
         (("{run}", "--to", "gif"), "at most 1200 s are written"),
-        (("{run}", "--to", "csv", "--world", "1"), "leave --world out"),
+        (("{run}", "--to", "csv", "--world", "1"), "a recording of one world"),
         (("{blocks}", "--to", "csv", "--world", "7"), "no run 7"),
         (("{blocks}", "--to", "pdf"), "is not the directory of a finished run"),
         (("nowhere.nc", "--to", "csv"), "does not exist"),
