@@ -36,7 +36,8 @@ def frame_rate(recording: xr.Dataset) -> float | None:
         if isinstance(rate, (int, float, np.number)) and _is_even(time, float(rate)):
             # Over the whole recording the rounding of single times does not count.
             frames = np.rint((time[-1] - time[0]) * rate)
-            return float(f"{frames / (time[-1] - time[0]):.12g}")
+            mean = float(f"{frames / (time[-1] - time[0]):.12g}")
+            return mean if _is_even(time, mean) else float(rate)
     return None
 
 
