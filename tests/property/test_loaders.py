@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import tempfile
 from pathlib import Path
@@ -141,6 +143,23 @@ def test_fields_are_counted_as_by_splitting(text: bytes, delimiter: str) -> None
     lines = [line.replace(b"\r", b" ") for line in lines]
     expected = [_fields_of(line, separator) if line.strip() else 0 for line in lines]
     assert _field_counts(b"\n".join(lines) + b"\n", delimiter).tolist() == expected
+
+
+@settings(deadline=None, max_examples=50)
+@given(
+    st.lists(st.lists(st.text("a,;\t\"' "), min_size=1, max_size=5), min_size=1, max_size=4),
+    st.sampled_from([",", "\t", ";"]),
+)
+def test_quoted_fields_are_counted_as_they_were_written(
+    rows: list[list[str]], delimiter: str
+) -> None:
+    """Python's own writer puts marks around every field, and doubles those within."""
+    text = io.StringIO()
+    csv.writer(text, delimiter=delimiter, quoting=csv.QUOTE_ALL, lineterminator="\n").writerows(
+        rows
+    )
+    counted = _field_counts(text.getvalue().encode(), delimiter).tolist()
+    assert counted == [len(row) for row in rows]
 
 
 @settings(deadline=None, max_examples=8)

@@ -158,6 +158,8 @@ def test_a_client_that_is_killed_goes_on_at_home(at_home: Path, tmp_path: Path) 
     ) as client:  # fmt: skip
         wait_for_shards(folder, client)
         page = RunSource(folder).greeting()[0]["page"]
+        while not page["state"]["progress"] and client.poll() is None:
+            page = RunSource(folder).greeting()[0]["page"]
         client.send_signal(signal.SIGKILL)
     kept = len(shards_of(folder))
     assert 0 < kept < 16
