@@ -24,7 +24,7 @@ _CHUNK: Final = 1 << 14
 
 
 class Judged(NamedTuple):
-    """What the test says of every step."""
+    """The verdict of the test on every step."""
 
     deviation: Array
     """Normalised deviation, shape (n,); NaN where a step is not judged."""

@@ -1,4 +1,4 @@
-"""What a field that was taken from a recording says of itself: its flags, and its warnings."""
+"""Flags and warnings of a field that was taken from a recording."""
 
 from __future__ import annotations
 

@@ -153,8 +153,8 @@ def _box(steps: Steps) -> Outline:
     low, high = steps.position.min(axis=0), steps.position.max(axis=0)
     if not (high > low).any():
         raise InputError(
-            f"all tracers are at one point, ({low[0] + 0.0:g}, {low[1] + 0.0:g}) m: there is no field to "
-            "measure; are these the right columns?"
+            f"all tracers are at one point, ({low[0] + 0.0:g}, {low[1] + 0.0:g}) m: there is no "
+            "field to measure; are these the right columns?"
         )
     # A box without height has no area; its cells have the size that the other side gives them.
     size = np.maximum(high - low, 1e-6 * (high - low).max())
