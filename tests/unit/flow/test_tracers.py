@@ -72,10 +72,11 @@ def test_false_links_are_left_out_and_right_ones_kept(fresh_seed: Callable[[int]
     true = np.stack(cell_averages(flow))
     whole = (flow.flag.values == MEASURED) & (flow.tracks.values >= 4)
 
-    def worst(field: xr.Dataset) -> float:
-        return float(np.abs(np.stack([field.u, field.v]) - true)[:, whole].max())
+    def error(field: xr.Dataset) -> float:
+        return float(np.std((np.stack([field.u, field.v]) - true)[:, whole]))
 
-    assert worst(kept) > 2.0 * worst(flow)
+    # Of 60 seeds the ratio is 2.7, give or take 0.24.
+    assert error(kept) > 1.5 * error(flow)
     assert flow.attrs["samples_rejected"] == pytest.approx(np.count_nonzero(false), rel=0.25)
 
 
