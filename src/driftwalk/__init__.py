@@ -77,6 +77,7 @@ _NAMES = {
     "driftwalk.flow": (
         "extract_flow",
         "flow_from_function",
+        "flow_from_tracers",
         "jets_flow",
         "load_flow",
         "save_flow",

@@ -65,6 +65,7 @@ from driftwalk.datasets import (
 from driftwalk.flow import (
     extract_flow as extract_flow,
     flow_from_function as flow_from_function,
+    flow_from_tracers as flow_from_tracers,
     jets_flow as jets_flow,
     load_flow as load_flow,
     save_flow as save_flow,

@@ -17,6 +17,7 @@ from typing import Any
 import h5py
 import numpy as np
 from command_line import FLOW, GRID, RECORDING, here
+from drifting_tracers import seeded_tank
 from finished_run import write_finished_run
 from self_propelled import moving
 
@@ -81,6 +82,20 @@ def _recording(seconds: float | None = None, name: str = "recording.csv") -> Cal
         return {}
 
     return provide
+
+
+def _tracks(folder: Path) -> Names:
+    """Provide ``tracks.csv``: synthetic tracers in pixels, as trackpy writes them."""
+    seen = seeded_tank(1, tracers=1500, samples=8, false_links=0.01).recording
+    table = seen[["x", "y"]].to_dataframe().reset_index()
+    pixels = {
+        "y": (0.16 - table["y"]) / 1e-4,
+        "x": (0.17 + table["x"]) / 1e-4,
+        "frame": (table["time"] / 0.05).round().astype(int),
+        "particle": table["body"],
+    }
+    table.assign(**pixels)[list(pixels)].to_csv(folder / "tracks.csv", index=False)
+    return {}
 
 
 def _flow(*names: str) -> Callable[[Path], Names]:
@@ -443,7 +458,9 @@ PAGES: dict[str, Page] = {
         slow=True,
     ),
     "docs/how-to/flow-field.md": Page(
-        provide=_recording(), numbers=Numbers.SAME, holds=("u.shape == (2,)",)
+        provide=_files(_recording(), _tracks),
+        numbers=Numbers.SAME,
+        holds=("u.shape == (2,)", "water.attrs['tracks_used'] == 1500"),
     ),
     "docs/how-to/install.md": Page(
         not_run={"pip install *": INSTALLS, "driftwalk demo --quick": DEMO, "docker *": DOCKER},

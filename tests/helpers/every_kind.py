@@ -7,6 +7,7 @@ from functools import cache
 
 import pytest
 import xarray as xr
+from drifting_tracers import seeded_tank
 from few_simulations import simulate_little
 from fit_worlds import coarse_study, recording
 from recovery_worlds import small_study
@@ -126,6 +127,9 @@ FORMS: dict[str, Callable[[], xr.Dataset]] = {
     "simulation": simulated,
     "flow_field of a formula": lambda: FLOW,
     "flow_field of a recording": lambda: dw.extract_flow(track(), **BLOCK),
+    "flow_field of tracers": lambda: dw.flow_from_tracers(
+        seeded_tank(1, tracers=40, samples=5).recording, cells=8
+    ),
     "flow_field of a fit": lambda: dw.fitted_flow(every_kind("fit")),
     "steps": lambda: dw.steps(track()),
     "comparison": lambda: compare(track(), recording(SECONDS, "second"), permutations=19),

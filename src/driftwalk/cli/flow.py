@@ -1,9 +1,10 @@
-"""`driftwalk flow`: how the water moved, from the track of the body that floats in it."""
+"""`driftwalk flow`: how the water moved, from the tracks of what floats in it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -13,6 +14,7 @@ from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_json, print_note
+from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import FLOW_KEYS
 
 if TYPE_CHECKING:
@@ -20,12 +22,17 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
+OF_A_BODY: Final = ("side", "mass", "depth", "window", "inertia", "flow_drag_coefficient")
+"""Options that say something of a floating body, which no tracer is."""
+NOISE: Final = FLOW_KEYS["position_noise"]
+
 
 @with_recording_options
 @with_study_options(
     FLOW_KEYS,
     *("tank_diameter", "side", "mass", "depth"),
     *("cells", "cell_size", "window", "inertia", "flow_drag_coefficient", "min_count"),
+    "position_noise",
 )
 def flow(
     recording: RecordingFile,
@@ -37,6 +44,12 @@ def flow(
     how: RecordingOptions,
     frame_interval: FrameInterval = None,
     flow_variables: FlowVariables = None,
+    tracers: Annotated[
+        bool,
+        typer.Option(
+            "--tracers", help="The bodies are passive tracers: their tracks make one flow (PTV)."
+        ),
+    ] = False,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a file that exists.")
     ] = False,
@@ -46,7 +59,8 @@ def flow(
 
     Averages the velocity of the body in each cell and corrects it for the body's inertia. Cells
     that the body never visited are filled in and flagged. Mass and side come from the study; the
-    default is the 11.6-g, 3-cm block of the paper. A field that was measured otherwise is brought
+    default is the 11.6-g, 3-cm block of the paper. With --tracers the steps of many tracks are
+    averaged, without those that join two particles. A field that was measured otherwise is brought
     to metres, with its masked nodes filled; --arena circle:D@X,Y says where its tank is.
     """
     from driftwalk.cli.inputs.flow_file import read_flow_file
@@ -63,9 +77,12 @@ def flow(
         tank_diameter=diameter,
     )
     if measured is not None:
+        if tracers:
+            raise InputError(f"{recording} is a flow field already: --tracers is for tracks")
         save_flow(measured, out, existing=existing)
         _report_file(measured, out, json=json)
         return
+    _check_given(given, tracers=tracers)
     resolved = given.study()
     if given.file is None:
         # Without a study nobody has said how large the tank is: the default one is no answer.
@@ -73,10 +90,51 @@ def flow(
     else:
         with explained():
             trajectory = load_with_study(recording, resolved, how.arguments())
-    require_motion(trajectory, body=how.body, where=recording)
-    field = _extract(trajectory, resolved, body=how.body)
+    if tracers:
+        field = _from_tracers(trajectory, resolved, noise=given.overrides.get(NOISE))
+    else:
+        _require_one_body(trajectory, recording, body=how.body)
+        require_motion(trajectory, body=how.body, where=recording)
+        field = _extract(trajectory, resolved, body=how.body)
     save_flow(field, out, existing=existing)
     _report(field, out, json=json)
+
+
+def _check_given(given: StudyOptions, *, tracers: bool) -> None:
+    """Refuse the options that have no meaning for what is measured."""
+    if not tracers:
+        if NOISE in given.overrides:
+            raise InputError("--position-noise is for --tracers: a body's track is smoothed")
+        return
+    unused = [
+        f"--{name.replace('_', '-')}" for name in OF_A_BODY if FLOW_KEYS[name] in given.overrides
+    ]
+    if unused:
+        raise InputError(
+            f"tracers move as the water does: {', '.join(unused)} is for a floating body; leave "
+            "it out"
+        )
+
+
+def _require_one_body(trajectory: xr.Dataset, path: Path, *, body: str | None) -> None:
+    count = trajectory.sizes["body"]
+    if body is None and count > 1:
+        raise InputError(
+            f"{path} has {count} bodies: --tracers makes one flow of them if they are passive "
+            "tracers, --body NAME takes one, --body all pools them as floating bodies"
+        )
+
+
+def _from_tracers(trajectory: xr.Dataset, study: Study, *, noise: float | str | None) -> xr.Dataset:
+    from driftwalk.flow import flow_from_tracers
+
+    return flow_from_tracers(
+        trajectory,
+        cells=study.flow.cells,
+        cell_size=study.flow.cell_size_m,
+        position_noise=None if isinstance(noise, str) else noise,
+        min_count=study.flow.min_count,
+    )
 
 
 def _extract(trajectory: xr.Dataset, study: Study, *, body: str | None) -> xr.Dataset:
@@ -123,13 +181,31 @@ def _report(field: xr.Dataset, out: Path, *, json: bool) -> None:
         return
     if "warning" in facts:
         print_note(f"warning: {facts['warning']}")
-    if facts["inertia"] == "corrected":
+    if facts.get("inertia") == "corrected":
         print_note(
             f"corrected for a body of {facts['mass_kg']:g} kg and {facts['area_m2']:g} m2 "
             f"with C_x = {facts['flow_drag_coefficient']:g}"
         )
+    measured_from = f"{facts['samples_used']} samples"
+    if "tracks_used" in facts:
+        measured_from = f"{facts['samples_used']} steps of {facts['tracks_used']} tracks"
+        _report_left_out(facts)
+    place = "tank" if "arena" in facts else "box of the tracks"
     print_note(
         f"wrote {out}: {field.sizes['x']} x {field.sizes['y']} cells of "
-        f"{1e3 * facts['cell_size_m']:g} mm from {facts['samples_used']} samples; "
-        f"{100 * facts['measured_share']:.0f} % of the tank measured, the rest filled"
+        f"{1e3 * facts['cell_size_m']:g} mm from {measured_from}; "
+        f"{100 * facts['measured_share']:.0f} % of the {place} measured, the rest filled"
     )
+
+
+def _report_left_out(facts: Mapping[str, Any]) -> None:
+    """Say which steps of tracers are not in the field."""
+    reasons = {
+        "samples_rejected": "join two particles",
+        "samples_across_gaps": "cross a gap",
+        "samples_ambiguous": "have an unsure identity",
+        "samples_outside_tank": "lie beyond the wall",
+    }
+    parts = [f"{facts[key]} that {why}" for key, why in reasons.items() if facts[key]]
+    if parts:
+        print_note(f"left out steps: {', '.join(parts)}")

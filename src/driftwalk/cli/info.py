@@ -45,6 +45,12 @@ _CIRCLE_ROWS: list[tuple[str, str, float]] = [
     ("circle of centres: radius [cm]", "radius_m", 100),
     ("  rim visited [%]", "sectors_visited_share", 100),
 ]
+_OF_A_RECORDING: list[tuple[str, str, float]] = [
+    ("tracks", "tracks_used", 1),
+    ("samples", "samples_used", 1),
+    ("standard error, median [cm/s]", "standard_error_median_m_s", 100),
+]
+"""Rows of a flow field that was taken from a recording."""
 _TRACKED = ["ambiguous_share"]
 _BRIEF = [
     *("samples", "duration_s", "rate_Hz", "gaps", "speed_mean_m_s", "position_noise_m"),
@@ -121,6 +127,7 @@ def _print_field(described: dict[str, Any], *, json: bool) -> None:
     print_table(
         [
             ["file", described["source"] or "-"],
+            ["method", described["method"] or "-"],
             ["flow field", f"{described['columns']} x {described['rows']} nodes"],
             ["frames", described["frames"]],
             *(
@@ -131,6 +138,11 @@ def _print_field(described: dict[str, Any], *, json: bool) -> None:
             ["measured nodes [%]", 100 * described["measured_share"]],
             ["speed, mean [cm/s]", 100 * described["speed_mean_m_s"]],
             ["speed, largest [cm/s]", 100 * described["speed_max_m_s"]],
+            *(
+                [label, factor * described[key]]
+                for label, key, factor in _OF_A_RECORDING
+                if key in described
+            ),
         ]
     )
     for warning in described["warnings"]:

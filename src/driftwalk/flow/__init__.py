@@ -1,6 +1,7 @@
-"""How did the water move? Flow fields from a floating body's track, a formula or a file.
+"""How did the water move? Flow fields from the tracks of bodies or tracers, formulas, files.
 
-`extract_flow` is the paper's estimator; `load_flow` and `save_flow` keep a field; the analytic
+`extract_flow` is the paper's estimator for a floating body, `flow_from_tracers` takes passive
+tracers; `load_flow` and `save_flow` keep a field; the analytic
 fields have exact values.
 """
 
@@ -21,6 +22,7 @@ from driftwalk.flow.inertia import inertia_correction
 from driftwalk.flow.random_flow import random_tank_flow
 from driftwalk.flow.read import load_flow
 from driftwalk.flow.recognise import flow_format
+from driftwalk.flow.tracers import flow_from_tracers
 from driftwalk.flow.write import save_flow
 
 __all__ = [
@@ -28,6 +30,7 @@ __all__ = [
     "extract_flow",
     "flow_format",
     "flow_from_function",
+    "flow_from_tracers",
     "inertia_correction",
     "jets_flow",
     "jets_velocity",

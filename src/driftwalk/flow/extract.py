@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -19,7 +18,8 @@ from driftwalk.flow.cell_means import CellMeans, Samples, average_cells
 from driftwalk.flow.fill import fill_velocity
 from driftwalk.flow.grid import Grid, make_grid
 from driftwalk.flow.inertia import cross_section, inertia_correction
-from driftwalk.schema import FLAGS, body_names, body_track, build_flow_field, check_trajectory
+from driftwalk.flow.measured import coverage_warnings, flags_of, measured_share
+from driftwalk.schema import body_names, body_track, build_flow_field, check_trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,8 +29,6 @@ Mask = npt.NDArray[np.bool_]
 Inertia = Literal["corrected", "none"]
 
 ALL_BODIES = "all"
-SPARSE_SHARE = 0.25
-"""Share of measured cells below which the field is mostly a guess, and says so."""
 
 
 @dataclass(frozen=True)
@@ -197,6 +195,11 @@ def _chosen_bodies(trajectory: xr.Dataset, body: str | None) -> list[str]:
         return names
     if body is None and len(names) == 1:
         return names
+    if body is None:
+        raise InputError(
+            f"the recording has {len(names)} bodies: name one with `body`, or pool them with "
+            'body="all"; of passive tracers `flow_from_tracers` makes one flow'
+        )
     body_track(trajectory, body)  # raises, naming the bodies, when there is no such one
     return [str(body)]
 
@@ -248,15 +251,13 @@ def _nothing_measured(smoothed: _Smoothed, inside: Samples, min_count: int, wind
 def _dataset(
     grid: Grid, outline: Outline, means: CellMeans, measured: Mask, settings: dict[str, Any]
 ) -> xr.Dataset:
-    x, y = (part.ravel() for part in grid.nodes())
-    in_tank = measured | (outline.depth(x, y) >= 0.0).reshape(grid.shape)
-    flag = np.where(in_tank, FLAGS["filled"], FLAGS["outside"])
-    flag[measured] = FLAGS["measured"]
+    flag = flags_of(grid, outline, measured)
     flow = fill_velocity(grid, means.flow.reshape(*grid.shape, 2), known=measured, outline=outline)
     error = np.where(measured[..., None], means.standard_error.reshape(*grid.shape, 2), np.nan)
     block = means.velocity.reshape(*grid.shape, 2)
-    share = float(np.count_nonzero(measured) / np.count_nonzero(in_tank))
-    warning = _warning(share, settings)
+    share = measured_share(flag)
+    used, beyond = settings["samples_used"], settings["samples_outside_tank"]
+    warning = " ".join(coverage_warnings(share, used=used, beyond=beyond))
     attrs = {
         "method": "cell means of a body's velocity, Eq. 4 with the mean acceleration"
         if settings["inertia"] == "corrected"
@@ -280,20 +281,3 @@ def _dataset(
         u_standard_error=error[..., 0],
         v_standard_error=error[..., 1],
     )
-
-
-def _warning(share: float, settings: Mapping[str, Any]) -> str:
-    """Return what the user of the field has to know, in sentences; empty when all is well."""
-    sentences = []
-    if share < SPARSE_SHARE:
-        sentences.append(
-            f"Only {100.0 * share:.0f} % of the tank's cells are measured, the others are filled "
-            "in: record for longer, or use larger cells."
-        )
-    used, beyond = settings["samples_used"], settings["samples_outside_tank"]
-    if beyond > math.ceil(0.01 * used):
-        sentences.append(
-            f"{beyond} of {used + beyond} samples lie beyond the wall of the tank and were left "
-            "out: check the scale, the origin and the arena."
-        )
-    return " ".join(sentences)

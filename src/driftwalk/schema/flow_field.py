@@ -4,7 +4,8 @@ Dimensions ``(y, x)`` or ``(time, y, x)``; coordinates ``x``, ``y`` [m] (uniform
 ``time`` [s]. Variables: ``u``, ``v`` [m/s], the water's velocity, finite at every node; ``flag``
 (int8, CF flag values 0 outside, 1 measured, 2 filled); and, where the field comes from a
 recording, ``u_block``, ``v_block`` [m/s] (mean velocity of the body in the cell, NaN where
-unvisited), ``count`` (samples), ``u_standard_error``, ``v_standard_error`` [m/s].
+unvisited; not of tracers), ``count`` (samples), ``tracks`` (of tracers), ``u_standard_error``,
+``v_standard_error`` [m/s].
 """
 
 from __future__ import annotations

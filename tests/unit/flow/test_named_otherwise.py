@@ -83,12 +83,36 @@ def test_a_grid_of_parcels(tmp_path: Path) -> None:
 
 def test_a_curved_grid_is_refused(tmp_path: Path) -> None:
     longitude, latitude = np.meshgrid(X, Y)
+    longitude += 0.1 * latitude
     dataset = xr.Dataset(
         {"vozocrtx": (("y", "x"), U, SPEED), "vomecrty": (("y", "x"), V, SPEED)},
         coords={"nav_lon": (("y", "x"), longitude), "nav_lat": (("y", "x"), latitude)},
     )
     with pytest.raises(InputError, match="is the grid curved, or in longitude and latitude"):
         load_flow(write(tmp_path / "nemo.nc", dataset))
+
+
+def test_a_straight_grid_written_as_a_curved_one(tmp_path: Path) -> None:
+    """As Parcels writes its fields: coordinates over both dimensions, here without units."""
+    at_x, at_y = np.meshgrid(X, Y)
+    dataset = xr.Dataset(
+        {"vozocrtx": (("time_counter", "y", "x"), U[None]), "vomecrty": (("y", "x"), V)},
+        coords={"nav_lon": (("y", "x"), at_x), "nav_lat": (("y", "x"), at_y)},
+    )
+    path = write(tmp_path / "parcels.nc", dataset)
+    with pytest.raises(InputError, match=r"'u' has no units.*or state them with `length_unit`"):
+        load_flow(path)
+    check(load_flow(path, length_unit="cm"), length=1e-2, speed=1e-2)
+
+
+def test_the_names_of_opendrift(tmp_path: Path) -> None:
+    names = ("x_sea_water_velocity", "y_sea_water_velocity", "x", "y")
+    dataset = ocean(names, [SPEED, SPEED, METRES, METRES], ("time",))
+    for name in names[:2]:
+        dataset[name].attrs["standard_name"] = name
+    path = write(tmp_path / "drift.nc", dataset)
+    assert flow_format(path) == "netcdf"
+    check(load_flow(path))
 
 
 def test_variables_by_name_with_a_mask_and_turned_dimensions(tmp_path: Path) -> None:

@@ -104,6 +104,13 @@ def describe_field(field: xr.Dataset) -> dict[str, Any]:
     speed = np.hypot(field["u"].values, field["v"].values)
     measured = field["flag"].values == 1
     known = speed[measured] if measured.any() else speed
+    facts: dict[str, float] = {
+        key: int(field.attrs[key]) for key in ("samples_used", "tracks_used") if key in field.attrs
+    }
+    if "u_standard_error" in field:
+        error = np.hypot(field["u_standard_error"].values, field["v_standard_error"].values)
+        if np.isfinite(error).any():
+            facts["standard_error_median_m_s"] = float(np.nanmedian(error))
     return {
         "source": field.attrs.get("source"),
         "method": field.attrs.get("method"),
@@ -118,5 +125,6 @@ def describe_field(field: xr.Dataset) -> dict[str, Any]:
         "measured_share": float(measured.mean()),
         "speed_mean_m_s": float(known.mean()),
         "speed_max_m_s": float(known.max()),
+        **facts,
         "warnings": [text for text in (field.attrs.get("warning"),) if text],
     }

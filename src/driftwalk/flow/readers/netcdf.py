@@ -25,16 +25,18 @@ _STANDARD: Final = {
         "sea_water_x_velocity",
         "eastward_sea_water_velocity",
         "surface_eastward_sea_water_velocity",
+        "x_sea_water_velocity",
     ),
     "v": (
         "sea_water_y_velocity",
         "northward_sea_water_velocity",
         "surface_northward_sea_water_velocity",
+        "y_sea_water_velocity",
     ),
     "x": ("projection_x_coordinate", "longitude"),
     "y": ("projection_y_coordinate", "latitude"),
 }
-"""Names of the CF conventions."""
+"""Names of the CF conventions, and those that OpenDrift has in their place."""
 _AXES: Final = {"x": "X", "y": "Y"}
 _USUAL: Final = {
     "u": ("U", "uo", "water_u", "vozocrtx"),
@@ -85,7 +87,7 @@ def to_si(dataset: xr.Dataset, path: Path, options: FieldOptions) -> SiField:
     for name in map(str, chosen.variables):
         if name == "time":
             continue
-        unit = _unit(chosen, name, path)
+        unit = _unit(chosen, name, path, options)
         try:
             factor = scale.velocity(unit) if name in ("u", "v") else scale.length(unit)
         except InputError as error:
@@ -130,7 +132,7 @@ def _named(dataset: xr.Dataset, path: Path, options: FieldOptions) -> xr.Dataset
         found[quantity] = name
     if len(set(found.values())) < len(found):
         raise InputError("`variables` names one variable twice")
-    kept = dataset[list(found.values())].reset_coords()
+    kept = _straight(dataset[list(found.values())].reset_coords(), found)
     # A dimension takes the name of its coordinate, whatever it was called.
     for quantity in ("x", "y", "time"):
         name = found.get(quantity)
@@ -139,6 +141,23 @@ def _named(dataset: xr.Dataset, path: Path, options: FieldOptions) -> xr.Dataset
     kept = kept.drop_vars([str(c) for c in kept.coords if c not in found.values()])
     renamed = {name: quantity for quantity, name in found.items() if name != quantity}
     return kept.rename(renamed)
+
+
+def _straight(dataset: xr.Dataset, found: dict[str, str]) -> xr.Dataset:
+    """Return the dataset with one dimension of x and of y, where they are written over both.
+
+    Parcels and ocean models write coordinates of straight grids like those of curved ones.
+    """
+    for name in (found["x"], found["y"]):
+        values = dataset[name]
+        if values.ndim != 2:
+            continue
+        for dimension in values.dims:
+            line = values.isel({dimension: 0}, drop=True)
+            if bool((values == line).all()):
+                dataset = dataset.drop_vars(name).assign({name: line})
+                break
+    return dataset
 
 
 def _free(dataset: xr.Dataset, name: str, found: dict[str, str]) -> xr.Dataset:
@@ -206,11 +225,16 @@ def _with_times(chosen: xr.Dataset, path: Path) -> tuple[xr.Dataset, list[str]]:
     return chosen.assign_coords(time=factor * chosen["time"].values.astype(np.float64)), []
 
 
-def _unit(chosen: xr.Dataset, name: str, path: Path) -> str:
+def _unit(chosen: xr.Dataset, name: str, path: Path, options: FieldOptions) -> str:
+    """Return the unit of a variable, empty where there is none and the user states it."""
     text = chosen[name].attrs.get("units")
-    if not isinstance(text, str) or not text.strip():
-        example = "m/s" if name in ("u", "v") else "m"
-        raise FormatError(
-            f"'{name}' has no units; write its attribute 'units', such as '{example}'", path=path
-        )
-    return text
+    if isinstance(text, str) and text.strip():
+        return text
+    if options.length_unit is not None or options.metres_per_pixel is not None:
+        return ""
+    example = "m/s" if name in ("u", "v") else "m"
+    raise FormatError(
+        f"'{name}' has no units; write its attribute 'units', such as '{example}', or state them "
+        "with `length_unit`",
+        path=path,
+    )

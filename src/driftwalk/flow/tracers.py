@@ -1,0 +1,250 @@
+"""The flow field that many passive tracers show: particle tracks made a flow."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError
+from driftwalk.flow.arena import Outline, outline_of, read_arena
+from driftwalk.flow.cell_means import CellMeans, Samples, average_cells
+from driftwalk.flow.false_links import THRESHOLD, judge_steps
+from driftwalk.flow.fill import fill_velocity
+from driftwalk.flow.grid import Grid, make_grid
+from driftwalk.flow.measured import coverage_warnings, flags_of, measured_share
+from driftwalk.flow.track_steps import Steps, step_noise, track_steps
+from driftwalk.schema import build_flow_field, check_trajectory
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+USUAL_NOISE_PX = 0.1
+"""Position noise of a tracker of particles, where the tracks are too short to tell [pixels]."""
+MANY_REJECTED = 0.1
+"""Share of false links above which the linking as a whole is in doubt."""
+LONG_STEP = 1.0
+"""Median step, in cells, above which the steps blur the field."""
+
+
+def flow_from_tracers(
+    trajectory: xr.Dataset,
+    *,
+    arena: Mapping[str, Any] | str | None = None,
+    cells: int = 50,
+    cell_size: float | None = None,
+    position_noise: float | None = None,
+    outlier_threshold: float = THRESHOLD,
+    min_count: int = 1,
+) -> xr.Dataset:
+    """Estimate the velocity of the water from the tracks of passive tracers (PTV).
+
+    A tracer moves as the water does. Each step from one sample of a track to the next, not across
+    a gap, is one velocity in the middle of the step. Steps that join two different particles are
+    left out (`judge_steps`), the others are averaged in square cells. Cells without data are filled
+    from their neighbours (`fill_velocity`).
+
+    Parameters
+    ----------
+    trajectory : xarray.Dataset
+        A `trajectory` in metres, each body of which is a tracer. Tracks may be as short as two
+        samples.
+    arena : mapping or str, optional
+        Outline of the tank, as `outline_of` reads it; default: the trajectory's own. Where there
+        is none, the field covers the box that the tracers were in, without a wall.
+    cells : int, optional
+        Cells across the longer side of the tank.
+    cell_size : float, optional
+        Side of a cell [m], in place of `cells`.
+    position_noise : float, optional
+        Noise of the positions, per axis [m], for the test of the links; default: estimated from
+        the tracks (`step_noise`), or a tenth of a pixel where they are too short for that, and not
+        below that of the file's resolution.
+    outlier_threshold : float, optional
+        Normalised deviation above which a step is a false link; infinite to keep all.
+    min_count : int, optional
+        Smallest number of steps in a measured cell.
+
+    Returns
+    -------
+    xarray.Dataset
+        A `flow_field`. ``flag`` is *measured* for cells with at least `min_count` steps, *filled*
+        for the other cells of the tank, *outside* for nodes beyond the wall. ``count`` is the
+        number of steps, ``tracks`` that of tracks. The steps of a track in a cell count as one
+        observation: the standard errors come from leaving out one track at a time
+        (`average_cells`), and are NaN with fewer than two tracks. ``attrs`` holds every setting,
+        what was left out and why, the shares of measured and filled cells and, where there is
+        something to know, ``warning``.
+
+    Raises
+    ------
+    InputError
+        When no body has two positions, an option is out of range, or no cell has enough steps.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from driftwalk.schema import build_trajectory
+    >>> t, start = np.arange(10) * 0.1, np.linspace(-0.1, 0.1, 40)
+    >>> x = start + 0.02 * t[:, None]
+    >>> flow = flow_from_tracers(build_trajectory(t, x, x[:, ::-1]), cells=10)
+    >>> float(flow.u.mean().round(6)), int(flow.tracks.max())
+    (0.02, 5)
+    """
+    check_trajectory(trajectory)
+    _check_options(min_count, outlier_threshold, position_noise)
+    found = track_steps(trajectory)
+    steps = found.steps
+    described = trajectory.attrs.get("arena") if arena is None else arena
+    tank = read_arena(described) if described else None
+    outline = None if tank is None else outline_of(tank)
+    grid = make_grid(_box(steps) if outline is None else outline, cells=cells, cell_size=cell_size)
+    inside = steps if outline is None else steps.select(outline.depth(*steps.position.T) >= 0.0)
+    if inside.time.size == 0:
+        raise InputError(_none_inside(steps))
+    noise = _noise(trajectory, steps) if position_noise is None else position_noise
+    judged = judge_steps(inside, noise=noise)
+    false = judged.is_false(outlier_threshold)
+    kept = inside.select(~false)
+    means = _average(kept, grid)
+    measured = means.count.reshape(grid.shape) >= min_count
+    if not measured.any():
+        raise InputError(
+            f"no cell has {min_count} steps of tracers: lower `min_count` or give larger cells "
+            "(`cells`)"
+        )
+    settings: dict[str, Any] = {
+        "method": "cell means of tracers' velocities",
+        "cell_size_m": grid.cell_size,
+        "min_count": min_count,
+        "position_noise_m": noise,
+        "outlier_threshold": outlier_threshold,
+        "tracks_used": int(np.unique(kept.body).size),
+        "samples_used": int(kept.time.size),
+        "samples_rejected": int(np.count_nonzero(false)),
+        "samples_unjudged": judged.unjudged,
+        "samples_across_gaps": found.across_gaps,
+        "samples_ambiguous": found.ambiguous,
+        "samples_outside_tank": int(steps.time.size - inside.time.size),
+        "source": str(trajectory.attrs.get("source", "")),
+        **({} if tank is None else {"arena": json.dumps(tank)}),
+    }
+    return _dataset(grid, outline, means, measured, settings, _doubts(kept, grid, means, settings))
+
+
+def _check_options(min_count: int, outlier_threshold: float, noise: float | None) -> None:
+    if min_count < 1:
+        raise InputError(f"`min_count` must be at least 1, got {min_count}")
+    if not outlier_threshold > 0.0:
+        raise InputError(f"`outlier_threshold` must be above 0, got {outlier_threshold}")
+    if noise is not None and not (math.isfinite(noise) and noise >= 0.0):
+        raise InputError(f"`position_noise` must be a length in m, 0 or more, got {noise}")
+
+
+def _box(steps: Steps) -> Outline:
+    """Return the box of the steps: a region to lay cells over, not a wall."""
+    low, high = steps.position.min(axis=0), steps.position.max(axis=0)
+    if not (high > low).any():
+        raise InputError(
+            f"all tracers are at one point, ({low[0] + 0.0:g}, {low[1] + 0.0:g}) m: there is no "
+            "field to measure; are these the right columns?"
+        )
+    # A box without height has no area; its cells have the size that the other side gives them.
+    size = np.maximum(high - low, 1e-6 * (high - low).max())
+    center = (low + high) / 2.0
+    return outline_of(
+        {
+            "shape": "rectangle",
+            "width_m": float(size[0]),
+            "height_m": float(size[1]),
+            "center_m": center.tolist(),
+        }
+    )
+
+
+def _none_inside(steps: Steps) -> str:
+    low, high = steps.position.min(axis=0), steps.position.max(axis=0)
+    return (
+        f"no tracer is in the tank: the tracks cover x from {low[0]:.4g} to {high[0]:.4g} m, "
+        f"y from {low[1]:.4g} to {high[1]:.4g} m; check the scale, the origin and the arena"
+    )
+
+
+def _noise(trajectory: xr.Dataset, steps: Steps) -> float:
+    """Return the position noise [m], at least that of rounding to the file's resolution."""
+    rounding = float(trajectory.attrs.get("position_quantum_m") or 0.0) / math.sqrt(12.0)
+    estimate = step_noise(steps)
+    if math.isnan(estimate):
+        estimate = USUAL_NOISE_PX * float(trajectory.attrs.get("metres_per_pixel") or 0.0)
+    return max(estimate, rounding)
+
+
+def _average(steps: Steps, grid: Grid) -> CellMeans:
+    """Return the mean velocity of each cell; a track is one visit, however often it returns."""
+    cell = grid.cell_of(*steps.position.T)
+    still = np.zeros_like(steps.velocity)
+    samples = Samples(cell, steps.body, steps.time, steps.velocity, still)
+    return average_cells(samples, cells=grid.size, pause=math.inf, correction=np.zeros_like)
+
+
+def _doubts(steps: Steps, grid: Grid, means: CellMeans, settings: Mapping[str, Any]) -> list[str]:
+    """Return what speaks against the links and the cells, in sentences."""
+    sentences = []
+    rejected, judged = settings["samples_rejected"], settings["samples_used"]
+    judged += rejected - settings["samples_unjudged"]
+    if rejected > MANY_REJECTED * judged:
+        sentences.append(
+            f"{rejected} of {judged} steps fit neither their neighbours nor their own track and "
+            "were left out: are the tracks linked rightly, or are these no passive tracers?"
+        )
+    length = float(np.median(np.hypot(*steps.velocity.T) * steps.interval))
+    if length > LONG_STEP * grid.cell_size:
+        sentences.append(
+            f"The usual step is {1e3 * length:.3g} mm long and a cell {1e3 * grid.cell_size:.3g} "
+            "mm: the steps blur the field; use larger cells."
+        )
+    if not (means.visits > 1).any():
+        sentences.append("No cell has two tracks: there are no standard errors; use larger cells.")
+    return sentences
+
+
+def _dataset(
+    grid: Grid,
+    outline: Outline | None,
+    means: CellMeans,
+    measured: Mask,
+    settings: Mapping[str, Any],
+    doubts: list[str],
+) -> xr.Dataset:
+    flag = flags_of(grid, outline, measured)
+    share = measured_share(flag)
+    used, beyond = settings["samples_used"], settings["samples_outside_tank"]
+    cells = "the cells" if outline is None else "the tank's cells"
+    coverage = coverage_warnings(share, used=used, beyond=beyond, cells=cells)
+    warning = " ".join([*coverage, *doubts])
+    flow = fill_velocity(grid, means.flow.reshape(*grid.shape, 2), known=measured, outline=outline)
+    error = np.where(measured[..., None], means.standard_error.reshape(*grid.shape, 2), np.nan)
+    return build_flow_field(
+        grid.x,
+        grid.y,
+        u=flow[..., 0],
+        v=flow[..., 1],
+        flag=flag,
+        attrs={
+            **settings,
+            "measured_share": share,
+            "filled_share": 1.0 - share,
+            **({"warning": warning} if warning else {}),
+        },
+        count=means.count.reshape(grid.shape),
+        tracks=means.visits.reshape(grid.shape),
+        u_standard_error=error[..., 0],
+        v_standard_error=error[..., 1],
+    )
