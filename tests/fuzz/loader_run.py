@@ -15,6 +15,7 @@ cases; a run that was stopped goes on where it was. Ranges of cases can run in s
 from __future__ import annotations
 
 import argparse
+import contextlib
 import fcntl
 import json
 import os
@@ -135,7 +136,10 @@ class Worker:
 
     def _death(self) -> str:
         assert self._process is not None
-        code = self._process.poll()
+        code: int | None = None
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            # A process that dies closes its pipe a moment before it is gone.
+            code = self._process.wait(timeout=5.0)
         self.end()
         if code is None:
             return "came to no end"

@@ -85,3 +85,26 @@ def test_messages_about_options_name_the_file(tmp_path: Path) -> None:
     two.write_text("\n".join(["t_s,x_m,y_m,id", *rows, ""]))
     said = refusal(here("flow", two, "--out", tmp_path / "o.nc", "--tank-diameter", "30cm"))
     assert "two.csv: the recording has 2 bodies (a, b): name one with --body" in said
+
+
+def test_skipping_more_lines_than_there_are_ends(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    rows = [f"{0.1 * k:.1f},{0.2 * k:.1f},0.1,a" for k in range(9)]
+    path.write_text("\n".join(["v2,9999999999999999999", "walk,,2", "1,1,1", "", "", "tag", *rows]))
+    assert "a.csv" in refusal(here("info", path, "--length-unit", "m"))
+
+
+def test_a_quaternion_too_small_to_be_squared_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "trajectory.txt"
+    rows = [f"{0.1 * k} {0.1 * k} 0.2 0 0 0 0 {'1e-320' if k == 3 else 1}" for k in range(9)]
+    path.write_text("\n".join(["# timestamp tx ty tz qx qy qz qw", *rows, ""]))
+    theta = dw.load(path)["theta"].values.ravel()
+    assert np.flatnonzero(np.isnan(theta)).tolist() == [3]
+
+
+def test_a_line_that_is_quoted_stays_on_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "log.txt"
+    path.write_bytes(b"$FRAMENUMBER,0\r$PARTICLE,4\r$FRAMENUMBER,1\n$PARTICLE,4,1,2,0,1,2\n")
+    with pytest.raises(FormatError, match="cannot read") as caught:
+        dw.load(path, frame_rate=10, metres_per_pixel=0.001)
+    assert len(str(caught.value).splitlines()) == 1

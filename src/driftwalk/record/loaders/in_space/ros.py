@@ -25,7 +25,8 @@ METADATA: Final = "metadata.yaml"
 _MCAP: Final = b"\x89MCAP0\r\n"
 _SQLITE: Final = b"SQLite format 3\0"
 _UP: Final = "z"
-MOST_METADATA: Final = 16 * MIB
+MOST_METADATA: Final = 1 * MIB
+"""Of the description of a bag: thousands of files. Its reader takes some 5 s for it."""
 _SECOND: Final = 1_000_000_000
 
 
@@ -102,7 +103,7 @@ def _opened(path: Path) -> Iterator[Any]:
 
 
 def _refuse_nested(path: Path) -> None:
-    """Refuse a description of the bag whose brackets its reader would follow for seconds."""
+    """Refuse a description of the bag that its reader would take many seconds for."""
     description = path / METADATA if path.is_dir() else path.with_name(METADATA)
     if not description.is_file():
         return
