@@ -22,7 +22,7 @@ CPP := $(shell find cpp -name '*.cpp' -o -name '*.hpp')
 # Every worker imports every test file: with the bytecode of the last run that takes half the time.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-slow test-fresh test-browser fuzz doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs site web wheel cross release-check clean
+.PHONY: demo test test-slow test-fresh test-browser fuzz fuzz-loaders doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs site web wheel cross release-check clean
 
 demo: $(PACKAGE)
 	$(BIN)/driftwalk demo
@@ -57,6 +57,18 @@ FUZZ_CASES := 2000
 
 fuzz: $(TEST_TOOLS)
 	$(BIN)/python tests/fuzz/fuzz_run.py $(FUZZ) --seed $(FUZZ_SEED) --cases $(FUZZ_CASES)
+
+# Damaged recordings and flow fields against the readers, without the command line: some 60 a second and
+# processor. Goes on where it was stopped. A part of the cases: make fuzz-loaders LOADER_FROM=50000
+# LOADER_CASES=100000. What it finds lies in run/fuzz-loaders/findings.
+LOADER_FUZZ := run/fuzz-loaders
+LOADER_FROM := 0
+LOADER_CASES := 200000
+LOADER_WORKERS := 2
+
+fuzz-loaders: $(TEST_TOOLS)
+	$(BIN)/python tests/fuzz/loader_run.py $(LOADER_FUZZ) --seed $(FUZZ_SEED) --from $(LOADER_FROM) \
+	  --cases $(LOADER_CASES) --workers $(LOADER_WORKERS)
 
 doctest: $(TEST_TOOLS)
 	$(BIN)/python -m pytest $(SIDE_BY_SIDE) --doctest-modules src/driftwalk tests/reference/twin

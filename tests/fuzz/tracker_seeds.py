@@ -47,6 +47,7 @@ def tracker_files() -> Iterator[tuple[str, str, tuple[str, ...], Callable[[Path]
     yield "animalta", "a.csv", PIXELS, animalta
     yield "idtrackerai", "a.npy", PIXELS, lambda path: np.save(path, np.array(session(), object))
     yield "idtrackerai-h5", "a.h5", PIXELS, _session
+    yield "idtrackerai-labels", "a.h5", PIXELS, lambda path: _session(path, ("identities_labels",))
     yield "trex", "tank_id0.npz", (), lambda path: trex(path.parent, 0)
     yield from _tables()
     settings = ("v2,6", "walk,,2", "1,1,1", "", "", "tag")
@@ -85,11 +86,10 @@ def _store(path: Path) -> None:
         frame_table(file, "tracks", FEATURES)
 
 
-def _session(path: Path) -> None:
+def _session(path: Path, texts: tuple[str, ...] = ()) -> None:
     values = session()
     with h5py.File(path, "w") as file:
         for name in ("trajectories", "id_probabilities"):
             file[name] = values[name]
-        # No labels: on damaged texts of variable length HDF5 itself does not come to an end.
-        for name in ("frames_per_second", "length_unit"):
+        for name in ("frames_per_second", "length_unit", *texts):
             file.attrs[name] = values[name]

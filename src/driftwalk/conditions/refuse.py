@@ -69,7 +69,10 @@ def require_motion(
     >>> dw.conditions.require_motion(dw.tank30_recording())
     """
     names = body_names(recording) if body == "all" else [body]
-    tracks = [body_track(recording, name) for name in names]
+    try:
+        tracks = [body_track(recording, name) for name in names]
+    except InputError as error:
+        raise InputError(f"{_begin(recording, where)}{error}") from error
     most = max(track.time.size for track in tracks)
     if most < FEWEST_POSITIONS:
         rows = "1 position" if most == 1 else f"{most} positions"

@@ -28,7 +28,7 @@ class FormatError(InputError):
     Parameters
     ----------
     message : str
-        The problem and the remedy.
+        The problem and the remedy; what it quotes of the file is brought on one line.
     path : path-like, optional
         The file.
     line, column : int, optional
@@ -43,6 +43,7 @@ class FormatError(InputError):
         line: int | None = None,
         column: int | None = None,
     ) -> None:
+        message = " ".join(message.splitlines())
         self.reason = message
         """The message without the place."""
         self.path = path

@@ -8,6 +8,7 @@ import numpy as np
 
 from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import InputError
+from driftwalk.record.extent import refuse_far
 from driftwalk.record.quantum import common_quantum
 from driftwalk.record.raw import (
     ANGLE_UNITS,
@@ -44,12 +45,13 @@ def convert_units(
     ------
     InputError
         When scale or frame rate are neither in the file nor given (the message names the argument),
-        or are given though the file holds them.
+        or are given though the file holds them; when a number is far too large for a position.
     """
     if y_axis not in (None, "up", "down"):
         raise InputError(f"`y_axis` is 'up' or 'down', got '{y_axis}'")
     scale, in_pixels = _length_scale(raw, options)
     ticks, rate = _ticks(raw, options)
+    refuse_far(raw.bodies, scale)
     flip, flip_theta = _flips(raw, y_axis=y_axis, in_pixels=in_pixels)
     quantum = common_quantum(values for body in raw.bodies[:4] for values in (body.x, body.y))
     attrs: dict[str, object] = dict(raw.attrs)
@@ -150,7 +152,9 @@ def _describe_negated(raw: RawRecording, flip: bool, flip_theta: bool) -> str:
 def _convert_clocks(raw: RawRecording, ticks: float, attrs: dict[str, object]) -> dict[int, Array]:
     """Return each distinct clock array in seconds; bodies that shared one still do."""
     arrays = {id(body.clock): body.clock for body in raw.bodies}
-    starts = [float(np.nanmin(c)) for c in arrays.values() if np.isfinite(c).any()]
+    # Without copies: a clock may have millions of times. An infinite one is no time.
+    known = [(clock, np.isfinite(clock)) for clock in arrays.values()]
+    starts = [float(c.min(where=k, initial=np.inf)) for c, k in known if k.any()]
     origin = min(starts, default=0.0)
     begin = float(_exactly(raw.clock_origin, origin) / Fraction(ticks))
     dated = raw.calendar in (UTC, LOCAL)

@@ -1,4 +1,6 @@
-"""How many bodies and times a recording may have: a `trajectory` has a place for each of both.
+"""How many bodies and times a recording may have, and how far they may be.
+
+A `trajectory` has a place for each body at each time.
 
 A column that counts its rows, taken for the names of the bodies, makes a body of every row: a file
 of one megabyte then asks for a hundred gigabytes of NaN.
@@ -9,7 +11,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from driftwalk.core.errors import FormatError
+import numpy as np
+
+from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.raw import Array, RawBody
 
 MOST_BODIES: Final = 5000
@@ -17,6 +21,11 @@ EMPTY_PLACES: Final = 20_000_000
 """Places, times by bodies, that a recording of any size may have: 0.5 GB."""
 PLACES_PER_SAMPLE: Final = 50
 """Places beyond that for each sample: bodies may come and go, as fragments of tracks do."""
+
+FARTHEST_M: Final = 1e12
+"""Beyond the planets. The noise and the speed take powers of positions, which float64 must hold."""
+LARGEST_ANGLE: Final = 1e12
+"""In the file's unit; of larger ones float64 no longer knows the fraction of a turn."""
 
 
 def refuse_many_bodies(names: Sequence[str]) -> None:
@@ -57,4 +66,38 @@ def refuse_sparse(time: Array, bodies: list[RawBody]) -> None:
             f"has {len(bodies)} bodies at {time.size} different times, which is a table of "
             f"{3 * 8 * places / 1e9:.3g} GB for {samples} samples: choose bodies (`body`) or a "
             "part of the time (`start`, `stop`)"
+        )
+
+
+def refuse_far(bodies: Sequence[RawBody], scale: float) -> None:
+    """Refuse numbers that are no position and no angle: a damaged file, or a mark of what is lost.
+
+    Parameters
+    ----------
+    bodies : sequence of RawBody
+        In the units of the file.
+    scale : float
+        Metres per unit.
+
+    Raises
+    ------
+    InputError
+        Names the body and the number.
+    """
+    for body in bodies:
+        for name, values in (("x", body.x), ("y", body.y)):
+            _refuse_beyond(body, name, values, FARTHEST_M / scale)
+        if body.theta is not None:
+            _refuse_beyond(body, "angle", body.theta, LARGEST_ANGLE)
+
+
+def _refuse_beyond(body: RawBody, name: str, values: Array, most: float) -> None:
+    known = np.isfinite(values)
+    largest = float(values.max(where=known, initial=0.0))
+    smallest = float(values.min(where=known, initial=0.0))
+    if max(largest, -smallest) > most:
+        number = largest if largest > -smallest else smallest
+        raise InputError(
+            f"body '{body.name}' has {number:.3g} as {name}, which cannot be one: is the file "
+            "damaged? Leave the field empty, or write nan, where nothing was measured"
         )

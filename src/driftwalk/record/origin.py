@@ -44,7 +44,7 @@ class Origin:
         if isinstance(error, DAMAGED_GZIP):
             return FormatError(f"is a damaged gzip file: {error}", path=self.path)
         if self.path is None or not isinstance(error, FormatError):
-            return InputError(f"{self.where}: {error}")
+            return InputError(f"{self.where}: {' '.join(str(error).splitlines())}")
         # A table that no loader of its own recognised may be one of theirs gone wrong.
         hint = failed_format(self.path) if self.guessed else ""
         path = error.path or self.path

@@ -407,7 +407,9 @@ def _blocks(path: Path, skip_lines: int) -> Iterator[tuple[int, bytes]]:
     with open_binary(path) as file:
         try:
             for _ in range(skip_lines):
-                file.readline(LONGEST_LINE)
+                # A file may say itself how many lines to skip, and be wrong about it.
+                if not file.readline(LONGEST_LINE):
+                    return
             if not skip_lines:
                 start = file.read(len(BOM))
                 rest = b"" if start == BOM else start

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.core.bounded import MIB
 from driftwalk.core.errors import FormatError
 from driftwalk.schema.earlier import current_file
+from driftwalk.schema.heap import refuse_endless_texts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -107,8 +108,9 @@ def _attribute_of_hdf5(path: Path, name: str) -> Any:
     import h5py
 
     try:
-        # On values of attributes the library may not come to an end where the file is damaged: so
-        # first what else is in it, and then no more than the one that is asked for.
+        # First what else is in it, which damage of other kinds shows in, and then no more than the
+        # one that is asked for.
+        refuse_endless_texts(path)
         _declared_hdf5(path)
         with h5py.File(path, "r") as file:
             value = file.attrs.get(name)
@@ -163,6 +165,8 @@ def _opened(path: Path) -> Iterator[xr.Dataset]:
         with warnings.catch_warnings():
             # What the libraries remark about a file of the user's is no line of ours.
             warnings.simplefilter("ignore")
+            if is_hdf5:
+                refuse_endless_texts(path)
             refuse_huge(_declared_hdf5(path) if is_hdf5 else _declared_classic(path), path)
             with xr.open_dataset(path, decode_times=False, **options) as dataset:
                 yield dataset

@@ -50,7 +50,9 @@ def read_flow_file(
     said = any(one is not None for one in recording)
     if variables is None and (said or flow_format(path) is None):
         if frame_interval is not None:
-            raise InputError("--frame-interval is for a flow field, and this is a recording")
+            raise InputError(
+                f"{path}: --frame-interval is for a flow field, and this is read as a recording"
+            )
         return None
     return _load(path, how, frame_interval, variables, tank_diameter)
 

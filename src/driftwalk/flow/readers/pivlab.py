@@ -14,6 +14,7 @@ import numpy.typing as npt
 from driftwalk.core.errors import FormatError
 from driftwalk.flow.readers.raw import RawField
 from driftwalk.flow.readers.text import masked_rows
+from driftwalk.schema.heap import refuse_endless_texts
 from driftwalk.schema.matlab import HDF5_BASED, OLD, matlab_variables
 from driftwalk.schema.netcdf import HDF5, declared_bytes, refuse_huge
 
@@ -114,6 +115,7 @@ def _opened(path: Path) -> Iterator[_File]:
             return
         import h5py
 
+        refuse_endless_texts(path)
         with h5py.File(path, "r") as file:
             refuse_huge(_declared(file), path)
             yield _File(list(file), lambda name: _hdf5_arrays(file, name))

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 QUATERNION: Final = "quaternion"
 VECTOR: Final = "vector"
+_NO_LENGTH: Final = 1e-12
+"""Of a quaternion that is none; float64 does not hold the squares of much smaller numbers."""
 _LENGTH_TOLERANCE: Final = 0.02
 """Printed with three digits, a unit quaternion still has its length to within this."""
 
@@ -61,7 +63,7 @@ class Turns:
         known = np.isfinite(self.values).all(axis=1)
         if self.form == QUATERNION:
             # Four zeros are how some programs write that there is none.
-            known = known & (self.values != 0.0).any(axis=1)
+            known = known & (np.abs(self.values) > _NO_LENGTH).any(axis=1)
         return np.asarray(known)
 
     def _rotation(self, values: Array) -> Rotation:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.raw import Array
+from driftwalk.schema.heap import refuse_endless_texts
 from driftwalk.schema.netcdf import HDF5, declared_bytes, refuse_huge
 
 if TYPE_CHECKING:
@@ -106,10 +107,10 @@ def opened_hdf5(path: Path) -> Iterator[Hdf5Contents]:
     import h5py
 
     try:
+        refuse_endless_texts(path)
         with h5py.File(path, "r") as file:
             for name in file:
-                # A damaged entry is found here, before attributes: on the values of those the
-                # library may not come to an end.
+                # A damaged entry is found here, before the attributes.
                 file[name]
             yield Hdf5Contents(file, path)
     except InputError:

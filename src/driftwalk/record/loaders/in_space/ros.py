@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,7 +12,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from driftwalk.core.bounded import MIB, read_bounded
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.nesting import MOST_LEVELS
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.space.flat import SpaceTrack, lay_flat
 from driftwalk.record.space.plane import plane_of
@@ -22,6 +25,8 @@ METADATA: Final = "metadata.yaml"
 _MCAP: Final = b"\x89MCAP0\r\n"
 _SQLITE: Final = b"SQLite format 3\0"
 _UP: Final = "z"
+MOST_METADATA: Final = 1 * MIB
+"""Of the description of a bag: thousands of files. Its reader takes some 5 s for it."""
 _SECOND: Final = 1_000_000_000
 
 
@@ -80,6 +85,7 @@ def _opened(path: Path) -> Iterator[Any]:
         from rosbags.typesys import Stores, get_typestore
     except ImportError as error:
         raise InputError("a ROS bag needs rosbags: pip install 'driftwalk[ros]'") from error
+    _refuse_nested(path)
     try:
         # A bag that does not describe its messages is taken to hold those of a common ROS 2.
         with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
@@ -94,6 +100,23 @@ def _opened(path: Path) -> Iterator[Any]:
             "(ros2 bag reindex, mcap recover)",
             path=path,
         ) from error
+
+
+def _refuse_nested(path: Path) -> None:
+    """Refuse a description of the bag that its reader would take many seconds for."""
+    description = path / METADATA if path.is_dir() else path.with_name(METADATA)
+    if not description.is_file():
+        return
+    content = read_bounded(description, most=MOST_METADATA)
+    level = 0
+    for mark in re.findall(rb"[\[\]{}]", content):
+        level += 1 if mark in b"[{" else -1
+        if level > MOST_LEVELS:
+            raise FormatError(
+                f"holds values nested more than {MOST_LEVELS} levels deep, as no bag does: it is "
+                "damaged (ros2 bag reindex writes it anew)",
+                path=description,
+            )
 
 
 def _choose(connections: list[Any], topic: str | None, path: Path) -> list[Any]:

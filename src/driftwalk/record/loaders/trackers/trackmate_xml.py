@@ -124,7 +124,9 @@ def _parsed(path: Path) -> _Contents:
     except expat.ExpatError as error:
         reason = expat.ErrorString(error.code)
         raise FormatError(f"is damaged XML: {reason}", path=path, line=error.lineno) from error
-    except KeyError as error:
+    except LookupError as error:
+        if not isinstance(error, KeyError):  # expat asks Python for encodings that it lacks
+            raise FormatError(f"is damaged XML: {error}", path=path) from error
         what = f"an element lacks its attribute {error}"
         raise FormatError(what, path=path, line=parser.CurrentLineNumber) from error
     except ValueError as error:

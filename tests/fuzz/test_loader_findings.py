@@ -1,0 +1,110 @@
+"""A short round of the fuzzer of readers, and what longer rounds found: each mistake once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import space_files
+from command_line import here, refusal
+
+import driftwalk as dw
+from driftwalk.core.errors import FormatError, InputError
+
+PIXELS = ("--metres-per-pixel", "0.001")
+
+
+@pytest.mark.slow
+def test_a_short_round_finds_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    from loader_run import fuzz_loaders
+
+    tally = fuzz_loaders(tmp_path, seed=1, cases=range(120))
+    assert not tally.findings, tally.findings
+    # Both happen: damage that is read all the same, and damage that is refused.
+    assert tally.ends["read"] > 10
+    assert tally.ends["refused"] > 30
+    # What is done is not run again.
+    again = fuzz_loaders(tmp_path, seed=1, cases=range(120))
+    assert again.ends == tally.ends
+
+
+def table(path: Path, *, row: str = "") -> Path:
+    rows = [f"{0.1 * k:.1f},{0.1 * np.cos(k):.5f},{0.1 * np.sin(k):.5f},{k}" for k in range(20)]
+    path.write_text("\n".join(["t_s,x_m,y_m,theta_rad", *rows, row, ""]))
+    return path
+
+
+@pytest.mark.parametrize("time", ["1e999", "-1e999"])
+def test_an_infinite_time_is_none(tmp_path: Path, time: str) -> None:
+    recording = dw.load(table(tmp_path / "a.csv", row=f"{time},0.1,0.1,0"))
+    assert recording.sizes["time"] == 20
+    assert recording["time"].values[-1] == pytest.approx(1.9)
+
+
+@pytest.mark.parametrize(
+    ("row", "what"),
+    [
+        ("2.0,1e300,0,0", "1e+300 as x"),
+        ("2.0,0,-2e12,0", "-2e+12 as y"),
+        ("2.0,0,0,1e13", "1e+13 as angle"),
+    ],
+)
+def test_what_is_no_position_is_refused(tmp_path: Path, row: str, what: str) -> None:
+    path = table(tmp_path / "a.csv", row=row)
+    with pytest.raises(InputError, match="which cannot be one") as caught:
+        dw.load(path)
+    assert what in str(caught.value)
+    assert "a.csv" in str(caught.value)
+
+
+def test_a_description_of_deep_brackets_is_refused(tmp_path: Path) -> None:
+    pytest.importorskip("rosbags")
+    bag = tmp_path / "bag"
+    space_files.write_bag(bag, mcap=False)
+    description = bag / "metadata.yaml"
+    whole = description.read_text()
+    assert dw.load(bag).sizes["body"] == 2
+    description.write_text(whole.replace("nanoseconds: 1900000000", "nanoseconds: " + "[" * 3000))
+    with pytest.raises(FormatError, match=r"metadata\.yaml: holds values nested more than 64"):
+        dw.load(bag)
+
+
+def test_xml_in_an_encoding_that_nobody_knows_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.xml"
+    path.write_text('<?xml version="1.0" encoding="UTF-NaN"?>\n<TrackMate version="7"></TrackMate>')
+    assert "a.xml: is damaged XML: unknown encoding" in refusal(here("info", path))
+
+
+def test_messages_about_options_name_the_file(tmp_path: Path) -> None:
+    path = table(tmp_path / "one.csv")
+    assert "one.csv: --frame-interval" in refusal(here("info", path, "--frame-interval", "10ms"))
+    two = tmp_path / "two.csv"
+    rows = [f"{0.1 * k:.1f},{0.01 * k},0.02,{name}" for k in range(9) for name in "ab"]
+    two.write_text("\n".join(["t_s,x_m,y_m,id", *rows, ""]))
+    said = refusal(here("flow", two, "--out", tmp_path / "o.nc", "--tank-diameter", "30cm"))
+    assert "two.csv: the recording has 2 bodies (a, b): name one with --body" in said
+
+
+def test_skipping_more_lines_than_there_are_ends(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    rows = [f"{0.1 * k:.1f},{0.2 * k:.1f},0.1,a" for k in range(9)]
+    path.write_text("\n".join(["v2,9999999999999999999", "walk,,2", "1,1,1", "", "", "tag", *rows]))
+    assert "a.csv" in refusal(here("info", path, "--length-unit", "m"))
+
+
+def test_a_quaternion_too_small_to_be_squared_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "trajectory.txt"
+    rows = [f"{0.1 * k} {0.1 * k} 0.2 0 0 0 0 {'1e-320' if k == 3 else 1}" for k in range(9)]
+    path.write_text("\n".join(["# timestamp tx ty tz qx qy qz qw", *rows, ""]))
+    theta = dw.load(path)["theta"].values.ravel()
+    assert np.flatnonzero(np.isnan(theta)).tolist() == [3]
+
+
+def test_a_line_that_is_quoted_stays_on_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "log.txt"
+    path.write_bytes(b"$FRAMENUMBER,0\r$PARTICLE,4\r$FRAMENUMBER,1\n$PARTICLE,4,1,2,0,1,2\n")
+    with pytest.raises(FormatError, match="cannot read") as caught:
+        dw.load(path, frame_rate=10, metres_per_pixel=0.001)
+    assert len(str(caught.value).splitlines()) == 1
