@@ -236,7 +236,7 @@ def _left(cases: range, log: Path, tally: Tally) -> list[tuple[int, int]]:
         for start in range(cases.start, cases.stop, CASES_PER_RANGE)
     ]
     if log.exists():
-        for entry in map(json.loads, log.read_text().splitlines()):
+        for entry in map(json.loads, log.read_text(encoding="utf-8").splitlines()):
             if tuple(entry["range"]) in ranges:
                 ranges.remove(tuple(entry["range"]))
                 tally.ends.update(entry["ends"])

@@ -83,7 +83,7 @@ def _used_s() -> int:
 
 def _address_space() -> int:
     """Return the bytes of address space that this process has."""
-    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    pages = int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[0])
     return pages * resource.getpagesize()
 
 

@@ -32,7 +32,7 @@ def test_a_short_round_finds_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 def table(path: Path, *, row: str = "") -> Path:
     rows = [f"{0.1 * k:.1f},{0.1 * np.cos(k):.5f},{0.1 * np.sin(k):.5f},{k}" for k in range(20)]
-    path.write_text("\n".join(["t_s,x_m,y_m,theta_rad", *rows, row, ""]))
+    path.write_text("\n".join(["t_s,x_m,y_m,theta_rad", *rows, row, ""]), encoding="utf-8")
     return path
 
 
@@ -84,7 +84,7 @@ def test_messages_about_options_name_the_file(tmp_path: Path) -> None:
     rows = [f"{0.1 * k:.1f},{0.01 * k},0.02,{name}" for k in range(9) for name in "ab"]
     two.write_text("\n".join(["t_s,x_m,y_m,id", *rows, ""]))
     said = refusal(here("flow", two, "--out", tmp_path / "o.nc", "--tank-diameter", "30cm"))
-    assert "two.csv: the recording has 2 bodies (a, b): name one with --body" in said
+    assert "two.csv has 2 bodies: --tracers makes one flow" in said
 
 
 def test_skipping_more_lines_than_there_are_ends(tmp_path: Path) -> None:

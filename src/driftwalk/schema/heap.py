@@ -1,8 +1,8 @@
 """Texts of variable length in an HDF5 file, looked at before the library reads them.
 
 HDF5 keeps them in collections, and refers to each by length, address of the collection and number.
-Where these are damaged the library comes to no end: a free space of no size is stepped over for
-ever. Or it clears as much memory as the length says, four gigabytes at most, and only then finds
+Where these are damaged the library comes to no end: it steps over a free space of no size again
+and again. Or it clears as much memory as the length says, four gigabytes at most, and only then finds
 that the text is shorter.
 """
 
@@ -21,7 +21,7 @@ from driftwalk.core.errors import FormatError
 _SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
 _COLLECTION: Final = b"GCOL\x01\x00\x00\x00"
 _HEADER: Final = struct.Struct("<HHIQ")
-"""Of a text in its collection: number, references to it, nothing, size."""
+"""What precedes a text in its collection: number, references to it, nothing, size."""
 _ADDRESS: Final = struct.Struct("<Q")
 _NUMBER: Final = struct.Struct("<I")
 _PLACES_OF_WIDTHS: Final = {0: 13, 1: 13, 2: 9, 3: 9}

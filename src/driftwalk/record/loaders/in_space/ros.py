@@ -26,7 +26,7 @@ _MCAP: Final = b"\x89MCAP0\r\n"
 _SQLITE: Final = b"SQLite format 3\0"
 _UP: Final = "z"
 MOST_METADATA: Final = 1 * MIB
-"""Of the description of a bag: thousands of files. Its reader takes some 5 s for it."""
+"""A description of a bag is no larger: it names thousands of files. Its reader takes 5 s."""
 _SECOND: Final = 1_000_000_000
 
 
@@ -114,7 +114,7 @@ def _refuse_nested(path: Path) -> None:
         if level > MOST_LEVELS:
             raise FormatError(
                 f"holds values nested more than {MOST_LEVELS} levels deep, as no bag does: it is "
-                "damaged (ros2 bag reindex writes it anew)",
+                "damaged (ros2 bag reindex writes it again)",
                 path=description,
             )
 
