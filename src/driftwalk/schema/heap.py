@@ -2,8 +2,8 @@
 
 HDF5 keeps them in collections, and refers to each by length, address of the collection and number.
 Where these are damaged the library comes to no end: it steps over a free space of no size again
-and again. Or it clears as much memory as the length says, four gigabytes at most, and only then finds
-that the text is shorter.
+and again. Or it clears as much memory as the length says, four gigabytes at most, and only then
+finds that the text is shorter.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from driftwalk.core.errors import FormatError
 _SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
 _COLLECTION: Final = b"GCOL\x01\x00\x00\x00"
 _HEADER: Final = struct.Struct("<HHIQ")
-"""What precedes a text in its collection: number, references to it, nothing, size."""
+"""A text in its collection begins with its number, a count of references, four zeros and a size."""
 _ADDRESS: Final = struct.Struct("<Q")
 _NUMBER: Final = struct.Struct("<I")
 _PLACES_OF_WIDTHS: Final = {0: 13, 1: 13, 2: 9, 3: 9}
