@@ -21,7 +21,7 @@ from driftwalk.core.errors import FormatError
 _SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
 _COLLECTION: Final = b"GCOL\x01\x00\x00\x00"
 _HEADER: Final = struct.Struct("<HHIQ")
-"""What precedes a text in its collection: number, references to it, nothing, size."""
+"""Each text begins with its number, the count of references to it, nothing, and its size."""
 _ADDRESS: Final = struct.Struct("<Q")
 _NUMBER: Final = struct.Struct("<I")
 _PLACES_OF_WIDTHS: Final = {0: 13, 1: 13, 2: 9, 3: 9}
