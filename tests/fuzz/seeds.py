@@ -121,6 +121,8 @@ def _in_space(place: Path) -> Iterator[Seed]:
     for kind, (name, content, options) in space_files.fields().items():
         folder = _kept(place / kind, lambda at, one={name: content}: _write(at, one))
         yield Seed(folder, name, _of_field(f"@/{name}", options))
+    old = _kept(place / "pivlab-old", lambda at: space_files.write_old_session(at / "session.mat"))
+    yield Seed(old, "session.mat", _of_field("@/session.mat", space_files.SHIFTS))
     session = _kept(place / "pivlab", lambda at: space_files.write_session(at / "session.mat"))
     yield Seed(session, "session.mat", _of_field("@/session.mat", space_files.SHIFTS))
 

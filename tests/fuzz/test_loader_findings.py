@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 import space_files
 from command_line import here, refusal
+from scipy.io import savemat
 
 import driftwalk as dw
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.record.tables.cells import as_numbers
 
 PIXELS = ("--metres-per-pixel", "0.001")
 
@@ -36,9 +39,9 @@ def table(path: Path, *, row: str = "") -> Path:
     return path
 
 
-@pytest.mark.parametrize("time", ["1e999", "-1e999"])
-def test_an_infinite_time_is_none(tmp_path: Path, time: str) -> None:
-    recording = dw.load(table(tmp_path / "a.csv", row=f"{time},0.1,0.1,0"))
+@pytest.mark.parametrize("clock", ["1e999", "-1e999"])
+def test_an_infinite_time_is_none(tmp_path: Path, clock: str) -> None:
+    recording = dw.load(table(tmp_path / "a.csv", row=f"{clock},0.1,0.1,0"))
     assert recording.sizes["time"] == 20
     assert recording["time"].values[-1] == pytest.approx(1.9)
 
@@ -108,3 +111,53 @@ def test_a_line_that_is_quoted_stays_on_one_line(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="cannot read") as caught:
         dw.load(path, frame_rate=10, metres_per_pixel=0.001)
     assert len(str(caught.value).splitlines()) == 1
+
+
+def test_a_table_of_many_tracks_is_no_flow_field_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "tracking.txt"
+    rows = [f"39\t{k}\t1\t39.0\t92.9\t1\n" for k in range(40_000)]
+    path.write_text("0\t0\t1\t1\t0\t1\n1\t0\t1\t1\t5\t1\n" + "".join(rows))
+    begin = time.process_time()
+    assert "bodies" in refusal(here("info", path, "--frame-rate", "10", *PIXELS))
+    assert time.process_time() - begin < 2.0  # 1 s beside 4 MB a second
+
+
+def test_a_clock_with_a_nan_that_signals_is_read(tmp_path: Path) -> None:
+    clock = 0.1 * np.arange(20)
+    clock[7:8] = np.frombuffer(bytes.fromhex("010000000000f07f"))
+    path = tmp_path / "a.mat"
+    savemat(path, {"S": {"t": clock, "x": 0.02 * np.arange(20), "y": 0.01 * np.arange(20)}})
+    assert dw.load(path).sizes["time"] == 19
+
+
+def test_times_too_near_for_a_speed_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t_s,x_m,y_m\n0,0,0\n1e-320,5,0\n")
+    assert "two times of body '0' are 1e-320 s apart, at 0 s" in refusal(here("info", path))
+    path.write_text("t_s,x_m,y_m\n0,0,0\n1e-12,5,0\n")
+    assert here("info", path).code == 0
+
+
+def test_a_position_beyond_float64_is_a_gap(tmp_path: Path) -> None:
+    path = tmp_path / "tracks.csv"
+    head = (
+        '\'list(Global=c(Date="2013"),Areas=matrix(c(200,190,407,252),4,1,dimname=list(c("W","H","X",'
+        '"Y"),c("05"))))\'\nArea,Territory,X,Y,time,L\n'
+    )
+    rows = [f"05,255,{'1e308' if k == 3 else 0.5},0.{k},{100 * k},-11" for k in range(9)]
+    path.write_text(head + "\n".join(rows) + "\n")
+    x = dw.load(path, metres_per_pixel=0.001)["x"].values.ravel()
+    assert np.flatnonzero(np.isnan(x)).tolist() == [3]
+
+
+def test_a_long_text_among_time_stamps_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    moments = [f"2024-05-01T12:00:{k:02d}.25Z,{k}.5,{k}" for k in range(20)]
+    path.write_text("\n".join(["time,x,y", *moments, "9" * 300 + ",1,2", ""]))
+    assert "line 22, column 1: '9999" in refusal(here("info", path, "--length-unit", "m"))
+
+
+@pytest.mark.parametrize("other", [1.5, "2.5"])
+def test_a_whole_number_beyond_float64_is_a_gap(other: float | str) -> None:
+    values = np.array([1, 10**400, -(10**400), other], dtype=object)
+    assert as_numbers(values, "x").tolist() == [1.0, np.inf, -np.inf, float(other)]

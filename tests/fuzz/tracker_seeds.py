@@ -67,6 +67,7 @@ def _tables() -> Iterator[tuple[str, str, tuple[str, ...], Callable[[Path], obje
     text = "\n".join(["time,x,y", *moments])
     yield "utf16", "a.csv", (), lambda path: path.write_bytes(text.encode("utf-16"))
     yield "matlab", "a.mat", (), lambda path: savemat(path, {"S": places})
+    yield "matlab-packed", "a.mat", (), lambda path: savemat(path, places, do_compression=True)
     yield (
         "matlab-h5",
         "a.mat",

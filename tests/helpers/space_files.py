@@ -5,6 +5,7 @@ from __future__ import annotations
 import h5py
 import numpy as np
 from rosbags import rosbag2, typesys
+from scipy.io import savemat
 
 SHIFTS = ("--metres-per-pixel", "1mm", "--frame-interval", "10ms")
 
@@ -92,6 +93,12 @@ def fields() -> dict[str, tuple[str, str, tuple[str, ...]]]:
         "insight": ("field.vec", vec + joined["insight"], ()),
         "davis": ("B00001.txt", davis + joined["davis"], ()),
     }
+
+
+def write_old_session(path) -> None:
+    """Write a session of PIVlab with one frame in MATLAB's old format."""
+    x, y = np.meshgrid(16.0 * np.arange(1, 9), 16.0 * np.arange(1, 10))
+    savemat(path, {"x_0": x, "y_0": y, "u_0": 0.01 * y, "v_0": 0.01 * x})
 
 
 def write_session(path) -> None:

@@ -60,15 +60,17 @@ def grid_rows(rows: FieldRows, path: Path) -> GriddedField:
     y, row = _axis("y", rows.y, rows.line, path)
     node = row * x.size + column
     _refuse_duplicates(node, rows, path)
-    absent = np.setdiff1d(np.arange(x.size * y.size), node)
-    if absent.size:
-        j, i = divmod(int(absent[0]), x.size)
+    order = np.argsort(node)
+    # No list of all nodes: scattered rows may span a grid of a billion of them.
+    absent = x.size * y.size - node.size
+    if absent:
+        moved = np.flatnonzero(node[order] != np.arange(node.size))
+        j, i = divmod(int(moved[0]) if moved.size else node.size, x.size)
         raise FormatError(
-            f"the grid of {x.size} x {y.size} nodes lacks {absent.size} of them, the first at "
+            f"the grid of {x.size} x {y.size} nodes lacks {absent} of them, the first at "
             f"x = {x[i]:.6g}, y = {y[j]:.6g}: write a row for every node",
             path=path,
         )
-    order = np.argsort(node)
     velocity = np.column_stack([rows.u, rows.v])[order].reshape(y.size, x.size, 2)
     return GriddedField(x, y, velocity)
 

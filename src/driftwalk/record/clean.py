@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +17,10 @@ from driftwalk.record.several_bodies import (
     refuse_several_bodies,
     times_in_two_places,
 )
+
+SHORTEST_STEP_S: Final = 1e-12
+"""A million times shorter than any camera's; powers of its inverse are still within float64."""
+_PART: Final = 1 << 20
 
 
 @dataclass
@@ -82,7 +87,7 @@ def clean_body(
     ------
     InputError
         When times go backwards and `sort` is ``"error"``, or when at more than 1 % of the times
-        rows are in different places, unless `separate`.
+        rows are in different places, unless `separate`; when two times are nearly one.
     """
     if sort not in ("error", "sort"):
         raise InputError(f"sort is 'error' or 'sort', got '{sort}'")
@@ -106,6 +111,7 @@ def clean_body(
         counts.times_in_two_places = int(apart.size)
         counts.duplicates_dropped = int(repeated.sum())
         body = _take(body, np.append(~repeated, True))
+    _refuse_closest(body)
     counts.missing = _blank_missing(body)
     if body.theta is not None and not np.isfinite(body.theta).all():
         body.theta = np.where(np.isfinite(body.theta), body.theta, np.nan)
@@ -143,6 +149,19 @@ def _in_order(body: RawBody, counts: Counts, *, sort: str, columns: BodyColumns 
         )
     counts.unsorted = int(backwards.size)
     return _take(body, np.argsort(body.clock, kind="stable"))
+
+
+def _refuse_closest(body: RawBody) -> None:
+    """Refuse two times by whose difference no speed can be divided."""
+    # In parts: a recording may have millions of times.
+    for start in range(0, body.clock.size - 1, _PART):
+        steps = np.diff(body.clock[start : start + _PART + 1])
+        at = int(steps.argmin())
+        if steps[at] < SHORTEST_STEP_S:
+            raise InputError(
+                f"two times of body '{body.name}' are {steps[at]:.3g} s apart, at "
+                f"{body.clock[start + at]:.6g} s: one of them is wrong"
+            )
 
 
 def _blank_missing(body: RawBody) -> int:

@@ -168,8 +168,9 @@ def _convert_clocks(raw: RawRecording, ticks: float, attrs: dict[str, object]) -
         attrs["time_origin"] = "00:00:00"
     converted = {key: _writable(clock) for key, clock in arrays.items()}
     for clock in converted.values():
-        np.subtract(clock, origin, out=clock)
-        np.divide(clock, ticks, out=clock)
+        with np.errstate(invalid="ignore"):  # damage may leave a NaN that signals
+            np.subtract(clock, origin, out=clock)
+            np.divide(clock, ticks, out=clock)
     return converted
 
 

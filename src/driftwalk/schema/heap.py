@@ -21,15 +21,16 @@ from driftwalk.core.errors import FormatError
 _SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
 _COLLECTION: Final = b"GCOL\x01\x00\x00\x00"
 _HEADER: Final = struct.Struct("<HHIQ")
-"""A text in its collection begins with its number, a count of references, four zeros and a size."""
+"""Each text begins with its number, the count of references to it, nothing, and its size."""
 _ADDRESS: Final = struct.Struct("<Q")
 _NUMBER: Final = struct.Struct("<I")
 _PLACES_OF_WIDTHS: Final = {0: 13, 1: 13, 2: 9, 3: 9}
 """By version of the file: where it says how wide addresses and sizes are."""
 MOST_NUMBER: Final = 0xFFFF
 """Of a text in its collection."""
-MOST_SEARCHED: Final = 4096 * MIB
-"""Bytes that are looked through; what lies beyond in a huge file is left to the library."""
+MOST_SEARCHED: Final = 512 * MIB
+"""Bytes that are looked through, for some tenths of a second; what a larger file or one with many
+collections holds beyond them is left to the library."""
 
 
 def refuse_endless_texts(path: Path) -> None:
@@ -60,7 +61,7 @@ def refuse_endless_texts(path: Path) -> None:
 @lru_cache(maxsize=8)
 def _damage(path: Path, size: int, _changed_ns: int) -> str:
     """Return what is wrong with a file's texts, ``""`` where nothing is; remembered by its age."""
-    if not size:
+    if not 0 < size <= MOST_SEARCHED:
         return ""
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
         base = content.find(_SIGNATURE, 0, MIB)

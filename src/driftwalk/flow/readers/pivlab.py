@@ -16,6 +16,7 @@ from driftwalk.flow.readers.raw import RawField
 from driftwalk.flow.readers.text import masked_rows
 from driftwalk.schema.heap import refuse_endless_texts
 from driftwalk.schema.matlab import HDF5_BASED, OLD, matlab_variables
+from driftwalk.schema.matlab_elements import refuse_unknown_elements
 from driftwalk.schema.netcdf import HDF5, declared_bytes, refuse_huge
 
 Array = npt.NDArray[np.float64]
@@ -130,6 +131,7 @@ def _opened(path: Path) -> Iterator[_File]:
 def _old_file(path: Path) -> _File:
     from scipy.io import loadmat
 
+    refuse_unknown_elements(path)
     content = loadmat(path, appendmat=False)
 
     def arrays(name: str) -> list[Any]:

@@ -42,13 +42,9 @@ class UbiTrailLoader:
                 f"the metadata give no width for area {unknown[0]}", path=path, line=1
             )
         scale = np.array([widths[area] for area in areas])[table.codes[0]]
-        bodies = split_bodies(
-            table.codes[0],
-            areas,
-            clock=table.numbers[4],
-            x=table.numbers[2] * scale,
-            y=table.numbers[3] * scale,
-        )
+        with np.errstate(over="ignore"):  # an infinite position is a gap
+            x, y = (table.numbers[column] * scale for column in (2, 3))
+        bodies = split_bodies(table.codes[0], areas, clock=table.numbers[4], x=x, y=y)
         # An area is a body. The clock, of a video's file, often says the same of two frames.
         return RawRecording(
             bodies, clock_unit="ms", length_unit="px", separate=True, rows=table.rows

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.stores.hdf5 import Hdf5Contents, opened_hdf5, text_of
 from driftwalk.schema.matlab import HDF5_BASED, OLD
+from driftwalk.schema.matlab_elements import refuse_unknown_elements
 from driftwalk.schema.netcdf import refuse_huge
 
 MOST_ELEMENTS: Final = 200_000
@@ -74,6 +75,7 @@ def _of_old(path: Path) -> dict[str, Value]:
             # Of two variables of one name the later counts, as in MATLAB.
             warnings.simplefilter("ignore")
             refuse_huge(_declared_old(path), path)
+            refuse_unknown_elements(path)
             content = loadmat(path, appendmat=False)
     except InputError:
         raise

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime
+import math
 import numbers
 from typing import Any, Final
 
@@ -66,7 +68,8 @@ def as_numbers(values: Values, name: str) -> Array:
         return np.array(values, dtype=np.float64)
     cells = values.tolist() if values.dtype.kind in "OUS" else list(values)
     if set(map(type, cells)) <= _PLAIN:
-        return np.array(cells, dtype=np.float64)
+        with contextlib.suppress(OverflowError):
+            return np.array(cells, dtype=np.float64)
     return _of_cells(cells, name)
 
 
@@ -91,9 +94,17 @@ def _plain(cell: Any) -> float | str:
     if isinstance(cell, (bool, np.bool_)):
         return str(cell)
     if isinstance(cell, numbers.Real) or hasattr(cell, "as_integer_ratio"):
-        return float(cell)
+        return _float(cell)
     text = text_of_cell(cell)
     return float("nan") if text in MISSING else text
+
+
+def _float(number: Any) -> float:
+    """Return a number as float64, infinite where it is too large, as a text of it would be."""
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf if number > 0 else -math.inf
 
 
 def text_of_cell(cell: Any) -> str:

@@ -48,6 +48,10 @@ _YEARS: Final = (1678, 2261)
 """Those whose nanoseconds since 1970 are 64-bit numbers."""
 
 
+LONGEST_STAMP: Final = 200
+"""Characters; a time stamp has some 40 at most."""
+
+
 class StampError(ValueError):
     """Raised by a text that is no time stamp like those before it."""
 
@@ -117,6 +121,10 @@ class StampReader:
         StampError
             At a text that is no stamp, or of another kind than the first.
         """
+        # One long text would make an array as wide as it of all.
+        if (longest := max(map(len, texts), default=0)) > LONGEST_STAMP:
+            row = next(row for row, text in enumerate(texts) if len(text) == longest)
+            raise StampError(row, f"'{texts[row]:.40}…' is no time stamp")
         try:
             ascii_texts = np.asarray(texts, dtype=object).astype("S")
         except UnicodeEncodeError:
