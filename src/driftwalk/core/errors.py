@@ -10,6 +10,17 @@ from __future__ import annotations
 from pathlib import Path
 
 
+def reason_of(error: BaseException) -> str:
+    r"""Return on one line what another library's error says, its kind where it says nothing.
+
+    Examples
+    --------
+    >>> reason_of(ValueError("bad\n  magic")), reason_of(KeyError())
+    ('bad magic', 'KeyError')
+    """
+    return " ".join(str(error).split()) or type(error).__name__
+
+
 class DriftwalkError(Exception):
     """Base of every error that driftwalk raises on purpose."""
 

@@ -1,11 +1,17 @@
-"""Which files are MATLAB's, and the names of the variables in them."""
+"""MATLAB files: which they are, the names of their variables, and what scipy reads of old ones."""
 
 from __future__ import annotations
 
 import warnings
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
+import numpy as np
+
+from driftwalk.schema.matlab_elements import refuse_unknown_elements
+from driftwalk.schema.netcdf import refuse_huge
+
+_SIZES: Final = {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "single": 4, "logical": 1}
 OLD: Final = b"MATLAB 5.0 MAT-file"
 """Start of the format that MATLAB writes unless a user chooses another."""
 HDF5_BASED: Final = b"MATLAB 7.3 MAT-file"
@@ -28,6 +34,49 @@ def matlab_variables(path: Path) -> list[str]:
             return _old_variables(path) if old else _hdf5_variables(path)
     except Exception:  # whatever the damage of a file leads the libraries to
         return []
+
+
+def read_old(path: Path) -> dict[str, Any]:
+    """Return what scipy reads from a file of the old format, by the variables' names.
+
+    Parameters
+    ----------
+    path : Path
+        A file that begins with `OLD`.
+
+    Raises
+    ------
+    FormatError
+        When the file declares more than it can hold, or an element of no known type. Of other
+        damage scipy raises what it likes.
+    """
+    from scipy.io import loadmat
+
+    with warnings.catch_warnings():
+        # Of two variables of one name the later counts, as in MATLAB.
+        warnings.simplefilter("ignore")
+        refuse_huge(_declared(path), path)
+        refuse_unknown_elements(path)
+        content: dict[str, Any] = loadmat(path, appendmat=False)
+    return {name: value for name, value in content.items() if not name.startswith("__")}
+
+
+def _declared(path: Path) -> int:
+    """Return how many bytes the variables of a file have in memory, 0 where it has objects.
+
+    Of objects scipy knows no shape, and gives up.
+    """
+    from scipy.io import whosmat
+
+    try:
+        return sum(_size(*entry) for entry in whosmat(path, appendmat=False))
+    except TypeError:
+        return 0
+
+
+def _size(_name: str, shape: tuple[int, ...], kind: str) -> int:
+    """Return how many bytes a variable has in memory by its header."""
+    return int(np.prod([float(length) for length in shape])) * _SIZES.get(kind, 8)
 
 
 def _old_variables(path: Path) -> list[str]:

@@ -11,12 +11,11 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import FormatError
+from driftwalk.core.errors import FormatError, reason_of
 from driftwalk.flow.readers.raw import RawField
 from driftwalk.flow.readers.text import masked_rows
 from driftwalk.schema.heap import refuse_endless_texts
-from driftwalk.schema.matlab import HDF5_BASED, OLD, matlab_variables
-from driftwalk.schema.matlab_elements import refuse_unknown_elements
+from driftwalk.schema.matlab import HDF5_BASED, OLD, matlab_variables, read_old
 from driftwalk.schema.netcdf import HDF5, declared_bytes, refuse_huge
 
 Array = npt.NDArray[np.float64]
@@ -124,21 +123,18 @@ def _opened(path: Path) -> Iterator[_File]:
         raise
     except Exception as error:
         # On a damaged file the libraries fail with whatever the damage leads them to.
-        reason = " ".join(str(error).split()) or type(error).__name__
+        reason = reason_of(error)
         raise FormatError(f"cannot be read as a MATLAB file: {reason}", path=path) from error
 
 
 def _old_file(path: Path) -> _File:
-    from scipy.io import loadmat
-
-    refuse_unknown_elements(path)
-    content = loadmat(path, appendmat=False)
+    content = read_old(path)
 
     def arrays(name: str) -> list[Any]:
         values = content[name]
         return list(values.ravel()) if values.dtype.kind == "O" else [values]
 
-    return _File([name for name in content if not name.startswith("__")], arrays)
+    return _File(list(content), arrays)
 
 
 def _hdf5_arrays(file: Any, name: str) -> list[Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -12,16 +11,12 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.errors import FormatError, InputError, reason_of
 from driftwalk.record.stores.hdf5 import Hdf5Contents, opened_hdf5, text_of
-from driftwalk.schema.matlab import HDF5_BASED, OLD
-from driftwalk.schema.matlab_elements import refuse_unknown_elements
-from driftwalk.schema.netcdf import refuse_huge
+from driftwalk.schema.matlab import HDF5_BASED, OLD, read_old
 
 MOST_ELEMENTS: Final = 200_000
 """Elements of an array of structs that are read."""
-_SIZES: Final = {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "single": 4, "logical": 1}
-_HIDDEN: Final = "__"
 _CLASS: Final = "MATLAB_class"
 
 
@@ -68,46 +63,15 @@ def matlab_variables_of(path: Path) -> Iterator[dict[str, Value]]:
 
 
 def _of_old(path: Path) -> dict[str, Value]:
-    from scipy.io import loadmat
-
     try:
-        with warnings.catch_warnings():
-            # Of two variables of one name the later counts, as in MATLAB.
-            warnings.simplefilter("ignore")
-            refuse_huge(_declared_old(path), path)
-            refuse_unknown_elements(path)
-            content = loadmat(path, appendmat=False)
+        content = read_old(path)
     except InputError:
         raise
     except Exception as error:
         # On a damaged file the library fails with whatever the damage leads it to.
-        reason = " ".join(str(error).split()) or type(error).__name__
+        reason = reason_of(error)
         raise FormatError(f"cannot be read as a MATLAB file: {reason}", path=path) from error
-    found: dict[str, Value] = {}
-    for name, value in content.items():
-        if name.startswith(_HIDDEN):
-            continue
-        own = _own_name(value)
-        found[own or name] = _old_value(value)
-    return found
-
-
-def _declared_old(path: Path) -> int:
-    """Return how many bytes the variables of a file have in memory, 0 where it has objects.
-
-    Of objects scipy knows no shape, and gives up.
-    """
-    from scipy.io import whosmat
-
-    try:
-        return sum(_declared(*entry) for entry in whosmat(path, appendmat=False))
-    except TypeError:
-        return 0
-
-
-def _declared(_name: str, shape: tuple[int, ...], kind: str) -> int:
-    """Return how many bytes a variable has in memory by its header."""
-    return int(np.prod([float(length) for length in shape])) * _SIZES.get(kind, 8)
+    return {_own_name(value) or name: _old_value(value) for name, value in content.items()}
 
 
 def _own_name(value: Any) -> str:
