@@ -13,7 +13,7 @@ from driftwalk.cluster.address import ClusterAddress
 from driftwalk.cluster.jobs import begin_jobs
 from driftwalk.cluster.probe import SameBits
 from driftwalk.cluster.versions import refuse_other_workers
-from driftwalk.core.errors import ClusterError, InputError
+from driftwalk.core.errors import ClusterError, InputError, reason_of
 from driftwalk.core.run_stages import tell_nobody
 from driftwalk.sweep import WorkerExecutor
 
@@ -149,7 +149,7 @@ def _client(address: ClusterAddress, stack: ExitStack) -> Any:
             return distributed.Client(address.url, timeout=ANSWER_S, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
             raise ClusterError(
-                f"no scheduler answers at {address.url}: {_reason(error)}; begin one with 'dask "
+                f"no scheduler answers at {address.url}: {reason_of(error)}; begin one with 'dask "
                 "scheduler', and workers with 'dask worker'"
             ) from error
     if address.kind == "local":
@@ -198,7 +198,3 @@ def _number(count: int, what: str) -> str:
 
 def _was(count: int) -> str:
     return "was" if count == 1 else "were"
-
-
-def _reason(error: BaseException) -> str:
-    return " ".join(str(error).split()) or type(error).__name__

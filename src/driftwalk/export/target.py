@@ -6,9 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-
-def _nobody(*_: object) -> None:
-    """Tell nobody."""
+from driftwalk.core.run_stages import tell_nobody
 
 
 @dataclass(frozen=True)
@@ -38,8 +36,8 @@ class Source:
     seed: int | None = None
     world: int | None = None
     speed: float | None = None
-    tell: Callable[[str], None] = _nobody
-    progress: Callable[[int, int], None] = _nobody
+    tell: Callable[[str], None] = tell_nobody
+    progress: Callable[[int, int], None] = tell_nobody
 
 
 @dataclass(frozen=True)

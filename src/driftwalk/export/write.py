@@ -7,7 +7,7 @@ import secrets
 import shutil
 from pathlib import Path
 
-from driftwalk.core.atomic import PARTIAL, storage_error
+from driftwalk.core.atomic import PARTIAL, rename, storage_error
 from driftwalk.core.errors import InputError
 from driftwalk.export.target import Source, Target
 
@@ -48,7 +48,7 @@ def export_run(source: Source, target: Target, folder: Path) -> list[Path]:
         # A folder that is renamed onto another takes its place where that is empty, on POSIX only.
         if folder.exists():
             folder.rmdir()
-        made.rename(folder)
+        rename(made, folder)
     except BaseException as error:
         shutil.rmtree(made, ignore_errors=True)
         refusal = storage_error(error, folder)

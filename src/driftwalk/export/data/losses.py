@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from driftwalk.core.atomic import write_atomic
 from driftwalk.core.json_text import parse_json
 from driftwalk.export.data.clock import frame_rate
 from driftwalk.export.data.motion import Motion
@@ -140,8 +141,6 @@ def write_tank(motion: Motion, folder: Path) -> list[Path]:
     >>> write_tank(Motion("a", build_trajectory([0.0], [0.0], [0.0])), Path("out"))
     []
     """
-    from driftwalk.core.atomic import write_atomic
-
     arena = parse_json(motion.recording.attrs.get("arena") or "{}")
     if not isinstance(arena, dict) or arena.get("shape") != "polygon":
         return []

@@ -48,7 +48,7 @@ def _write_films(ending: str, source: Source, folder: Path) -> list[Path]:
     motions = find_motions(source.path, world=source.world)
     if len(motions) > 1:
         source.tell(
-            f"the film shows {motions[0].name}, the first of {len(motions)}; you can name one"
+            f"the film shows {motions[0].name}, the first of {len(motions)}: name a world to see it"
         )
     file = write_film(
         motions[0],

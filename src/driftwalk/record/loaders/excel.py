@@ -11,7 +11,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.errors import FormatError, InputError, reason_of
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.stores.npz import ZIP
 from driftwalk.record.tables.choose import the_one_that_fits
@@ -109,7 +109,7 @@ def _opened(path: Path) -> Iterator[Workbook]:
         raise
     except Exception as error:
         # On a damaged file the library fails with whatever the damage leads it to.
-        reason = " ".join(str(error).split()) or type(error).__name__
+        reason = reason_of(error)
         raise FormatError(f"cannot be read as an Excel workbook: {reason}", path=path) from error
 
 

@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from driftwalk.core.bounded import MIB, read_bounded
-from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.errors import FormatError, InputError, reason_of
 from driftwalk.core.nesting import MOST_LEVELS
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.space.flat import SpaceTrack, lay_flat
@@ -94,7 +94,7 @@ def _opened(path: Path) -> Iterator[Any]:
         raise
     except Exception as error:
         # On a damaged bag the library fails with whatever the damage leads it to.
-        reason = " ".join(str(error).split()) or type(error).__name__
+        reason = reason_of(error)
         raise FormatError(
             f"cannot be read as a ROS bag: {reason.rstrip('.')}; if it was cut off, mend it first "
             "(ros2 bag reindex, mcap recover)",
