@@ -411,7 +411,7 @@ PAGES: dict[str, Page] = {
     ),
     "docs/how-to/compare-models.md": Page(
         provide=_recording(20.0),
-        instead={"-o compare": "--models inertial,active+wall -o compare"},
+        instead={"-o compare": "--models inertial,active+wall --bootstrap 0 -o compare"},
         makes=("compare/comparison.nc",),
         draws=False,
         slow=True,

@@ -22,10 +22,12 @@ times = [0.1 * k for k in range(6000)]
 path = dw.simulate(model, parameters=chosen, study=dw.Study(), sample_time=times, seed=1)
 
 # %%
-# The searches of this page are short. `dw.compare_models` takes its time.
+# The searches of this page are short, and the summaries of the motion are left out.
+# `dw.compare_models` takes its time.
 
 few = Budget(design=64, starts=2, short=8, long=20)
 models = ["inertial", "active+wall", "run_rest+wall"]
-found = dw.calibration.compare_models(path.isel(replicate=0), models, study=dw.Study(), budget=few)
+study = dw.Study(calibration={"bootstrap": 0})
+found = dw.calibration.compare_models(path.isel(replicate=0), models, study=study, budget=few)
 figure, ax = plt.subplots(figsize=(8, 3.4), layout="constrained")
 dw.figures.plot_models(found, ax)

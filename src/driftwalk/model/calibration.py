@@ -42,7 +42,9 @@ class Calibration(ForceGrid):
         default=8, description="Simulations per setting of the refined grid near the optimum."
     )
     bootstrap: Annotated[int, Quantity("1", ge=0, le=1_000_000, whole=True)] = Field(
-        default=200, description="Bootstrap samples for the intervals; 0 gives no intervals."
+        default=200,
+        description="Bootstrap samples for the intervals, and simulated recordings by which the "
+        "summaries of a motion are judged; 0 leaves both out.",
     )
     seed: Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)] = Field(
         default=1, description="Seed of the simulations and of the bootstrap."

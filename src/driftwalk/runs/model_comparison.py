@@ -122,8 +122,8 @@ def run_model_comparison(
             begun()
         run.write("recording.nc", netcdf_bytes(work.recording))
 
-        def store(fingerprint: Mapping[str, Any]) -> Store:
-            return run.store("models", fingerprint=fingerprint)
+        def stores(name: str, fingerprint: dict[str, Any]) -> Store:
+            return run.store(name, fingerprint=fingerprint)
 
         found = compare_models(
             work.recording,
@@ -133,7 +133,7 @@ def run_model_comparison(
             body=work.body,
             threads=work.threads,
             executor=executor,
-            store=store,
+            stores=stores,
             tell=progress,
         )
         run.write("comparison.nc", netcdf_bytes(found))

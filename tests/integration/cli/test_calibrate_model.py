@@ -112,7 +112,14 @@ def test_a_model_that_fails_is_one_line_with_its_setting(
     address = f"{place / 'mine.py'}:{name}"
     done = here(*words(place, tmp_path / "run"), "--model", address)
     assert said in refusal(done)
-    others = ("compare-models", place / "recording.nc", "--models", f"{address},inertial")
+    others = (
+        "compare-models",
+        place / "recording.nc",
+        "--models",
+        f"{address},inertial",
+        "--bootstrap",
+        "0",
+    )
     done = here(*others, "-o", tmp_path / "compared")
     line = done.err.splitlines()[-1]
     assert done.code == 2

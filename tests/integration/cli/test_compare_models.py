@@ -13,7 +13,10 @@ from driftwalk.calibration import DEFAULT_MODELS
 from driftwalk.cli.terminal.models_answer import print_answer
 from driftwalk.schema.netcdf import open_netcdf
 
-SHORT = (RECORDING, "--to", "30s", "--tank-diameter", "30cm", "--models", "inertial,active")
+SHORT = (
+    *(RECORDING, "--to", "30s", "--tank-diameter", "30cm", "--models", "inertial,active"),
+    *("--bootstrap", "0"),
+)
 
 
 @pytest.fixture(scope="module")

@@ -51,6 +51,31 @@ def test_the_ranking_has_a_row_for_each_model(
     assert walks == comparison["baseline"].values.tolist()
 
 
+def test_summaries_have_a_table_of_the_models_that_were_asked(comparison: xr.Dataset) -> None:
+    asked = ~comparison["baseline"].values.astype(bool)
+    first = asked & (np.cumsum(asked) == 1)
+
+    def of_asked(*values: float) -> tuple[str, np.ndarray]:
+        column = np.full(asked.size, np.nan)
+        column[asked] = values
+        return "model", column
+
+    matched = comparison.assign(
+        asked=("model", asked),
+        named=("model", first),
+        misfit=of_asked(101.0, 812.0),
+        usual_misfit=of_asked(99.0, 98.0),
+        most_misfit=of_asked(140.0, 141.0),
+        unlikely=of_asked(-400.0, 300.0),
+    )
+    (table,) = (part for part in model_sections(matched) if part["id"] == "summaries")
+    names = comparison["model"].values[asked]
+    assert table["rows"] == [
+        [names[0], 101.0, 99.0, 140.0, 0.0, "yes"],
+        [names[1], 812.0, 98.0, 141.0, 700.0, "no"],
+    ]
+
+
 def test_the_aspects_end_with_the_recording_itself(
     comparison: xr.Dataset, sections: dict[str, dict[str, Any]]
 ) -> None:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from concurrent.futures import Executor
 from typing import TYPE_CHECKING
 
-from driftwalk.calibration.estimation.contact import contact_distance
+from driftwalk.calibration.estimation.contact import at_the_wall
 from driftwalk.calibration.estimation.result import build_model_calibration
 from driftwalk.calibration.estimation.run import Stores, Tell, estimate
-from driftwalk.calibration.evolution import wall_distance
 from driftwalk.calibration.models.contestants import contestants
-from driftwalk.calibration.models.recorded import RecordedMotion, body_motion
-from driftwalk.motion import MotionModel, ParticleModel
+from driftwalk.calibration.models.recorded import body_motion
+from driftwalk.motion import MotionModel
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,7 +60,7 @@ def calibrate_many(
         When the recording is too short or does not move, or the model gives no numbers.
     """
     motion = body_motion(recording, study, flow=flow, body=body, threads=threads)
-    entries, warnings = contestants([_at_the_wall(model, motion)], motion, study)
+    entries, warnings = contestants([at_the_wall(model, motion)], motion, study)
     search = study.calibration
     found = estimate(
         entries[0],
@@ -74,12 +73,3 @@ def calibrate_many(
         tell=tell,
     )
     return build_model_calibration(found, entries[0], motion, study, recording, warnings)
-
-
-def _at_the_wall(model: MotionModel, motion: RecordedMotion) -> MotionModel:
-    """Return the model with the recording's distance from the wall, if it states none."""
-    if not isinstance(model, ParticleModel) or model.states_clearance:
-        return model
-    from_wall = wall_distance(motion.like)(motion.track.x, motion.track.y)
-    noise = motion.like.camera.position_noise
-    return model.with_clearance(contact_distance(from_wall, noise))

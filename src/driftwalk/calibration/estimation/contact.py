@@ -7,6 +7,10 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.calibration.evolution import wall_distance
+from driftwalk.calibration.models.recorded import RecordedMotion
+from driftwalk.motion import MotionModel, ParticleModel
+
 Floats = npt.NDArray[np.float64]
 
 NEAREST: Final = 0.01
@@ -41,3 +45,18 @@ def contact_distance(from_wall: Floats, noise: float) -> float:
     at_wall = float(np.mean(from_wall < nearest + NOISY * noise))
     deep = -float(norm.ppf(min(NEAREST / max(at_wall, NEAREST), 0.5)))
     return max(nearest + noise * deep, 0.0)
+
+
+def at_the_wall(model: MotionModel, motion: RecordedMotion) -> MotionModel:
+    """Return the model with the recording's distance from the wall at contact, if it has no own.
+
+    A comparison gives its models the least recorded distance but for one sample in a hundred, and
+    that one counts as no own.
+    """
+    if not isinstance(model, ParticleModel):
+        return model
+    if model.states_clearance and model.clearance != motion.clearance:
+        return model
+    from_wall = wall_distance(motion.like)(motion.track.x, motion.track.y)
+    noise = motion.like.camera.position_noise
+    return model.with_clearance(contact_distance(from_wall, noise))

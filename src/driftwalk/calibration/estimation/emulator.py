@@ -43,6 +43,8 @@ class Solved(NamedTuple):
     """Sum of the squares of what is left, in standard deviations."""
     std: Floats
     """Standard deviations by the curvature there, in parts of the ranges."""
+    log_volume: float
+    """Logarithm of the determinant of the covariance that belongs to them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,6 +174,8 @@ class LocalEmulator:
             place=found.x,
             misfit=2.0 * float(found.cost),
             std=np.sqrt(np.diag(np.linalg.inv(curvature))) * self.width,
+            log_volume=2.0 * float(np.log(self.width).sum())
+            - float(np.linalg.slogdet(curvature)[1]),
         )
 
 

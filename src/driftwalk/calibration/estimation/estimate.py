@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.calibration.estimation import approach as approaching, descend as descending
 from driftwalk.calibration.estimation.approach import WIDE_ERRORS, Order, approach
-from driftwalk.calibration.estimation.descend import WIDEST, Descended, descend
+from driftwalk.calibration.estimation.descend import WIDEST, Descended, Simulate, descend
 from driftwalk.calibration.estimation.modes import Modes, find_modes
-from driftwalk.calibration.estimation.objective import SummaryObjective
 from driftwalk.calibration.estimation.posterior import (
     MOST_ROUNDS as MOST_REGIONS,
     Posterior,
@@ -39,6 +38,18 @@ UNSETTLED: Final = 1.0
 UNLIKE: Final = 4.0
 """Misfit, in usual ones, from which on the recording is that of another model: intervals would have
 to be more than twice as wide."""
+
+
+class Summaries(Simulate, Protocol):
+    """Simulates settings, and knows the recording.
+
+    Attributes
+    ----------
+    recorded : ndarray, shape (parts, summaries)
+        Summaries of the recording and of its parts.
+    """
+
+    recorded: Floats
 
 
 class Matched(NamedTuple):
@@ -88,7 +99,7 @@ def most_simulations(parameters: int, worlds: int) -> int:
 
 
 def match_summaries(
-    objective: SummaryObjective,
+    objective: Summaries,
     parameters: int,
     starts: Starts,
     *,
@@ -100,7 +111,7 @@ def match_summaries(
 
     Parameters
     ----------
-    objective : SummaryObjective
+    objective : Summaries
         Simulates settings and summarises them.
     parameters : int
         Dimensions of the unit cube.
@@ -115,32 +126,42 @@ def match_summaries(
         Of the settings that are simulated.
     """
     recorded = objective.recorded
-    ends = _descents(objective, parameters, starts, order=order, seed=seed)
+    ends = find_ends(objective, parameters, starts, order=order, seed=seed)
     modes = find_modes(
         ends,
         lambda end, number: sample_posterior(
             objective, recorded, end.emulator, end.solved, seed=seed + 10_000 * (1 + number)
         ),
     )
-    repeated = repeat_estimates(lambda one: objective(one)[:, 0], modes.best, worlds)
+    repeated = repeat_estimates(lambda one: objective(one, parts=1)[:, 0], modes.best, worlds)
     return _matched(order, modes, recorded[0], repeated, ends[0].rounds)
 
 
-def _descents(
-    objective: SummaryObjective, parameters: int, starts: Starts, *, order: Order, seed: int
+def find_ends(
+    objective: Summaries,
+    parameters: int,
+    starts: Starts,
+    *,
+    order: Order,
+    seed: int,
+    hopeless: float = HOPELESS,
 ) -> list[Descended]:
     """Return the ends of the searches that are worth a posterior, the most likely first.
 
-    The first begins where a regression puts the parameters. Even where its errors are large, its
-    centre is closer to the truth than they say: they are mostly those of settings that move unlike
-    the recording. Where the end does not match, the model has more than one place to look, and an
-    end that matches may not be the best that does.
+    The arguments are those of `match_summaries`, and the misfit, in summaries, from which on no
+    other start is tried. The first search begins where a regression puts
+    the parameters. Even where its errors are large, its centre is closer to the truth than they
+    say: they are mostly those of settings that move unlike the recording. Where the end does not
+    match, the model has more than one place to look, and an end that matches may not be the best
+    that does.
     """
     recorded = objective.recorded[0]
-    box = approach(lambda one: objective(one)[:, 0], recorded, parameters, order=order, seed=seed)
+    box = approach(
+        lambda one: objective(one, parts=1)[:, 0], recorded, parameters, order=order, seed=seed
+    )
     width = WIDE_ERRORS * box.error
     found = [descend(objective, recorded, box.centre, width, seed=seed + 1000)]
-    if _matches(found[0]) or _hopeless(found[0]):
+    if _matches(found[0]) or _misfit(found[0]) > hopeless:
         return found
     wide = np.full(parameters, WIDEST)
     for number, start in enumerate(_distinct(order(starts()))[:MOST_STARTS], 2):
@@ -150,11 +171,12 @@ def _descents(
 
 
 def _matches(found: Descended) -> bool:
-    return found.solved.misfit < MATCHES * found.emulator.summaries
+    return _misfit(found) < MATCHES
 
 
-def _hopeless(found: Descended) -> bool:
-    return found.solved.misfit > HOPELESS * found.emulator.summaries
+def _misfit(found: Descended) -> float:
+    """Return the misfit in summaries; there may be none that vary."""
+    return found.solved.misfit / max(found.emulator.summaries, 1)
 
 
 def _matched(

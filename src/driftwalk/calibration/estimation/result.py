@@ -13,9 +13,9 @@ from driftwalk.calibration.estimation.estimate import Matched
 from driftwalk.calibration.estimation.run import Estimation
 from driftwalk.calibration.models.checks import CHECKS, UNITS
 from driftwalk.calibration.models.contestants import Contestant
-from driftwalk.calibration.models.judge import JUDGED
+from driftwalk.calibration.models.judge import JUDGED, without_error
 from driftwalk.calibration.models.recorded import RecordedMotion
-from driftwalk.calibration.models.result import steadiness_warnings, without_error
+from driftwalk.calibration.models.result import steadiness_warnings
 from driftwalk.calibration.models.verdict import verdict_of
 from driftwalk.motion import ParticleModel
 from driftwalk.schema.check import build_dataset

@@ -1,10 +1,7 @@
-"""Which motion model explains a recording? All of them searched alike, and judged alike."""
+"""Motion models on a recording: what takes part, and how each is searched and judged.
 
-from driftwalk.calibration.models.compare import (
-    ALL_MODELS,
-    DEFAULT_MODELS,
-    check_models,
-    compare_models,
-)
+`driftwalk.calibration.compare` compares them. It is not imported here, for it needs
+`driftwalk.calibration.estimation`, which needs the modules of this folder.
+"""
 
-__all__ = ["ALL_MODELS", "DEFAULT_MODELS", "check_models", "compare_models"]
+__all__: list[str] = []

@@ -101,3 +101,9 @@ def require_numbers(objective: AspectObjective) -> None:
     if broken_worlds(seen.status).all():
         values = {name: float(column[0]) for name, column in objective.values(tried).items()}
         raise InputError(no_numbers(objective.model.name, values))
+
+
+def without_error(without: Floats) -> float:
+    """Return the standard error of a mean from what is left without each block (jackknife)."""
+    count = without.size
+    return float(np.sqrt((count - 1) / count * ((without - without.mean()) ** 2).sum()))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -10,8 +10,9 @@ import numpy.typing as npt
 
 from driftwalk.calibration.models.checks import CHECKS, UNITS
 from driftwalk.calibration.models.contestants import Contestant
-from driftwalk.calibration.models.judge import JUDGED, Judged
+from driftwalk.calibration.models.judge import JUDGED, Judged, without_error
 from driftwalk.calibration.models.recorded import RecordedMotion
+from driftwalk.calibration.models.ties import Summarised, naming, said_of, tie_sentence
 from driftwalk.calibration.models.verdict import Verdict, verdict_of
 from driftwalk.calibration.steadiness import Steadiness, steadiness_of_steps
 from driftwalk.comparison import KsReference
@@ -39,10 +40,16 @@ def build_comparison(
     study: Study,
     recording: xr.Dataset,
     warnings: Sequence[str],
+    summarised: Mapping[int, Summarised],
 ) -> xr.Dataset:
-    """Return the dataset of a comparison; `entries` and `judged` have one item for each model."""
+    """Return the dataset of a comparison; `entries` and `judged` have one item for each model.
+
+    `summarised` has those whose summaries were matched, by their places among them.
+    """
     order = np.argsort([one.score for one in judged], kind="stable")
     entries, judged = [entries[k] for k in order], [judged[k] for k in order]
+    asked = {at: summarised[k] for at, k in enumerate(order) if k in summarised}
+    answer = naming(entries, asked)
     behind = np.array([one.score - judged[0].score for one in judged])
     behind_std = np.array([without_error(one.without - judged[0].without) for one in judged])
     names = [entry.model.name for entry in entries]
@@ -51,7 +58,10 @@ def build_comparison(
             one,
             motion,
             baseline=entry.baseline,
-            clearly_behind=names[0] if behind[k] > TIED_SIGMAS * behind_std[k] else None,
+            clearly_behind=names[0]
+            if behind[k] > TIED_SIGMAS * behind_std[k] and k != answer.named
+            else None,
+            unlike=None if answer.named is None or k not in asked else said_of(asked[k]),
         )
         for k, (entry, one) in enumerate(zip(entries, judged, strict=True))
     ]
@@ -67,6 +77,8 @@ def build_comparison(
     steady = _steadiness(motion)
     said = [*warnings, *_edge_warnings(entries, judged), *steadiness_warnings(motion)]
     findings = _findings(names, entries, verdicts, closest, tied)
+    if asked:
+        findings.insert(0 if answer.named is not None else 1, tie_sentence(names, asked, answer))
     data: dict[str, Any] = {
         "score": ("model", [one.score for one in judged]),
         "score_std": ("model", [without_error(one.without) for one in judged]),
@@ -89,6 +101,7 @@ def build_comparison(
         "parameter_unit": ("parameter", texts(list(units.values()))),
         "end_score": (("model", "end"), _padded([one.ends for one in judged])),
         "evaluations": ("model", [one.evaluations for one in judged]),
+        **_summaries(len(entries), asked, answer.named),
     }
     coords = {
         "model": ("model", texts(names)),
@@ -112,10 +125,18 @@ def build_comparison(
     return build_dataset("model_comparison", data, coords, attrs)
 
 
-def without_error(without: Floats) -> float:
-    """Return the standard error of a mean from what is left without each block (jackknife)."""
-    count = without.size
-    return float(np.sqrt((count - 1) / count * ((without - without.mean()) ** 2).sum()))
+def _summaries(models: int, asked: Mapping[int, Summarised], named: int | None) -> dict[str, Any]:
+    """Return what the summaries of the motion say; nothing where no model was asked."""
+    if not asked:
+        return {}
+    data: dict[str, Any] = {
+        "asked": ("model", [k in asked for k in range(models)]),
+        "named": ("model", [k == named for k in range(models)]),
+    }
+    for name in Summarised._fields:
+        values = [getattr(asked[k], name) if k in asked else np.nan for k in range(models)]
+        data[name] = ("model", values)
+    return data
 
 
 def _padded(rows: Sequence[Floats]) -> Floats:

@@ -36,7 +36,12 @@ class Verdict(NamedTuple):
 
 
 def verdict_of(
-    judged: Judged, motion: RecordedMotion, *, baseline: bool, clearly_behind: str | None = None
+    judged: Judged,
+    motion: RecordedMotion,
+    *,
+    baseline: bool,
+    clearly_behind: str | None = None,
+    unlike: str | None = None,
 ) -> Verdict:
     """Compare a model with the recording's own differences, and with facts that are not fitted.
 
@@ -50,6 +55,8 @@ def verdict_of(
         Whether it only repeats recorded steps: then it explains nothing, however near.
     clearly_behind : str, optional
         A model that is closer by more than chance: so this one differs from the recording.
+    unlike : str, optional
+        How far its summaries are from those of the recording, where another model gives them.
     """
     over = judged.held / motion.own
     off = checks_off(judged.checks, motion.recorded_checks)
@@ -62,6 +69,8 @@ def verdict_of(
     if np.count_nonzero(off) > MOST_CHECKS_OFF:
         names = [words for words, is_off in zip(CHECK_WORDS.values(), off, strict=True) if is_off]
         parts.append(f"far beyond all its worlds: {', '.join(names)}")
+    if unlike is not None:
+        parts.append(unlike)
     if not parts and clearly_behind is not None:
         parts.append(f"{clearly_behind} is clearly closer")
     if baseline:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 COLUMNS = ("model", "numbers", "distance", "behind", "D of steps", "explained")
+SUMMARIES = ("misfit", "usual_misfit", "most_misfit", "unlikely")
 
 
 def summary(found: xr.Dataset) -> dict[str, Any]:
@@ -55,6 +56,7 @@ def _model(one: xr.Dataset, aspects: list[str], checks: list[str]) -> dict[str, 
         "score_std": float(one["score_std"]),
         "behind": float(one["behind"]),
         "behind_std": float(one["behind_std"]),
+        **_summaries(one),
         "held_out_distance": dict(
             zip(aspects, one["held_out_distance"].values.tolist(), strict=True)
         ),
@@ -76,6 +78,13 @@ def _model(one: xr.Dataset, aspects: list[str], checks: list[str]) -> dict[str, 
     }
 
 
+def _summaries(one: xr.Dataset) -> dict[str, Any]:
+    """Return what the summaries of the motion say, of a model that was asked."""
+    if "asked" not in one or not bool(one["asked"]):
+        return {}
+    return {"named": bool(one["named"]), **{name: float(one[name]) for name in SUMMARIES}}
+
+
 def print_answer(found: xr.Dataset, folder: Path) -> None:
     """Print the ranking, the answer in sentences, and where everything is."""
     rows = [
@@ -85,11 +94,13 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
             f"{float(one['score']):.2f} ± {float(one['score_std']):.2f}",
             _behind(one, index),
             f"{float(one['held_out_distance'][0]):.3f}",
+            *((_misfit(one),) if "asked" in found else ()),
             _explained(one),
         )
         for index, one in enumerate(_each(found))
     ]
-    print_table(rows, columns=COLUMNS, title="models, the closest first")
+    columns = (*COLUMNS[:-1], *(("misfit",) if "asked" in found else ()), COLUMNS[-1])
+    print_table(rows, columns=columns, title="models, the closest first")
     own = ", ".join(
         f"{ASPECT_WORDS.get(str(name), name)} {float(value):.3f}"
         for name, value in zip(found["aspect"].values, found["own_distance"].values, strict=True)
@@ -104,6 +115,12 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
 
 def _behind(one: xr.Dataset, index: int) -> str:
     return "" if not index else f"{float(one['behind']):.2f} ± {float(one['behind_std']):.2f}"
+
+
+def _misfit(one: xr.Dataset) -> str:
+    if not bool(one["asked"]):
+        return ""
+    return f"{float(one['misfit']):.0f} (own below {float(one['most_misfit']):.0f})"
 
 
 def _explained(one: xr.Dataset) -> str:

@@ -59,6 +59,10 @@ def model_sections(
             lambda: models_summary(comparison), lambda: stated_warnings(comparison)
         )
         made += attempt("ranking", "Ranking", lambda: ranking_section(comparison))
+        if "asked" in comparison:
+            made += attempt(
+                "summaries", "Summaries of the motion", lambda: summaries_section(comparison)
+            )
         made += attempt("scores", "Distances", lambda: scores_section(comparison))
         made += attempt("verdicts", "Where they differ", lambda: verdicts_section(comparison))
         made += attempt("aspects", "Aspects", lambda: aspects_section(comparison))
@@ -103,6 +107,30 @@ def ranking_section(comparison: xr.Dataset) -> Section:
     return section(
         "ranking", "table", "Ranking", "Distance from blocks of time that no model was fitted to.",
         columns=columns, rows=rows,
+    )  # fmt: skip
+
+
+def summaries_section(comparison: xr.Dataset) -> Section:
+    """Return the table of models that were compared by the summaries of the motion."""
+    names = ("misfit", "usual_misfit", "most_misfit", "unlikely")
+    require(comparison, "asked", "named", *names)
+    asked = comparison.isel(model=np.flatnonzero(comparison["asked"].values))
+    least = float(asked["unlikely"].min())
+    rows = []
+    for index in range(asked.sizes["model"]):
+        one = asked.isel(model=index)
+        shown = [number(one[name]) for name in names[:-1]]
+        behind = number(one["unlikely"] - least)
+        rows.append([one["model"].item(), *shown, behind, "yes" if bool(one["named"]) else "no"])
+    return section(
+        "summaries", "table", "Summaries of the motion",
+        "About a hundred numbers of the motion, matched by the models that are about as close. The "
+        "misfit is compared with those of the model's own simulated recordings; the evidence, as "
+        "-2 log above the likeliest model, has a price for each parameter.",
+        columns=[
+            "model", "misfit", "of own recordings, median", "99 % below", "less likely by", "named",
+        ],
+        rows=rows,
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from typing import Final
 from driftwalk.schema.description import ARENA, SIMULATED, SOURCE, Attribute, Kind, Variable
 
 _HELD: Final = "odd blocks of time, which no model has seen"
+_TIED: Final = "several models are about as close"
 
 MODEL_COMPARISON: Final = Kind(
     name="model_comparison",
@@ -56,6 +57,26 @@ MODEL_COMPARISON: Final = Kind(
         Variable("parameter_unit", "parameter", None, "unit of the parameter", "text"),
         Variable("end_score", "model end", "1", "score at the end of a search", note="even blocks"),
         Variable("evaluations", "model", None, "settings that were simulated", "int"),
+        Variable(
+            "asked", "model", None, "whether the summaries of the motion were matched", "bool",
+            when=_TIED,
+        ),
+        Variable(
+            "named", "model", None, "whether the summaries of the motion speak for the model",
+            "bool", when=_TIED,
+        ),
+        Variable(
+            "misfit", "model", "1", "sum of squares of the deviations of the summaries",
+            when=_TIED, note="in standard deviations; NaN where it was not asked",
+        ),
+        Variable(
+            "usual_misfit", "model", "1", "its median over the model's own recordings", when=_TIED
+        ),
+        Variable("most_misfit", "model", "1", "its 99 % quantile over them", when=_TIED),
+        Variable(
+            "unlikely", "model", "1", "-2 log of the evidence of the summaries", when=_TIED,
+            note="but for a constant that all models share",
+        ),
         Variable("finding", "finding", None, "answer", "text"),
         Variable("warning", "warning", None, "warning", "text"),
         Variable("model", "model", None, "motion model", "text"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -12,12 +12,16 @@ from self_propelled import moving
 
 import driftwalk as dw
 from driftwalk.calibration import check_models, compare_models
+from driftwalk.calibration.estimation import approach, descend, likeness
 from driftwalk.calibration.evolution import Budget
+from driftwalk.calibration.models import ties
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.schema.check import check_dataset
 from driftwalk.sweep import MemoryStore, SweepError
 
 SMALL = Budget(design=32, starts=1, short=6, long=6, retest=2)
+DISTANCES = dw.apply_overrides(dw.Study(), {"calibration.bootstrap": 0})
+"""Leaves the summaries out."""
 TRUTH = {
     "speed": 0.05, "speed_cv": 0.4, "run_time": 2.0, "turn_std": 1.2, "rotational_diffusion": 0.3,
     "turn_rate": 0.0,
@@ -37,7 +41,9 @@ def recorded() -> xr.Dataset:
 
 @pytest.fixture(scope="module")
 def found() -> xr.Dataset:
-    return compare_models(recording(240.0), ["inertial", "run_tumble"], budget=SMALL)
+    return compare_models(
+        recording(240.0), ["inertial", "run_tumble"], study=DISTANCES, budget=SMALL
+    )
 
 
 def test_the_true_model_is_the_closest(found: xr.Dataset) -> None:
@@ -78,7 +84,8 @@ def test_each_model_has_values_of_its_own_parameters_alone(found: xr.Dataset) ->
 
 def test_threads_do_not_change_the_answer(recorded: xr.Dataset) -> None:
     one, two = (
-        compare_models(recorded, ["inertial"], budget=SMALL, threads=threads) for threads in (1, 2)
+        compare_models(recorded, ["inertial"], study=DISTANCES, budget=SMALL, threads=threads)
+        for threads in (1, 2)
     )
     xr.testing.assert_identical(one, two)
 
@@ -91,9 +98,10 @@ def test_a_comparison_that_was_ended_goes_on_with_the_model_that_it_was_at(
     recorded: xr.Dataset,
 ) -> None:
     kept = MemoryStore()
-    fingerprints: list[Mapping[str, Any]] = []
+    fingerprints: list[dict[str, Any]] = []
 
-    def store(fingerprint: Mapping[str, Any]) -> MemoryStore:
+    def stores(name: str, fingerprint: dict[str, Any]) -> MemoryStore:
+        assert name == "models"
         fingerprints.append(fingerprint)
         return kept
 
@@ -103,15 +111,78 @@ def test_a_comparison_that_was_ended_goes_on_with_the_model_that_it_was_at(
 
     models = ["active", "inertial"]
     with pytest.raises(SweepError) as error:
-        compare_models(recorded, models, budget=SMALL, store=store, tell=ended)
+        compare_models(recorded, models, study=DISTANCES, budget=SMALL, stores=stores, tell=ended)
     assert isinstance(error.value.__cause__, Interrupted)
     seen: list[str] = []
     again = compare_models(
-        recorded, models, budget=SMALL, store=store, tell=lambda *said: seen.append(said[2])
+        recorded,
+        models,
+        study=DISTANCES,
+        budget=SMALL,
+        stores=stores,
+        tell=lambda *said: seen.append(said[2]),
     )
     assert "active" not in seen
     assert fingerprints[0] == fingerprints[1]
-    xr.testing.assert_identical(again, compare_models(recorded, models, budget=SMALL))
+    xr.testing.assert_identical(
+        again, compare_models(recorded, models, study=DISTANCES, budget=SMALL)
+    )
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let every model be asked, and simulate little for it."""
+    monkeypatch.setattr(ties, "ASKED_SIGMAS", 1e6)
+    monkeypatch.setattr(approach, "SIMULATIONS", 64)
+    monkeypatch.setattr(approach, "MOST_ROUNDS", 2)
+    monkeypatch.setattr(descend, "FEWEST_SIMULATIONS", (128, 128))
+    monkeypatch.setattr(descend, "MOST_ROUNDS", 2)
+    monkeypatch.setattr(likeness, "SIMULATIONS", 256)
+
+
+def with_summaries(recorded: xr.Dataset, **options: Any) -> xr.Dataset:
+    study = dw.apply_overrides(dw.Study(), {"calibration.bootstrap": 20})
+    models = ["inertial", "run_tumble"]
+    return compare_models(recorded, models, study=study, budget=SMALL, **options)
+
+
+class Counted(MemoryStore):
+    """Counts what is written."""
+
+    written = 0
+
+    def write(self, *unit: Any) -> None:
+        self.written += 1
+        super().write(*unit)
+
+
+@pytest.mark.usefixtures("asked")
+def test_summaries_are_matched_and_kept(recorded: xr.Dataset) -> None:
+    kept: dict[str, Counted] = {}
+    said: list[tuple[int, int, str]] = []
+
+    def stores(name: str, _: dict[str, Any]) -> Counted:
+        return kept.setdefault(name, Counted())
+
+    found = with_summaries(recorded, stores=stores, tell=lambda *all_of: said.append(all_of))
+    check_dataset(found)
+    assert found["asked"].values.tolist() == (~found["baseline"].values.astype(bool)).tolist()
+    assert (np.isfinite(found["misfit"].values) == found["asked"].values).all()
+    done, most = np.array([one[:2] for one in said]).T
+    assert (np.diff(done) >= 0).all()
+    assert len(set(most)) == 1
+    assert done[-1] == most[0]
+    # No model is searched again, and the summaries are read, not simulated.
+    written = {name: one.written for name, one in kept.items()}
+    assert set(written) == {"models", "summaries-0", "summaries-1"}
+    said.clear()
+    again = with_summaries(recorded, stores=stores, tell=lambda *all_of: said.append(all_of))
+    xr.testing.assert_identical(found, again)
+    assert {text.partition(" of ")[0] for *_, text in said} == {"summaries", "figures"}
+    assert written == {name: one.written for name, one in kept.items()}
+    with ThreadPoolExecutor(2) as executor:
+        there = with_summaries(recorded, executor=executor)
+    xr.testing.assert_identical(found, there)
 
 
 def test_mistakes_are_said(recorded: xr.Dataset) -> None:
@@ -132,14 +203,16 @@ def test_mistakes_are_said(recorded: xr.Dataset) -> None:
 
 
 def test_a_block_without_a_flow_is_left_out_with_its_reason(recorded: xr.Dataset) -> None:
-    study = dw.apply_overrides(dw.Study(), {"flow.min_count": 5000})
+    study = dw.apply_overrides(dw.Study(), {"flow.min_count": 5000, "calibration.bootstrap": 0})
     found = compare_models(recorded, ["block", "inertial"], study=study, budget=SMALL)
     assert "block" not in found["model"].values
     assert any("the block is left out" in str(text) for text in found["warning"].values)
 
 
 def test_a_model_that_feels_others_is_left_out_where_there_are_none(recorded: xr.Dataset) -> None:
-    found = compare_models(recorded, ["active+neighbours", "inertial"], budget=SMALL)
+    found = compare_models(
+        recorded, ["active+neighbours", "inertial"], study=DISTANCES, budget=SMALL
+    )
     assert "active+neighbours" not in found["model"].values
     said = [str(text) for text in found["warning"].values]
     assert any(text.startswith("active+neighbours is left out: the model") for text in said)

@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
+from driftwalk.calibration.estimation import Stores
 from driftwalk.calibration.evolution import Budget
 from driftwalk.calibration.models.contestants import (
     BLOCK,
     Chosen,
-    Contestant,
     contestants,
     made_models,
     walks,
 )
-from driftwalk.calibration.models.judge import Judged, judge
-from driftwalk.calibration.models.recorded import RecordedMotion, body_motion
+from driftwalk.calibration.models.recorded import body_motion
 from driftwalk.calibration.models.result import build_comparison
+from driftwalk.calibration.stages import Searches, Stages, Tell
 from driftwalk.conditions import study_in_arena
-from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.run_stages import tell_nobody
 from driftwalk.motion import MotionModel, ParticleModel
-from driftwalk.sweep import Store, WorkUnit, grid, run_sweep, threads_of_unit
+from driftwalk.sweep import threads_of_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,7 +36,6 @@ ALL_MODELS: Final = (
     *DEFAULT_MODELS, "run_tumble+wall+slow", "run_rest+wall+stroke", "run_rest+wall+reverse",
     "run_tumble+wall+follow+keep", "run_rest+wall+neighbours",
 )  # fmt: skip
-Tell = Callable[[int, int, str], None]
 
 
 def compare_models(
@@ -54,7 +48,7 @@ def compare_models(
     threads: int | None = None,
     executor: Executor | None = None,
     budget: Budget | None = None,
-    store: Callable[[Mapping[str, Any]], Store] | None = None,
+    stores: Stores | None = None,
     tell: Tell | None = None,
 ) -> xr.Dataset:
     """Search several motion models on a recording, and say which is closest and which explains it.
@@ -70,6 +64,11 @@ def compare_models(
     where no more than one of eight facts that are not fitted is far off, and where no other one is
     clearly closer.
 
+    Where several models are about as close, up to five of them are matched with the recording by a
+    hundred summaries of the motion, as in a calibration (`driftwalk.calibration.estimation`), and
+    compared by their evidence. A model counts there if the recording's summaries are like those of
+    its own simulated recordings.
+
     Parameters
     ----------
     recording : xarray.Dataset
@@ -78,6 +77,8 @@ def compare_models(
         Names of the family with their parts, "block", or models.
     study : Study, optional
         Tank, camera, step interval and seed; default: the paper's, in the arena of the recording.
+        ``bootstrap`` is the number of simulated recordings by which a misfit of the summaries is
+        judged; below 2 leaves the summaries out.
     flow : xarray.Dataset, optional
         The water's velocity. For the block it is extracted from the even blocks when left out.
     body : str, optional
@@ -86,13 +87,13 @@ def compare_models(
         Default: all processors. The result does not depend on it.
     executor : concurrent.futures.Executor, optional
         Searches and judges models elsewhere, see `driftwalk.sweep.run_sweep`: a work unit is one
-        model. Each then has one thread if `threads` is left out. Workers of a Dask cluster need the
-        same numpy and scipy.
+        model, or 16 settings of which summaries are matched. Each then has one thread if `threads`
+        is left out. Workers of a Dask cluster need the same numpy and scipy.
     budget : Budget, optional
         How much each search may simulate.
-    store : callable, optional
-        Returns where finished models are kept, for what determines their numbers; memory when left
-        out.
+    stores : callable, optional
+        Returns where finished models of a stage are kept, for what determines their numbers; memory
+        when left out.
     tell : callable, optional
         Called with the settings done, all of them, and the model under way.
 
@@ -121,9 +122,14 @@ def compare_models(
     )
     entries, warnings = contestants(made_models(models, motion, chosen), motion, chosen)
     entries += walks(motion)
-    work = _Comparison(entries, motion, chosen.calibration.seed, budget or Budget())
-    judged = _judged_all(work, store, executor, tell)
-    return build_comparison(entries, judged, motion, chosen, recording, warnings)
+    search = chosen.calibration
+    worlds = search.bootstrap if search.refine == "auto" else 0
+    work = Searches(entries, motion, search.seed, budget or Budget())
+    stages = Stages(work, worlds, stores, executor, tell or tell_nobody)
+    judged = stages.judged()
+    said = stages.summarised(judged)
+    stages.finish()
+    return build_comparison(entries, judged, motion, chosen, recording, warnings, said)
 
 
 def check_models(
@@ -178,101 +184,3 @@ def _study(recording: xr.Dataset, study: Study | None) -> Study:
     from driftwalk.model import Study
 
     return study_in_arena(Study(), recording) if study is None else study
-
-
-@dataclass(frozen=True, eq=False)
-class _Comparison:
-    """The function of the sweep: one model, searched and judged wherever it is sent."""
-
-    entries: Sequence[Contestant]
-    motion: RecordedMotion
-    seed: int
-    budget: Budget
-    within: Callable[[int, int], None] | None = None
-    """Called with the model and the settings done."""
-    linear_algebra: ClassVar[bool] = True
-    """Its results depend on numpy and scipy."""
-
-    def __call__(self, unit: WorkUnit) -> dict[str, np.ndarray]:
-        index = unit.start
-
-        def say(done: int, _: int) -> None:
-            if self.within is not None:
-                self.within(index, done)
-
-        say(0, 0)
-        with one_blas_thread():
-            found = judge(
-                self.entries[index], self.motion, budget=self.budget, seed=self.seed, tell=say
-            )
-        most = max(len(entry.ranges) for entry in self.entries)
-        return _packed(found, most, self.budget.starts + 1)
-
-    def costs(self) -> list[int]:
-        """Return the settings that each model's search simulates at most."""
-        numbers = [len(entry.ranges) for entry in self.entries]
-        return [self.budget.evaluations(one) if one else 0 for one in numbers]
-
-    def fingerprint(self) -> dict[str, Any]:
-        """Return what determines the numbers of all models, for the store of a run."""
-        return {
-            "models": [entry.model.describe() for entry in self.entries],
-            "ranges": [[one.describe() for one in entry.ranges] for entry in self.entries],
-            "seed": self.seed,
-            "budget": vars(self.budget),
-            "aspects": list(self.motion.held.names),
-        }
-
-
-def _judged_all(
-    work: _Comparison,
-    store: Callable[[Mapping[str, Any]], Store] | None,
-    executor: Executor | None,
-    tell: Tell | None,
-) -> list[Judged]:
-    """Judge every model, one work unit each."""
-    before = [0, *itertools.accumulate(work.costs())]
-    say = tell if tell is not None else tell_nobody
-
-    def within(index: int, done: int) -> None:
-        say(before[index] + done, before[-1], work.entries[index].model.name)
-
-    def finished(done: int, total: int) -> None:
-        say(done, total, "models")
-
-    units = grid(model=np.arange(len(work.entries))).units(1)
-    kept = None if store is None else store(work.fingerprint())
-    # Only work of this process can say how far it is within a model.
-    arrays = (
-        run_sweep(replace(work, within=within), units, store=kept)
-        if executor is None
-        else run_sweep(work, units, store=kept, executor=executor, progress=finished)
-    )
-    say(before[-1], before[-1], "figures")
-    return [
-        _unpacked({name: values[index] for name, values in arrays.items()}, entry)
-        for index, entry in enumerate(work.entries)
-    ]
-
-
-def _packed(judged: Judged, most: int, searches: int) -> dict[str, np.ndarray]:
-    """Return arrays of the same shapes for every model, with one entry each."""
-    point = np.full(most, np.nan)
-    point[: judged.point.size] = judged.point
-    ends = np.full(searches, np.nan)
-    ends[: judged.ends.size] = judged.ends
-    arrays = {**judged._asdict(), "point": point, "ends": ends}
-    return {name: np.asarray(values)[None] for name, values in arrays.items()}
-
-
-def _unpacked(arrays: Mapping[str, np.ndarray], entry: Contestant) -> Judged:
-    return Judged(
-        point=arrays["point"][: len(entry.ranges)],
-        trained=arrays["trained"],
-        held=arrays["held"],
-        score=float(arrays["score"]),
-        without=arrays["without"],
-        checks=arrays["checks"],
-        ends=arrays["ends"][np.isfinite(arrays["ends"])],
-        evaluations=int(arrays["evaluations"]),
-    )

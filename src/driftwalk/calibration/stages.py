@@ -1,0 +1,180 @@
+"""The two stages of a comparison of models: distances of all, then summaries of those that tie."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from driftwalk.calibration.estimation import Stores
+from driftwalk.calibration.estimation.compared import most_settings, summarised
+from driftwalk.calibration.evolution import Budget
+from driftwalk.calibration.models.contestants import Contestant
+from driftwalk.calibration.models.judge import Judged, judge
+from driftwalk.calibration.models.recorded import RecordedMotion
+from driftwalk.calibration.models.ties import MOST_ASKED, Summarised, asked_models
+from driftwalk.core.processors import one_blas_thread
+from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
+
+Tell = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Searches:
+    """The function of the sweep: one model, searched and judged wherever it is sent."""
+
+    entries: Sequence[Contestant]
+    motion: RecordedMotion
+    seed: int
+    budget: Budget
+    within: Callable[[int, int], None] | None = None
+    """Called with the model and the settings done."""
+    linear_algebra: ClassVar[bool] = True
+    """Its results depend on numpy and scipy."""
+
+    def __call__(self, unit: WorkUnit) -> dict[str, np.ndarray]:
+        """Search and judge the model of a unit."""
+        index = unit.start
+
+        def say(done: int, _: int) -> None:
+            if self.within is not None:
+                self.within(index, done)
+
+        say(0, 0)
+        with one_blas_thread():
+            found = judge(
+                self.entries[index], self.motion, budget=self.budget, seed=self.seed, tell=say
+            )
+        most = max(len(entry.ranges) for entry in self.entries)
+        return _packed(found, most, self.budget.starts + 1)
+
+    def costs(self) -> list[int]:
+        """Return the settings that each model's search simulates at most."""
+        numbers = [len(entry.ranges) for entry in self.entries]
+        return [self.budget.evaluations(one) if one else 0 for one in numbers]
+
+    def fingerprint(self) -> dict[str, Any]:
+        """Return what determines the numbers of all models, for the store of a run."""
+        return {
+            "models": [entry.model.describe() for entry in self.entries],
+            "ranges": [[one.describe() for one in entry.ranges] for entry in self.entries],
+            "seed": self.seed,
+            "budget": vars(self.budget),
+            "aspects": list(self.motion.held.names),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Stages:
+    """The two stages, and how far they are together."""
+
+    work: Searches
+    worlds: int
+    """Recordings by which a misfit is judged; below 2 nobody is asked."""
+    stores: Stores | None
+    executor: Executor | None
+    tell: Tell
+
+    def judged(self) -> list[Judged]:
+        """Judge every model, one work unit each."""
+        entries = self.work.entries
+        begins = list(itertools.accumulate(self.work.costs(), initial=0))
+
+        def within(index: int, done: int) -> None:
+            self.tell(begins[index] + done, self.all_of, entries[index].model.name)
+
+        def finished(done: int, _: int) -> None:
+            self.tell(done, self.all_of, "models")
+
+        units = grid(model=np.arange(len(entries))).units(1)
+        kept = self._store("models", self.work.fingerprint())
+        # Only work of this process can say how far it is within a model.
+        arrays = (
+            run_sweep(replace(self.work, within=within), units, store=kept)
+            if self.executor is None
+            else run_sweep(self.work, units, store=kept, executor=self.executor, progress=finished)
+        )
+        return [
+            _unpacked({name: values[index] for name, values in arrays.items()}, entry)
+            for index, entry in enumerate(entries)
+        ]
+
+    def summarised(self, judged: Sequence[Judged]) -> dict[int, Summarised]:
+        """Ask the summaries of those that are about as close as the closest."""
+        asked = asked_models(self.work.entries, judged) if self.worlds > 1 else []
+        before = self._total(self.work.costs(), len(self.work.entries))
+        found = {}
+        for number, index in enumerate(asked):
+            found[index] = self._matched(number, index, judged[index].point, before)
+            before += self._total(self._most([self.work.entries[index]]), 1)
+        return found
+
+    def finish(self) -> None:
+        """Say that all is done but the figures."""
+        self.tell(self.all_of, self.all_of, "figures")
+
+    @property
+    def all_of(self) -> int:
+        """The work there is at most: settings here, models where an executor has them."""
+        able = [one for one in self.work.entries if one.ranges and not one.baseline]
+        costs = sorted(self._most(able))[-MOST_ASKED:] if self.worlds > 1 and len(able) > 1 else []
+        return self._total([*self.work.costs(), *costs], len(self.work.entries) + len(costs))
+
+    def _matched(self, number: int, index: int, answer: np.ndarray, before: int) -> Summarised:
+        """Match the summaries with one model: units of 16 settings, the rest in this process."""
+        entry = self.work.entries[index]
+
+        def say(done: int, _: int) -> None:
+            inside = done if self.executor is None else 0
+            self.tell(before + inside, self.all_of, f"summaries of {entry.model.name}")
+
+        fingerprint = {
+            **self.work.fingerprint(), "asked": index, "answer": answer.tolist(),
+            "worlds": self.worlds,
+        }  # fmt: skip
+        return summarised(
+            entry,
+            self.work.motion,
+            answer,
+            seed=self.work.seed,
+            worlds=self.worlds,
+            executor=self.executor,
+            store=self._store(f"summaries-{number}", fingerprint),
+            tell=say,
+        )
+
+    def _store(self, name: str, fingerprint: dict[str, Any]) -> Store | None:
+        return None if self.stores is None else self.stores(name, fingerprint)
+
+    def _most(self, entries: Sequence[Contestant]) -> list[int]:
+        return [most_settings(len(one.ranges), self.worlds) for one in entries]
+
+    def _total(self, costs: Sequence[int], units: int) -> int:
+        return sum(costs) if self.executor is None else units
+
+
+def _packed(judged: Judged, most: int, searches: int) -> dict[str, np.ndarray]:
+    """Return arrays of the same shapes for every model, with one entry each."""
+    point = np.full(most, np.nan)
+    point[: judged.point.size] = judged.point
+    ends = np.full(searches, np.nan)
+    ends[: judged.ends.size] = judged.ends
+    arrays = {**judged._asdict(), "point": point, "ends": ends}
+    return {name: np.asarray(values)[None] for name, values in arrays.items()}
+
+
+def _unpacked(arrays: Mapping[str, np.ndarray], entry: Contestant) -> Judged:
+    return Judged(
+        point=arrays["point"][: len(entry.ranges)],
+        trained=arrays["trained"],
+        held=arrays["held"],
+        score=float(arrays["score"]),
+        without=arrays["without"],
+        checks=arrays["checks"],
+        ends=arrays["ends"][np.isfinite(arrays["ends"])],
+        evaluations=int(arrays["evaluations"]),
+    )
