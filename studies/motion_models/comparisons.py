@@ -17,11 +17,18 @@ Line = dict[str, Any]
 
 def truth_table(lines: list[Line]) -> str:
     """Return where the true model came, and which models explain the recording."""
-    cells = [["conditions of", "true model", "place", "behind the first", "first", "explained"]]
+    cells = [
+        [
+            "conditions of", "true model", "place", "behind the first", "first", "explained",
+            "named by summaries",
+        ]
+    ]  # fmt: skip
     for line in lines:
         names = [name for name in line["ranking"] if " " not in name]
         at = names.index(line["model"])
         behind = f"{line['behind']:.2f} ± {line['behind_std']:.2f}" if at else ""
+        asked = line.get("summaries", {})
+        named = [name for name, one in asked.items() if one["named"]]
         cells.append(
             [
                 line["recording"],
@@ -30,6 +37,7 @@ def truth_table(lines: list[Line]) -> str:
                 behind,
                 names[0] if at else "",
                 ", ".join(line["explained"]) or "none",
+                "".join(named) or ("none" if asked else "not asked"),
             ]
         )
     return rows_of(cells)

@@ -1,6 +1,7 @@
 """Compare models on simulated recordings of known truth; count how often it is named.
 
     python studies/motion_models/truth.py DATA OUT.jsonl [--recording NAME ...] [--model NAME ...]
+        [--stated-noise]
 
 A recording is simulated under the conditions of a real one, by a model with the values that it got
 there (`results/models.jsonl`). OUT gets a line of JSON for each; what is there is not done again.
@@ -41,11 +42,17 @@ def simulated(prepared: Prepared, line: dict[str, Any]) -> Any:
     )
 
 
-def compared(prepared: Prepared, line: dict[str, Any], threads: int) -> dict[str, Any]:
+def compared(
+    prepared: Prepared, line: dict[str, Any], threads: int, *, stated_noise: bool
+) -> dict[str, Any]:
     """Compare models on a recording of the line's model."""
     began = time.perf_counter()
+    study = prepared.study
+    if stated_noise:
+        noise = prepared.like.camera.position_noise
+        study = dw.apply_overrides(study, {"observation.position_noise_m": noise})
     found = dw.calibration.compare_models(
-        simulated(prepared, line), DEFAULT_MODELS, study=prepared.study, threads=threads
+        simulated(prepared, line), DEFAULT_MODELS, study=study, threads=threads
     )
     names = [str(name) for name in found["model"].values]
     at = names.index(line["model"])
@@ -59,6 +66,7 @@ def compared(prepared: Prepared, line: dict[str, Any], threads: int) -> dict[str
             name for name, one in zip(names, found["explained"].values, strict=True) if one
         ],
         "verdict": str(found["verdict"].values[at]),
+        "summaries": summaries_of(found),
         "held_out_distance": found["held_out_distance"].values.tolist(),
         "own_distance": found["own_distance"].values.tolist(),
         "checks": {
@@ -74,6 +82,23 @@ def compared(prepared: Prepared, line: dict[str, Any], threads: int) -> dict[str
     }
 
 
+def summaries_of(found: Any) -> dict[str, dict[str, Any]]:
+    """Return what the summaries of the motion say of each model that was asked."""
+    if "asked" not in found:
+        return {}
+    asked = found.isel(model=np.flatnonzero(found["asked"].values))
+    return {
+        str(name): {
+            "named": bool(asked["named"][at]),
+            **{
+                key: float(asked[key][at])
+                for key in ("misfit", "usual_misfit", "most_misfit", "unlikely")
+            },
+        }
+        for at, name in enumerate(asked["model"].values)
+    }
+
+
 def main() -> None:
     """Do what is not done yet."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -82,6 +107,9 @@ def main() -> None:
     parser.add_argument("--recording", action="append", choices=RECORDINGS)
     parser.add_argument("--model", action="append")
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument(
+        "--stated-noise", action="store_true", help="state the camera's noise, do not estimate it"
+    )
     given = parser.parse_args()
     done = {(one["recording"], one["model"]) for one in read_lines(given.out)}
     for line in read_lines(RESULTS):
@@ -90,12 +118,14 @@ def main() -> None:
         if not (wanted and here) or (line["recording"], line["model"]) in done:
             continue
         prepared = Prepared(given.data, RECORDINGS[line["recording"]], given.threads)
-        found = compared(prepared, line, given.threads)
+        found = compared(prepared, line, given.threads, stated_noise=given.stated_noise)
         with given.out.open("a") as file:
             file.write(json.dumps(found) + "\n")
         print(
             f"{line['recording']}, {line['model']}: {found['ranking'][:3]}, "
-            f"explained {found['explained']}; {found['seconds']:.0f} s",
+            f"explained {found['explained']}, named "
+            f"{[name for name, one in found['summaries'].items() if one['named']]}; "
+            f"{found['seconds']:.0f} s",
             flush=True,
         )
 
