@@ -4,7 +4,7 @@ How a recording is read when a study says so, and what is refused; the tank and 
 reconciled with the study; times and gaps, start and camera; the flow.
 """
 
-from driftwalk.conditions.camera import noise_doubt, recorded_camera
+from driftwalk.conditions.camera import possible_noises, recorded_camera
 from driftwalk.conditions.like import simulate_like
 from driftwalk.conditions.neighbours import Neighbours, neighbours_of
 from driftwalk.conditions.own_flow import recording_flow
@@ -28,7 +28,7 @@ __all__ = [
     "load_for_run",
     "load_with_study",
     "neighbours_of",
-    "noise_doubt",
+    "possible_noises",
     "read_recordings",
     "recorded_camera",
     "recorded_conditions",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from driftwalk.record import estimate_tracking_noise
+from driftwalk.record import estimate_tracking_noise, noise_bound
 from driftwalk.simulation.backend import Camera
 
 if TYPE_CHECKING:
@@ -20,6 +20,11 @@ NEGLIGIBLE_QUANTUM: Final = 0.05
 ROUGH_NOISE: Final = 0.05
 """An estimated noise is not better known than to this part: the motion is not quite that of the
 estimate's model. Of bodies with a steady speed and a turning heading it came out 2 % too large."""
+CLEAR: Final = 2.0
+"""Standard errors by which an estimated noise is above zero before it counts as known."""
+DEVIATIONS: Final = (-0.3775, 1.3630, -1.3630, 0.3775)
+"""Middles of four equal parts of a normal distribution, scaled to variance 1, in an order that
+makes each pair of neighbours differ by a lot."""
 
 
 def recorded_camera(track: Track, study: Study, *, position_quantum: float) -> Camera:
@@ -70,10 +75,14 @@ def recorded_camera(track: Track, study: Study, *, position_quantum: float) -> C
     return Camera(float(position), angle, float(quantum))
 
 
-def noise_doubt(track: Track, study: Study) -> float:
-    """Return the relative standard deviation of the noise of positions: 0 where it is stated.
+def possible_noises(track: Track, study: Study, *, position_quantum: float) -> tuple[float, ...]:
+    """Return noises of positions that a recording's camera may have, each as likely [m].
 
-    That of an estimate is its standard error, and 5 % at least.
+    A stated noise is the only one. Around an estimate there are four: the middles of four equal
+    parts of its distribution. Its logarithm is normal, with the relative standard error of the
+    estimate, or 5 % where that is less. Where an estimate is not above zero by two standard errors,
+    the variance of the noise is normal instead, and lies between zero and what the shortest steps
+    allow (`driftwalk.record.noise_bound`).
 
     Parameters
     ----------
@@ -81,24 +90,45 @@ def noise_doubt(track: Track, study: Study) -> float:
         The recorded body.
     study : Study
         Its [observation].
+    position_quantum : float
+        Resolution of the file [m], 0 when unknown.
 
     Examples
     --------
     >>> import driftwalk as dw
     >>> from driftwalk.schema import body_track
     >>> track, study = body_track(dw.tank30_recording()), dw.Study()
-    >>> noise_doubt(track, study)
-    0.05
-    >>> noise_doubt(track, dw.apply_overrides(study, {"observation.position_noise_m": 3e-4}))
-    0.0
+    >>> [round(1e3 * noise, 2) for noise in possible_noises(track, study, position_quantum=0.0)]
+    [0.3, 0.32, 0.28, 0.31]
+    >>> stated = dw.apply_overrides(study, {"observation.position_noise_m": 3e-4})
+    >>> possible_noises(track, stated, position_quantum=0.0)
+    (0.0003,)
     """
+    camera = recorded_camera(track, study, position_quantum=position_quantum)
     if study.observation.position_noise_m != "estimate":
-        return 0.0
+        return (camera.position_noise,)
     estimate = estimate_tracking_noise(track)
-    if not estimate.position_noise_m > 0.0:
-        return 0.0
-    relative = estimate.position_noise_standard_error_m / estimate.position_noise_m
-    return max(float(relative) if np.isfinite(relative) else 1.0, ROUGH_NOISE)
+    noise, error = estimate.position_noise_m, estimate.position_noise_standard_error_m
+    if not noise > CLEAR * error:
+        return _unclear_noises(noise, error, noise_bound(track).position_noise_m, camera)
+    doubt = max(error / noise, ROUGH_NOISE)
+    return tuple(
+        float(camera.position_noise * np.exp(doubt * deviation)) for deviation in DEVIATIONS
+    )
+
+
+def _unclear_noises(noise: float, error: float, bound: float, camera: Camera) -> tuple[float, ...]:
+    """Return four noises by a normal distribution of the variance, from zero to a bound."""
+    from scipy.special import ndtr, ndtri
+
+    if not (np.isfinite(noise) and error > 0.0):
+        return (camera.position_noise,)
+    # The standard error of the noise comes from that of its variance, one way or the other.
+    spread = max(2.0 * noise * error, error**2)
+    low, high = ndtr(-(noise**2) / spread), ndtr((bound**2 - noise**2) / spread)
+    shares = low + (high - low) * ndtr(np.array(DEVIATIONS))
+    variances = noise**2 + spread * ndtri(shares) - camera.position_quantum**2 / 12.0
+    return tuple(float(one) for one in np.sqrt(np.maximum(variances, 0.0)))
 
 
 def study_as_seen(study: Study, recording: xr.Dataset, track: Track) -> Study:

@@ -29,17 +29,14 @@ AT_ONCE: Final = ALIKE
 """Settings of a work unit: a round of 256 then has units for 16 workers."""
 POINT: Final = "point"
 """Settings of a unit, in the unit cube; they travel with it."""
-DEVIATIONS: Final = (-0.3775, 1.3630, -1.3630, 0.3775)
-"""How far the logarithm of the camera's noise is off in turn, in standard deviations: the middles
-of four equal parts of a normal distribution, with variance 1."""
 
 
 class SummaryObjective:
     """Simulates settings of a model and summarises what the camera saw.
 
-    Where the noise of the camera is not known but estimated, simulated cameras differ by the error
-    of the estimate. Its effect on the summaries becomes part of their covariance, as if the
-    noise were one more parameter, with the estimate for its prior.
+    Where the noise of the camera is not known but estimated, simulated cameras have the noises that
+    it may have. Their effect on the summaries becomes part of their covariance, as if the noise
+    were one more parameter, with the estimate for its prior.
 
     Parameters
     ----------
@@ -74,7 +71,7 @@ class SummaryObjective:
     ) -> None:
         self.worlds, self.store, self.tell, self.most = worlds, store, tell, most
         self._executor = executor
-        self._cameras = _cameras(worlds, motion.noise_doubt)
+        self._cameras = _cameras(worlds, motion.noises)
         self.done = 0
 
         def all_of(time: Floats) -> npt.NDArray[np.bool_]:
@@ -160,12 +157,10 @@ class _Summaries:
         return Worlds(*map(np.concatenate, zip(*parts, strict=True)))
 
 
-def _cameras(worlds: AspectObjective, doubt: float) -> list[AspectObjective]:
-    """Return the conditions of simulations in turn: cameras with other noise."""
+def _cameras(worlds: AspectObjective, noises: Sequence[float]) -> list[AspectObjective]:
+    """Return the conditions of simulations in turn: cameras with these noises [m]."""
     like = worlds.like
     return [
-        replace(
-            worlds, like=replace(like, camera=replace(like.camera, position_noise=float(noise)))
-        )
-        for noise in like.camera.position_noise * np.exp(doubt * np.array(DEVIATIONS))
+        replace(worlds, like=replace(like, camera=replace(like.camera, position_noise=noise)))
+        for noise in noises
     ]

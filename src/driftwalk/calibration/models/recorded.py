@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
@@ -30,7 +30,7 @@ from driftwalk.conditions import (
     Conditions,
     Neighbours,
     neighbours_of,
-    noise_doubt,
+    possible_noises,
     recorded_camera,
     recorded_conditions,
 )
@@ -80,8 +80,8 @@ class RecordedMotion:
         Largest recorded distance from the wall [m].
     usual_step : float
         Median step [m].
-    noise_doubt : float
-        Relative standard deviation of the noise of positions; 0 where it is known.
+    noises : tuple of float
+        Noises of positions that the camera may have, each as likely [m]; one where it is stated.
     recorded_checks : ndarray, shape (checks,)
         Facts of the recording that are not fitted, see `motion_checks`.
     """
@@ -99,7 +99,7 @@ class RecordedMotion:
     clearance: float
     depth: float
     usual_step: float
-    noise_doubt: float
+    noises: tuple[float, ...]
     recorded_checks: Floats
 
     @cached_property
@@ -215,6 +215,10 @@ def recorded_motion(
         neighbours = neighbours.since(float(track.time[0]))
     track = track._replace(time=track.time - track.time[0])
     camera = recorded_camera(track, study, position_quantum=position_quantum)
+    noises = possible_noises(track, study, position_quantum=position_quantum)
+    if not min(noises) <= camera.position_noise <= max(noises):
+        # An estimate of zero: bodies that rest would rest to the last digit.
+        camera = replace(camera, position_noise=float(np.median(noises)))
     like = recorded_conditions(
         track, study, camera=camera, flow=flow, neighbours=neighbours, threads=threads
     )
@@ -258,7 +262,7 @@ def recorded_motion(
         clearance=max(float(np.quantile(from_wall, CONTACT_QUANTILE)), 0.0),
         depth=depth,
         usual_step=usual_step,
-        noise_doubt=noise_doubt(track, study),
+        noises=noises,
         recorded_checks=motion_checks(
             plan, track.x, track.y, wall=wall, depth=depth, usual_step=usual_step
         ),
