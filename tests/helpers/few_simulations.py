@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import pytest
 
-from driftwalk.calibration.estimation import approach, descend, posterior, run
+from driftwalk.calibration import compare
+from driftwalk.calibration.estimation import approach, descend, likeness, posterior, run
 from driftwalk.calibration.evolution import Budget
-from driftwalk.calibration.models import compare
 
 FEW = Budget(design=16, starts=1, short=2, long=2)
 
@@ -22,16 +22,27 @@ def simulate_little(patch: pytest.MonkeyPatch, *, matched: bool = False) -> None
     estimate lies at the bottom of its profiles.
     """
     patch.setattr(run, "SEARCH", FEW)
-    patch.setattr(approach, "SIMULATIONS", 64)
-    patch.setattr(approach, "MOST_ROUNDS", 2)
+    _approach_little(patch)
     patch.setattr(posterior, "MOST_ROUNDS", 2)
     patch.setattr(posterior, "STEPS", 60)
     if not matched:
-        patch.setattr(descend, "FEWEST_SIMULATIONS", (128, 128))
-        patch.setattr(descend, "COEFFICIENTS", (4, 8))
-        patch.setattr(descend, "MOST_ROUNDS", 2)
+        _descend_little(patch)
 
 
 def compare_after_little(patch: pytest.MonkeyPatch) -> None:
-    """Let a comparison search each model for as short a time."""
+    """Let a comparison search each model, and match its summaries, for as short a time."""
     patch.setattr(compare, "Budget", lambda: FEW)
+    _approach_little(patch)
+    _descend_little(patch)
+    patch.setattr(likeness, "SIMULATIONS", 256)
+
+
+def _approach_little(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(approach, "SIMULATIONS", 64)
+    patch.setattr(approach, "MOST_ROUNDS", 2)
+
+
+def _descend_little(patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(descend, "FEWEST_SIMULATIONS", (128, 128))
+    patch.setattr(descend, "COEFFICIENTS", (4, 8))
+    patch.setattr(descend, "MOST_ROUNDS", 2)
