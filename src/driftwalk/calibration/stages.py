@@ -1,4 +1,4 @@
-"""The two stages of a comparison of models: distances of all, then summaries of those that tie."""
+"""The two stages of a comparison of models: distances of all, then summaries of the closest."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from driftwalk.calibration.evolution import Budget
 from driftwalk.calibration.models.contestants import Contestant
 from driftwalk.calibration.models.judge import Judged, judge
 from driftwalk.calibration.models.recorded import RecordedMotion
-from driftwalk.calibration.models.ties import MOST_ASKED, Summarised, asked_models
+from driftwalk.calibration.models.ties import MOST_ASKED, Asked, Summarised, asked_models
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
 
@@ -104,11 +104,13 @@ class Stages:
         ]
 
     def summarised(self, judged: Sequence[Judged]) -> dict[int, Summarised]:
-        """Ask the summaries of those that are about as close as the closest."""
-        asked = asked_models(self.work.entries, judged) if self.worlds > 1 else []
+        """Ask the summaries of those that tie, and of others while none of them gives them."""
+        asked = asked_models(self.work.entries, judged) if self.worlds > 1 else Asked((), 0)
         before = self._total(self.work.costs(), len(self.work.entries))
-        found = {}
-        for number, index in enumerate(asked):
+        found: dict[int, Summarised] = {}
+        for number, index in enumerate(asked.models):
+            if number >= asked.tied and any(one.usual for one in found.values()):
+                break
             found[index] = self._matched(number, index, judged[index].point, before)
             before += self._total(self._most([self.work.entries[index]]), 1)
         return found

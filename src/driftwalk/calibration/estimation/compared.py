@@ -30,8 +30,9 @@ BLUR: Final = 1e-3
 camera, some vary by much less, and a micrometre too much of the clearance would count as another
 motion."""
 HOPELESS: Final = 3.0
-"""Misfit, in summaries, from which on no other start is tried. A recording of the model itself has
-0.7 to 1.2 of it, and models of other motions would take twice as long."""
+"""Misfit, in summaries, from which on a search is given up and no other start is tried. A recording
+of the model itself has 0.7 to 1.2 of it, and models of other motions would take three times as
+long."""
 STARTS: Final = 2
 """The box of the regression, and the answer of the comparison."""
 
@@ -89,7 +90,13 @@ def summarised(
     simulate = _Blurred(objective, seed)
     order = order_of(entry)
     ends = find_ends(
-        simulate, parameters, lambda: answer[None], order=order, seed=seed, hopeless=HOPELESS
+        simulate,
+        parameters,
+        lambda: answer[None],
+        order=order,
+        seed=seed,
+        hopeless=HOPELESS,
+        give_up=HOPELESS,
     )
     best = ends[0].solved
     found = likeness(

@@ -18,6 +18,8 @@ FEWEST_SIMULATIONS: Final = (256, 512)
 """However few the coefficients are: there is a covariance of some hundred summaries, too."""
 FEWEST_ROUNDS: Final = 3
 MOST_ROUNDS: Final = 12
+PATIENT_ROUNDS: Final = 4
+"""Rounds in which a true model comes close to the recording: in two or three, as a rule."""
 MOST_IN_VAIN: Final = 4
 """Rounds without a better fit after which the search ends."""
 REACH: Final = 1.25
@@ -59,7 +61,13 @@ class Descended(NamedTuple):
 
 
 def descend(
-    simulate: Simulate, recorded: Floats, start: Floats, width: Floats, *, seed: int
+    simulate: Simulate,
+    recorded: Floats,
+    start: Floats,
+    width: Floats,
+    *,
+    seed: int,
+    give_up: float = np.inf,
 ) -> Descended:
     """Go from a start to the setting that fits the summaries of a recording best.
 
@@ -78,16 +86,20 @@ def descend(
         The first box.
     seed : int
         Of the settings that are drawn.
+    give_up : float
+        Misfit, in summaries, that the search has to reach in `PATIENT_ROUNDS`, or it ends.
     """
     centre, width = start, np.clip(width, NARROWEST, WIDEST)
-    lowest, since = np.inf, 0
+    lowest, since, least = np.inf, 0, np.inf
     for number in range(MOST_ROUNDS):
         count = simulations_of(centre.size)[0]
         settings = drawn_settings(centre, width, count, seed + number)
         summaries = simulate(settings, parts=1)[:, 0]
         emulator = fit_emulator(settings, summaries, centre=centre, width=width)
         solved = emulator.solve(recorded, reach=REACH)
-        excess = np.sqrt(max(1.0, solved.misfit / max(emulator.summaries, 1)))
+        misfit = solved.misfit / max(emulator.summaries, 1)
+        least = min(least, misfit)
+        excess = np.sqrt(max(1.0, misfit))
         far = np.abs(solved.place).max()
         wanted = np.clip(WIDE_STDS * excess * solved.std, NARROWEST, WIDEST)
         following = np.clip(wanted, SHRINKS[int(far > 1.0)] * width, GROWS * width)
@@ -101,7 +113,8 @@ def descend(
         # A quadratic that holds badly leaves much, and then a large misfit looks small.
         unlikely = solved.misfit + emulator.log_variance
         lowest, since = min(lowest, unlikely), 0 if unlikely < lowest else since + 1
-        if settled or since == MOST_IN_VAIN:
+        hopeless = number + 1 >= PATIENT_ROUNDS and least > give_up
+        if settled or hopeless or since == MOST_IN_VAIN:
             break
         centre, width = rounded(np.clip(solved.setting, 0.0, 1.0)), rounded(following)
     return Descended(emulator, solved, number + 1)

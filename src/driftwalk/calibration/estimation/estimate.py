@@ -145,27 +145,34 @@ def find_ends(
     order: Order,
     seed: int,
     hopeless: float = HOPELESS,
+    give_up: float = np.inf,
 ) -> list[Descended]:
     """Return the ends of the searches that are worth a posterior, the most likely first.
 
-    The arguments are those of `match_summaries`, and the misfit, in summaries, from which on no
-    other start is tried. The first search begins where a regression puts
-    the parameters. Even where its errors are large, its centre is closer to the truth than they
-    say: they are mostly those of settings that move unlike the recording. Where the end does not
-    match, the model has more than one place to look, and an end that matches may not be the best
-    that does.
+    The arguments are those of `match_summaries`, the misfit, in summaries, from which on no other
+    start is tried, and that from which on a search is not worth its end (see `descend`). The first
+    search begins where a regression puts the parameters. Even where its errors are large, its
+    centre is closer to the truth than they say: they are mostly those of settings that move unlike
+    the recording. Where the end does not match, the model has more than one place to look, and an
+    end that matches may not be the best that does.
     """
     recorded = objective.recorded[0]
     box = approach(
         lambda one: objective(one, parts=1)[:, 0], recorded, parameters, order=order, seed=seed
     )
     width = WIDE_ERRORS * box.error
-    found = [descend(objective, recorded, box.centre, width, seed=seed + 1000)]
+
+    def search(number: int, start: Floats, width: Floats) -> Descended:
+        return descend(
+            objective, recorded, start, width, seed=seed + 1000 * number, give_up=give_up
+        )
+
+    found = [search(1, box.centre, width)]
     if _matches(found[0]) or _misfit(found[0]) > hopeless:
         return found
     wide = np.full(parameters, WIDEST)
     for number, start in enumerate(_distinct(order(starts()))[:MOST_STARTS], 2):
-        found.append(descend(objective, recorded, start, wide, seed=seed + 1000 * number))
+        found.append(search(number, start, wide))
     found.sort(key=lambda end: end.unlikely)
     return found[:1] + [end for end in found[1:] if _matches(end)]
 

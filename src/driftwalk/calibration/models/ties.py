@@ -11,10 +11,9 @@ from driftwalk.calibration.models.contestants import Contestant
 from driftwalk.calibration.models.judge import Judged, without_error
 
 ASKED_SIGMAS: Final = 4.0
-"""Models are asked that are behind the closest one by less than so many standard errors. There are
-ten held-out blocks: their errors are known to a quarter, and of six models one is far off."""
+"""Models tie that are behind the closest one by less than so many standard errors. There are ten
+held-out blocks: their errors are known to a quarter, and of six models one is far off."""
 MOST_ASKED: Final = 5
-"""The closest of them."""
 RIVAL: Final = 10.0
 """Models whose -2 log of the evidence differs by less count as equally likely. A misfit of about a
 hundred has an error of some 5, for the covariance comes from simulations."""
@@ -48,20 +47,34 @@ class Naming(NamedTuple):
     """Others that give them as well."""
 
 
-def asked_models(entries: Sequence[Contestant], judged: Sequence[Judged]) -> list[int]:
-    """Return the models whose summaries decide, the closest first; none where there is no tie.
+class Asked(NamedTuple):
+    """Models whose summaries are asked, in turn."""
+
+    models: tuple[int, ...]
+    """Those that tie first, the closest before the others; their places among all models."""
+    tied: int
+    """How many are asked in any case. The others are asked until one gives the summaries: a search
+    by distances may have missed the place of the true model."""
+
+
+def asked_models(entries: Sequence[Contestant], judged: Sequence[Judged]) -> Asked:
+    """Return the models whose summaries decide; none where there are not two to choose from.
 
     Walks of recorded steps are never asked, nor are models without parameters.
     """
     order = np.argsort([one.score for one in judged], kind="stable")
     able = [int(k) for k in order if not entries[k].baseline and entries[k].ranges]
-    tied = [
-        k
-        for k in able
-        if judged[k].score - judged[able[0]].score
-        <= ASKED_SIGMAS * without_error(judged[k].without - judged[able[0]].without)
-    ][:MOST_ASKED]
-    return tied if len(tied) > 1 else []
+    if len(able) < 2:
+        return Asked((), 0)
+    closest = judged[able[0]]
+
+    def ties(k: int) -> bool:
+        error = without_error(judged[k].without - closest.without)
+        return judged[k].score - closest.score <= ASKED_SIGMAS * error
+
+    tied = [k for k in able if ties(k)]
+    behind = [k for k in able if not ties(k)]
+    return Asked(tuple([*tied, *behind][:MOST_ASKED]), min(len(tied), MOST_ASKED))
 
 
 def naming(entries: Sequence[Contestant], said: Mapping[int, Summarised]) -> Naming:

@@ -14,6 +14,7 @@ from driftwalk.calibration.models.ties import (
     ASKED_SIGMAS,
     MOST_ASKED,
     RIVAL,
+    Asked,
     Naming,
     Summarised,
     asked_models,
@@ -43,28 +44,32 @@ def test_the_error_of_a_score_is_the_jackknife_s() -> None:
     assert without_error(judged(1.0).without) == pytest.approx(ERROR)
 
 
-def test_models_about_as_close_as_the_closest_are_asked() -> None:
+def test_models_about_as_close_as_the_closest_are_asked_in_any_case() -> None:
     # Differences between the two signs have twice the error.
     near, far = (1.0 + 2 * ERROR * (ASKED_SIGMAS + off) for off in (-0.1, 0.1))
     scores = [judged(far, sign=-1.0), judged(1.0), judged(near, sign=-1.0)]
-    assert asked_models([entry(3)] * 3, scores) == [1, 2]
+    assert asked_models([entry(3)] * 3, scores) == Asked((1, 2, 0), 2)
 
 
-def test_nobody_is_asked_where_one_is_clearly_the_closest() -> None:
-    scores = [judged(1.0), judged(1.0 + 2 * ERROR * (ASKED_SIGMAS + 1.0), sign=-1.0)]
-    assert asked_models([entry(3)] * 2, scores) == []
-    assert asked_models([entry(3)], scores[:1]) == []
+def test_one_that_ties_comes_before_a_closer_one_that_does_not() -> None:
+    # The second differs from the first by little, but in the same way in every block.
+    scores = [judged(1.0), judged(1.1), judged(1.2, sign=-1.0)]
+    assert asked_models([entry(3)] * 3, scores) == Asked((0, 2, 1), 2)
+
+
+def test_of_one_model_nobody_is_asked() -> None:
+    assert asked_models([entry(3)], [judged(1.0)]) == Asked((), 0)
 
 
 def test_walks_are_never_asked_even_where_they_are_the_closest() -> None:
     entries = [entry(18, baseline=True), entry(3), entry(9)]
     scores = [judged(1.0), judged(1.01, sign=-1.0), judged(1.02)]
-    assert asked_models(entries, scores) == [1, 2]
+    assert asked_models(entries, scores) == Asked((1, 2), 2)
 
 
 def test_no_more_than_a_handful_are_asked() -> None:
     scores = [judged(1.0 + 0.001 * k, sign=-1.0 if k else 1.0) for k in reversed(range(9))]
-    assert asked_models([entry(3)] * 9, scores) == [8, 7, 6, 5, 4]
+    assert asked_models([entry(3)] * 9, scores) == Asked((8, 7, 6, 5, 4), MOST_ASKED)
     assert MOST_ASKED == 5
 
 
