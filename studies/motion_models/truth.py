@@ -1,7 +1,7 @@
 """Compare models on simulated recordings of known truth; count how often it is named.
 
     python studies/motion_models/truth.py DATA OUT.jsonl [--recording NAME ...] [--model NAME ...]
-        [--stated-noise]
+        [--stated-noise] [--seed 77]
 
 A recording is simulated under the conditions of a real one, by a model with the values that it got
 there (`results/models.jsonl`). OUT gets a line of JSON for each; what is there is not done again.
@@ -28,11 +28,11 @@ RESULTS: Final = Path(__file__).resolve().parent / "results" / "models.jsonl"
 SEED: Final = 77
 
 
-def simulated(prepared: Prepared, line: dict[str, Any]) -> Any:
+def simulated(prepared: Prepared, line: dict[str, Any], seed: int) -> Any:
     """Return a recording by a model, with the values and conditions of a real one."""
     model = dw.motion_model(line["model"], clearance=prepared.clearance)
     values = {name: np.array([value]) for name, value in line["values"].items()}
-    keys = world_keys(SEED, trial=0, replicate=0)
+    keys = world_keys(seed, trial=0, replicate=0)
     seen = model.simulate(values, prepared.like, keys)
     return build_trajectory(
         prepared.like.sample_time,
@@ -43,7 +43,7 @@ def simulated(prepared: Prepared, line: dict[str, Any]) -> Any:
 
 
 def compared(
-    prepared: Prepared, line: dict[str, Any], threads: int, *, stated_noise: bool
+    prepared: Prepared, line: dict[str, Any], threads: int, *, seed: int, stated_noise: bool
 ) -> dict[str, Any]:
     """Compare models on a recording of the line's model."""
     began = time.perf_counter()
@@ -52,13 +52,14 @@ def compared(
         noise = prepared.like.camera.position_noise
         study = dw.apply_overrides(study, {"observation.position_noise_m": noise})
     found = dw.calibration.compare_models(
-        simulated(prepared, line), DEFAULT_MODELS, study=study, threads=threads
+        simulated(prepared, line, seed), DEFAULT_MODELS, study=study, threads=threads
     )
     names = [str(name) for name in found["model"].values]
     at = names.index(line["model"])
     return {
         "recording": line["recording"],
         "model": line["model"],
+        "seed": seed,
         "ranking": names,
         "behind": float(found["behind"][at]),
         "behind_std": float(found["behind_std"][at]),
@@ -110,15 +111,18 @@ def main() -> None:
     parser.add_argument(
         "--stated-noise", action="store_true", help="state the camera's noise, do not estimate it"
     )
+    parser.add_argument("--seed", type=int, default=SEED, help="of the simulated recordings")
     given = parser.parse_args()
-    done = {(one["recording"], one["model"]) for one in read_lines(given.out)}
+    done = {(one["recording"], one["model"], one["seed"]) for one in read_lines(given.out)}
     for line in read_lines(RESULTS):
         wanted = line["model"] in (given.model or DEFAULT_MODELS)
         here = line["recording"] in (given.recording or RECORDINGS)
-        if not (wanted and here) or (line["recording"], line["model"]) in done:
+        if not (wanted and here) or (line["recording"], line["model"], given.seed) in done:
             continue
         prepared = Prepared(given.data, RECORDINGS[line["recording"]], given.threads)
-        found = compared(prepared, line, given.threads, stated_noise=given.stated_noise)
+        found = compared(
+            prepared, line, given.threads, seed=given.seed, stated_noise=given.stated_noise
+        )
         with given.out.open("a") as file:
             file.write(json.dumps(found) + "\n")
         print(
