@@ -64,10 +64,10 @@ def compare_models(
     where no more than one of eight facts that are not fitted is far off, and where no other one is
     clearly closer.
 
-    Where several models are about as close, up to five of them are matched with the recording by a
-    hundred summaries of the motion, as in a calibration (`driftwalk.calibration.estimation`), and
-    compared by their evidence. A model counts there if the recording's summaries are like those of
-    its own simulated recordings.
+    The closest model, and those about as close, are matched with the recording by a hundred
+    summaries of the motion, as in a calibration (`driftwalk.calibration.estimation`), and compared
+    by their evidence. A model counts there if the recording's summaries are like those of its own
+    simulated recordings. While none is, models farther off are asked as well, five in all at most.
 
     Parameters
     ----------

@@ -48,9 +48,9 @@ def compare_models(
     """Say which motion models explain a recording.
 
     Searches every model on one half of the recording's blocks of time, and judges all of them on
-    the other half, together with walks that only repeat recorded steps. Where models tie, summaries
-    of the motion decide. Reports the ranking, and where a model differs from the recording. After a
-    kill, the same command continues.
+    the other half, together with walks that only repeat recorded steps. Summaries of the motion
+    decide between the closest models. Reports the ranking, and where a model differs from the
+    recording. After a kill, the same command continues.
     """
     from driftwalk.calibration import ALL_MODELS, DEFAULT_MODELS
     from driftwalk.motion import feels_others

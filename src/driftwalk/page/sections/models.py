@@ -124,7 +124,7 @@ def summaries_section(comparison: xr.Dataset) -> Section:
         rows.append([one["model"].item(), *shown, behind, "yes" if bool(one["named"]) else "no"])
     return section(
         "summaries", "table", "Summaries of the motion",
-        "About a hundred numbers of the motion, matched by the models that are about as close. The "
+        "About a hundred numbers of the motion, matched by the closest models. The "
         "misfit is compared with those of the model's own simulated recordings; the evidence, as "
         "-2 log above the likeliest model, has a price for each parameter.",
         columns=[

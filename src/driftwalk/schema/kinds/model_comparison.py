@@ -7,7 +7,7 @@ from typing import Final
 from driftwalk.schema.description import ARENA, SIMULATED, SOURCE, Attribute, Kind, Variable
 
 _HELD: Final = "odd blocks of time, which no model has seen"
-_TIED: Final = "several models are about as close"
+_TIED: Final = "of two models or more"
 
 MODEL_COMPARISON: Final = Kind(
     name="model_comparison",
