@@ -18,8 +18,8 @@ FEWEST_SIMULATIONS: Final = (256, 512)
 """However few the coefficients are: there is a covariance of some hundred summaries, too."""
 FEWEST_ROUNDS: Final = 3
 MOST_ROUNDS: Final = 12
-PATIENT_ROUNDS: Final = 4
-"""Rounds in which a true model comes close to the recording: in two or three, as a rule."""
+PATIENT_ROUNDS: Final = 3
+"""Rounds in which a true model comes close to the recording: in two, as a rule."""
 MOST_IN_VAIN: Final = 4
 """Rounds without a better fit after which the search ends."""
 REACH: Final = 1.25

@@ -9,6 +9,7 @@ import pytest
 
 from driftwalk.calibration.estimation.descend import (
     MOST_ROUNDS,
+    PATIENT_ROUNDS,
     WIDEST,
     Descended,
     descend,
@@ -102,6 +103,19 @@ def test_a_model_far_from_the_recording_still_ends():
     assert found.rounds <= MOST_ROUNDS
     assert np.isfinite(found.solved.setting).all()
     assert found.solved.misfit > 100.0
+
+
+def test_a_search_that_stays_far_from_the_recording_is_given_up_early():
+    """Of a recording that no setting gives; one that a setting gives is followed to its end."""
+    far, near = np.array([0.0, 0.5, 5.0, -3.0]), valley(np.array([[0.8, 0.416]]))[0]
+    start, width = np.array([0.5, 0.5]), np.full(2, 0.1)
+    rounds = [
+        descend(Recorder(valley, 6), recorded, start, width, seed=6, give_up=give_up).rounds
+        for recorded in (far, near)
+        for give_up in (np.inf, 3.0)
+    ]
+    assert rounds[0] > rounds[1] == PATIENT_ROUNDS
+    assert rounds[2] == rounds[3]
 
 
 def test_the_same_seed_gives_the_same_end():
