@@ -25,20 +25,21 @@ void bin_steps(const Scoring& scoring, const double* length, const double* angle
   }
 }
 
-// One thread's scratch and what it does with the worlds of a call, at most `most`.
+// One thread's scratch and what it does with the worlds of a call.
 class Scorer {
 public:
   Scorer(const PreparedRun<float>& run, const BatchWorlds& worlds, const Scoring& scoring,
-         const Scores& out, const SimulateKernel& kernel, int most)
-      : run_(run), worlds_(worlds), scoring_(scoring), out_(out), kernel_(kernel), most_(most),
+         const Scores& out, const SimulateKernel& kernel, const WorldCalls& calls)
+      : run_(run), worlds_(worlds), scoring_(scoring), out_(out), kernel_(kernel), calls_(calls),
         // A whole number of cache lines plus one, so that lanes do not share cache sets.
-        stride_((run.view().samples / 16 + 2) * 16), x_(static_cast<std::size_t>(stride_ * most_)),
-        y_(x_.size()), blended_(static_cast<std::size_t>(run.blended_flow_size())),
+        stride_((run.view().samples / 16 + 2) * 16),
+        x_(static_cast<std::size_t>(stride_ * calls.most())), y_(x_.size()),
+        blended_(static_cast<std::size_t>(run.blended_flow_size())),
         length_(static_cast<std::size_t>(scoring.plan.pairs)), angle_(length_.size()) {}
 
-  void operator()(std::int64_t task) {
-    const std::int64_t first = task * most_;
-    const int count = static_cast<int>(std::min<std::int64_t>(most_, worlds_.count - first));
+  void operator()(std::int64_t call) {
+    const std::int64_t first = calls_.first(call);
+    const int count = calls_.size(call);
     const SampleSink<float> sink{x_.data(), y_.data(), nullptr, stride_, blended_.data()};
     kernel_.run(run_.view(), worlds_, first, count, sink, out_.status + first);
     for (int lane = 0; lane < count; ++lane) {
@@ -90,7 +91,7 @@ private:
   const Scoring& scoring_;
   const Scores& out_;
   const SimulateKernel kernel_;
-  const int most_;
+  const WorldCalls& calls_;
   std::int64_t stride_;
   std::vector<float> x_, y_;
   std::vector<std::int16_t> blended_;
@@ -117,9 +118,9 @@ std::vector<KsReference> prepare_rows(const StepTable& table, std::int64_t first
 void score_batch(const PreparedRun<float>& run, const BatchWorlds& worlds, const Scoring& scoring,
                  int threads, const Scores& out) {
   const SimulateKernel kernel = chosen_kernel();
-  const int most = worlds_per_call(kernel, worlds.count, threads);
-  run_tasks((worlds.count + most - 1) / most, threads,
-            [&] { return Scorer(run, worlds, scoring, out, kernel, most); });
+  const WorldCalls calls(kernel, worlds.count, threads);
+  run_tasks(calls.count(), threads,
+            [&] { return Scorer(run, worlds, scoring, out, kernel, calls); });
 }
 
 void ks_matrix(const StepTable& references, const StepTable& samples, int threads, double* out) {

@@ -24,17 +24,16 @@ void simulate_batch(const PreparedRun<float>& run, const BatchWorlds& worlds, in
                     const Trajectories<float>& out) {
   const SimulateKernel kernel = chosen_kernel();
   const std::int64_t samples = run.view().samples;
-  const int most = worlds_per_call(kernel, worlds.count, threads);
-  run_tasks((worlds.count + most - 1) / most, threads, [&] {
+  const WorldCalls calls(kernel, worlds.count, threads);
+  run_tasks(calls.count(), threads, [&] {
     return [&, blended = std::vector<std::int16_t>(
-                   static_cast<std::size_t>(run.blended_flow_size()))](std::int64_t task) mutable {
-      const std::int64_t first = task * most;
-      const int count = static_cast<int>(std::min<std::int64_t>(most, worlds.count - first));
+                   static_cast<std::size_t>(run.blended_flow_size()))](std::int64_t call) mutable {
+      const std::int64_t first = calls.first(call);
       const std::int64_t at = first * samples;
       const SampleSink<float> sink{out.x + at, out.y + at,
                                    out.theta == nullptr ? nullptr : out.theta + at, samples,
                                    blended.data()};
-      kernel.run(run.view(), worlds, first, count, sink, out.status + first);
+      kernel.run(run.view(), worlds, first, calls.size(call), sink, out.status + first);
     };
   });
 }

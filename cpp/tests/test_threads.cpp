@@ -1,5 +1,6 @@
 // Threads: every task runs once, failures come back, and results do not depend on their number.
 #include "check.hpp"
+#include "driftwalk/simulate/lanes.hpp"
 #include "driftwalk/simulate/threads.hpp"
 #include "synthetic_tank.hpp"
 
@@ -50,6 +51,30 @@ void check_failure_is_rethrown() {
   }
 }
 
+// Calls follow each other without a gap, none is too large, and threads that take them in turn end
+// within one pack of each other.
+void check_even_calls() {
+  const driftwalk::SimulateKernel kernel{nullptr, 16};
+  for (const int threads : {0, 1, 2, 3, 8}) {
+    const auto workers = static_cast<std::size_t>(std::max(threads, 1));
+    for (const int worlds : {0, 1, 6, 16, 17, 44, 64, 200, 292, 1681}) {
+      const driftwalk::WorldCalls calls(kernel, worlds, threads);
+      std::vector<int> packs(workers);
+      std::int64_t next = 0;
+      for (std::int64_t call = 0; call < calls.count(); ++call) {
+        const int size = calls.size(call);
+        CHECK(calls.first(call) == next && size > 0 && size <= calls.most());
+        CHECK(size <= driftwalk::most_packs * kernel.lanes);
+        packs[static_cast<std::size_t>(call) % workers] += (size + 15) / 16;
+        next += size;
+      }
+      CHECK(next == worlds);
+      const auto [least, most] = std::minmax_element(packs.begin(), packs.end());
+      CHECK(*most - *least <= 1);
+    }
+  }
+}
+
 // Batch sizes, order and threads: world by world the same bits.
 void check_same_bits() {
   synthetic::Tank tank;
@@ -87,6 +112,7 @@ void check_same_bits() {
 int main() {
   check_every_task_runs_once();
   check_failure_is_rethrown();
+  check_even_calls();
   check_same_bits();
   return check::result();
 }
