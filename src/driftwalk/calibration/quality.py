@@ -14,6 +14,7 @@ from driftwalk.calibration.problem import Problem, limits_of
 from driftwalk.calibration.refine import first_window, locate
 from driftwalk.calibration.region import Bootstrap, recordings_at, simulated_steps
 from driftwalk.calibration.search import Map, run_map
+from driftwalk.comparison.statistic import distances_among
 from driftwalk.schema.calibration_facts import is_explained
 
 FAR_ABOVE_FLOOR = 2.0
@@ -25,8 +26,8 @@ VALIDATION_REPLICATES = 16
 def noise_floor_at(problem: Problem, point: Sequence[float]) -> float:
     """Return the median distance between two simulated recordings of the same parameters."""
     steps = simulated_steps(problem, point, stage="floor", replicates=FLOOR_REPLICATES)
-    matrix = problem.statistic.matrix(steps, steps, threads=problem.like.threads)
-    return float(np.median(matrix[np.triu_indices(FLOOR_REPLICATES, 1)]))
+    among = distances_among(problem.statistic, steps, threads=problem.like.threads)
+    return float(np.median(among))
 
 
 class Quality(NamedTuple):
@@ -114,9 +115,8 @@ def validate_on_halves(
     recordings, distances = recordings_at(
         second, optimum, stage="second_half", count=VALIDATION_REPLICATES
     )
-    among = second.statistic.matrix(recordings, recordings, threads=second.like.threads)
-    floor = np.median(among[np.triu_indices(VALIDATION_REPLICATES, 1)])
-    return Halves(optimum.point, float(distances.mean()), float(floor))
+    among = distances_among(second.statistic, recordings, threads=second.like.threads)
+    return Halves(optimum.point, float(distances.mean()), float(np.median(among)))
 
 
 def could_be_best(whole: Problem, coarse: Map, part: Problem) -> npt.NDArray[np.bool_]:

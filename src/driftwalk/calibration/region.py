@@ -37,6 +37,7 @@ from driftwalk.calibration.surface import (
     nearest_point,
 )
 from driftwalk.comparison import Statistic, StepTable
+from driftwalk.comparison.statistic import distances_among
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
 
 SURFACE_INTERVALS: Final[dict[int, int]] = {1: 32, 2: 10}
@@ -169,8 +170,7 @@ def _apart(problem: Problem, table: StepTable, settings: int) -> Floats:
 
     def of(setting: int) -> float:
         own = table.rows(slice(setting, None, settings))
-        matrix = problem.statistic.matrix(own, own, threads=1)
-        return float(matrix[np.triu_indices(SURFACE_REPLICATES, 1)].mean())
+        return float(distances_among(problem.statistic, own).mean())
 
     with ThreadPoolExecutor(problem.like.threads) as pool:
         return np.array(list(pool.map(of, range(settings))))

@@ -99,6 +99,48 @@ class Statistic(Protocol):
         """Return the distance of every row of one table to every row of another."""
 
 
+def distances_among(statistic: Statistic, table: StepTable, *, threads: int = 1) -> Floats:
+    """Return the distances between every two rows of a table, each once.
+
+    Parameters
+    ----------
+    statistic : Statistic
+        The distance.
+    table : StepTable
+        The worlds.
+    threads : int
+        Threads; the result does not depend on it.
+
+    Returns
+    -------
+    ndarray, shape (rows (rows - 1) / 2,)
+        In the order of ``numpy.triu_indices(rows, 1)``.
+
+    Examples
+    --------
+    >>> steps = np.random.default_rng(1).normal(size=(2, 3, 50))
+    >>> table = StepTable(*steps, np.full(3, 50))
+    >>> whole = StepDistance().matrix(table, table)
+    >>> distances_among(StepDistance(), table).tolist() == whole[[0, 0, 1], [1, 2, 2]].tolist()
+    True
+    """
+    count = table.pairs.size
+    found = np.zeros((count, count))
+
+    def fill(first: int, last: int) -> None:
+        # The first half meets the second; then each meets itself.
+        if last - first < 2:
+            return
+        middle = (first + last) // 2
+        halves = table.rows(slice(first, middle)), table.rows(slice(middle, last))
+        found[first:middle, middle:last] = statistic.matrix(*halves, threads=threads)
+        fill(first, middle)
+        fill(middle, last)
+
+    fill(0, count)
+    return found[np.triu_indices(count, 1)]
+
+
 @dataclass(frozen=True)
 class StepDistance:
     """The two-dimensional Kolmogorov-Smirnov distance of step lengths and turning angles.
