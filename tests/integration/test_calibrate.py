@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from command_line import assert_same_bits
 from slow_orbits import TRUTH as SLOW, slow_flow, slow_recording
 
 import driftwalk as dw
+from driftwalk.figures import write_figures
 from driftwalk.model import apply_overrides
 from driftwalk.schema import build_trajectory
 from driftwalk.schema.calibration_facts import calibration_facts
@@ -158,8 +160,38 @@ def test_place_and_quadrant_are_where_the_world_and_the_recording_differ(found):
 @pytest.mark.slow
 def test_threads_do_not_change_a_single_bit(found):
     study = apply_overrides(dw.Study(), SMALL)
-    again = dw.calibrate(synthetic_recording(400.0), study, flow=dw.tank30_flow(), threads=1)
+    given = []
+    again = dw.calibration.calibrate(
+        synthetic_recording(400.0),
+        study,
+        flow=dw.tank30_flow(),
+        threads=1,
+        meanwhile=given.append,
+    )
+    # One thread has no other: it is called at the end.
+    assert len(given) == 1
+    assert given[0] is again
     assert again.identical(found)
+
+
+@pytest.mark.slow
+def test_meanwhile_gets_all_that_figures_show(found, tmp_path):
+    recording, flow = synthetic_recording(400.0), dw.tank30_flow()
+    given = []
+    study = apply_overrides(dw.Study(), SMALL)
+    whole = dw.calibration.calibrate(recording, study, flow=flow, threads=2, meanwhile=given.append)
+    assert_same_bits(whole, found)
+    [early] = given
+    lacking = set(whole.variables) - set(early.variables)
+    assert {"second_half_ks_distance", "second_half_noise_floor"} <= lacking
+    assert all(name.startswith(("first_half_", "second_half_")) for name in lacking)
+    early_files, files = (
+        write_figures(one, flow=flow, trajectory=recording, folder=tmp_path / name)
+        for one, name in ((early, "early"), (whole, "whole"))
+    )
+    assert len(files) == 14
+    for one, other in zip(early_files, files, strict=True):
+        assert one.read_bytes() == other.read_bytes(), other.name
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from driftwalk.calibration.maps import Mapper
 from driftwalk.calibration.problem import Problem, limits_of
 from driftwalk.calibration.refine import first_window, locate
 from driftwalk.calibration.region import Bootstrap, recordings_at, simulated_steps
-from driftwalk.calibration.search import Map, run_map
+from driftwalk.calibration.search import Map, Progress, run_map
 from driftwalk.comparison.statistic import distances_among
 from driftwalk.schema.calibration_facts import is_explained
 
@@ -81,6 +81,7 @@ def validate_on_halves(
     second: Problem,
     *,
     executor: Executor | None = None,
+    progress: Progress | None = None,
 ) -> Halves:
     """Calibrate on the first half of a recording and measure the distance on the second.
 
@@ -99,6 +100,8 @@ def validate_on_halves(
         The halves; `second` has the flow of `first`.
     executor : concurrent.futures.Executor, optional
         Computes the maps' work units elsewhere, with one thread each.
+    progress : callable, optional
+        Called after every work unit with the settings of its map that are done, and all of them.
     """
     map_of_half = run_map(
         first,
@@ -107,10 +110,11 @@ def validate_on_halves(
         replicates=1,
         only=could_be_best(whole, coarse, first),
         executor=executor,
+        progress=progress,
     )
     lowest = map_of_half.point(map_of_half.cell_of_minimum())
     window = first_window(map_of_half, noise_floor_at(first, lowest))
-    maps = Mapper(first, "first_half_refined", executor=executor)
+    maps = Mapper(first, "first_half_refined", executor=executor, progress=progress)
     optimum = locate(maps, window, limits_of(first)).landscape.optimum
     recordings, distances = recordings_at(
         second, optimum, stage="second_half", count=VALIDATION_REPLICATES

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from driftwalk.calibration.aside import aside
 from driftwalk.calibration.estimation import Stores, Tell, calibrate_many
 from driftwalk.calibration.maps import Mapper, Narrowing, window_id
 from driftwalk.calibration.problem import Axes, Problem, limits_of, prepare_problem
@@ -39,12 +41,13 @@ from driftwalk.calibration.search import Map, Progress
 from driftwalk.calibration.steadiness import Steadiness, steadiness_of
 from driftwalk.calibration.surface import Optimum, at_settings
 from driftwalk.calibration.wall import wall_warning
-from driftwalk.comparison import Statistic
+from driftwalk.comparison import Statistic, StepDistance
 from driftwalk.conditions import neighbours_of, recorded_camera, study_in_arena
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.run_stages import tell_nobody
 from driftwalk.motion import BlockModel, Details, MotionModel
 from driftwalk.motion.batches import no_numbers
+from driftwalk.motion.protocol import ScoresItself
 from driftwalk.motion.score import broken_worlds
 from driftwalk.schema import Track, body_track
 
@@ -71,6 +74,7 @@ def calibrate(
     executor: Executor | None = None,
     stores: Stores | None = None,
     tell: Tell | None = None,
+    meanwhile: Callable[[xr.Dataset], object] | None = None,
 ) -> xr.Dataset:
     """Find the parameters of a motion model that explain a recording.
 
@@ -106,6 +110,10 @@ def calibrate(
         Where each stage keeps finished work (`driftwalk.core.rundir`); memory when left out.
     tell : callable, optional
         Called with the stage and its progress: ``tell("map", 64, 1681)``.
+    meanwhile : callable, optional
+        Called once with the calibration, as soon as all of it is known that figures show. The
+        block's is still without its two halves, which other threads compare in the meantime, if
+        there may be several.
 
     Returns
     -------
@@ -141,7 +149,7 @@ def calibrate(
                 f"a statistic of its own is for one or two parameters; {searched.name} has "
                 f"{len(searched.parameters)}"
             )
-        return calibrate_many(
+        many = calibrate_many(
             recording,
             searched,
             chosen,
@@ -152,6 +160,9 @@ def calibrate(
             stores=stores if stores is not None else _in_memory,
             tell=tell if tell is not None else tell_nobody,
         )
+        if meanwhile is not None:
+            meanwhile(many)
+        return many
     require_searchable(searched)
     track = body_track(recording, body)
     quantum = float(recording.attrs.get("position_quantum_m", 0.0))
@@ -175,8 +186,33 @@ def calibrate(
     steadiness = steadiness_of(problem)
     of_time = None if steadiness is None else steadiness.warning
     result.warnings += [text for text in (of_wall, of_time) if text is not None]
-    halves = _halves(track, problem, result.coarse, flow_of, executor, say)
-    return _finish(result, halves, steadiness, recording, problem)
+
+    def finish(halves: Halves | None) -> xr.Dataset:
+        return _finish(result, halves, steadiness, recording, problem)
+
+    def compare_halves(progress: Progress | None = None) -> Halves | None:
+        return _halves(track, problem, result.coarse, flow_of, executor, progress)
+
+    if problem.study.calibration.refine == "none":
+        halves = None
+    else:
+        say("validation", 0, 1)
+        if meanwhile is not None and _is_left_to_threads(problem, executor):
+            halves = aside(compare_halves, partial(meanwhile, finish(None)))
+            meanwhile = None
+        else:
+            halves = compare_halves()
+        say("validation", 1, 1)
+    found = finish(halves)
+    if meanwhile is not None:
+        meanwhile(found)
+    return found
+
+
+def _is_left_to_threads(problem: Problem, executor: Executor | None) -> bool:
+    """Return whether the core computes on several threads, and calls no function of a user."""
+    native = isinstance(problem.model, ScoresItself) and isinstance(problem.statistic, StepDistance)
+    return native and executor is None and problem.like.threads > 1
 
 
 def _study_and_model(
@@ -388,12 +424,9 @@ def _halves(
     coarse: Map,
     flow_of: FlowSource,
     executor: Executor | None,
-    say: Tell,
+    progress: Progress | None,
 ) -> Halves | None:
     """Calibrate on the first half, judge on the second; None where a half is too short."""
-    if problem.study.calibration.refine == "none":
-        return None
-    say("validation", 0, 1)
     middle = 0.5 * (track.time[0] + track.time[-1])
     others = problem.like.neighbours
     if others is not None:
@@ -417,9 +450,7 @@ def _halves(
         )
     except InputError:
         return None
-    halves = validate_on_halves(problem, coarse, first, second, executor=executor)
-    say("validation", 1, 1)
-    return halves
+    return validate_on_halves(problem, coarse, first, second, executor=executor, progress=progress)
 
 
 def _finish(

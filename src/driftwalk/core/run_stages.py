@@ -30,7 +30,7 @@ CALIBRATION_STAGES: Final[dict[str, Stage]] = {
     "coarse": Stage("map", 0.0, 26.0),
     "refined": Stage("refined map", 26.0, 60.0),
     "bootstrap": Stage("bootstrap", 60.0, 80.0),
-    "validation": Stage("halves", 80.0, 90.0),
+    "validation": Stage("halves and figures", 80.0, 100.0),
     # of more than two parameters: the search is made only where the summaries find no match
     "summaries": Stage("summaries", 0.0, 90.0),
     "search": Stage("search", 40.0, 60.0),

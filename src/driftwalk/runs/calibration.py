@@ -140,12 +140,12 @@ def run_calibration(
             executor=executor,
             stores=_stores(run),
             tell=lambda stage, done, total: progress(*_overall(stage, done, total)),
+            meanwhile=lambda early: _write_figures(early, work, flow, run),
         )
+        progress(100, 100, "results")
         run.write(result_file(work.model), netcdf_bytes(found))
         if work.posterior:
             run.write("posterior.csv", _posterior_table(found))
-        progress(100, 100, "figures")
-        _write_figures(found, work, flow, run)
     return found
 
 
