@@ -102,10 +102,11 @@ void check_infer(Numbers& all) {
   std::vector<double> coefficients(2 * nodes * nodes);
   std::fill_n(coefficients.begin(), nodes * nodes, speed);
   std::vector<double> time, x, y, theta, omega;
+  // No sine and cosine, which each system's C library ends in other digits.
   for (int k = 0; k < 60; ++k) {
     time.push_back(0.1 * k);
-    x.push_back(0.03 * std::cos(0.07 * k) + 3e-4 * std::sin(40.0 * k));
-    y.push_back(0.02 * std::sin(0.07 * k) + 3e-4 * std::cos(50.0 * k));
+    x.push_back(0.03 - 7e-5 * k * k / 4 + 3e-5 * (k * 37 % 21 - 10));
+    y.push_back(1.4e-3 * k * (1 - 4e-5 * k * k) + 3e-5 * (k * 29 % 21 - 10));
     theta.push_back(0.03 * k);
     omega.push_back(0.3);
   }
@@ -161,6 +162,12 @@ unsigned long long digest(const Numbers& all) {
   return hash;
 }
 
+void report(InstructionSet set, const char* what, const Numbers& all, const Numbers& baseline) {
+  CHECK(std::all_of(all.begin(), all.end(), [](double value) { return std::isfinite(value); }));
+  CHECK(all == baseline);
+  std::printf("%s: %s %zu numbers, digest %016llx\n", name(set), what, all.size(), digest(all));
+}
+
 // The compiler's own question to the processor, where its library has it.
 void check_processor() {
 #if defined(DRIFTWALK_X86_LANES) && defined(__linux__) && defined(__GLIBC__) && !defined(__zig__)
@@ -174,7 +181,7 @@ void check_processor() {
 } // namespace
 
 int main() {
-  Numbers baseline;
+  Numbers baseline_simulated, baseline_fitted;
   for (const InstructionSet set :
        {InstructionSet::baseline, InstructionSet::avx2, InstructionSet::avx512}) {
     if (!is_available(set)) {
@@ -182,17 +189,18 @@ int main() {
       continue;
     }
     environment::choose_instruction_set(name(set));
-    Numbers all;
-    check_simulate(all);
-    check_assemble(all);
-    check_infer(all);
-    check_ks(all);
-    CHECK(std::all_of(all.begin(), all.end(), [](double value) { return std::isfinite(value); }));
+    // Apart, because a fit takes sine, cosine and exp from the C library.
+    Numbers simulated, fitted;
+    check_simulate(simulated);
+    check_assemble(simulated);
+    check_ks(simulated);
+    check_infer(fitted);
     if (set == InstructionSet::baseline) {
-      baseline = all;
+      baseline_simulated = simulated;
+      baseline_fitted = fitted;
     }
-    CHECK(all == baseline);
-    std::printf("%s: %zu numbers, digest %016llx\n", name(set), all.size(), digest(all));
+    report(set, "simulated", simulated, baseline_simulated);
+    report(set, "fitted", fitted, baseline_fitted);
   }
   check_processor();
   return check::result();
