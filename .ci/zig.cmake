@@ -13,3 +13,6 @@ set(CMAKE_CXX_ARCHIVE_CREATE "\"${DRIFTWALK_ZIG}\" ar qc <TARGET> <OBJECTS>")
 set(CMAKE_CXX_ARCHIVE_FINISH "\"${DRIFTWALK_ZIG}\" ranlib <TARGET>")
 # For the questions to the compiler too: Zig builds its C++ library once per level of optimisation.
 set(CMAKE_CXX_FLAGS_INIT "-O3")
+if(CMAKE_SYSTEM_NAME STREQUAL Darwin)
+  set(CMAKE_USER_MAKE_RULES_OVERRIDE_CXX "${CMAKE_CURRENT_LIST_DIR}/zig-macos.cmake")
+endif()
