@@ -144,7 +144,7 @@ wheel: $(DEV_TOOLS)
 cross: $(CROSS_TOOLS)
 	PATH="$(CURDIR)/$(BIN):$$PATH" .ci/cross
 
-# Everything that has to hold before a release, with all tests: an hour. Only some of it:
+# Everything that has to hold before a release, with all tests: an hour or more. Only some of it:
 # make release-check CHECKS="versions recipe"
 CHECKS :=
 

@@ -16,6 +16,8 @@ from recipe import EXTRAS
 WHEEL_NAMES: Final = re.compile(
     r"driftwalk/(_core\S*\.(so|pyd)|py\.typed|[\w/]+\.(py|pyi)"
     r"|page/static/driftwalk\.(js|css)"
+    r"|export/simulators/files/(force|gazebo|mujoco|webots)"
+    r"/(Makefile|\w+\.(c|cc|h|md|proto|sdf|txt|wbt|xml))"
     r"|datasets/tank30_ode_a/(\w+\.csv|truth\.json|PROVENANCE\.md))"
     r"|driftwalk-[^/]+\.dist-info/(METADATA|WHEEL|RECORD|entry_points\.txt|licenses/LICENSE)"
 )
@@ -49,7 +51,8 @@ def wheel_metadata(wheel: Path) -> Message:
 def needless_files(wheel: Path) -> str:
     """Name files of a wheel that no user needs, and one that is too large; empty if none."""
     with zipfile.ZipFile(wheel) as archive:
-        names = archive.namelist()
+        # auditwheel lists the folders too.
+        names = [one.filename for one in archive.infolist() if not one.is_dir()]
     needless = [name for name in names if WHEEL_NAMES.fullmatch(name) is None]
     if needless:
         return f"{wheel.name} holds {', '.join(needless[:5])}"

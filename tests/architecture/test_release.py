@@ -124,10 +124,15 @@ def a_wheel(path: Path, *names: str) -> Path:
 
 def test_needless_files_of_a_wheel_are_found(tmp_path: Path) -> None:
     kept = ("driftwalk/core/units.py", "driftwalk-1.dist-info/RECORD")
-    sound = a_wheel(tmp_path / "a.whl", "driftwalk/_core.abi3.so", *kept)
+    sound = a_wheel(tmp_path / "a.whl", "driftwalk/", "driftwalk/_core.abi3.so", *kept)
     assert needless_files(sound) == ""
+    folder = "driftwalk/export/simulators/files/webots"
+    exported = a_wheel(tmp_path / "e.whl", "driftwalk/_core.abi3.so", f"{folder}/Makefile", *kept)
+    assert needless_files(exported) == ""
     bare = a_wheel(tmp_path / "b.whl", *kept)
     assert needless_files(bare) == "b.whl has no native core"
+    left = a_wheel(tmp_path / "d.whl", "driftwalk/_core.abi3.so", f"{folder}/wall.o", *kept)
+    assert needless_files(left) == f"d.whl holds {folder}/wall.o"
     full = a_wheel(tmp_path / "c.whl", "driftwalk/_core.abi3.so", "cpp/src/infer.cpp", *kept)
     assert needless_files(full) == "c.whl holds cpp/src/infer.cpp"
 
