@@ -151,6 +151,8 @@ def _plot_aspects(comparison: xr.Dataset, ax: Axes) -> None:
         held, name = one["held_out_distance"].values, str(one["model"].values)
         ax.plot(held, place, marker, ms=3.5, color=color, label=name)
     plot_own_aspects(comparison, ax, label="own")
+    # Room for the names: points are anywhere on the left.
+    ax.set_xlim(0.0, 1.6 * ax.get_xlim()[1])
     ax.legend(loc="best")
 
 
