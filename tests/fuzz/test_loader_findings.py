@@ -74,6 +74,19 @@ def test_a_description_of_deep_brackets_is_refused(tmp_path: Path) -> None:
         dw.load(bag)
 
 
+def test_a_description_too_long_to_be_read_soon_is_refused(tmp_path: Path) -> None:
+    pytest.importorskip("rosbags")
+    bag = tmp_path / "bag"
+    space_files.write_bag(bag, mcap=False)
+    description = bag / "metadata.yaml"
+    whole = description.read_text()
+    description.write_text(
+        whole.replace("nanoseconds: 1900000000", "nanoseconds: " + "1" * 300_000)
+    )
+    with pytest.raises(FormatError, match=r"metadata\.yaml: is larger than 0\.25 MiB"):
+        dw.load(bag)
+
+
 def test_xml_in_an_encoding_that_nobody_knows_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.xml"
     path.write_text('<?xml version="1.0" encoding="UTF-NaN"?>\n<TrackMate version="7"></TrackMate>')
