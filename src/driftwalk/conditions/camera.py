@@ -75,7 +75,7 @@ def recorded_camera(track: Track, study: Study, *, position_quantum: float) -> C
     return Camera(float(position), angle, float(quantum))
 
 
-def possible_noises(track: Track, study: Study, *, position_quantum: float) -> tuple[float, ...]:
+def possible_noises(track: Track, study: Study, camera: Camera) -> tuple[float, ...]:
     """Return noises of positions that a recording's camera may have, each as likely [m].
 
     A stated noise is the only one. Around an estimate there are four: the middles of four equal
@@ -90,21 +90,21 @@ def possible_noises(track: Track, study: Study, *, position_quantum: float) -> t
         The recorded body.
     study : Study
         Its [observation].
-    position_quantum : float
-        Resolution of the file [m], 0 when unknown.
+    camera : Camera
+        What `recorded_camera` makes of both.
 
     Examples
     --------
     >>> import driftwalk as dw
     >>> from driftwalk.schema import body_track
     >>> track, study = body_track(dw.tank30_recording()), dw.Study()
-    >>> [round(1e3 * noise, 2) for noise in possible_noises(track, study, position_quantum=0.0)]
+    >>> camera = recorded_camera(track, study, position_quantum=0.0)
+    >>> [round(1e3 * noise, 2) for noise in possible_noises(track, study, camera)]
     [0.3, 0.32, 0.28, 0.31]
     >>> stated = dw.apply_overrides(study, {"observation.position_noise_m": 3e-4})
-    >>> possible_noises(track, stated, position_quantum=0.0)
+    >>> possible_noises(track, stated, recorded_camera(track, stated, position_quantum=0.0))
     (0.0003,)
     """
-    camera = recorded_camera(track, study, position_quantum=position_quantum)
     if study.observation.position_noise_m != "estimate":
         return (camera.position_noise,)
     estimate = estimate_tracking_noise(track)

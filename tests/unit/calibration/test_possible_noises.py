@@ -19,6 +19,11 @@ JERKS = {
 NOISE = 8e-5
 
 
+def noises(track: Track, study: dw.Study, *, quantum: float) -> tuple[float, ...]:
+    camera = recorded_camera(track, study, position_quantum=quantum)
+    return possible_noises(track, study, camera)
+
+
 def jerking(seed: int) -> Track:
     model = dw.motion_model("run_rest")
     return body_track(moving(model, JERKS, 600.0, seed=seed, noise=NOISE))
@@ -26,14 +31,14 @@ def jerking(seed: int) -> Track:
 
 def test_a_stated_noise_is_the_only_one():
     study = dw.apply_overrides(dw.Study(), {"observation.position_noise_m": 4e-4})
-    assert possible_noises(jerking(1), study, position_quantum=0.0) == (4e-4,)
+    assert noises(jerking(1), study, quantum=0.0) == (4e-4,)
 
 
 def test_around_a_clear_estimate_the_logarithm_is_normal():
     track = body_track(dw.tank30_recording())
     estimate = estimate_tracking_noise(track)
     nominal = recorded_camera(track, dw.Study(), position_quantum=0.0).position_noise
-    logs = np.log(np.array(possible_noises(track, dw.Study(), position_quantum=0.0)) / nominal)
+    logs = np.log(np.array(noises(track, dw.Study(), quantum=0.0)) / nominal)
     doubt = max(estimate.position_noise_standard_error_m / nominal, 0.05)
     assert logs.mean() == pytest.approx(0.0, abs=1e-12)
     assert logs.std() == pytest.approx(doubt, rel=1e-3)
@@ -50,7 +55,7 @@ def test_an_estimate_of_zero_gives_way_to_noises_that_include_the_true_one():
     ]
     assert len(unclear) > 10
     for track in unclear:
-        found = possible_noises(track, dw.Study(), position_quantum=0.0)
+        found = noises(track, dw.Study(), quantum=0.0)
         assert 0.0 < min(found) < NOISE < max(found) < noise_bound(track).position_noise_m
 
 
@@ -63,7 +68,7 @@ def test_unclear_noises_have_a_normal_variance_between_zero_and_the_bound():
     spread = estimate.position_noise_standard_error_m**2
     drawn = spread * np.random.default_rng(1).standard_normal(1_000_000)
     drawn = drawn[(drawn > 0.0) & (drawn < bound**2)]
-    found = sorted(possible_noises(track, dw.Study(), position_quantum=0.0))
+    found = sorted(noises(track, dw.Study(), quantum=0.0))
     below = [(drawn < noise**2).mean() for noise in found]
     # Of a normal distribution these parts lie below -1.363, -0.3775, 0.3775 and 1.363.
     np.testing.assert_allclose(below, [0.0864, 0.3529, 0.6471, 0.9136], atol=0.005)
@@ -71,13 +76,13 @@ def test_unclear_noises_have_a_normal_variance_between_zero_and_the_bound():
 
 def test_what_rounding_adds_is_taken_away_again():
     track, quantum = jerking(1), 1e-4
-    whole = np.array(possible_noises(track, dw.Study(), position_quantum=0.0))
-    rounded = np.array(possible_noises(track, dw.Study(), position_quantum=quantum))
+    whole = np.array(noises(track, dw.Study(), quantum=0.0))
+    rounded = np.array(noises(track, dw.Study(), quantum=quantum))
     np.testing.assert_allclose(rounded**2, np.maximum(whole**2 - quantum**2 / 12.0, 0.0))
 
 
 def test_positions_without_noise_or_motion_have_none():
     time = np.arange(200) * 0.1
     line = Track(time, 0.01 * time, 0.0 * time, np.full(200, np.nan))
-    found = possible_noises(line, dw.Study(), position_quantum=0.0)
+    found = noises(line, dw.Study(), quantum=0.0)
     assert max(found) < 1e-9

@@ -215,7 +215,7 @@ def recorded_motion(
         neighbours = neighbours.since(float(track.time[0]))
     track = track._replace(time=track.time - track.time[0])
     camera = recorded_camera(track, study, position_quantum=position_quantum)
-    noises = possible_noises(track, study, position_quantum=position_quantum)
+    noises = possible_noises(track, study, camera)
     if not min(noises) <= camera.position_noise <= max(noises):
         # An estimate of zero: bodies that rest would rest to the last digit.
         camera = replace(camera, position_noise=float(np.median(noises)))
