@@ -17,9 +17,9 @@ COEFFICIENTS: Final = (4, 16)
 FEWEST_SIMULATIONS: Final = (256, 512)
 """However few the coefficients are: there is a covariance of some hundred summaries, too."""
 FEWEST_ROUNDS: Final = 3
+"""A search neither settles nor is given up before. A true model comes close to the recording in
+two, as a rule."""
 MOST_ROUNDS: Final = 12
-PATIENT_ROUNDS: Final = 3
-"""Rounds in which a true model comes close to the recording: in two, as a rule."""
 MOST_IN_VAIN: Final = 4
 """Rounds without a better fit after which the search ends."""
 REACH: Final = 1.25
@@ -87,7 +87,7 @@ def descend(
     seed : int
         Of the settings that are drawn.
     give_up : float
-        Misfit, in summaries, that the search has to reach in `PATIENT_ROUNDS`, or it ends.
+        Misfit, in summaries, that the search has to reach in `FEWEST_ROUNDS`, or it ends.
     """
     centre, width = start, np.clip(width, NARROWEST, WIDEST)
     lowest, since, least = np.inf, 0, np.inf
@@ -113,7 +113,7 @@ def descend(
         # A quadratic that holds badly leaves much, and then a large misfit looks small.
         unlikely = solved.misfit + emulator.log_variance
         lowest, since = min(lowest, unlikely), 0 if unlikely < lowest else since + 1
-        hopeless = number + 1 >= PATIENT_ROUNDS and least > give_up
+        hopeless = number + 1 >= FEWEST_ROUNDS and least > give_up
         if settled or hopeless or since == MOST_IN_VAIN:
             break
         centre, width = rounded(np.clip(solved.setting, 0.0, 1.0)), rounded(following)

@@ -202,11 +202,29 @@ def fit_emulator(
     spread = np.sqrt((left**2).sum(axis=0) / freedom)
     used = spread > CONSTANT * (np.abs(summaries).max(axis=0) + CONSTANT)
     scaled = left[:, used] / spread[used]
-    correlation = (1.0 - SHRUNK) * (scaled.T @ scaled) / freedom + SHRUNK * np.eye(used.sum())
+    correlation = shrunk_correlation(scaled, freedom)
     whitening = np.linalg.cholesky(np.linalg.inv(correlation)).T / spread[used]
     return LocalEmulator(
         centre, width, form, whitening @ coefficients[:, used].T, whitening, used, freedom
     )
+
+
+def shrunk_correlation(scaled: Floats, freedom: int) -> Floats:
+    """Return the correlations of summaries of simulations, less a part of each.
+
+    Parameters
+    ----------
+    scaled : ndarray, shape (simulations, summaries)
+        Deviations, in standard deviations.
+    freedom : int
+        Their degrees of freedom.
+
+    Examples
+    --------
+    >>> shrunk_correlation(np.array([[1.0, 1.0], [-1.0, -1.0]]), 2).round(2).tolist()
+    [[1.0, 0.95], [0.95, 1.0]]
+    """
+    return (1.0 - SHRUNK) * (scaled.T @ scaled) / freedom + SHRUNK * np.eye(scaled.shape[1])
 
 
 def _best_form(place: Floats, summaries: Floats) -> Form:

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.estimation.emulator import SHRUNK
+from driftwalk.calibration.estimation.emulator import shrunk_correlation
 
 Floats = npt.NDArray[np.float64]
 
@@ -60,10 +60,7 @@ def likeness(
     known, others = seen[:SIMULATIONS], seen[SIMULATIONS:]
     mean = known.mean(axis=0)
     spread = np.sqrt(known.var(axis=0, ddof=1))
-    scaled = (known - mean) / spread
-    correlation = scaled.T @ scaled / (SIMULATIONS - 1)
-    correlation = (1.0 - SHRUNK) * correlation + SHRUNK * np.eye(spread.size)
-    root = np.linalg.cholesky(correlation)
+    root = np.linalg.cholesky(shrunk_correlation((known - mean) / spread, SIMULATIONS - 1))
     apart = np.linalg.solve(root, ((np.vstack([recorded, others]) - mean) / spread).T)
     misfits = (apart**2).sum(axis=0)
     return Likeness(

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from driftwalk.calibration.estimation.descend import (
+    FEWEST_ROUNDS,
     MOST_ROUNDS,
-    PATIENT_ROUNDS,
     WIDEST,
     Descended,
     descend,
@@ -114,7 +114,7 @@ def test_a_search_that_stays_far_from_the_recording_is_given_up_early():
         for recorded in (far, near)
         for give_up in (np.inf, 3.0)
     ]
-    assert rounds[0] > rounds[1] == PATIENT_ROUNDS
+    assert rounds[0] > rounds[1] == FEWEST_ROUNDS
     assert rounds[2] == rounds[3]
 
 
