@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -119,7 +120,7 @@ class Stages:
         """Say that all is done but the figures."""
         self.tell(self.all_of, self.all_of, "figures")
 
-    @property
+    @cached_property
     def all_of(self) -> int:
         """The work there is at most: settings here, models where an executor has them."""
         able = [one for one in self.work.entries if one.ranges and not one.baseline]
