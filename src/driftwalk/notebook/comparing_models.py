@@ -63,8 +63,8 @@ def compare_models(
     progress : callable, optional
         Called as ``progress(done, total, text)`` while the work goes on.
     **settings
-        Keys of the study by their short names: ``step_interval=0.2``, ``seed=3``. Where models
-        tie, summaries of the motion decide between them; ``bootstrap=0`` leaves those out.
+        Keys of the study by their short names: ``step_interval=0.2``, ``seed=3``. Summaries
+        of the motion decide between the closest models; ``bootstrap=0`` leaves those out.
 
     Returns
     -------
