@@ -100,7 +100,7 @@ def possible_noises(track: Track, study: Study, camera: Camera) -> tuple[float, 
     >>> track, study = body_track(dw.tank30_recording()), dw.Study()
     >>> camera = recorded_camera(track, study, position_quantum=0.0)
     >>> [round(1e3 * noise, 2) for noise in possible_noises(track, study, camera)]
-    [0.3, 0.32, 0.28, 0.31]
+    [0.29, 0.32, 0.28, 0.3]
     >>> stated = dw.apply_overrides(study, {"observation.position_noise_m": 3e-4})
     >>> possible_noises(track, stated, recorded_camera(track, stated, position_quantum=0.0))
     (0.0003,)
