@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from typing import TYPE_CHECKING, Final
 
+from driftwalk.calibration.beside import threads_beside
 from driftwalk.calibration.estimation import Stores
 from driftwalk.calibration.evolution import Budget
 from driftwalk.calibration.models.contestants import (
@@ -84,7 +85,8 @@ def compare_models(
     body : str, optional
         The body, where the recording has several.
     threads : int, optional
-        Default: all processors. The result does not depend on it.
+        Default: all processors. The result does not depend on it. Models of driftwalk are searched
+        at the same time, a user's own one after the other.
     executor : concurrent.futures.Executor, optional
         Searches and judges models elsewhere, see `driftwalk.sweep.run_sweep`: a work unit is one
         model, or 16 settings of which summaries are matched. Each then has one thread if `threads`
@@ -95,7 +97,8 @@ def compare_models(
         Returns where finished models of a stage are kept, for what determines their numbers; memory
         when left out.
     tell : callable, optional
-        Called with the settings done, all of them, and the model under way.
+        Called with the settings done, all of them, and the models under way; from several threads,
+        one at a time.
 
     Returns
     -------
@@ -125,9 +128,10 @@ def compare_models(
     search = chosen.calibration
     worlds = search.bootstrap if search.refine == "auto" else 0
     work = Searches(entries, motion, search.seed, budget or Budget())
-    stages = Stages(work, worlds, stores, executor, tell or tell_nobody)
-    judged = stages.judged()
-    said = stages.summarised(judged)
+    with threads_beside(motion.like.threads if executor is None else 1) as beside:
+        stages = Stages(work, worlds, stores, executor, tell or tell_nobody, beside)
+        judged = stages.judged()
+        said = stages.summarised(judged)
     stages.finish()
     return build_comparison(entries, judged, motion, chosen, recording, warnings, said)
 

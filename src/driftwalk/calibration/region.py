@@ -17,7 +17,7 @@ raised by their ratio, as a reduced chi-square above one widens the errors of a 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Final, NamedTuple
 
@@ -38,6 +38,7 @@ from driftwalk.calibration.surface import (
 )
 from driftwalk.comparison import Statistic, StepTable
 from driftwalk.comparison.statistic import distances_among
+from driftwalk.core.processors import map_in_threads
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
 
 SURFACE_INTERVALS: Final[dict[int, int]] = {1: 32, 2: 10}
@@ -172,8 +173,7 @@ def _apart(problem: Problem, table: StepTable, settings: int) -> Floats:
         own = table.rows(slice(setting, None, settings))
         return float(distances_among(problem.statistic, own).mean())
 
-    with ThreadPoolExecutor(problem.like.threads) as pool:
-        return np.array(list(pool.map(of, range(settings))))
+    return np.array(map_in_threads(of, range(settings), problem.like.threads))
 
 
 def simulated_steps(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple
 
@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from driftwalk.calibration.problem import Axes, Floats, Problem, score_settings
 from driftwalk.comparison import StepTable
+from driftwalk.core.processors import map_in_threads
 from driftwalk.motion import Details
 from driftwalk.motion.score import broken_worlds
 from driftwalk.sweep import Design, Store, WorkUnit, grid, run_sweep, settings_per_unit
@@ -267,8 +268,8 @@ class _Cells:
             halves = steps.rows(slice(first, middle)), steps.rows(slice(middle, first + count))
             return float(self.problem.statistic.matrix(*halves, threads=1).mean())
 
-        with ThreadPoolExecutor(self.problem.like.threads) as pool:
-            return np.repeat(list(pool.map(one, range(sound.size))), count)
+        apart = map_in_threads(one, range(sound.size), self.problem.like.threads)
+        return np.repeat(apart, count)
 
 
 def _design(problem: Problem, axes: Sequence[npt.ArrayLike]) -> Design:

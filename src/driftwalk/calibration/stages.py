@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
+from driftwalk.calibration.beside import Together, is_ours, longest_first, sharing
 from driftwalk.calibration.estimation import Stores
 from driftwalk.calibration.estimation.compared import most_settings, summarised
 from driftwalk.calibration.evolution import Budget
@@ -19,9 +19,14 @@ from driftwalk.calibration.models.judge import Judged, judge
 from driftwalk.calibration.models.recorded import RecordedMotion
 from driftwalk.calibration.models.ties import MOST_ASKED, Asked, Summarised, asked_models
 from driftwalk.core.processors import one_blas_thread
-from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
+from driftwalk.core.shards import Arrays
+from driftwalk.sweep import MemoryStore, Store, WorkUnit, grid, run_sweep
 
 Tell = Callable[[int, int, str], None]
+
+USUAL_PART: Final = 4
+"""Searches by summaries simulate a quarter of what they may: most are given up after a few rounds,
+or find their end soon."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +38,7 @@ class Searches:
     seed: int
     budget: Budget
     within: Callable[[int, int], None] | None = None
-    """Called with the model and the settings done."""
+    """Called with the model and the settings done; with all of them when it is finished."""
     linear_algebra: ClassVar[bool] = True
     """Its results depend on numpy and scipy."""
 
@@ -50,6 +55,7 @@ class Searches:
             found = judge(
                 self.entries[index], self.motion, budget=self.budget, seed=self.seed, tell=say
             )
+        say(self.costs()[index], 0)
         most = max(len(entry.ranges) for entry in self.entries)
         return _packed(found, most, self.budget.starts + 1)
 
@@ -78,26 +84,20 @@ class Stages:
     """Recordings by which a misfit is judged; below 2 nobody is asked."""
     stores: Stores | None
     executor: Executor | None
+    """Elsewhere."""
     tell: Tell
+    beside: Executor | None = None
+    """Threads of this process, where there is no executor."""
 
     def judged(self) -> list[Judged]:
         """Judge every model, one work unit each."""
         entries = self.work.entries
-        begins = list(itertools.accumulate(self.work.costs(), initial=0))
-
-        def within(index: int, done: int) -> None:
-            self.tell(begins[index] + done, self.all_of, entries[index].model.name)
-
-        def finished(done: int, _: int) -> None:
-            self.tell(done, self.all_of, "models")
-
         units = grid(model=np.arange(len(entries))).units(1)
         kept = self._store("models", self.work.fingerprint())
-        # Only work of this process can say how far it is within a model.
         arrays = (
-            run_sweep(replace(self.work, within=within), units, store=kept)
+            self._searched_here(units, MemoryStore() if kept is None else kept)
             if self.executor is None
-            else run_sweep(self.work, units, store=kept, executor=self.executor, progress=finished)
+            else self._searched_elsewhere(units, kept)
         )
         return [
             _unpacked({name: values[index] for name, values in arrays.items()}, entry)
@@ -113,7 +113,7 @@ class Stages:
             if number >= asked.tied and any(one.usual for one in found.values()):
                 break
             found[index] = self._matched(number, index, judged[index].point, before)
-            before += self._total(self._most([self.work.entries[index]]), 1)
+            before += self._total(_usual([self.work.entries[index]], self.worlds), 1)
         return found
 
     def finish(self) -> None:
@@ -122,17 +122,49 @@ class Stages:
 
     @cached_property
     def all_of(self) -> int:
-        """The work there is at most: settings here, models where an executor has them."""
+        """The work there is: settings here, models where an executor has them."""
         able = [one for one in self.work.entries if one.ranges and not one.baseline]
-        costs = sorted(self._most(able))[-MOST_ASKED:] if self.worlds > 1 and len(able) > 1 else []
+        costs = (
+            sorted(_usual(able, self.worlds))[-MOST_ASKED:]
+            if self.worlds > 1 and len(able) > 1
+            else []
+        )
         return self._total([*self.work.costs(), *costs], len(self.work.entries) + len(costs))
+
+    def _searched_here(self, units: Sequence[WorkUnit], kept: Store) -> Arrays:
+        """Search the models of driftwalk at the same time, then a user's own, one by one."""
+        entries = self.work.entries
+        together = Together(
+            [one.model.name for one in entries],
+            self.work.costs(),
+            lambda done, names: self.tell(done, self.all_of, names),
+        )
+        missing = [unit.start for unit in kept.missing(units)]
+        together.finished([unit.start for unit in units if unit.start not in missing])
+        ours = [k for k in missing if is_ours(entries[k])] if self.beside is not None else []
+        alone = replace(self.work, within=together)
+        shared = replace(alone, entries=[sharing(one, len(ours)) for one in entries])
+        with together.watched():
+            if ours:
+                first = [units[k] for k in longest_first(ours, entries)]
+                run_sweep(shared, first, store=kept, executor=self.beside)
+            return run_sweep(alone, units, store=kept)
+
+    def _searched_elsewhere(self, units: Sequence[WorkUnit], kept: Store | None) -> Arrays:
+        """Search models where an executor puts them: only whole ones are heard of."""
+
+        def finished(done: int, _: int) -> None:
+            self.tell(done, self.all_of, "models")
+
+        return run_sweep(self.work, units, store=kept, executor=self.executor, progress=finished)
 
     def _matched(self, number: int, index: int, answer: np.ndarray, before: int) -> Summarised:
         """Match the summaries with one model: units of 16 settings, the rest in this process."""
         entry = self.work.entries[index]
 
-        def say(done: int, _: int) -> None:
-            inside = done if self.executor is None else 0
+        def say(done: int, most: int) -> None:
+            (share,) = _usual([entry], self.worlds)
+            inside = done * share // most if self.executor is None else 0
             self.tell(before + inside, self.all_of, f"summaries of {entry.model.name}")
 
         fingerprint = {
@@ -145,7 +177,7 @@ class Stages:
             answer,
             seed=self.work.seed,
             worlds=self.worlds,
-            executor=self.executor,
+            executor=self.executor or (self.beside if is_ours(entry) else None),
             store=self._store(f"summaries-{number}", fingerprint),
             tell=say,
         )
@@ -153,11 +185,13 @@ class Stages:
     def _store(self, name: str, fingerprint: dict[str, Any]) -> Store | None:
         return None if self.stores is None else self.stores(name, fingerprint)
 
-    def _most(self, entries: Sequence[Contestant]) -> list[int]:
-        return [most_settings(len(one.ranges), self.worlds) for one in entries]
-
     def _total(self, costs: Sequence[int], units: int) -> int:
         return sum(costs) if self.executor is None else units
+
+
+def _usual(entries: Sequence[Contestant], worlds: int) -> list[int]:
+    """Return how many settings the summaries of models usually need."""
+    return [most_settings(len(one.ranges), worlds) // USUAL_PART for one in entries]
 
 
 def _packed(judged: Judged, most: int, searches: int) -> dict[str, np.ndarray]:

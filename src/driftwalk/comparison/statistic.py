@@ -7,7 +7,6 @@ step lengths and turning angles.
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Final, NamedTuple, Protocol
 
@@ -18,6 +17,7 @@ from driftwalk import _core
 from driftwalk.comparison.ks import KsReference
 from driftwalk.comparison.plan import StepPlan, apply_steps, plan_steps
 from driftwalk.core.errors import InputError
+from driftwalk.core.processors import map_in_threads
 from driftwalk.schema.trajectory import Track
 
 Floats = npt.NDArray[np.float64]
@@ -212,8 +212,7 @@ class StepDistance:
             x, y, quadrant, _ = place1 if d1 >= d2 else place2
             return (d1 + d2) / (2 * recorded * count), x, y, quadrant
 
-        with ThreadPoolExecutor(max(threads, 1)) as pool:
-            found = list(pool.map(one, range(worlds.pairs.size)))
+        found = map_in_threads(one, range(worlds.pairs.size), threads)
         columns = np.array(found, dtype=np.float64).reshape(-1, 4).T
         return Distances(columns[0], columns[1], columns[2], columns[3].astype(np.int32))
 

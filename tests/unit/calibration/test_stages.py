@@ -30,7 +30,7 @@ def test_others_than_those_that_tie_are_asked_until_one_gives_the_summaries(
         return Summarised(100.0 if entry in giving else 500.0, 90.0, 140.0, 0.0)
 
     monkeypatch.setattr(stages, "asked_models", lambda *_: Asked((3, 0, 2), tied))
-    monkeypatch.setattr(stages, "most_settings", lambda *_: 1)
+    monkeypatch.setattr(stages, "most_settings", lambda *_: 4)
     monkeypatch.setattr(Stages, "_matched", lambda _, number, index, point, before: answer(index))
     entry = SimpleNamespace(ranges=("a",), baseline=False)
     work: Any = SimpleNamespace(entries=[entry] * 4, costs=lambda: [1] * 4)

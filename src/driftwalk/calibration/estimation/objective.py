@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import ClassVar, Final
 
@@ -16,7 +16,7 @@ from driftwalk.calibration.evolution import AspectObjective, wall_distance
 from driftwalk.calibration.evolution.search import Tell
 from driftwalk.calibration.models.recorded import RecordedMotion
 from driftwalk.comparison.aspects import block_of
-from driftwalk.core.processors import one_blas_thread
+from driftwalk.core.processors import map_in_threads, one_blas_thread
 from driftwalk.motion import Worlds
 from driftwalk.motion.score import broken_worlds
 from driftwalk.sweep import Store, WorkUnit, run_sweep
@@ -140,9 +140,9 @@ class _Summaries:
         def one(world: tuple[Floats, Floats]) -> list[Floats]:
             return [summarise(plan, *world) for plan in self.plans]
 
-        threads = max(self.cameras[0].like.threads, 1)
-        with one_blas_thread(), ThreadPoolExecutor(threads) as pool:
-            found = np.array(list(pool.map(one, zip(seen.x, seen.y, strict=True))))
+        threads = self.cameras[0].like.threads
+        with one_blas_thread():
+            found = np.array(map_in_threads(one, zip(seen.x, seen.y, strict=True), threads))
         # A world that lost its numbers is like none.
         found[broken_worlds(seen.status)] = 0.0
         return {"summaries": found}

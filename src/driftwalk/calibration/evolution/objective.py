@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,7 @@ from driftwalk.comparison.aspects import (
 )
 from driftwalk.comparison.aspects.form import WallDistance
 from driftwalk.conditions import Conditions
+from driftwalk.core.processors import map_in_threads
 from driftwalk.core.seeds import world_keys
 from driftwalk.core.streams import trial_in
 from driftwalk.motion import MotionModel, Worlds
@@ -94,8 +95,7 @@ class AspectObjective:
         def one(world: tuple[Floats, Floats]) -> Sequence[Aspect]:
             return form_aspects(self.plan, *world, wall=wall)
 
-        with ThreadPoolExecutor(max(self.like.threads, 1)) as pool:
-            return list(pool.map(one, zip(seen.x, seen.y, strict=True)))
+        return map_in_threads(one, zip(seen.x, seen.y, strict=True), self.like.threads)
 
     def values(self, settings: Floats) -> dict[str, Floats]:
         """Return the values of the parameters at points of the unit cube."""
@@ -106,13 +106,19 @@ class AspectObjective:
 
 
 def wall_distance(like: Conditions) -> WallDistance:
-    """Return the function that gives a point's distance from the wall of a recording [m]."""
+    """Return the function that gives a point's distance from the wall of a recording [m].
+
+    It pickles.
+    """
     radius = like.tank.radius_m
     if radius is not None:
-        return lambda x, y: np.asarray(radius - np.hypot(x, y))
-    edges = wall_edges(like.tank)
+        return partial(_from_circle, radius)
+    return partial(_from_edges, wall_edges(like.tank))
 
-    def nearest(x: Floats, y: Floats) -> Floats:
-        return np.asarray(np.min([far - nx * x - ny * y for nx, ny, far in edges], axis=0))
 
-    return nearest
+def _from_circle(radius: float, x: Floats, y: Floats) -> Floats:
+    return np.asarray(radius - np.hypot(x, y))
+
+
+def _from_edges(edges: Floats, x: Floats, y: Floats) -> Floats:
+    return np.asarray(np.min([far - nx * x - ny * y for nx, ny, far in edges], axis=0))

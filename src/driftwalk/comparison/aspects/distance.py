@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Final
 
@@ -14,6 +13,7 @@ from driftwalk.comparison.aspects.form import Aspect
 from driftwalk.comparison.aspects.plan import FEWEST_POINTS
 from driftwalk.comparison.ks import KsReference
 from driftwalk.core.errors import InputError
+from driftwalk.core.processors import map_in_threads
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -64,8 +64,7 @@ class AspectReference:
                 for name, reference in zip(self.names, self._native, strict=True)
             ]
 
-        with ThreadPoolExecutor(max(threads, 1)) as pool:
-            found = list(pool.map(one, motions))
+        found = map_in_threads(one, motions, threads)
         return np.array(found, dtype=np.float64).reshape(len(motions), len(self.names))
 
     def overall(self, distances: Floats) -> Floats:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,6 +14,7 @@ from driftwalk.calibration.problem import Problem, prepare_problem
 from driftwalk.comparison import apply_steps, plan_steps
 from driftwalk.conditions import recorded_camera
 from driftwalk.core.errors import InputError
+from driftwalk.core.processors import map_in_threads
 from driftwalk.core.seeds import world_keys
 from driftwalk.core.streams import CheckStream
 from driftwalk.likelihood.check.errors import Estimate
@@ -160,8 +160,7 @@ def replicates_drawn(
             begin = float(series.time[0])
             return _simulated(own, keys[flow_of == k], float(drag[k]), float(force[k]), begin)
 
-        with ThreadPoolExecutor(problem.like.threads) as pool:
-            found = list(pool.map(simulated, range(flows)))
+        found = map_in_threads(simulated, range(flows), problem.like.threads)
         parts.append([found[k][j // flows] for j, k in enumerate(flow_of)])
     return _joined(parts, flow_of)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+import threading
 from typing import Any
 
 import numpy as np
@@ -16,8 +16,10 @@ from driftwalk.calibration.estimation import approach, descend, likeness
 from driftwalk.calibration.evolution import Budget
 from driftwalk.calibration.models import ties
 from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.schema import Parameter
 from driftwalk.schema.check import check_dataset
 from driftwalk.sweep import MemoryStore, SweepError
+from driftwalk.sweep.processes import single_threaded_processes
 
 SMALL = Budget(design=32, starts=1, short=6, long=6, retest=2)
 DISTANCES = dw.apply_overrides(dw.Study(), {"calibration.bootstrap": 0})
@@ -94,6 +96,16 @@ class Interrupted(Exception):
     """Ends a comparison."""
 
 
+class Counted(MemoryStore):
+    """Counts what is written."""
+
+    written = 0
+
+    def write(self, *unit: Any) -> None:
+        self.written += 1
+        super().write(*unit)
+
+
 def test_a_comparison_that_was_ended_goes_on_with_the_model_that_it_was_at(
     recorded: xr.Dataset,
 ) -> None:
@@ -111,7 +123,15 @@ def test_a_comparison_that_was_ended_goes_on_with_the_model_that_it_was_at(
 
     models = ["active", "inertial"]
     with pytest.raises(SweepError) as error:
-        compare_models(recorded, models, study=DISTANCES, budget=SMALL, stores=stores, tell=ended)
+        compare_models(
+            recorded,
+            models,
+            study=DISTANCES,
+            threads=1,
+            budget=SMALL,
+            stores=stores,
+            tell=ended,
+        )
     assert isinstance(error.value.__cause__, Interrupted)
     seen: list[str] = []
     again = compare_models(
@@ -129,6 +149,48 @@ def test_a_comparison_that_was_ended_goes_on_with_the_model_that_it_was_at(
     )
 
 
+def test_models_searched_at_the_same_time_that_were_ended_go_on(recorded: xr.Dataset) -> None:
+    kept = Counted()
+    models = ["run_tumble", "active", "inertial"]
+    under_way: set[str] = set()
+
+    def ended(_done: int, _total: int, text: str) -> None:
+        under_way.add(text)
+        if kept.written:
+            raise Interrupted
+
+    def compared(tell: Any = None) -> xr.Dataset:
+        return compare_models(
+            recorded, models, study=DISTANCES, threads=2, budget=SMALL, tell=tell,
+            stores=lambda *_: kept,
+        )  # fmt: skip
+
+    with pytest.raises(SweepError):
+        compared(ended)
+    assert any(", " in text for text in under_way)
+    before = kept.written
+    assert 0 < before < 5
+    again = compared()
+    assert kept.written == 5
+    xr.testing.assert_identical(
+        again, compare_models(recorded, models, study=DISTANCES, threads=1, budget=SMALL)
+    )
+
+
+def test_a_users_own_model_is_asked_by_one_thread_alone(recorded: xr.Dataset) -> None:
+    seen: set[str] = set()
+
+    def jitter(scene: Any, *, step: Any) -> tuple[Any, Any]:
+        seen.add(threading.current_thread().name)
+        steps = step * scene.random.normal(scene.times.size, 2)
+        walk = np.cumsum(steps, axis=1)
+        return scene.start.x[:, None] + walk[..., 0], scene.start.y[:, None] + walk[..., 1]
+
+    own = dw.motion_model(jitter, step=Parameter("step", "m", 1e-4, 1e-2, scale="log"))
+    compare_models(recorded, [own, "inertial", "active"], study=DISTANCES, budget=SMALL, threads=2)
+    assert seen == {threading.current_thread().name}
+
+
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let every model be asked, and simulate little for it."""
@@ -144,16 +206,6 @@ def with_summaries(recorded: xr.Dataset, **options: Any) -> xr.Dataset:
     study = dw.apply_overrides(dw.Study(), {"calibration.bootstrap": 20})
     models = ["inertial", "run_tumble"]
     return compare_models(recorded, models, study=study, budget=SMALL, **options)
-
-
-class Counted(MemoryStore):
-    """Counts what is written."""
-
-    written = 0
-
-    def write(self, *unit: Any) -> None:
-        self.written += 1
-        super().write(*unit)
 
 
 @pytest.mark.usefixtures("asked")
@@ -180,7 +232,7 @@ def test_summaries_are_matched_and_kept(recorded: xr.Dataset) -> None:
     xr.testing.assert_identical(found, again)
     assert {text.partition(" of ")[0] for *_, text in said} == {"summaries", "figures"}
     assert written == {name: one.written for name, one in kept.items()}
-    with ThreadPoolExecutor(2) as executor:
+    with single_threaded_processes(2) as executor:
         there = with_summaries(recorded, executor=executor)
     xr.testing.assert_identical(found, there)
 
