@@ -21,6 +21,8 @@ Floats = npt.NDArray[np.float64]
 
 FINENESS = 4
 """Lattice points per cell of a grid along each axis."""
+REACH = 2.0
+"""How far the cells are that count, in bandwidths."""
 _RIDGE = 1e-9
 _NOTHING = 1e-12
 """Added to every normal matrix: far from any cell the surface is 0, and not an error."""
@@ -124,13 +126,23 @@ def make_smoother(
 
 def _fit_row(x: float, rest: Sequence[Floats], cells: Sequence[Floats], weights: Floats) -> Floats:
     """Return the weights of the cells at the lattice points (x, rest[0]), (x, rest[1]), ..."""
+    near = np.abs(cells[0] - x) < REACH
+    fitted = np.zeros((rest[0].size if rest else 1, near.size))
+    fitted[:, near] = _fit_points(x, rest, [one[near] for one in cells], weights[near])
+    return fitted
+
+
+def _fit_points(
+    x: float, rest: Sequence[Floats], cells: Sequence[Floats], weights: Floats
+) -> Floats:
+    """Return the weights of cells that are near in the first axis."""
     points = rest[0].size if rest else 1
     away = [np.broadcast_to(cells[0] - x, (points, cells[0].size))]
     away += [cell - at[:, None] for cell, at in zip(cells[1:], rest, strict=True)]
     squares = away[0] ** 2
     for one in away[1:]:
         squares = squares + one**2
-    weight = weights * np.clip(1.0 - squares / 4.0, 0.0, None) ** 3
+    weight = weights * np.clip(1.0 - squares / REACH**2, 0.0, None) ** 3
     products = [a * b for a, b in combinations_with_replacement(away, 2)]
     terms = np.stack([np.ones_like(away[0]), *away, *products], axis=-1)
     weighted = terms * weight[..., None]
