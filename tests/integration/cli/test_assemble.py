@@ -26,6 +26,7 @@ from command_line import (
     here,
     refusal,
 )
+from redrawn import assert_drawn_alike
 from signals_at_units import after_units
 
 from driftwalk.schema.calibration_facts import calibration_facts
@@ -327,3 +328,7 @@ def test_killed_interrupted_and_continued(
     for name in (*RESULTS, *DRAWN):
         assert_same_bits(dataset(folder / name), dataset(whole[0] / name))
     assert not (folder / ".shards").exists()
+
+
+def test_its_figures_are_drawn_again_alike(whole: tuple[Path, Done], tmp_path: Path) -> None:
+    assert_drawn_alike(whole[0], tmp_path / "out")

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import here, refusal
+from redrawn import assert_drawn_alike
 from self_propelled import moving
 
 import driftwalk as dw
@@ -101,3 +102,7 @@ def test_its_values_can_be_simulated(run: tuple[Path, dict]) -> None:
     assert done.code == 0, done.err
     stored = json.loads(open_netcdf(out).attrs["model_parameters"])
     assert stored["speed_m_s"] == said["parameters"]["speed_m_s"]["value"]
+
+
+def test_its_figures_are_drawn_again_alike(run: tuple[Path, dict], tmp_path: Path) -> None:
+    assert_drawn_alike(run[0] / "run", tmp_path / "out")

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from command_line import RECORDING, here, refusal
 from few_simulations import compare_after_little
+from redrawn import assert_drawn_alike
 
 from driftwalk.calibration import DEFAULT_MODELS
 from driftwalk.cli.terminal.models_answer import print_answer
@@ -82,3 +83,7 @@ def test_a_finished_run_is_kept(run: tuple[Path, dict]) -> None:
 
 def test_the_usual_models_begin_with_the_block() -> None:
     assert DEFAULT_MODELS[0] == "block"
+
+
+def test_its_figures_are_drawn_again_alike(run: tuple[Path, dict], tmp_path: Path) -> None:
+    assert_drawn_alike(run[0], tmp_path / "out")

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import RECORDING, Done, here
+from redrawn import assert_drawn_alike
 
 from driftwalk.schema.facts import fit_facts
 
@@ -119,3 +120,7 @@ def test_a_robot_that_drives_itself_is_not_explained(
     assert found["explained"] is False
     assert any("excess kurtosis" in text for text in found["findings"])
     assert found["ks_distance"] > 3.0 * found["ks_noise_floor"]
+
+
+def test_its_figures_are_drawn_again_alike(fitted: tuple[Path, Done], tmp_path: Path) -> None:
+    assert_drawn_alike(fitted[0], tmp_path / "out")

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import FLOW, NO_FIGURES, Done, apart, end, here, refusal, start
+from redrawn import assert_drawn_alike
 from signals_at_units import after_units, go_on, halted
 
 import driftwalk as dw
@@ -210,3 +211,7 @@ def test_python_gives_the_same(truth: Path, finished: tuple[Path, Done]) -> None
         assert found[name].values == pytest.approx(
             stored[name].values, rel=1e-4, abs=1e-9
         )  # threads of BLAS
+
+
+def test_its_figures_are_drawn_again_alike(finished: tuple[Path, Done], tmp_path: Path) -> None:
+    assert_drawn_alike(finished[0], tmp_path / "out")

@@ -13,6 +13,7 @@ import pytest
 import xarray as xr
 from command_line import NO_FIGURES, Done, apart, here, refusal
 from few_simulations import simulate_little
+from redrawn import assert_drawn_alike
 from self_propelled import moving
 from signals_at_units import after_units
 
@@ -208,3 +209,9 @@ def test_mistakes_are_one_line(options: tuple[str, ...], message: str, tmp_path:
     done: Done = here("study", "recover", *options, "-o", tmp_path / "run")
     assert message in refusal(done)
     assert not (tmp_path / "run").exists()
+
+
+def test_its_figures_are_drawn_again_alike(
+    run: tuple[Path, dict[str, Any]], tmp_path: Path
+) -> None:
+    assert_drawn_alike(run[0], tmp_path / "out")
