@@ -66,7 +66,8 @@ class Neighbours:
 def neighbours_of(recording: xr.Dataset, body: str | None, tank: Tank) -> Neighbours | None:
     """Return the other bodies of a recording that are in the tank; None where there are none.
 
-    A body that is mostly beyond the wall is in another tank: one recording may show several.
+    A body that is mostly beyond the wall is in another tank: one recording may show several. Where
+    each body has a tank of its own, with positions in that tank, none is another's neighbour.
 
     Parameters
     ----------
@@ -84,7 +85,7 @@ def neighbours_of(recording: xr.Dataset, body: str | None, tank: Tank) -> Neighb
     True
     """
     names = body_names(recording)
-    if body is None or len(names) < 2:
+    if body is None or len(names) < 2 or recording.attrs.get("bodies_apart") == "yes":
         return None
     tracks = [body_track(recording, name) for name in names if name != body]
     inside = tuple(one for one in tracks if one.time.size > 1 and _mostly_inside(one, tank))

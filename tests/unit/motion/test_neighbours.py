@@ -73,6 +73,7 @@ def test_who_is_in_another_tank_is_no_neighbour(recording, shape):
     np.testing.assert_array_equal(found.tracks[0].x, body_track(recording, "b").x)
     assert neighbours_of(recording[["x", "y", "theta"]].isel(body=[0]), "a", TANKS[shape]) is None
     assert neighbours_of(recording.isel(body=[0, 2]), "a", TANKS[shape]) is None
+    assert neighbours_of(recording.assign_attrs(bodies_apart="yes"), "a", TANKS[shape]) is None
 
 
 def test_a_body_that_begins_later_keeps_its_time(recording):

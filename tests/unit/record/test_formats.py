@@ -241,6 +241,7 @@ def test_ubitrail(tmp_path: Path) -> None:
     path.write_bytes(gzip.compress(text.encode()))
     dataset = load(path, metres_per_pixel=0.001)
     assert dataset.attrs["format"] == "ubitrail"
+    assert dataset.attrs["bodies_apart"] == "yes"
     track = body_track(dataset, "05")
     np.testing.assert_allclose(track.x, [0.1, 0.14])  # 200 pixels wide; the last row is kept
     np.testing.assert_allclose(body_track(dataset, "04").x, [0.05])

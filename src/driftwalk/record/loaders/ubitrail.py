@@ -47,7 +47,12 @@ class UbiTrailLoader:
         bodies = split_bodies(table.codes[0], areas, clock=table.numbers[4], x=x, y=y)
         # An area is a body. The clock, of a video's file, often says the same of two frames.
         return RawRecording(
-            bodies, clock_unit="ms", length_unit="px", separate=True, rows=table.rows
+            bodies,
+            clock_unit="ms",
+            length_unit="px",
+            separate=True,
+            rows=table.rows,
+            attrs={"bodies_apart": "yes"},
         )
 
 

@@ -60,6 +60,7 @@ TRAJECTORY: Final = Kind(
         Attribute("arena", "object", ARENA.meaning, "the tank is known"),
         Attribute("arena_found", "object", "how the tank was found", "the tank is known"),
         Attribute("origin_shift_m", "list", "offset that was subtracted from the positions", _FILE),
+        Attribute("bodies_apart", "yes or no", "whether each has a tank of its own", "it has"),
         Attribute("counts", "object", "counts of what cleaning did", _FILE),
         Attribute("simulated", "yes or no", "whether a model made the motion", "simulated"),
         Attribute("tracked_from", "text", "the video or camera", _TRACKED),
