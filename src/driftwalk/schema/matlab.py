@@ -8,9 +8,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from driftwalk.core.errors import FormatError
 from driftwalk.schema.matlab_elements import refuse_unknown_elements
 from driftwalk.schema.netcdf import refuse_huge
 
+MOST_ELEMENTS: Final = 200_000
+"""Elements of an array of structs or cells that are read."""
 _SIZES: Final = {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "single": 4, "logical": 1}
 OLD: Final = b"MATLAB 5.0 MAT-file"
 """Start of the format that MATLAB writes unless a user chooses another."""
@@ -47,36 +50,68 @@ def read_old(path: Path) -> dict[str, Any]:
     Raises
     ------
     FormatError
-        When the file declares more than it can hold, or an element of no known type. Of other
-        damage scipy raises what it likes.
+        When the file declares more than it can hold, more than 200,000 structs or cells, or an
+        element of no known type. Of other damage scipy raises what it likes.
     """
     from scipy.io import loadmat
 
     with warnings.catch_warnings():
         # Of two variables of one name the later counts, as in MATLAB.
         warnings.simplefilter("ignore")
-        refuse_huge(_declared(path), path)
+        _refuse_declared(path)
         refuse_unknown_elements(path)
         content: dict[str, Any] = loadmat(path, appendmat=False)
     return {name: value for name, value in content.items() if not name.startswith("__")}
 
 
-def _declared(path: Path) -> int:
-    """Return how many bytes the variables of a file have in memory, 0 where it has objects.
+def refuse_many(count: float, path: Path | None = None) -> None:
+    """Refuse an array of more structs or cells than are read.
+
+    Parameters
+    ----------
+    count : float
+        How many there are.
+    path : Path, optional
+        The file.
+
+    Raises
+    ------
+    FormatError
+        When there are more.
+    """
+    if count > MOST_ELEMENTS:
+        raise FormatError(
+            f"has an array of {count:.0f} structs or cells, and {MOST_ELEMENTS} are read: save a "
+            "struct of arrays (table2struct(T, 'ToScalar', true))",
+            path=path,
+        )
+
+
+def _refuse_declared(path: Path) -> None:
+    """Refuse what a file declares and cannot hold.
 
     Of objects scipy knows no shape, and gives up.
     """
     from scipy.io import whosmat
 
     try:
-        return sum(_size(*entry) for entry in whosmat(path, appendmat=False))
+        declared = whosmat(path, appendmat=False)
+        size = sum(_size(*entry) for entry in declared)
     except TypeError:
-        return 0
+        return
+    refuse_huge(size, path)
+    for _, shape, kind in declared:
+        if kind in ("struct", "cell"):
+            refuse_many(_count(shape), path)
 
 
 def _size(_name: str, shape: tuple[int, ...], kind: str) -> int:
     """Return how many bytes a variable has in memory by its header."""
-    return int(np.prod([float(length) for length in shape])) * _SIZES.get(kind, 8)
+    return int(_count(shape)) * _SIZES.get(kind, 8)
+
+
+def _count(shape: tuple[int, ...]) -> float:
+    return float(np.prod([float(length) for length in shape]))
 
 
 def _old_variables(path: Path) -> list[str]:

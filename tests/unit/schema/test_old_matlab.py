@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import struct
 from collections.abc import Callable
 from pathlib import Path
 
@@ -21,6 +22,21 @@ def test_variables_come_by_their_names(tmp_path: Path) -> None:
     found = read_old(path)
     assert sorted(found) == ["u", "who"]
     np.testing.assert_array_equal(found["u"].ravel(), [0.0, 1.0, 2.0])
+
+
+@pytest.mark.parametrize("kind", ["struct", "cell"])
+def test_more_structs_or_cells_than_a_file_could_hold_are_refused_before_they_are_made(
+    kind: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "many.mat"
+    value = {"struct": {"x": 1.0}, "cell": np.array([[1.0]], dtype=object)}[kind]
+    savemat(path, {"S": value})
+    one, many = struct.pack("<IIii", 5, 8, 1, 1), struct.pack("<IIii", 5, 8, 1 << 23, 1)
+    content = path.read_bytes()
+    assert one in content
+    path.write_bytes(content.replace(one, many, 1))
+    with pytest.raises(dw.FormatError, match="8388608 structs or cells, and 200000 are read"):
+        read_old(path)
 
 
 @pytest.mark.parametrize("read", [read_old, dw.load, load_flow])

@@ -13,10 +13,8 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError, reason_of
 from driftwalk.record.stores.hdf5 import Hdf5Contents, opened_hdf5, text_of
-from driftwalk.schema.matlab import HDF5_BASED, OLD, read_old
+from driftwalk.schema.matlab import HDF5_BASED, OLD, read_old, refuse_many
 
-MOST_ELEMENTS: Final = 200_000
-"""Elements of an array of structs that are read."""
 _CLASS: Final = "MATLAB_class"
 
 
@@ -93,13 +91,13 @@ def _old_value(value: Any) -> Value:
     if not isinstance(value, np.ndarray):
         return None
     if value.dtype.names is not None:
-        _refuse_many(value.size)
+        refuse_many(value.size)
         fields = value.dtype.names
         return Struct(
             [{name: _old_value(one[name]) for name in fields} for one in value.ravel(order="F")]
         )
     if value.dtype.kind == "O":
-        _refuse_many(value.size)
+        refuse_many(value.size)
         return [_old_value(one) for one in value.ravel(order="F")]
     if value.dtype.kind == "U":
         return _texts([str(row) for row in value.ravel()])
@@ -171,14 +169,6 @@ def _hdf5_struct(contents: Hdf5Contents, group: Any) -> Struct:
 
 def _referred(contents: Hdf5Contents, entry: Any) -> list[str]:
     """Return the names of the entries that a cell array refers to, in MATLAB's order."""
-    _refuse_many(entry.size)
+    refuse_many(entry.size)
     references = contents.array(str(entry.name)).T.ravel(order="F")
     return [str(contents.file[reference].name) for reference in references]
-
-
-def _refuse_many(count: int) -> None:
-    if count > MOST_ELEMENTS:
-        raise FormatError(
-            f"has an array of {count} structs or cells, and {MOST_ELEMENTS} are read: save a "
-            "struct of arrays (table2struct(T, 'ToScalar', true))"
-        )
