@@ -11,12 +11,9 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from threading import Lock
-from typing import TypeVar
 
 from driftwalk.calibration.models.contestants import Contestant
 from driftwalk.motion import BlockModel, ParticleModel
-
-ItemT = TypeVar("ItemT")
 
 
 class Left(Exception):

@@ -20,7 +20,7 @@ from driftwalk.calibration.models.recorded import RecordedMotion
 from driftwalk.calibration.models.ties import MOST_ASKED, Asked, Summarised, asked_models
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.shards import Arrays
-from driftwalk.sweep import MemoryStore, Store, WorkUnit, grid, run_sweep
+from driftwalk.sweep import MemoryStore, Store, WorkUnit, collect, grid, run_sweep
 
 Tell = Callable[[int, int, str], None]
 
@@ -132,7 +132,10 @@ class Stages:
         return self._total([*self.work.costs(), *costs], len(self.work.entries) + len(costs))
 
     def _searched_here(self, units: Sequence[WorkUnit], kept: Store) -> Arrays:
-        """Search the models of driftwalk at the same time, then a user's own, one by one."""
+        """Search a user's own models, one by one, then those of driftwalk at the same time.
+
+        A user's model may fail: that is said before the others take minutes.
+        """
         entries = self.work.entries
         together = Together(
             [one.model.name for one in entries],
@@ -142,13 +145,16 @@ class Stages:
         missing = [unit.start for unit in kept.missing(units)]
         together.finished([unit.start for unit in units if unit.start not in missing])
         ours = [k for k in missing if is_ours(entries[k])] if self.beside is not None else []
+        others = [k for k in missing if k not in ours]
         alone = replace(self.work, within=together)
         shared = replace(alone, entries=[sharing(one, len(ours)) for one in entries])
         with together.watched():
+            if others:
+                run_sweep(alone, [units[k] for k in others], store=kept)
             if ours:
                 first = [units[k] for k in longest_first(ours, entries)]
                 run_sweep(shared, first, store=kept, executor=self.beside)
-            return run_sweep(alone, units, store=kept)
+        return collect(kept, units)
 
     def _searched_elsewhere(self, units: Sequence[WorkUnit], kept: Store | None) -> Arrays:
         """Search models where an executor puts them: only whole ones are heard of."""

@@ -187,8 +187,23 @@ def test_a_users_own_model_is_asked_by_one_thread_alone(recorded: xr.Dataset) ->
         return scene.start.x[:, None] + walk[..., 0], scene.start.y[:, None] + walk[..., 1]
 
     own = dw.motion_model(jitter, step=Parameter("step", "m", 1e-4, 1e-2, scale="log"))
-    compare_models(recorded, [own, "inertial", "active"], study=DISTANCES, budget=SMALL, threads=2)
+    compare_models(recorded, ["inertial", "active", own], study=DISTANCES, budget=SMALL, threads=2)
     assert seen == {threading.current_thread().name}
+
+
+def test_a_users_own_model_that_fails_is_not_waited_for(recorded: xr.Dataset) -> None:
+    kept = Counted()
+
+    def broken(scene: Any, *, step: Any) -> tuple[Any, Any]:
+        raise ValueError("no such motor")
+
+    own = dw.motion_model(broken, step=(0.1, 1.0, "m"))
+    with pytest.raises((InputError, SweepError), match="no such motor"):
+        compare_models(
+            recorded, ["inertial", own], study=DISTANCES, budget=SMALL, threads=2,
+            stores=lambda *_: kept,
+        )  # fmt: skip
+    assert kept.written == 0
 
 
 @pytest.fixture
