@@ -2,9 +2,10 @@
 
 Recordings are simulated by driftwalk itself at stated parameters, in the true flow of the bundled
 recording, with its length, sampling and camera noise. Each is calibrated by the functions that
-`driftwalk calibrate` runs from the refined map on (the coarse map only finds the window), with the
-simulated steps of the refined map shared by the recordings of one truth. Results go to
-``coverage.jsonl``, one line a recording; run again, it continues.
+`driftwalk calibrate` runs from the refined map on; what the coarse map finds is the first window,
+which is given here, from half to one and a half times the true values. Results go to
+``coverage.jsonl``, one line a recording; run again, it continues. ``coverage_before.jsonl`` has
+those of the search before 24 November 2026, which took nothing off the distance.
 
     python studies/coverage/coverage.py --recordings 26 --bootstrap 60
 """
@@ -13,31 +14,29 @@ from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import driftwalk as dw
+from driftwalk.calibration.maps import Mapper
 from driftwalk.calibration.problem import Problem, limits_of, prepare_problem
 from driftwalk.calibration.quality import quality_of_fit
-from driftwalk.calibration.refine import Refined, refined
+from driftwalk.calibration.refine import Refined, locate, refine
 from driftwalk.calibration.region import (
     build_surface,
     confidence_region,
     region_contains,
     run_bootstrap,
-    simulated_steps,
 )
-from driftwalk.calibration.search import full_map
 from driftwalk.comparison import StepTable
 from driftwalk.conditions import recorded_camera
-from driftwalk.schema import body_track
+from driftwalk.core.seeds import world_keys
+from driftwalk.schema import Track, body_track
 
 TRUTHS = ((0.45, 0.55e-3), (0.80, 0.90e-3))
-STEPS = (0.005, 3e-5)
-REPLICATES = 4
+SEED = 60_000
 RESULTS = Path(__file__).with_name("coverage.jsonl")
 
 
@@ -52,54 +51,39 @@ def main() -> None:
     study = dw.Study()
     camera = recorded_camera(track, study, position_quantum=0.0)
     problem = prepare_problem(track, study, dw.tank30_flow(), camera=camera, threads=wanted.threads)
-    for index, truth in enumerate(TRUTHS):
-        calibrate_truth(problem, index, truth, wanted)
+    done = {(line["truth"], line["recording"]) for line in read(RESULTS)}
+    for k in range(wanted.recordings):
+        for index, truth in enumerate(TRUTHS):
+            if (index, k) in done:
+                continue
+            own = simulated_recording(problem, index, truth, k)
+            line = answer_of(own, refined_map(own, truth), truth, wanted.bootstrap)
+            write(RESULTS, {"truth": index, "recording": k, **line})
     report()
 
 
-def calibrate_truth(problem: Any, index: int, truth: tuple[float, float], wanted: Any) -> None:
-    """Calibrate recordings of one truth, appending a line for each."""
-    done = {(line["truth"], line["recording"]) for line in read(RESULTS)}
-    missing = [k for k in range(wanted.recordings) if (index, k) not in done]
-    if not missing:
-        return
-    # The truth lies between the nodes of the grid, as it would in life.
-    window = tuple(
-        np.round(value + step * (np.arange(-8, 9) + shift), 12)
-        for value, step, shift in zip(truth, STEPS, (0.37, -0.29), strict=True)
-    )
-    settings = [axis.ravel() for axis in np.meshgrid(*window, indexing="ij")]
-    shared = simulated_steps(problem, settings, stage="refined", replicates=REPLICATES)
-    apart = np.array(
-        [own_floor(problem, shared.rows(slice(k, k + REPLICATES))) for k in starts(shared)]
-    )
-    recordings = simulated_steps(
-        problem,
-        truth,
-        stage="coverage",
-        replicates=wanted.recordings,
-        first=index,
-    )
+def simulated_recording(
+    problem: Problem, index: int, truth: tuple[float, float], number: int
+) -> Problem:
+    """Simulate a recording at a truth and make it ready for comparison."""
+    names = [one.name for one in problem.parameters]
+    values = {name: np.array([value]) for name, value in zip(names, truth, strict=True)}
+    keys = world_keys(SEED, trial=np.array([index]), replicate=number)
+    seen = problem.model.simulate(values, problem.like, keys)
+    track = Track(problem.like.sample_time, seen.x[0], seen.y[0], seen.theta[0])
+    study = dw.apply_overrides(dw.Study(), {"calibration.seed": 100 + 1000 * index + number})
+    camera = recorded_camera(track, study, position_quantum=0.0)
+    threads = problem.like.threads
+    return prepare_problem(track, study, dw.tank30_flow(), camera=camera, threads=threads)
+
+
+def refined_map(problem: Problem, truth: tuple[float, float]) -> Refined:
+    """Return the refined map of a recording, from a window about the truth on."""
     limits = limits_of(problem)
-    box = tuple((float(axis[0]), float(axis[-1])) for axis in window)
-    shape = tuple(axis.size for axis in window)
-    for k in missing:
-        row = recordings.rows(slice(k, k + 1))
-        steps = np.column_stack([row.length[0], row.angle[0]]).astype(np.float64)[: row.pairs[0]]
-        matrix = problem.statistic.matrix(row, shared, threads=problem.like.threads)
-        distance = matrix.reshape(*shape, REPLICATES)
-        reference = replace(problem.reference, steps=np.ascontiguousarray(steps))
-        search = problem.study.calibration.model_copy(update={"seed": 100 + 1000 * index + k})
-        study = problem.study.model_copy(update={"calibration": search})
-        own = replace(problem, reference=reference, study=study)
-        found = refined(full_map(window, distance, {"apart": apart.reshape(shape)}), box, limits)
-        line = answer_of(own, found, truth, wanted.bootstrap)
-        write(RESULTS, {"truth": index, "recording": k, **line})
-
-
-def starts(shared: StepTable) -> range:
-    """Return the number of the first replicate of each setting."""
-    return range(0, shared.pairs.size, REPLICATES)
+    first = tuple((0.5 * value, 1.5 * value) for value in truth)
+    maps = Mapper(problem, "refined")
+    replicates = problem.study.calibration.refined_replicates
+    return refine(maps, locate(maps, first, limits), limits, problem.refined_steps, replicates)
 
 
 def own_floor(problem: Problem, replicates: StepTable) -> float:
