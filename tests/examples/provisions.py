@@ -562,6 +562,7 @@ PAGES: dict[str, Page] = {
         holds=("message['type'] == 'frame'", "printed.count('\\n') > 3"),
         slow=True,
     ),
+    "docs/reference/models-on-recordings.md": Page(not_run={"python studies/*": STUDY}),
     "docs/reference/page-data.md": Page(provide=_report, holds=("values.size > 1",), slow=True),
     "docs/reference/study-file.md": Page(),
     "docs/tutorials/first-calibration.md": Page(
