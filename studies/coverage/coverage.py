@@ -30,7 +30,6 @@ from driftwalk.calibration.region import (
     region_contains,
     run_bootstrap,
 )
-from driftwalk.comparison import StepTable
 from driftwalk.conditions import recorded_camera
 from driftwalk.core.seeds import world_keys
 from driftwalk.schema import Track, body_track
@@ -84,12 +83,6 @@ def refined_map(problem: Problem, truth: tuple[float, float]) -> Refined:
     maps = Mapper(problem, "refined")
     replicates = problem.study.calibration.refined_replicates
     return refine(maps, locate(maps, first, limits), limits, problem.refined_steps, replicates)
-
-
-def own_floor(problem: Problem, replicates: StepTable) -> float:
-    """Return the mean distance between the replicates of a setting."""
-    matrix = problem.statistic.matrix(replicates, replicates, threads=problem.like.threads)
-    return float(matrix[np.triu_indices(len(matrix), 1)].mean())
 
 
 def answer_of(

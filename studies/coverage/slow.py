@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from coverage import answer_of, own_floor, read, write
+from coverage import answer_of, read, write
 
 import driftwalk as dw
 from driftwalk.calibration.maps import Mapper
@@ -31,6 +31,7 @@ from driftwalk.calibration.refine import LOCATING_REPLICATES, locate, refined
 from driftwalk.calibration.region import simulated_steps
 from driftwalk.calibration.search import full_map
 from driftwalk.calibration.surface import lowest_point
+from driftwalk.comparison.statistic import distances_among
 from driftwalk.conditions import recorded_camera
 from driftwalk.schema import body_track
 
@@ -96,7 +97,7 @@ def calibrate_in_world(number: int, wanted: Any) -> None:
     shared = simulated_steps(trial, settings, stage="refined", replicates=count)
     shape = tuple(axis.size for axis in axes)
     each = [shared.rows(slice(k, k + count)) for k in range(0, shared.pairs.size, count)]
-    apart = np.array([own_floor(trial, one) for one in each]).reshape(shape)
+    apart = np.array([distances_among(trial.statistic, one).mean() for one in each]).reshape(shape)
     for k in missing:
         problem = problem_of(world, 100 * number + k, wanted.threads)
         # The simulated camera is the trial's, as its steps are shared.

@@ -14,4 +14,5 @@ def test_the_page_is_made_of_the_stored_lines(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     made = [STUDY / "all_models.py", STUDY / "results" / "compare.jsonl", page]
     subprocess.run([sys.executable, *map(str, made)], check=True)
-    assert page.read_text() == (ROOT / "docs/reference/models-on-recordings.md").read_text()
+    stored = ROOT / "docs" / "reference" / "models-on-recordings.md"
+    assert page.read_text(encoding="utf-8") == stored.read_text(encoding="utf-8")

@@ -12,8 +12,33 @@ from driftwalk.calibration.search import Progress
 Result = TypeVar("Result")
 
 
-class _LeftOff(Exception):
+class LeftOff(Exception):
     """Ends work whose result nobody waits for any more."""
+
+
+class Waiting:
+    """A block that waits for work of other threads, and ends it when an error or Ctrl-C ends it.
+
+    Examples
+    --------
+    >>> with Waiting() as waiting:
+    ...     waiting.go_on()
+    """
+
+    def __init__(self) -> None:
+        self._left_off = threading.Event()
+
+    def __enter__(self) -> Waiting:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is not None:
+            self._left_off.set()
+
+    def go_on(self) -> None:
+        """Raise `LeftOff` where nobody waits any more; the work calls it often."""
+        if self._left_off.is_set():
+            raise LeftOff
 
 
 def aside(work: Callable[[Progress], Result], meanwhile: Callable[[], object]) -> Result:
@@ -33,17 +58,7 @@ def aside(work: Callable[[Progress], Result], meanwhile: Callable[[], object]) -
     meanwhile
     42
     """
-    left_off = threading.Event()
-
-    def go_on(_done: int, _total: int) -> None:
-        if left_off.is_set():
-            raise _LeftOff
-
-    with ThreadPoolExecutor(1) as pool:
-        future = pool.submit(work, go_on)
-        try:
-            meanwhile()
-            return future.result()
-        except BaseException:
-            left_off.set()
-            raise
+    with ThreadPoolExecutor(1) as pool, Waiting() as waiting:
+        future = pool.submit(work, lambda _done, _total: waiting.go_on())
+        meanwhile()
+        return future.result()

@@ -12,12 +12,9 @@ from contextlib import contextmanager
 from dataclasses import replace
 from threading import Lock
 
+from driftwalk.calibration.aside import Waiting
 from driftwalk.calibration.models.contestants import Contestant
 from driftwalk.motion import BlockModel, ParticleModel
-
-
-class Left(Exception):
-    """Ends a search that nobody waits for any more."""
 
 
 def is_ours(entry: Contestant) -> bool:
@@ -70,6 +67,11 @@ class Together:
         Settings that each simulates at most.
     tell : callable
         Called with the settings done, in all, and the models under way.
+
+    Attributes
+    ----------
+    waiting : Waiting
+        The block that waits for the searches; they end with it.
     """
 
     def __init__(
@@ -79,7 +81,7 @@ class Together:
         self._done = [0] * len(names)
         self._under_way: set[int] = set()
         self._lock = Lock()
-        self._left = False
+        self.waiting = Waiting()
 
     def finished(self, indices: Sequence[int]) -> None:
         """Hear which models were searched before."""
@@ -88,8 +90,7 @@ class Together:
 
     def __call__(self, index: int, done: int) -> None:
         """Hear how many settings of a model are done; all of them when it is finished."""
-        if self._left:
-            raise Left
+        self.waiting.go_on()
         with self._lock:
             self._done[index] = done
             if done < self._costs[index]:
@@ -98,12 +99,3 @@ class Together:
                 self._under_way.discard(index)
             names = ", ".join(self._names[k] for k in sorted(self._under_way))
             self._tell(sum(self._done), names or self._names[index])
-
-    @contextmanager
-    def watched(self) -> Iterator[None]:
-        """End the searches that are under way when the block is left by an error."""
-        try:
-            yield
-        except BaseException:
-            self._left = True
-            raise

@@ -113,7 +113,7 @@ class Stages:
             if number >= asked.tied and any(one.usual for one in found.values()):
                 break
             found[index] = self._matched(number, index, judged[index].point, before)
-            before += self._total(_usual([self.work.entries[index]], self.worlds), 1)
+            before += self._total([self._usual(self.work.entries[index])], 1)
         return found
 
     def finish(self) -> None:
@@ -124,11 +124,8 @@ class Stages:
     def all_of(self) -> int:
         """The work there is: settings here, models where an executor has them."""
         able = [one for one in self.work.entries if one.ranges and not one.baseline]
-        costs = (
-            sorted(_usual(able, self.worlds))[-MOST_ASKED:]
-            if self.worlds > 1 and len(able) > 1
-            else []
-        )
+        asks = self.worlds > 1 and len(able) > 1
+        costs = sorted(map(self._usual, able))[-MOST_ASKED:] if asks else []
         return self._total([*self.work.costs(), *costs], len(self.work.entries) + len(costs))
 
     def _searched_here(self, units: Sequence[WorkUnit], kept: Store) -> Arrays:
@@ -148,7 +145,7 @@ class Stages:
         others = [k for k in missing if k not in ours]
         alone = replace(self.work, within=together)
         shared = replace(alone, entries=[sharing(one, len(ours)) for one in entries])
-        with together.watched():
+        with together.waiting:
             if others:
                 run_sweep(alone, [units[k] for k in others], store=kept)
             if ours:
@@ -169,8 +166,7 @@ class Stages:
         entry = self.work.entries[index]
 
         def say(done: int, most: int) -> None:
-            (share,) = _usual([entry], self.worlds)
-            inside = done * share // most if self.executor is None else 0
+            inside = done * self._usual(entry) // most if self.executor is None else 0
             self.tell(before + inside, self.all_of, f"summaries of {entry.model.name}")
 
         fingerprint = {
@@ -191,13 +187,12 @@ class Stages:
     def _store(self, name: str, fingerprint: dict[str, Any]) -> Store | None:
         return None if self.stores is None else self.stores(name, fingerprint)
 
+    def _usual(self, entry: Contestant) -> int:
+        """Return how many settings the summaries of a model usually need."""
+        return most_settings(len(entry.ranges), self.worlds) // USUAL_PART
+
     def _total(self, costs: Sequence[int], units: int) -> int:
         return sum(costs) if self.executor is None else units
-
-
-def _usual(entries: Sequence[Contestant], worlds: int) -> list[int]:
-    """Return how many settings the summaries of models usually need."""
-    return [most_settings(len(one.ranges), worlds) // USUAL_PART for one in entries]
 
 
 def _packed(judged: Judged, most: int, searches: int) -> dict[str, np.ndarray]:
