@@ -12,7 +12,7 @@ import numpy.typing as npt
 from driftwalk.calibration.estimation import Stores
 from driftwalk.calibration.problem import Axes, Problem
 from driftwalk.calibration.search import Map, Progress, add_replicates, run_map
-from driftwalk.core.run_stages import share_of_windows
+from driftwalk.core.run_stages import share_of_map, share_of_windows
 from driftwalk.motion import Details
 from driftwalk.sweep import Store
 
@@ -77,6 +77,7 @@ class Mapper:
             apart=self.apart,
             store=self._store(f"more-{self.stage}", found.axes, facts),
             executor=self.executor,
+            progress=self.progress,
         )
 
     def _store(self, name: str, axes: Axes, facts: dict[str, object]) -> Store | None:
@@ -84,6 +85,34 @@ class Mapper:
             return None
         fingerprint = {"axes": [axis.tolist() for axis in axes], **facts}
         return self.stores(f"{name}-{window_id(axes)}", fingerprint)
+
+
+class OnceThenMore:
+    """Progress through a map whose settings are simulated once, and then some of them more often.
+
+    Parameters
+    ----------
+    say : callable
+        Called with how much is done, of `PARTS`.
+
+    Examples
+    --------
+    >>> shares = []
+    >>> of_map = OnceThenMore(lambda done, total: shares.append(done / total))
+    >>> for done, total in [(800, 1600), (1600, 1600), (3, 6), (6, 6)]:
+    ...     of_map(done, total)
+    >>> shares
+    [0.45, 0.9, 0.95, 1.0]
+    """
+
+    def __init__(self, say: Progress) -> None:
+        self._say, self._once = say, 0.0
+
+    def __call__(self, done: int, total: int) -> None:
+        """Tell how much is done when so many settings of a sweep are."""
+        share, more = done / max(total, 1), self._once >= 1.0
+        self._once = 1.0 if more else share
+        self._say(round(PARTS * share_of_map(self._once, share if more else 0.0)), PARTS)
 
 
 class Narrowing:

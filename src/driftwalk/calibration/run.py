@@ -11,7 +11,7 @@ import numpy as np
 
 from driftwalk.calibration.aside import aside
 from driftwalk.calibration.estimation import Stores, Tell, calibrate_many
-from driftwalk.calibration.maps import Mapper, Narrowing, window_id
+from driftwalk.calibration.maps import Mapper, Narrowing, OnceThenMore, window_id
 from driftwalk.calibration.problem import Axes, Problem, limits_of, prepare_problem
 from driftwalk.calibration.quality import (
     FAR_ABOVE_FLOOR,
@@ -201,7 +201,7 @@ def calibrate(
             halves = aside(compare_halves, partial(meanwhile, finish(None)))
             meanwhile = None
         else:
-            halves = compare_halves()
+            halves = compare_halves(Narrowing(lambda done, total: say("validation", done, total)))
         say("validation", 1, 1)
     found = finish(halves)
     if meanwhile is not None:
@@ -288,7 +288,8 @@ class _Calibration:
     def _coarse_map(self, replicates: int) -> Map:
         """Return the coarse map: one replicate of every setting, all where the optimum could be."""
         axes = tuple(np.array(one.coordinates) for one in self.problem.parameters)
-        maps = self._maps("coarse", "all", self._progress("coarse"), apart=False)
+        progress = OnceThenMore(self._progress("coarse"))
+        maps = self._maps("coarse", "all", progress, apart=False)
         once = maps.full(axes, 1)
         self.floor = noise_floor_at(self.problem, once.point(once.cell_of_minimum()))
         return maps.more(once, once.mean <= once.mean.min() + self.floor, replicates)

@@ -142,6 +142,7 @@ def add_replicates(
     apart: bool = False,
     store: Store | None = None,
     executor: Executor | None = None,
+    progress: Progress | None = None,
 ) -> Map:
     """Simulate more replicates of some settings of a map; see `run_map`.
 
@@ -164,6 +165,8 @@ def add_replicates(
         As of the map.
     store, executor
         As of `run_map`.
+    progress : callable, optional
+        Called with the number of chosen settings that are finished, and of all of them.
     """
     before = found.distance.shape[-1]
     cells = np.flatnonzero(chosen)
@@ -175,7 +178,7 @@ def add_replicates(
     among = apart and replicates - before > 1
     function = _Cells(shared, stage, cells, before, replicates - before, details, among)
     units = _units(design, cells, _per_unit(problem, cells, replicates - before))
-    new = run_sweep(function, units, store=store, executor=executor)
+    new = run_sweep(function, units, store=store, executor=executor, progress=progress)
     old = {**found.arrays, "ks_distance": found.distance}
     joined = {
         name: _joined(name, values, new[name], cells, before / replicates, replicates)

@@ -39,6 +39,26 @@ CALIBRATION_STAGES: Final[dict[str, Stage]] = {
 }
 
 
+ONCE: Final = 0.9
+"""Share of a map's time until every setting has been simulated once."""
+
+
+def share_of_map(once: float, more: float) -> float:
+    """Return how much of a map is done: every setting once, then some settings more often.
+
+    Parameters
+    ----------
+    once, more : float
+        Share of each of the two sweeps that is done, from 0 to 1.
+
+    Examples
+    --------
+    >>> share_of_map(0.5, 0.0), share_of_map(1.0, 1.0)
+    (0.45, 1.0)
+    """
+    return ONCE * once + (1.0 - ONCE) * more
+
+
 def share_of_windows(done: Iterable[float]) -> float:
     """Return how much of a search through windows is done, whose number nobody knows before.
 

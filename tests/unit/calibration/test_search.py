@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import driftwalk as dw
+from driftwalk.calibration.maps import Mapper, OnceThenMore
 from driftwalk.calibration.problem import prepare_problem
 from driftwalk.calibration.region import simulated_steps
 from driftwalk.calibration.search import add_replicates, run_map
@@ -104,6 +105,18 @@ def test_more_replicates_are_those_of_a_map_that_has_them_everywhere(problem):
     np.testing.assert_allclose(found.mean[chosen], every.mean[chosen])
     np.testing.assert_allclose(found.standard_error[chosen], every.standard_error[chosen])
     assert np.isnan(found.standard_error[~chosen]).all()
+
+
+def test_a_map_and_its_more_replicates_say_how_far_they_are_and_never_go_back(problem):
+    shares = []
+    progress = OnceThenMore(lambda done, total: shares.append(done / total))
+    maps = Mapper(problem, "coarse", apart=False, progress=progress)
+    axes = tuple(np.array(values) for values in ([0.3, 0.5], [4e-4, 8e-4]))
+    once = maps.full(axes, 1)
+    assert (shares[0], shares[-1]) == (0.0, 0.9)
+    maps.more(once, np.array([[False, True], [True, False]]), 3)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
 
 
 def test_none_chosen_or_none_wanted_leaves_a_map_as_it_is(problem):

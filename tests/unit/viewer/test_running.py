@@ -95,7 +95,7 @@ def test_map_fills_as_units_are_finished(run: RunDirectory) -> None:
         value = dw.page.decode_array(the_map(source)["value"]).reshape(-1)
         np.testing.assert_allclose(value[:done], DISTANCE.mean(axis=1)[:done])
         assert np.isnan(value[done:]).all()
-        assert page(source)["state"]["progress"] == pytest.approx(0.26 * done / 12)
+        assert page(source)["state"]["progress"] == pytest.approx(0.26 * 0.9 * done / 12)
         assert source.look() == []
     error = DISTANCE.std(axis=1, ddof=1) / np.sqrt(2)
     np.testing.assert_allclose(
@@ -120,7 +120,7 @@ def test_a_page_opened_late_shows_what_is_there(run: RunDirectory) -> None:
     store = coarse(run)
     for unit in UNITS:
         store.write(unit, arrays(unit))
-    assert page(RunSource(run.path))["state"]["progress"] == pytest.approx(0.26)
+    assert page(RunSource(run.path))["state"]["progress"] == pytest.approx(0.26 * 0.9)
 
 
 def test_a_setting_without_numbers_is_as_far_as_can_be(run: RunDirectory) -> None:
@@ -154,6 +154,39 @@ def test_a_cell_that_is_not_there_is_empty(run: RunDirectory, row: int, column: 
     source.look()
     assert source._running is not None
     assert set(source._running.cell(row, column).values()) == {None}
+
+
+def test_replicates_that_some_settings_get_count_as_progress(run: RunDirectory) -> None:
+    store = coarse(run)
+    for unit in UNITS:
+        store.write(unit, arrays(unit))
+    axes = [DRAG, FORCE]
+    more = run.store(
+        "more-coarse-x", fingerprint={"axes": axes, "replicates": 4, "chosen": [3, 7, 8, 9]}
+    )
+    source = RunSource(run.path)
+    shown = the_map(source)["value"]
+    halves = grid(setting=np.arange(4)).units(2)
+    for share, unit in zip((0.95, 1.0), halves, strict=True):
+        more.write(unit, {"ks_distance": np.full((2, 2), 0.5)})
+        source.look()
+        assert page(source)["state"]["progress"] == pytest.approx(0.26 * share)
+        assert the_map(source)["value"] == shown
+    assert page(source)["state"]["words"] == "map: done, the next step is under way"
+    # Of the refined map they are like one more window: half of what was left.
+    fine = [[0.25, 0.3], [1e-4, 2e-4]]
+    refined = run.store("refined-x", fingerprint={"axes": fine, "replicates": 2})
+    for unit in grid(drag_coefficient=fine[0], force_std=fine[1]).units(2):
+        refined.write(unit, {"ks_distance": np.full((2, 2), 0.5)})
+    source.look()
+    assert page(source)["state"]["progress"] == pytest.approx(0.26 + 0.34 * 0.5)
+    rest = {"axes": fine, "replicates": 4, "chosen": [1, 2]}
+    run.store("more-refined-x", fingerprint=rest).write(
+        halves[0], {"ks_distance": np.full((2, 2), 0.5)}
+    )
+    source.look()
+    assert page(source)["state"]["progress"] == pytest.approx(0.26 + 0.34 * 0.75)
+    assert dw.page.decode_array(the_map(source)["refined"]["value"]).size == 4
 
 
 def test_refined_map_and_bootstrap(run: RunDirectory) -> None:
@@ -425,10 +458,10 @@ def test_a_killed_run_says_since_when_nothing_came(
     coarse(run).write(UNITS[0], arrays(UNITS[0]))
     age(run, duration_s)
     state = page(RunSource(run.path))["state"]
-    assert state["progress"] == pytest.approx(0.26 * 5 / 12)
-    assert state["words"].startswith("map: 42 %")
+    assert state["progress"] == pytest.approx(0.26 * 0.9 * 5 / 12)
+    assert state["words"].startswith("map: 38 %")
     if ago is None:
-        assert state["words"] == "map: 42 %"
+        assert state["words"] == "map: 38 %"
     else:
         assert f"the last result came {ago} (" in state["words"]
 
@@ -442,7 +475,7 @@ def test_a_run_that_goes_on_is_no_longer_quiet(run: RunDirectory) -> None:
     assert source.look() == []
     store.write(UNITS[1], arrays(UNITS[1]))
     assert [content["type"] for content in source.look()] == ["section", "state"]
-    assert page(source)["state"]["words"] == "map: 83 %"
+    assert page(source)["state"]["words"] == "map: 75 %"
 
 
 def test_a_finished_run_that_cannot_be_shown_is_read_once(
@@ -481,7 +514,7 @@ def test_a_one_by_one_search(run: RunDirectory, tmp_path: Path) -> None:
         unit = grid(drag_coefficient=[0.3], force_std=[2e-4]).units(5)[0]
         store.write(unit, arrays(unit))
         source.look()
-        assert page(source)["state"]["words"] == "map: done, the next step is under way"
+        assert page(source)["state"]["words"] == "map: 90 %"
         found = dw.page.decode_array(the_map(source)["value"])
         np.testing.assert_allclose(found, [[DISTANCE[0].mean()]], rtol=1e-6)
 

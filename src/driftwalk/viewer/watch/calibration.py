@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import DriftwalkError
-from driftwalk.core.run_stages import CALIBRATION_STAGES, share_of_windows
+from driftwalk.core.run_stages import CALIBRATION_STAGES, share_of_map, share_of_windows
 from driftwalk.page import bootstrap_section, encode_array, map_section, profile_sections
 from driftwalk.schema import Parameter
 from driftwalk.schema.calibration import BLOCK
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from driftwalk.viewer.watch.recording_steps import RecordedSteps
 
 DETAILS: Final = ("excerpt_x", "excerpt_y", "step_density", "ks_step_length", "ks_turning_angle")
+MORE: Final = "more-"
+"""Begins the name of a sweep that simulates some settings of a map again."""
 NO_DISTANCE: Final = 1.0
 """A setting that lost its numbers is as far as can be, as in the finished map."""
 
@@ -67,6 +69,28 @@ class SettingsMap:
             self.details[unit.start + row] = {name: kept[name][row] for name in kept}
 
 
+class MoreReplicates:
+    """How many of the settings that get more replicates have them.
+
+    Parameters
+    ----------
+    settings : int
+        The settings that get more.
+    """
+
+    def __init__(self, settings: int) -> None:
+        self._settings, self._finished = settings, 0
+
+    @property
+    def done(self) -> float:
+        """Share of the settings that have them."""
+        return self._finished / max(self._settings, 1)
+
+    def add(self, unit: FinishedUnit) -> None:
+        """Count the settings of a work unit."""
+        self._finished += unit.stop - unit.start
+
+
 class RunningCalibration:
     """A calibration under way.
 
@@ -89,6 +113,8 @@ class RunningCalibration:
         self._parameters = _parameters(specification, self._study)
         self._reader = RunReader(folder)
         self._maps: dict[str, SettingsMap] = {}
+        self._more: dict[str, MoreReplicates] = {}
+        """Settings of a map that are simulated more often, by the stage of the map."""
         self._bootstrap: list[FinishedUnit] = []
         self._loaded: xr.Dataset | None = None
         self._steps: RecordedSteps | None = None
@@ -101,15 +127,18 @@ class RunningCalibration:
         self._reader.look()
         changed = set()
         for name, reader in self._reader.sweeps.items():
-            stage = name.partition("-")[0]
+            of_map = name.removeprefix(MORE)
+            stage = of_map.partition("-")[0]
             if stage not in CALIBRATION_STAGES:
                 continue
             self._stage = stage
-            if stage != "bootstrap" and name not in self._maps:
+            if of_map != name and stage not in self._more:
+                self._more[stage] = MoreReplicates(len(reader.sweep["chosen"]))
+            elif of_map == name and stage != "bootstrap" and name not in self._maps:
                 self._maps[name] = SettingsMap(reader.sweep["axes"])
                 changed.add("map")
             if stage == "refined":
-                self._refined = name
+                self._refined = of_map
             for unit in reader.new_units():
                 changed.add("bootstrap" if stage == "bootstrap" else "map")
                 self._take(name, stage, unit)
@@ -153,7 +182,9 @@ class RunningCalibration:
         }
 
     def _take(self, name: str, stage: str, unit: FinishedUnit) -> None:
-        if stage == "bootstrap":
+        if name.startswith(MORE):
+            self._more[stage].add(unit)
+        elif stage == "bootstrap":
             self._bootstrap.append(unit)
         else:
             self._maps[name].add(unit)
@@ -162,10 +193,11 @@ class RunningCalibration:
         if self._stage == "bootstrap":
             done = sum(unit.stop - unit.start for unit in self._bootstrap)
             return done / max(self._study.calibration.bootstrap, 1)
+        more = self._more[self._stage].done if self._stage in self._more else 0.0
         if self._stage == "coarse":
-            return 0.0 if self._coarse is None else self._coarse.done
+            return 0.0 if self._coarse is None else share_of_map(self._coarse.done, more)
         refined = [one.done for name, one in self._maps.items() if name.startswith("refined-")]
-        return share_of_windows(refined)
+        return share_of_windows([*refined, more])
 
     @property
     def _coarse(self) -> SettingsMap | None:
