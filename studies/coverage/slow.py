@@ -4,34 +4,27 @@ On slow, regular orbits a recording visits few independent states, so two record
 parameters differ much, and by more the stronger the force. The worlds are drawn by a rule and never
 chosen again: the regular flows of `studies/likelihood/worlds.py`, at 1, 0.6 and 0.4 times their
 speed in turn, C_d uniform in 0.3 to 1 and sigma_F uniform in 0.1 to 0.35 mN. In each, driftwalk
-simulates recordings of 10 minutes at 10 Hz with 0.3 mm and 0.5 degrees of noise. A further one
-finds the window of the world, from half to one and a half times the true C_d and 0 to two and a
-half times the true sigma_F on; the simulated steps of that window, two of each setting, are shared
-by the recordings of a world. Flow and window are right, so this is about the statistics. Results
-go to ``slow.jsonl``, one line a recording; run again, it continues.
+simulates a recording of 10 minutes at 10 Hz with 0.3 mm and 0.5 degrees of noise, and calibrates it
+as in `coverage.py`, from a first window of half to one and a half times the true values on. Flow
+and window are right, so this is about the statistics. Results go to ``slow.jsonl``, one line a
+recording; run again, it continues.
 
-    python studies/coverage/slow.py --worlds 8 --recordings 5 --bootstrap 60
+    python studies/coverage/slow.py --worlds 80 --bootstrap 60
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from coverage import answer_of, read, write
+from coverage import answer_of, read, refined_map, write
 
 import driftwalk as dw
-from driftwalk.calibration.maps import Mapper
 from driftwalk.calibration.problem import Problem, prepare_problem
-from driftwalk.calibration.refine import LOCATING_REPLICATES, locate, refined
-from driftwalk.calibration.region import simulated_steps
-from driftwalk.calibration.search import full_map
 from driftwalk.calibration.surface import lowest_point
-from driftwalk.comparison.statistic import distances_among
 from driftwalk.conditions import recorded_camera
 from driftwalk.schema import body_track
 
@@ -43,22 +36,20 @@ from worlds import World, draw_flow
 SEED = 70_000
 SPEEDS = (1.0, 0.6, 0.4)
 MINUTES = 10.0
-LIMITS = ((0.05, 2.0), (0.0, 1.2e-3))
 RESULTS = Path(__file__).with_name("slow.jsonl")
-TRIAL = 99
-"""Number of the recording that finds the window of a world."""
 
 
 def main() -> None:
     """Calibrate what is not in the results yet, then print the coverage."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--worlds", type=int, default=8)
-    parser.add_argument("--recordings", type=int, default=5, help="per world")
+    parser.add_argument("--worlds", type=int, default=80)
     parser.add_argument("--bootstrap", type=int, default=60)
     parser.add_argument("--threads", type=int, default=None)
     wanted = parser.parse_args()
+    done = {line["world"] for line in read(RESULTS)}
     for number in range(wanted.worlds):
-        calibrate_in_world(number, wanted)
+        if number not in done:
+            write(RESULTS, calibrated(number, wanted.bootstrap, wanted.threads))
     report()
 
 
@@ -80,44 +71,23 @@ def problem_of(world: World, seed: int, threads: int | None) -> Problem:
     return prepare_problem(track, study, world.flow(), camera=camera, threads=threads)
 
 
-def calibrate_in_world(number: int, wanted: Any) -> None:
-    """Calibrate the recordings of a world that are not in the results yet."""
-    done = {(line["world"], line["recording"]) for line in read(RESULTS)}
-    missing = [k for k in range(wanted.recordings) if (number, k) not in done]
-    if not missing:
-        return
+def calibrated(number: int, bootstrap: int, threads: int | None) -> dict[str, Any]:
+    """Calibrate the recording of a world."""
     world = world_of(number)
     truth = world.drag_coefficient, world.force_std_N
-    trial = problem_of(world, 100 * number + TRIAL, wanted.threads)
-    first = (0.5 * truth[0], 1.5 * truth[0]), (0.0, 2.5 * truth[1])
-    located = locate(Mapper(trial, "refined"), first, LIMITS)
-    axes = located.map.axes
-    settings = [axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")]
-    count = LOCATING_REPLICATES
-    shared = simulated_steps(trial, settings, stage="refined", replicates=count)
-    shape = tuple(axis.size for axis in axes)
-    each = [shared.rows(slice(k, k + count)) for k in range(0, shared.pairs.size, count)]
-    apart = np.array([distances_among(trial.statistic, one).mean() for one in each]).reshape(shape)
-    for k in missing:
-        problem = problem_of(world, 100 * number + k, wanted.threads)
-        # The simulated camera is the trial's, as its steps are shared.
-        problem = replace(problem, like=trial.like)
-        matrix = problem.statistic.matrix(problem.reference.table, shared)
-        found = full_map(axes, matrix.reshape(*shape, count), {"apart": apart})
-        surface = refined(found, located.window, LIMITS)
-        smoother = surface.landscape.smoother
-        line = {
-            "world": number,
-            "recording": k,
-            "true_drag_coefficient": truth[0],
-            "true_force_std_N": truth[1],
-            # For comparison: nothing taken off the distance.
-            "force_std_of_mean_N": lowest_point(
-                smoother.axes, smoother.surface(found.mean.ravel())
-            )[1],
-            **answer_of(problem, surface, truth, wanted.bootstrap),
-        }
-        write(RESULTS, line)
+    problem = problem_of(world, 100 * number, threads)
+    found = refined_map(problem, truth)
+    smoother = found.landscape.smoother
+    return {
+        "world": number,
+        "true_drag_coefficient": truth[0],
+        "true_force_std_N": truth[1],
+        # For comparison: nothing taken off the distance.
+        "force_std_of_mean_N": lowest_point(
+            smoother.axes, smoother.surface(found.map.mean.ravel())
+        )[1],
+        **answer_of(problem, found, truth, bootstrap),
+    }
 
 
 def report() -> None:
