@@ -19,7 +19,8 @@ namespace {
 // Below this the tables of the radix sort cost more than a comparison sort.
 constexpr std::int64_t radix_from = 128;
 // What is sorted in one part, and the aim for the size of a part where there are many.
-constexpr std::int64_t largest_part = 1 << 18;
+constexpr int place_bits = 18;
+constexpr std::int64_t largest_part = 1 << place_bits;
 constexpr int part_bits = 10;
 // Fewer parts wait for each other's counters; more write to more pages of memory than a processor
 // keeps in view.
@@ -30,6 +31,7 @@ constexpr std::int64_t short_digits_to = 1 << 12;
 constexpr int short_digit = 8;
 constexpr int long_digit = 11;
 constexpr int lead_bits = most_deal_bits + 2 * long_digit;
+static_assert(long_digit + place_bits <= 32); // what goes through memory between the passes
 
 // Integers in the order of the numbers; -0.0 + 0.0 is +0.0.
 constexpr std::uint64_t sign_bit = 0x8000000000000000u;
@@ -292,8 +294,7 @@ private:
     }
   }
 
-  // (two digits << 32 | place) in the order of the digits; `shift`: the bits of the lead that
-  // follow them.
+  // Places in the order of two digits of the lead; `shift`: the bits of the lead that follow them.
   template <int digit_bits, class Source, class Lead>
   void radix_sort(const Source& source, std::int64_t n, const Lead& lead, int shift) {
     constexpr std::uint32_t digit_count = 1u << digit_bits;
@@ -310,15 +311,18 @@ private:
     }
     exclusive_sums(low, digit_count);
     exclusive_sums(high, digit_count);
-    std::uint64_t* const order = scratch_.order.data();
-    std::uint64_t* const middle = scratch_.middle.data();
+    // Short items: what is written all over memory should stay in the inner caches.
+    std::uint32_t* const order = scratch_.order.data();
+    std::uint32_t* const middle = scratch_.middle.data();
     for (std::int64_t i = 0; i < n; ++i) {
       const std::uint32_t digits = leads[i];
-      middle[low[digits & mask]++] = std::uint64_t(digits) << 32 | std::uint64_t(i);
+      const std::uint32_t second = digits >> digit_bits & mask;
+      middle[low[digits & mask]++] = second << place_bits | std::uint32_t(i);
     }
+    constexpr std::uint32_t place_mask = (1u << place_bits) - 1;
     for (std::int64_t i = 0; i < n; ++i) {
-      const std::uint64_t item = middle[i];
-      order[high[item >> (32 + digit_bits) & mask]++] = item;
+      const std::uint32_t item = middle[i];
+      order[high[item >> place_bits]++] = item & place_mask;
     }
   }
 

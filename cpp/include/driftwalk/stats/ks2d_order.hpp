@@ -32,8 +32,8 @@ struct KsKeyedPlace {
 struct KsSortScratch {
   KsSortedAxis dealt;
   std::vector<std::uint32_t> leads;
-  std::vector<std::uint64_t> order;
-  std::vector<std::uint64_t> middle;
+  std::vector<std::uint32_t> order;
+  std::vector<std::uint32_t> middle;
   std::vector<KsKeyedPlace> items;
   std::vector<double> y_by_x;
 };
