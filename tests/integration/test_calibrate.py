@@ -232,6 +232,15 @@ def test_without_a_given_flow_it_is_extracted_from_the_recording():
     assert own.attrs["simulated_recording"] == "yes"
 
 
+def test_a_block_that_its_own_flow_does_not_explain_is_told_what_to_do():
+    study = apply_overrides(dw.Study(), {**SMALL, "calibration.bootstrap": 10})
+    recording = dw.tank30_recording().isel(time=slice(0, 1000))
+    own, true = (dw.calibrate(recording, study, flow=flow) for flow in (None, dw.tank30_flow()))
+    assert not bool(own["explained"])
+    assert any("driftwalk fit" in text for text in own["warning"].values)
+    assert not any("driftwalk fit" in text for text in true["warning"].values)
+
+
 @pytest.mark.slow
 def test_a_minute_says_how_little_it_tells():
     """The window grows until the settings that a minute does not exclude end within it.

@@ -12,6 +12,7 @@ import numpy as np
 from driftwalk.calibration.aside import aside
 from driftwalk.calibration.estimation import Stores, Tell, calibrate_many
 from driftwalk.calibration.maps import Mapper, Narrowing, OnceThenMore, window_id
+from driftwalk.calibration.own_flow import own_flow_warning
 from driftwalk.calibration.problem import Axes, Problem, limits_of, prepare_problem
 from driftwalk.calibration.quality import (
     FAR_ABOVE_FLOOR,
@@ -185,7 +186,8 @@ def calibrate(
     of_wall = wall_warning(track, chosen) if isinstance(searched, BlockModel) else None
     steadiness = steadiness_of(problem)
     of_time = None if steadiness is None else steadiness.warning
-    result.warnings += [text for text in (of_wall, of_time) if text is not None]
+    of_flow = own_flow_warning(searched, result.quality) if flow is None else None
+    result.warnings += [text for text in (of_flow, of_wall, of_time) if text is not None]
 
     def finish(halves: Halves | None) -> xr.Dataset:
         return _finish(result, halves, steadiness, recording, problem)
