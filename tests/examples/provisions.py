@@ -128,6 +128,13 @@ def _calibrated(folder: Path) -> Names:
     return {}
 
 
+def _calibrated_twice(folder: Path) -> Names:
+    """Provide ``runs/one`` and ``runs/two``: two such calibrations."""
+    for name in ("one", "two"):
+        write_finished_run(folder / "runs" / name)
+    return {}
+
+
 def _with_intervals(folder: Path) -> Names:
     """Provide ``run/calibration.nc`` with the intervals of a small bootstrap."""
     study = dw.load_study(folder / "search.toml")
@@ -520,6 +527,8 @@ PAGES: dict[str, Page] = {
         slow=True,
     ),
     "docs/how-to/use-a-cluster.md": Page(
+        provide=_calibrated_twice,
+        holds=("table.shape == (2, 2)", "'drag_coefficient' in table"),
         not_run={"pip install *": INSTALLS, "driftwalk *": "needs workers; has a test"},
     ),
     "docs/how-to/take-the-model-to-your-simulator.md": Page(

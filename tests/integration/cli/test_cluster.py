@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,13 +17,15 @@ from pathlib import Path
 
 import pytest
 import slurm
-from command_line import FLOW, NO_FIGURES, Done, apart, end, refusal, start
+from command_line import FLOW, GRID, NO_FIGURES, Done, apart, end, refusal, start
 
+import driftwalk as dw
 from driftwalk.viewer.watch.run import RunSource
 
 pytestmark = pytest.mark.slow
 pytest.importorskip("distributed", reason="workers need driftwalk[cluster]")
 
+ROOT = Path(__file__).resolve().parents[3]
 # Some seconds of computing in 20 or so units, without figures and film.
 ASSEMBLE = ("assemble", "--flow", FLOW, "--runs", 1600, "--film", "none")
 
@@ -271,6 +274,35 @@ def test_jobs_of_a_real_slurm_give_the_same_bytes(
         found = end(client)
     done(found)
     same_results(at_home, tmp_path / "run")
+
+
+def test_the_array_of_jobs_on_the_page_calibrates_every_recording(
+    real_slurm: Mapping[str, str], tmp_path: Path
+) -> None:
+    page = (ROOT / "docs/how-to/use-a-cluster.md").read_text(encoding="utf-8")
+    [script] = [text for text in re.findall(r"```text\n(.*?)```", page, re.S) if "--array" in text]
+    quick = "--study grid.toml --flow flow.csv"
+    for old, new in {
+        "--array=0-99": "--array=0-1",
+        "--cpus-per-task=2": "--cpus-per-task=1",
+        "~/driftwalk/bin/driftwalk calibrate": f"{sys.executable} -m driftwalk calibrate {quick}",
+    }.items():
+        assert old in script
+        script = script.replace(old, new)
+    (tmp_path / "many.sh").write_text(script, encoding="utf-8")
+    shutil.copy(FLOW, tmp_path / "flow.csv")
+    (tmp_path / "grid.toml").write_text(GRID, encoding="utf-8")
+    (tmp_path / "recordings").mkdir()
+    for name, part in {"first": slice(0, 1200), "with a space": slice(1200, 2400)}.items():
+        recording = dw.tank30_recording().isel(time=part)
+        recording.to_netcdf(tmp_path / "recordings" / f"{name}.nc")
+    subprocess.run(["sbatch", "many.sh"], cwd=tmp_path, env=real_slurm, check=True)
+    late = time.monotonic() + 120.0
+    while subprocess.check_output(["squeue", "-h"], env=real_slurm):
+        assert time.monotonic() < late, "the jobs have not ended"
+        time.sleep(0.2)
+    found = sorted(path.parent.name for path in tmp_path.glob("runs/*/calibration.nc"))
+    assert found == ["first", "with a space"]
 
 
 def test_jobs_whose_time_is_over_are_asked_for_again(
