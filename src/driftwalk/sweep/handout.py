@@ -34,6 +34,9 @@ class Handout(Protocol):
     def result(self, future: UnitFuture, /) -> Found:
         """Return what a unit gave, or raise what it failed by."""
 
+    def lost(self, future: UnitFuture, /) -> bool:
+        """Return whether a unit was with several workers that ended, so that nobody takes it."""
+
     @property
     def width(self) -> int:
         """How many units are handed out at a time."""
@@ -65,6 +68,12 @@ def threads_of_unit(threads: int | None, executor: Executor | None) -> int | Non
     (None, 1)
     """
     return 1 if threads is None and executor is not None else threads
+
+
+def is_lost(error: BaseException | None) -> bool:
+    """Return whether an error says that every worker that had a unit has ended."""
+    # By its name: Dask is not imported where it is not used.
+    return type(error).__name__ == "KilledWorker"
 
 
 def handout(executor: Executor, function: UnitFunction) -> Handout:
@@ -100,6 +109,9 @@ class _OnExecutor:
         found: Found = future.result()
         return found
 
+    def lost(self, _future: UnitFuture, /) -> bool:
+        return False
+
     def slow(self, _age_s: float, /) -> bool:
         return False
 
@@ -130,6 +142,9 @@ class _OnWorkers:
         self._seconds.append(answer.seconds)
         found: Found = answer.arrays
         return found
+
+    def lost(self, future: UnitFuture, /) -> bool:
+        return not future.cancelled() and is_lost(future.exception())
 
     def slow(self, age_s: float, /) -> bool:
         if not self._seconds:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from driftwalk.core.errors import ClusterError, DriftwalkError, InputError
 from driftwalk.core.shards import Arrays
 from driftwalk.sweep.design import WorkUnit
-from driftwalk.sweep.handout import Handout, UnitFuture, handout
+from driftwalk.sweep.handout import FOR_EACH_WORKER, Handout, UnitFuture, handout, is_lost
 from driftwalk.sweep.store import MemoryStore, Store, collect
 from driftwalk.sweep.workers import UnitFunction
 
@@ -24,6 +24,9 @@ Progress = Callable[[int, int], None]
 
 LOOK_S: Final = 1.0
 """How often units under way are looked at, where none comes back [s]."""
+MOST_SUSPECTS: Final = 2 * FOR_EACH_WORKER
+"""Units that were with several workers that ended. One that ends its workers makes suspects of as
+many as a worker holds, so beyond this there are more, or the workers end for another reason."""
 
 
 class SweepError(RuntimeError):
@@ -107,7 +110,7 @@ def run_sweep(
         for unit in missing:
             _keep(unit, partial(function, unit), kept, tally)
     else:
-        _run_in(executor, function, missing, kept, tally)
+        _Elsewhere(handout(executor, function), missing, kept, tally).run()
     return collect(kept, units)
 
 
@@ -134,54 +137,6 @@ class _Tally:
             self._progress(self._done, self._total)
 
 
-def _run_in(
-    executor: Executor,
-    function: UnitFunction,
-    missing: Sequence[WorkUnit],
-    store: Store,
-    tally: _Tally,
-) -> None:
-    """Hand out units in a window, keep what comes back, and hand out slow ones again."""
-    hand = handout(executor, function)
-    queue = deque(missing)
-    waiting: dict[UnitFuture, _Handed] = {}
-    left = {unit.id for unit in missing}
-
-    def hand_out(unit: WorkUnit, again: bool = False) -> None:
-        waiting[hand.submit(unit)] = _Handed(unit, time.monotonic(), again)
-
-    def keep(unit: WorkUnit, future: UnitFuture) -> None:
-        if unit.id not in left:
-            # It was handed out twice, and the other answer came first.
-            return
-        # Before: what is told of progress names the units.
-        hand.tell(tally.units_done + 1, tally.units)
-        _keep(unit, partial(hand.result, future), store, tally)
-        left.discard(unit.id)
-
-    hand.tell(tally.units_done, tally.units)
-    try:
-        while left:
-            while queue and len(waiting) < hand.width:
-                hand_out(queue.popleft())
-            done, _ = wait(waiting, timeout=LOOK_S, return_when=FIRST_COMPLETED)
-            for future in done:
-                keep(waiting.pop(future).unit, future)
-            if not queue:
-                for unit in _slow_ones(hand, list(waiting.values()), left):
-                    hand_out(unit, again=True)
-                    hand.again()
-        _cancel_rest(waiting)
-    except SweepError:
-        _keep_rest(waiting, as_completed(_cancel_rest(waiting)), keep)
-        raise
-    except BaseException:
-        # Ctrl-C and a full disk: nothing is waited for.
-        done_by_now = [future for future in _cancel_rest(waiting) if future.done()]
-        _keep_rest(waiting, done_by_now, keep)
-        raise
-
-
 class _Handed(NamedTuple):
     """A unit that was handed out."""
 
@@ -190,33 +145,105 @@ class _Handed(NamedTuple):
     """When [s]."""
     again: bool
     """Whether it is under way elsewhere, too."""
+    alone: bool
+    """Whether no other unit is under way."""
 
 
-def _slow_ones(hand: Handout, waiting: Sequence[_Handed], left: set[str]) -> list[WorkUnit]:
-    """Return units that take long, and are under way once: workers with nothing to do take them."""
-    now = time.monotonic()
-    twice = {one.unit.id for one in waiting if one.again}
-    return [
-        one.unit
-        for one in waiting
-        if one.unit.id in left and one.unit.id not in twice and hand.slow(now - one.since)
-    ]
+class _Elsewhere:
+    """Hands out units in a window, keeps what comes back, and hands out slow ones again.
 
+    A worker holds a few units, and when it ends all of them are suspected. So those that were with
+    too many such workers are handed out once more when all others are done, one at a time: one that
+    ends its workers then is to blame.
+    """
 
-def _cancel_rest(waiting: Iterable[UnitFuture]) -> list[UnitFuture]:
-    """Cancel what has not begun; return what has."""
-    return [future for future in waiting if not future.cancel()]
+    def __init__(
+        self, hand: Handout, missing: Sequence[WorkUnit], store: Store, tally: _Tally
+    ) -> None:
+        self._hand, self._store, self._tally = hand, store, tally
+        self._queue = deque(missing)
+        self._suspects: deque[WorkUnit] = deque()
+        self._waiting: dict[UnitFuture, _Handed] = {}
+        self._left = {unit.id for unit in missing}
 
+    def run(self) -> None:
+        """Have all units computed."""
+        self._hand.tell(self._tally.units_done, self._tally.units)
+        try:
+            while self._left:
+                self._hand_out_some()
+                done, _ = wait(self._waiting, timeout=LOOK_S, return_when=FIRST_COMPLETED)
+                for future in done:
+                    self._take(self._waiting.pop(future), future)
+                if not self._queue:
+                    self._hand_out_slow_ones()
+            self._cancel_rest()
+        except SweepError:
+            self._keep_rest(as_completed(self._cancel_rest()))
+            raise
+        except BaseException:
+            # Ctrl-C and a full disk: nothing is waited for.
+            self._keep_rest([future for future in self._cancel_rest() if future.done()])
+            raise
 
-def _keep_rest(
-    waiting: Mapping[UnitFuture, _Handed],
-    futures: Iterable[UnitFuture],
-    keep: Callable[[WorkUnit, UnitFuture], None],
-) -> None:
-    for future in futures:
-        # The error that is under way is the one to report.
-        with contextlib.suppress(SweepError, DriftwalkError):
-            keep(waiting[future].unit, future)
+    def _hand_out(self, unit: WorkUnit, *, again: bool = False, alone: bool = False) -> None:
+        self._waiting[self._hand.submit(unit)] = _Handed(unit, time.monotonic(), again, alone)
+
+    def _hand_out_some(self) -> None:
+        """Fill the window; hand out a suspect where no other unit is left."""
+        while self._queue and len(self._waiting) < self._hand.width:
+            self._hand_out(self._queue.popleft())
+        if not self._waiting:
+            unit = self._suspects.popleft()
+            if unit.id in self._left:
+                self._hand_out(unit, alone=True)
+
+    def _hand_out_slow_ones(self) -> None:
+        """Hand out again what takes long and is under way once, to workers with nothing to do."""
+        now = time.monotonic()
+        handed = list(self._waiting.values())
+        once = {one.unit.id for one in handed} - {one.unit.id for one in handed if one.again}
+        for one in handed:
+            known = one.unit.id in self._left and one.unit.id in once
+            if known and not one.alone and self._hand.slow(now - one.since):
+                self._hand_out(one.unit, again=True)
+                self._hand.again()
+
+    def _take(self, handed: _Handed, future: UnitFuture) -> None:
+        """Keep what a unit gave, or suspect it."""
+        unit = handed.unit
+        if unit.id not in self._left:
+            # It was handed out twice, and the other answer came first.
+            return
+        if self._hand.lost(future) and not handed.alone:
+            self._suspect(unit)
+            return
+        # Before: what is told of progress names the units.
+        self._hand.tell(self._tally.units_done + 1, self._tally.units)
+        _keep(unit, partial(self._hand.result, future), self._store, self._tally)
+        self._left.discard(unit.id)
+
+    def _suspect(self, unit: WorkUnit) -> None:
+        if unit not in self._suspects:
+            self._suspects.append(unit)
+        if len(self._suspects) > MOST_SUSPECTS:
+            first = self._suspects[0].id
+            raise SweepError(
+                f"{len(self._suspects)} units, the first of which is {first}, were each with "
+                "several workers that ended (too little memory, or jobs that were cancelled): "
+                "their logs say why; finished units are kept",
+                unit_id=first,
+            )
+
+    def _cancel_rest(self) -> list[UnitFuture]:
+        """Cancel what has not begun; return what has."""
+        return [future for future in self._waiting if not future.cancel()]
+
+    def _keep_rest(self, futures: Iterable[UnitFuture]) -> None:
+        for future in futures:
+            # The error that is under way is the one to report.
+            with contextlib.suppress(SweepError, DriftwalkError):
+                self._take(self._waiting[future], future)
 
 
 def _keep(
@@ -247,7 +274,7 @@ def _keep(
 
 def _what_befell(error: Exception) -> str:
     """Return what a unit failed by."""
-    if type(error).__name__ == "KilledWorker":
+    if is_lost(error):
         deaths = int(getattr(error, "allowed_failures", 0)) + 1
         return (
             f"ended all {deaths} workers that it met (too little memory, or a crash): their logs "

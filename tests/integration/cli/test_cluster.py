@@ -139,8 +139,8 @@ def test_a_unit_that_kills_every_worker_is_named_and_the_rest_kept(tmp_path: Pat
     said = sweep("fatal", tmp_path / "fatal")
     assert said.startswith("ERROR unit 00000003-00000004")
     assert "ended all 4 workers" in said
-    kept = len(shards_of(tmp_path / "fatal"))
-    assert 3 <= kept < 16
+    # Two others at most were with workers that ended as often, and were still to be tried alone.
+    assert 13 <= len(shards_of(tmp_path / "fatal")) < 16
     # At home, where nothing kills it, the sweep goes on from there.
     assert "SUM 1240.0" in sweep("quiet", tmp_path / "fatal")
 
