@@ -76,7 +76,10 @@ def test_the_truth_of_a_synthetic_recording_is_found(found):
     )
     assert found["distance_to_floor_ratio"] < 1.5
     assert bool(found["explained"])
-    assert found["warning"].values.tolist() == []
+    # In so few and coarse steps what they do not exclude of sigma_F goes on beyond the search.
+    assert all(
+        "force_std reaches the end of the search" in text for text in found["warning"].values
+    )
 
 
 @pytest.mark.false_alarm(2e-3)
@@ -239,6 +242,21 @@ def test_a_block_that_its_own_flow_does_not_explain_is_told_what_to_do():
     assert not bool(own["explained"])
     assert any("driftwalk fit" in text for text in own["warning"].values)
     assert not any("driftwalk fit" in text for text in true["warning"].values)
+
+
+def test_an_interval_that_the_search_cuts_off_is_warned_of():
+    """A minute leaves sigma_F open from 0.2 to 0.8 mN; the truth, 0.6 mN, is within."""
+    study = apply_overrides(
+        dw.Study(), {**SMALL, "calibration.force_std_max_N": 0.8e-3, "calibration.bootstrap": 20}
+    )
+    found = dw.calibrate(synthetic_recording(60.0), study, flow=dw.tank30_flow())
+    np.testing.assert_allclose(found["interval"].sel(parameter="force_std"), [0.2e-3, 0.8e-3])
+    told = [text for text in found["warning"].values if "end of the search" in text]
+    assert told == [
+        f"the interval of the force_std reaches the end of the search ({end} N): extend the grid "
+        f"if {which} values are possible"
+        for end, which in (("0.0002", "smaller"), ("0.0008", "larger"))
+    ]
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from concurrent.futures import Executor
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.calibration.aside import aside
+from driftwalk.calibration.ends import End, interval_warnings, optimum_warnings
 from driftwalk.calibration.estimation import Stores, Tell, calibrate_many
 from driftwalk.calibration.maps import Mapper, Narrowing, OnceThenMore, window_id
 from driftwalk.calibration.own_flow import own_flow_warning
-from driftwalk.calibration.problem import Axes, Problem, limits_of, prepare_problem
+from driftwalk.calibration.problem import Problem, limits_of, prepare_problem
 from driftwalk.calibration.quality import (
     FAR_ABOVE_FLOOR,
     Halves,
@@ -57,8 +58,6 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
     from driftwalk.sweep import Store
-
-WIDE_SHARE = 0.05
 
 FlowSource = Callable[[Track], "xr.Dataset | None"]
 
@@ -282,9 +281,10 @@ class _Calibration:
         self.refined: Refined | None = None
         if search.refine == "auto":
             self._refine(search.refined_replicates)
-        self._check_edges()
+        at_ends = optimum_warnings(self.problem.parameters, self.coarse.axes, self.optimum.point)
+        self.warnings += at_ends.values()
         if search.bootstrap >= 2 and self.refined is not None:
-            self._bootstrap(self.refined, search.bootstrap)
+            self._bootstrap(self.refined, search.bootstrap, at_ends)
         return self
 
     def _coarse_map(self, replicates: int) -> Map:
@@ -344,20 +344,7 @@ class _Calibration:
             "wider than stated"
         )
 
-    def _check_edges(self) -> None:
-        for parameter, axis, value in zip(
-            self.problem.parameters, self.coarse.axes, self.optimum.point, strict=True
-        ):
-            spacing = np.diff(axis).min() if axis.size > 1 else 0.0
-            for edge in {axis[0], axis[-1]}:
-                if abs(value - edge) <= 0.5 * spacing:
-                    found, end = (float(parameter.to_value(one)) for one in (value, edge))
-                    self.warnings.append(
-                        f"the optimum lies at the edge of the grid: {parameter.label} = {found:g} "
-                        f"with the grid ending at {end:g}; extend the grid, or doubt the model"
-                    )
-
-    def _bootstrap(self, refined: Refined, count: int) -> None:
+    def _bootstrap(self, refined: Refined, count: int, known: Container[End]) -> None:
         surface = build_surface(self.problem, refined)
         landscape = refined.landscape
         fingerprint = {
@@ -385,40 +372,22 @@ class _Calibration:
             confidence=self.problem.study.calibration.confidence,
             stretch=self.quality.stretch,
         )
-        self._check_window(refined.map.axes, surface.axes)
+        self.warnings += interval_warnings(
+            self.problem.parameters,
+            self.region.intervals,
+            self.bootstrap.estimates,
+            search=self.coarse.axes,
+            window=refined.map.axes,
+            lattice=surface.axes,
+            steps=self._steps,
+            known=known,
+        )
         if not self.quality.explained:
             self.warnings.append(
                 f"the model does not explain the recording: D = {self.quality.distance:.3f} at the "
                 f"optimum is {self.quality.distance / self.quality.floor:.1f} times the noise "
                 f"floor {self.quality.floor:.3f}; the parameters are the best of bad fits"
             )
-
-    def _check_window(self, refined: Axes, axes: Axes) -> None:
-        """Warn where what could be the truth goes on beyond the settings that were simulated.
-
-        `axes` are those on which the bootstrap's recordings were estimated.
-        """
-        found, region = self.bootstrap, self.region
-        assert found is not None
-        assert region is not None
-        for index, parameter in enumerate(self.problem.parameters):
-            axis, window, limits = axes[index], refined[index], self.coarse.axes[index]
-            step = float(np.diff(window).min()) if window.size > 1 else self._steps[index]
-            for side in (0, -1):
-                estimated_there = _close(found.estimates[:, index], axis[side], step)
-                crowded = np.mean(estimated_there) > WIDE_SHARE
-                cut = _close(region.intervals[index][side], window[side], step)
-                if (crowded or cut) and not _close(window[side], limits[side], step):
-                    end = float(parameter.to_value(window[side]))
-                    self.warnings.append(
-                        f"the interval of the {parameter.label} reaches the end of the refined "
-                        f"grid ({end:g}): it is wider than stated"
-                    )
-
-
-def _close(values: Any, end: float, step: float) -> Any:
-    """Return whether coordinates are the same but for rounding, on the scale of a grid's step."""
-    return np.abs(values - end) <= min(1e-8 + 1e-5 * abs(end), 1e-3 * step)
 
 
 def _halves(
