@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Final
@@ -12,12 +13,12 @@ import numpy.typing as npt
 from driftwalk.calibration.estimation import Stores
 from driftwalk.calibration.problem import Axes, Problem
 from driftwalk.calibration.search import Map, Progress, add_replicates, run_map
-from driftwalk.core.run_stages import share_of_map, share_of_windows
+from driftwalk.core.run_stages import MORE
 from driftwalk.motion import Details
 from driftwalk.sweep import Store
 
 PARTS: Final = 1000
-"""Of which progress through windows is counted."""
+"""Of which progress through sweeps is counted."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ class Mapper:
             replicates=replicates,
             details=self.details,
             apart=self.apart,
-            store=self._store(f"more-{self.stage}", found.axes, facts),
+            store=self._store(f"{MORE}{self.stage}", found.axes, facts),
             executor=self.executor,
             progress=self.progress,
         )
@@ -87,58 +88,34 @@ class Mapper:
         return self.stores(f"{name}-{window_id(axes)}", fingerprint)
 
 
-class OnceThenMore:
-    """Progress through a map whose settings are simulated once, and then some of them more often.
+class InTurn:
+    """Progress through sweeps that follow each other.
 
     Parameters
     ----------
     say : callable
         Called with how much is done, of `PARTS`.
+    share_of : callable
+        Returns how much of all is done, from the share of each sweep that has begun: `share_of_map`
+        or `share_of_windows`.
 
     Examples
     --------
+    >>> from driftwalk.core.run_stages import share_of_windows
     >>> shares = []
-    >>> of_map = OnceThenMore(lambda done, total: shares.append(done / total))
-    >>> for done, total in [(800, 1600), (1600, 1600), (3, 6), (6, 6)]:
-    ...     of_map(done, total)
-    >>> shares
-    [0.45, 0.9, 0.95, 1.0]
-    """
-
-    def __init__(self, say: Progress) -> None:
-        self._say, self._once = say, 0.0
-
-    def __call__(self, done: int, total: int) -> None:
-        """Tell how much is done when so many settings of a sweep are."""
-        share, more = done / max(total, 1), self._once >= 1.0
-        self._once = 1.0 if more else share
-        self._say(round(PARTS * share_of_map(self._once, share if more else 0.0)), PARTS)
-
-
-class Narrowing:
-    """Progress through windows of which nobody knows how many there will be.
-
-    Parameters
-    ----------
-    say : callable
-        Called with how much is done, of `PARTS`.
-
-    Examples
-    --------
-    >>> shares = []
-    >>> narrowing = Narrowing(lambda done, total: shares.append(done / total))
+    >>> narrowing = InTurn(lambda done, total: shares.append(done / total), share_of_windows)
     >>> for done in (5, 10, 5, 10):
     ...     narrowing(done, 10)
     >>> shares
     [0.25, 0.5, 0.625, 0.75]
     """
 
-    def __init__(self, say: Progress) -> None:
-        self._say, self._finished = say, 0
+    def __init__(self, say: Progress, share_of: Callable[[Sequence[float]], float]) -> None:
+        self._say, self._share_of, self._finished = say, share_of, 0
 
     def __call__(self, done: int, total: int) -> None:
-        """Tell how much is done when so many settings of a window are."""
-        share = share_of_windows([*[1.0] * self._finished, done / max(total, 1)])
+        """Tell how much is done when so many settings of a sweep are."""
+        share = self._share_of([*[1.0] * self._finished, done / max(total, 1)])
         self._finished += done >= total
         self._say(round(PARTS * share), PARTS)
 

@@ -12,7 +12,7 @@ import numpy as np
 from driftwalk.calibration.aside import aside
 from driftwalk.calibration.ends import End, interval_warnings, optimum_warnings
 from driftwalk.calibration.estimation import Stores, Tell, calibrate_many
-from driftwalk.calibration.maps import Mapper, Narrowing, OnceThenMore, window_id
+from driftwalk.calibration.maps import InTurn, Mapper, window_id
 from driftwalk.calibration.own_flow import own_flow_warning
 from driftwalk.calibration.problem import Problem, limits_of, prepare_problem
 from driftwalk.calibration.quality import (
@@ -46,7 +46,7 @@ from driftwalk.calibration.wall import wall_warning
 from driftwalk.comparison import Statistic, StepDistance
 from driftwalk.conditions import neighbours_of, recorded_camera, study_in_arena
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.core.run_stages import tell_nobody
+from driftwalk.core.run_stages import share_of_map, share_of_windows, tell_nobody
 from driftwalk.motion import BlockModel, Details, MotionModel
 from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.protocol import ScoresItself
@@ -202,7 +202,7 @@ def calibrate(
             halves = aside(compare_halves, partial(meanwhile, finish(None)))
             meanwhile = None
         else:
-            halves = compare_halves(Narrowing(lambda done, total: say("validation", done, total)))
+            halves = compare_halves(InTurn(partial(say, "validation"), share_of_windows))
         say("validation", 1, 1)
     found = finish(halves)
     if meanwhile is not None:
@@ -290,7 +290,7 @@ class _Calibration:
     def _coarse_map(self, replicates: int) -> Map:
         """Return the coarse map: one replicate of every setting, all where the optimum could be."""
         axes = tuple(np.array(one.coordinates) for one in self.problem.parameters)
-        progress = OnceThenMore(self._progress("coarse"))
+        progress = InTurn(self._progress("coarse"), share_of_map)
         maps = self._maps("coarse", "all", progress, apart=False)
         once = maps.full(axes, 1)
         self.floor = noise_floor_at(self.problem, once.point(once.cell_of_minimum()))
@@ -308,7 +308,7 @@ class _Calibration:
         raise InputError(no_numbers(self.problem.model.name, setting))
 
     def _progress(self, stage: str) -> Progress:
-        return lambda done, total: self._say(stage, done, total)
+        return partial(self._say, stage)
 
     def _maps(self, stage: str, details: Details, progress: Progress, *, apart: bool) -> Mapper:
         return Mapper(
@@ -323,7 +323,7 @@ class _Calibration:
 
     def _refine(self, wanted: int) -> None:
         limits = limits_of(self.problem)
-        narrowing = Narrowing(self._progress("refined"))
+        narrowing = InTurn(self._progress("refined"), share_of_windows)
         maps = self._maps("refined", "none", narrowing, apart=True)
         located = locate(maps, first_window(self.coarse, self.floor), limits)
         self.refined = refine(maps, located, limits, self._steps, wanted)

@@ -39,23 +39,26 @@ CALIBRATION_STAGES: Final[dict[str, Stage]] = {
 }
 
 
+MORE: Final = "more-"
+"""Stands before the name of a map where some of its settings are simulated again."""
 ONCE: Final = 0.9
 """Share of a map's time until every setting has been simulated once."""
 
 
-def share_of_map(once: float, more: float) -> float:
+def share_of_map(done: Iterable[float]) -> float:
     """Return how much of a map is done: every setting once, then some settings more often.
 
     Parameters
     ----------
-    once, more : float
-        Share of each of the two sweeps that is done, from 0 to 1.
+    done : iterable of float
+        Share of each of the two sweeps that is done, from 0 to 1; the second may be missing.
 
     Examples
     --------
-    >>> share_of_map(0.5, 0.0), share_of_map(1.0, 1.0)
+    >>> share_of_map([0.5]), share_of_map([1.0, 1.0])
     (0.45, 1.0)
     """
+    once, more = (*done, 0.0)[:2]
     return ONCE * once + (1.0 - ONCE) * more
 
 

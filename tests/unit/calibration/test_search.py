@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 import driftwalk as dw
-from driftwalk.calibration.maps import Mapper, OnceThenMore
+from driftwalk.calibration.maps import InTurn, Mapper
 from driftwalk.calibration.problem import prepare_problem
 from driftwalk.calibration.region import simulated_steps
 from driftwalk.calibration.search import add_replicates, run_map
 from driftwalk.comparison import apply_steps
 from driftwalk.conditions import recorded_camera
 from driftwalk.core.errors import InputError
+from driftwalk.core.run_stages import share_of_map
 from driftwalk.core.seeds import world_keys
 from driftwalk.schema import Track, body_track
 from driftwalk.simulation import Start
@@ -109,7 +110,7 @@ def test_more_replicates_are_those_of_a_map_that_has_them_everywhere(problem):
 
 def test_a_map_and_its_more_replicates_say_how_far_they_are_and_never_go_back(problem):
     shares = []
-    progress = OnceThenMore(lambda done, total: shares.append(done / total))
+    progress = InTurn(lambda done, total: shares.append(done / total), share_of_map)
     maps = Mapper(problem, "coarse", apart=False, progress=progress)
     axes = tuple(np.array(values) for values in ([0.3, 0.5], [4e-4, 8e-4]))
     once = maps.full(axes, 1)

@@ -28,15 +28,15 @@ class KilledWorker(Exception):
 class Workers:
     """A scheduler as Dask's: a unit that was with four workers when they ended is given up.
 
-    A worker that gets a unit of `fatal` ends. All units that it holds count that, and go to other
-    workers, those that it computed last first.
+    A worker that computes a unit of `fatal` ends. All units that it holds count that, and are dealt
+    again.
     """
 
     def __init__(self, fatal: set[int], workers: int, seed: int) -> None:
         self.width = FOR_EACH_WORKER * workers
         self.seen: Counter[int] = Counter()
         self.alone: list[int] = []
-        self._fatal, self._workers = fatal, workers
+        self._fatal = fatal
         self._random = np.random.default_rng(seed)
         self._under_way: list[tuple[WorkUnit, Future[Any]]] = []
         self._ended: Counter[Future[Any]] = Counter()

@@ -169,7 +169,7 @@ def test_replicates_that_some_settings_get_count_as_progress(run: RunDirectory) 
     halves = grid(setting=np.arange(4)).units(2)
     for share, unit in zip((0.95, 1.0), halves, strict=True):
         more.write(unit, {"ks_distance": np.full((2, 2), 0.5)})
-        source.look()
+        assert [content["type"] for content in source.look()] == ["state"]
         assert page(source)["state"]["progress"] == pytest.approx(0.26 * share)
         assert the_map(source)["value"] == shown
     assert page(source)["state"]["words"] == "map: done, the next step is under way"

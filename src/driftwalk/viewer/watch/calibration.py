@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import DriftwalkError
-from driftwalk.core.run_stages import CALIBRATION_STAGES, share_of_map, share_of_windows
+from driftwalk.core.run_stages import CALIBRATION_STAGES, MORE, share_of_map, share_of_windows
 from driftwalk.page import bootstrap_section, encode_array, map_section, profile_sections
 from driftwalk.schema import Parameter
 from driftwalk.schema.calibration import BLOCK
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from driftwalk.viewer.watch.recording_steps import RecordedSteps
 
 DETAILS: Final = ("excerpt_x", "excerpt_y", "step_density", "ks_step_length", "ks_turning_angle")
-MORE: Final = "more-"
-"""Begins the name of a sweep that simulates some settings of a map again."""
 NO_DISTANCE: Final = 1.0
 """A setting that lost its numbers is as far as can be, as in the finished map."""
 
@@ -140,8 +138,7 @@ class RunningCalibration:
             if stage == "refined":
                 self._refined = of_map
             for unit in reader.new_units():
-                changed.add("bootstrap" if stage == "bootstrap" else "map")
-                self._take(name, stage, unit)
+                changed |= self._take(name, stage, unit)
         made = {"map": self._map_section, "bootstrap": self._bootstrap_section}
         return [made[name]() for name in sorted(changed, reverse=True)]
 
@@ -181,13 +178,16 @@ class RunningCalibration:
             "ks_turning_angle": float(kept["ks_turning_angle"][nearest]),
         }
 
-    def _take(self, name: str, stage: str, unit: FinishedUnit) -> None:
+    def _take(self, name: str, stage: str, unit: FinishedUnit) -> set[str]:
+        """Take a work unit, and return the sections that it changes."""
         if name.startswith(MORE):
             self._more[stage].add(unit)
-        elif stage == "bootstrap":
+            return set()
+        if stage == "bootstrap":
             self._bootstrap.append(unit)
-        else:
-            self._maps[name].add(unit)
+            return {"bootstrap"}
+        self._maps[name].add(unit)
+        return {"map"}
 
     def _share(self) -> float:
         if self._stage == "bootstrap":
@@ -195,7 +195,7 @@ class RunningCalibration:
             return done / max(self._study.calibration.bootstrap, 1)
         more = self._more[self._stage].done if self._stage in self._more else 0.0
         if self._stage == "coarse":
-            return 0.0 if self._coarse is None else share_of_map(self._coarse.done, more)
+            return 0.0 if self._coarse is None else share_of_map([self._coarse.done, more])
         refined = [one.done for name, one in self._maps.items() if name.startswith("refined-")]
         return share_of_windows([*refined, more])
 
