@@ -36,6 +36,9 @@ def coarse_study(law: Literal["auto", "paper"] = "paper") -> Study:
     return apply_overrides(
         Study(),
         {
+            "tank.diameter_m": 2.0 * TRUTH["tank_radius_m"],
+            "block.side_m": TRUTH["side_m"],
+            "block.mass_kg": TRUTH["mass_kg"],
             "forces.force_interval_s": TRUTH["force_interval_s"],
             "fit.spline_spacing_m": 0.03,
             **(closed if law == "paper" else {}),

@@ -44,10 +44,15 @@ from driftwalk.calibration.steadiness import Steadiness, steadiness_of
 from driftwalk.calibration.surface import Optimum, at_settings
 from driftwalk.calibration.wall import wall_warning
 from driftwalk.comparison import Statistic, StepDistance
-from driftwalk.conditions import neighbours_of, recorded_camera, study_in_arena
+from driftwalk.conditions import (
+    neighbours_of,
+    recorded_camera,
+    study_in_arena,
+    unstated_warning,
+)
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.run_stages import share_of_map, share_of_windows, tell_nobody
-from driftwalk.motion import BlockModel, Details, MotionModel
+from driftwalk.motion import BlockModel, Details, MotionModel, is_family_name
 from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.protocol import ScoresItself
 from driftwalk.motion.score import broken_worlds
@@ -182,11 +187,15 @@ def calibrate(
     keep = stores if stores is not None else _in_memory
     say = tell if tell is not None else tell_nobody
     result = _Calibration(problem, keep, say, executor).run()
-    of_wall = wall_warning(track, chosen) if isinstance(searched, BlockModel) else None
+    is_block = isinstance(searched, BlockModel)
+    in_tank = is_block or is_family_name(searched.name)
+    unstated = unstated_warning(chosen, block=is_block) if in_tank else None
+    of_wall = wall_warning(track, chosen) if is_block else None
     steadiness = steadiness_of(problem)
     of_time = None if steadiness is None else steadiness.warning
     of_flow = own_flow_warning(searched, result.quality) if flow is None else None
-    result.warnings += [text for text in (of_flow, of_wall, of_time) if text is not None]
+    said = (unstated, of_flow, of_wall, of_time)
+    result.warnings += [text for text in said if text is not None]
 
     def finish(halves: Halves | None) -> xr.Dataset:
         return _finish(result, halves, steadiness, recording, problem)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from driftwalk.cli.inputs.study_recording import read_with_flow, tank_note
+from driftwalk.cli.inputs.study_recording import opening_note, read_with_flow
 from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
 from driftwalk.cli.options.model import ModelName, ParameterChoices, chosen_model
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
@@ -66,8 +66,9 @@ def calibrate(
     work = CalibrationWork(
         read.trajectories[0], read.study, field, body, inputs, threads, chosen, posterior
     )
+    begun = opening_note(read.study, given, block=model is None)
     with Workers(cluster, cluster_options).reported("calibrate") as told:
-        found = run_calibration(work, out, overwrite=overwrite, begun=tank_note(read), **told)
+        found = run_calibration(work, out, overwrite=overwrite, begun=begun, **told)
     many = found.attrs["kind"] == "model_calibration"
     answer = model_answer if many else calibration_answer
     if json:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from driftwalk.cli.inputs.study_recording import read_with_flow, tank_note
+from driftwalk.cli.inputs.study_recording import opening_note, read_with_flow
 from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
@@ -70,8 +70,9 @@ def compare_models(
     work = ModelComparisonWork(
         read.trajectories[0], chosen, read.study, field, body, inputs, threads
     )
+    begun = opening_note(read.study, given, block="block" in chosen)
     with Workers(cluster, cluster_options).reported("compare models") as told:
-        found = run_model_comparison(work, out, overwrite=overwrite, begun=tank_note(read), **told)
+        found = run_model_comparison(work, out, overwrite=overwrite, begun=begun, **told)
     if json:
         print_json(summary(found))
     else:

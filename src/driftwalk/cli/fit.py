@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from driftwalk.cli.inputs.study_recording import read_for_run, tank_note
+from driftwalk.cli.inputs.study_recording import opening_note, read_for_run
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json, Overwrite
 from driftwalk.cli.options.study import StudyOptions, with_study_options
@@ -73,8 +73,9 @@ def fit(
     work = FitWork(
         read.trajectories, read.study, how.body, inputs, not no_check, compare_laws, wall
     )
+    begun = opening_note(read.study, given, block=True)
     with reported("fit") as told:
-        found = run_fit(work, out, overwrite=overwrite, begun=tank_note(read), **told)
+        found = run_fit(work, out, overwrite=overwrite, begun=begun, **told)
     if json:
         print_json(answer(found.fit, found.check))
     else:

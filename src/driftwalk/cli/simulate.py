@@ -9,6 +9,7 @@ import numpy as np
 import typer
 
 from driftwalk.cli.inputs.assembly_source import load_flow_for
+from driftwalk.cli.inputs.study_recording import opening_note
 from driftwalk.cli.options.model import (
     KnownModel,
     ModelName,
@@ -161,8 +162,7 @@ def _of_model(
     result = simulate_motion(
         known.model, known.values, chosen, flow=field, like=recording, body=body
     )
-    if recording is None and not given.states_tank:
-        print_note(f"the tank is the default study's, a {chosen.tank.describe()}")
+    opening_note(chosen, given, block=False)()
     for warning in known.warnings:
         print_note(f"warning: {warning}")
     return result

@@ -17,7 +17,7 @@ from driftwalk.conditions.reading import (
 from driftwalk.conditions.recorded import Conditions, recorded_conditions
 from driftwalk.conditions.refuse import require_motion, require_positions
 from driftwalk.conditions.start import recorded_start
-from driftwalk.conditions.study import estimated_study, study_for
+from driftwalk.conditions.study import estimated_study, study_for, unstated_warning
 from driftwalk.conditions.tank import require_inside, study_in_arena
 
 __all__ = [
@@ -40,4 +40,5 @@ __all__ = [
     "simulate_like",
     "study_for",
     "study_in_arena",
+    "unstated_warning",
 ]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from driftwalk.conditions.refuse import require_motion, require_positions
 from driftwalk.conditions.study import study_for
-from driftwalk.conditions.tank import study_in_arena
+from driftwalk.conditions.tank import OUTLINE, study_in_arena
 from driftwalk.core.json_text import parse_json
 from driftwalk.record import load
 
@@ -26,8 +26,6 @@ class ReadRecordings(NamedTuple):
 
     trajectories: list[xr.Dataset]
     study: Study
-    has_tank: bool
-    """Whether anything but the default study says the tank."""
     body: str | None
     """The body, where the arguments or the study name one."""
 
@@ -79,19 +77,25 @@ def read_recordings(
     >>> read.study.tank.diameter_m
     0.32
     """
+    from driftwalk.model import apply_overrides
+
     values = dict(given or {})
-    trajectories, known = [], []
+    trajectories, of_files = [], []
     for path in paths:
-        trajectory, has_tank = load_for_run(path, study, values, tank=tank)
+        trajectory, of_file = load_for_run(path, study, values, tank=tank)
         require_motion(trajectory, body=body, where=path)
         if bodies == "all":
             trajectory = _with_others(trajectory, path, study, values)
         trajectories.append(trajectory)
-        known.append(has_tank)
+        of_files.append(of_file)
+    stated = not study.tank.model_fields_set.isdisjoint(OUTLINE) or any(of_files)
     if "tank" in values or study.recording.arena != "tank":
-        study = study_in_arena(study, trajectories[0])
+        study, stated = study_in_arena(study, trajectories[0]), True
     named = body or study.recording.body
-    return ReadRecordings(trajectories, study_for(trajectories, study, body=named), known[0], named)
+    study = study_for(trajectories, study, body=named)
+    # The recordings were placed in the default tank, which does not make it a stated one.
+    study = study if stated else apply_overrides(study, {"tank.diameter_m": None})
+    return ReadRecordings(trajectories, study, named)
 
 
 def _with_others(
@@ -132,7 +136,7 @@ def load_for_run(
     xarray.Dataset
         A `trajectory`.
     bool
-        Whether anything but the default study says its tank.
+        Whether its tank is the arena that the file holds.
 
     Examples
     --------
@@ -148,7 +152,7 @@ def load_for_run(
         own = load_with_study(path, apply_overrides(study, {"recording.arena": "file"}), given)
         if "arena" in own.attrs:
             return own, True
-    return load_with_study(path, study, given), tank == "stated"
+    return load_with_study(path, study, given), False
 
 
 def load_with_study(path: Path, study: Study, given: Mapping[str, Any] | None = None) -> xr.Dataset:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.conditions.tank import OUTLINE, require_inside, study_in_arena
@@ -25,7 +25,12 @@ LAW_KEYS: Final = {
 STICKING: Final = 10.0
 """Friction of a wall at which every contact sticks."""
 _SAME: Final = 1e-9
-"""Relative difference of two lengths up to which they are the same statement."""
+"""Relative difference of two numbers up to which they are the same statement."""
+_BLOCK_ATTRIBUTES: Final = {
+    "side_m": ("block_side_m", "m", "side", "`block` when the recording is loaded"),
+    "mass_kg": ("block_mass_kg", "kg", "mass", "`block.mass_kg`"),
+}
+"""Keys of [block] that a recording may state, with its attribute."""
 
 
 def study_for(
@@ -75,16 +80,16 @@ def study_for(
     chosen = apply_overrides(study if study is not None else Study(), overrides or {})
     # A fact that is stated already, by the study or by an earlier recording, has to be the same.
     tank = not chosen.tank.model_fields_set.isdisjoint(OUTLINE)
-    block = "side_m" in chosen.block.model_fields_set
+    block = set(chosen.block.model_fields_set)
     fitted = False
     for recording in recordings:
         # A circle that is fitted to the positions states no tank: another recording has another.
         if not (fitted and _is_fitted(recording)):
             chosen = _with_tank(chosen, recording, is_stated=tank)
         fitted = fitted or _is_fitted(recording)
-        chosen = _with_block(chosen, recording, is_stated=block)
+        chosen = _with_block(chosen, recording, stated=block)
         tank = tank or "arena" in recording.attrs
-        block = block or "block_side_m" in recording.attrs
+        block |= {key for key, (name, *_) in _BLOCK_ATTRIBUTES.items() if name in recording.attrs}
     for recording in recordings if tank or needs_tank else ():
         require_inside(chosen, recording, body)
     return chosen
@@ -170,6 +175,49 @@ def _fitted_wall(found: xr.Dataset) -> dict[str, Any]:
     }
 
 
+def unstated_warning(study: Study, *, block: bool = True) -> str | None:
+    """Return the warning that nobody stated the body or the tank of a study, None where all are.
+
+    Parameters
+    ----------
+    study : Study
+        As the work is done with it: what a recording states counts as stated.
+    block : bool
+        Whether the work is about the block, whose mass and side decide C_d and σ_F.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> unstated_warning(dw.Study(), block=False)[:60]
+    'nobody stated the tank: the default, a circle of diameter 0.'
+    >>> unstated_warning(dw.conditions.study_for([dw.tank30_recording()])) is None
+    True
+    """
+    body, tank = study.block, study.tank
+    assumed = {}
+    if block and "mass_kg" not in body.model_fields_set:
+        assumed["mass", "block.mass_kg"] = f"{1e3 * body.mass_kg:.4g} g"
+    if block and "side_m" not in body.model_fields_set:
+        assumed["side", "block.side_m"] = f"{100 * body.side_m:.4g} cm"
+    scale = ", and C_d and σ_F are right for that body alone" if assumed else ""
+    if tank.model_fields_set.isdisjoint(OUTLINE):
+        assumed["tank", "tank.diameter_m"] = f"a {tank.describe()}"
+    if not assumed:
+        return None
+    names, keys = zip(*assumed, strict=True)
+    values = list(assumed.values())
+    one = len(values) == 1
+    return (
+        f"nobody stated the {_listed(names)}: the default{'' if one else 's'}, {_listed(values)},"
+        f" {'is' if one else 'are'} assumed{scale}; state " + _listed([f"`{key}`" for key in keys])
+    )
+
+
+def _listed(words: Sequence[str]) -> str:
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
+
+
 def _with_tank(study: Study, recording: xr.Dataset, *, is_stated: bool) -> Study:
     """Return the study in the tank of a recording; refuse one that is not the stated tank."""
     own = study_in_arena(study, recording)
@@ -181,20 +229,23 @@ def _with_tank(study: Study, recording: xr.Dataset, *, is_stated: bool) -> Study
     return own
 
 
-def _with_block(study: Study, recording: xr.Dataset, *, is_stated: bool) -> Study:
+def _with_block(study: Study, recording: xr.Dataset, *, stated: Collection[str]) -> Study:
     """Return the study with the block of a recording; refuse one that is not the stated block."""
     from driftwalk.model import apply_overrides
 
-    side = recording.attrs.get("block_side_m")
-    if side is None or abs(float(side) - study.block.side_m) <= _SAME * study.block.side_m:
-        return study
-    if is_stated:
-        raise InputError(
-            f"{_name_of(recording)}the recording is of a block of {float(side):g} m, and the study "
-            f"says {study.block.side_m:g} m: state the side once, `block` when the recording is "
-            "loaded"
-        )
-    return apply_overrides(study, {"block.side_m": float(side)})
+    for key, (name, unit, word, way) in _BLOCK_ATTRIBUTES.items():
+        if name not in recording.attrs:
+            continue
+        own, ours = float(recording.attrs[name]), getattr(study.block, key)
+        is_same = abs(own - ours) <= _SAME * ours
+        if key in stated and not is_same:
+            raise InputError(
+                f"{_name_of(recording)}the recording is of a block of {own:g} {unit}, and the "
+                f"study says {ours:g} {unit}: state the {word} once, {way}"
+            )
+        if key not in stated:
+            study = apply_overrides(study, {f"block.{key}": ours if is_same else own})
+    return study
 
 
 def _is_fitted(recording: xr.Dataset) -> bool:

@@ -48,7 +48,10 @@ def tank30_recording(
 
     with as_file(_folder() / _FILES[realisation]) as path:
         recording = load(path, tank=f"circle:{_diameter()!r}@0,0")
-    return recording.assign_attrs(simulated="yes")
+    truth = tank30_truth()
+    return recording.assign_attrs(
+        simulated="yes", block_side_m=truth["side_m"], block_mass_kg=truth["mass_kg"]
+    )
 
 
 def tank30_flow() -> xr.Dataset:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, ModelWrapValidatorHandler, model_validator
 
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.model.section import OrNumber, Quantity, Section
@@ -50,19 +50,22 @@ class Block(Section):
         default=8, description="Vertical strips into which each side face is cut for the drag."
     )
 
-    @model_validator(mode="before")
+    @model_validator(mode="wrap")
     @classmethod
-    def _one_depth(cls, data: Any) -> Any:
+    def _one_depth(cls, data: Any, build: ModelWrapValidatorHandler[Self]) -> Self:
         if not isinstance(data, dict):
-            return data
+            return build(data)
         word, number = data.get("depth"), data.get("depth_m")
-        if word is None and number is None:
-            return {**data, "depth": "immersed"}
         if word is not None and number is not None:
             raise ConfigurationError(
                 f"depth = {word!r} and depth_m = {number} both given: keep one"
             )
-        return data
+        if word is not None or number is not None:
+            return build(data)
+        block = build({**data, "depth": "immersed"})
+        # A default is not stated: a run says which numbers nobody gave.
+        block.model_fields_set.discard("depth")
+        return block
 
     @classmethod
     def replaced_by(cls, keys: set[str]) -> set[str]:

@@ -128,7 +128,7 @@ def test_a_file_and_a_program(place: Path, tmp_path: Path) -> None:
         *("--duration", "200s", "--replicates", "4"),
     )
     assert "diffuse with diffusivity_m2_s 1e-05" in done.err
-    assert "the tank is the default study's" in done.err
+    assert "tank: circle of diameter 0.3 m (default)" in done.err
     # 16,000 squared steps of mean 2 D dt: known to 1.2 %, and this is four of that.
     steps = np.diff(run["x"].values[:, :, 0], axis=1), np.diff(run["y"].values[:, :, 0], axis=1)
     assert np.mean(np.square(steps)) == pytest.approx(2e-6, rel=0.048)

@@ -11,7 +11,7 @@ from driftwalk.calibration.models.baselines import HiddenMarkovWalk, ResampledSt
 from driftwalk.calibration.models.hidden_markov import fit_hidden_walk
 from driftwalk.calibration.models.recorded import RecordedMotion
 from driftwalk.comparison.aspects import block_of, interleaved
-from driftwalk.conditions import Conditions
+from driftwalk.conditions import Conditions, unstated_warning
 from driftwalk.conditions.own_flow import flow_from_track
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.motion import (
@@ -89,7 +89,8 @@ def contestants(
             warnings.append(f"{what} is left out: {error}")
     if not found:
         raise InputError("; ".join(warnings))
-    return found, warnings
+    unstated = unstated_warning(study, block=any(one.name == BLOCK for one in models))
+    return found, warnings if unstated is None else [unstated, *warnings]
 
 
 def walks(motion: RecordedMotion) -> list[Contestant]:

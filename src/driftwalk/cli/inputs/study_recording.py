@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from driftwalk.cli.inputs.assembly_source import load_flow_for
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingOptions
-from driftwalk.cli.options.study import StudyOptions
+from driftwalk.cli.options.study import StudyOptions, option_name
 from driftwalk.cli.terminal.output import print_note
 
 if TYPE_CHECKING:
@@ -105,9 +105,48 @@ def read_with_flow(
     )
 
 
-def tank_note(read: ReadRecordings) -> Callable[[], None] | None:
-    """Return what says, when a run begins, that nobody stated its tank; None where one did."""
-    if read.has_tank:
-        return None
-    study: Study = read.study
-    return lambda: print_note(f"the tank is the default study's, a {study.tank.describe()}")
+def opening_note(
+    study: Study, given: StudyOptions, *, block: bool, otherwise: str = "recording"
+) -> Callable[[], None]:
+    """Return what says, when a run begins, which body and tank it takes, and who stated them.
+
+    Parameters
+    ----------
+    study : Study
+        As the run is made with it.
+    given : StudyOptions
+        The options and the study file.
+    block : bool
+        Whether the run is about the block.
+    otherwise : str
+        Who stated what neither an option nor the study file does.
+    """
+    from driftwalk.conditions.tank import OUTLINE
+    from driftwalk.model import load_study
+
+    file = None if given.file is None else load_study(given.file)
+
+    def stated(text: str, section: str, *keys: str) -> str:
+        options = [key for key in keys if f"{section}.{key}" in given.overrides]
+        in_file = file is not None and not getattr(file, section).model_fields_set.isdisjoint(keys)
+        if options:
+            source = option_name(f"{section}.{options[0]}", keys=given.keys)
+        elif in_file:
+            source = str(given.file)
+        else:
+            is_set = not getattr(study, section).model_fields_set.isdisjoint(keys)
+            source = otherwise if is_set else "default"
+        return f"{text} ({source})"
+
+    body, depth_m = study.block, study.block.wetted_depth_m(study.water.density_kg_m3)
+    lines = []
+    if block:
+        lines += [
+            stated(f"block of side {100 * body.side_m:.4g} cm", "block", "side_m"),
+            stated(f"mass {1e3 * body.mass_kg:.4g} g", "block", "mass_kg"),
+            stated(f"wetted depth {100 * depth_m:.4g} cm", "block", "depth", "depth_m"),
+        ]
+        interval = f"force redrawn every {1e3 * study.forces.force_interval_s:g} ms"
+        lines.append(stated(interval, "forces", "force_interval_s"))
+    lines.append(stated(f"tank: {study.tank.describe()}", "tank", *OUTLINE))
+    return lambda: print_note("; ".join(lines))

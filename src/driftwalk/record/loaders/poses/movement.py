@@ -32,8 +32,8 @@ TEXTS: Final = (
     "interrupted",
 )
 NUMBERS: Final = (
-    *("block_side_m", "metres_per_pixel", "position_quantum_m", "sample_rate_Hz"),
-    "time_origin_unix_s",
+    *("block_side_m", "block_mass_kg", "metres_per_pixel", "position_quantum_m"),
+    *("sample_rate_Hz", "time_origin_unix_s"),
 )
 """Attributes that are taken over of a recording that driftwalk wrote in this format."""
 
