@@ -87,13 +87,16 @@ def demo(
 
 
 def demo_study(*, quick: bool) -> Study:
-    """Return the study of the demo: the wall and the force interval are those of the recording."""
+    """Return the study of the demo: block, tank and force interval are those of the recording."""
     from driftwalk.datasets import tank30_truth
     from driftwalk.model import Study, apply_overrides
 
     truth = tank30_truth()
     known = {
+        "block.side_m": truth["side_m"],
+        "block.mass_kg": truth["mass_kg"],
         "forces.force_interval_s": truth["force_interval_s"],
+        "tank.diameter_m": 2.0 * truth["tank_radius_m"],
         "tank.wall_friction": truth["wall_friction"],
         "tank.wall_restitution": truth["wall_restitution"],
     }

@@ -12,7 +12,7 @@ from command_line import Done, apart, contents, here, refusal, start
 from page_reading import page_in
 
 TRUTH = {
-    "drag_coefficient": 0.3867,
+    "drag_coefficient": 0.3948,
     "force_std_N": 0.0006123,
     "force_interval_s": 0.016,
     "tracking_noise_m": 0.0003,
@@ -68,7 +68,7 @@ def test_both_answers_stand_beside_the_truth(finished: tuple[Path, Done]) -> Non
         assert lines[first].endswith(method)
         lines = lines[first + 1 :]
         rows = {line[:27].strip(): line[27:].split() for line in reversed(lines)}
-        assert rows["drag coefficient C_d"][0] == "0.3867"
+        assert rows["drag coefficient C_d"][0] == "0.3948"
         assert rows["stochastic force σ_F [mN]"][0] == "0.6123"
         assert rows["tracking noise [mm]"][0] == "0.3"
         assert rows["model explains it"] == ["yes"]
@@ -101,6 +101,8 @@ def test_a_finished_demo_is_read(finished: tuple[Path, Done]) -> None:
     assert found["truth"] == TRUTH
     # Half an hour with the orientation as a state: C_d within 5 %, sigma_F 3 %, flow 2 %.
     assert found["fit"]["drag_coefficient"] == pytest.approx(TRUTH["drag_coefficient"], rel=0.05)
+    low, high = found["fit"]["drag_coefficient_interval"]
+    assert low < TRUTH["drag_coefficient"] < high
     assert found["fit"]["force_std_N"] == pytest.approx(TRUTH["force_std_N"], rel=0.03)
     assert found["fit"]["tracking_noise_m"] == pytest.approx(TRUTH["tracking_noise_m"], rel=0.03)
     assert 0.0 < found["fit"]["flow_error"] < 0.02

@@ -18,10 +18,11 @@ if TYPE_CHECKING:
 
 ROWS: Final = ("drag_coefficient", "force_std_N", "tracking_noise_m")
 """The estimates by their flat names."""
-KNOWN: Final = ("drag_coefficient", "force_std_N", "force_interval_s", "tracking_noise_m")
-STEP_REMARK: Final = (
-    "The engine's steps of 16 ms\nmake its drag act some 2 % stronger than its C_d says."
-)
+TRUTH: Final = {
+    "drag_coefficient": "acting_drag_coefficient",
+    **{name: name for name in ("force_std_N", "force_interval_s", "tracking_noise_m")},
+}
+"""What an estimate is compared with, by its key in the truth: the drag as it acts in the engine."""
 
 
 @dataclass(frozen=True)
@@ -61,11 +62,11 @@ class Fitted:
 
 
 def demo_truth() -> dict[str, float]:
-    """Return what made the recording, units in the keys."""
+    """Return what the estimates are compared with, units in the keys."""
     from driftwalk.datasets import tank30_truth
 
     truth = tank30_truth()
-    return {key: truth[key] for key in KNOWN}
+    return {name: truth[key] for name, key in TRUTH.items()}
 
 
 def in_json(fitted: Fitted, calibration: xr.Dataset) -> dict[str, Any]:
@@ -79,12 +80,17 @@ def in_json(fitted: Fitted, calibration: xr.Dataset) -> dict[str, Any]:
 
 def print_fit(fit: xr.Dataset) -> None:
     """Print the estimates of the fit next to the truth, as soon as they are ready."""
-    every = 1e3 * demo_truth()["force_interval_s"]
+    from driftwalk.datasets import tank30_truth
+
+    truth = tank30_truth()
     print("This recording was simulated by another engine (ODE): the truth is known.")
     _print_estimates("likelihood fit", fit)
+    every, step = (1e3 * truth[name] for name in ("force_interval_s", "time_step_s"))
+    was, acts = (truth[name] for name in ("drag_coefficient", "acting_drag_coefficient"))
     # Through a pipe the answer would wait in the buffer for the check and the map.
     print(
-        f"Intervals of 90 %; σ_F redrawn every {every:g} ms. {STEP_REMARK}",
+        f"Intervals of 90 %; σ_F redrawn every {every:g} ms. The engine's C_d was set to {was:g}; "
+        f"in its steps\nof {step:g} ms the drag acts like {acts:g}.",
         flush=True,
     )
 
