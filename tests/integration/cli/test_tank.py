@@ -1,4 +1,4 @@
-"""Which tank a fit or a calibration takes: what is said, else the file's, else the default."""
+"""Which tank and block a run takes: what is said, else the file's, else the default."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 
 import driftwalk as dw
-from driftwalk.conditions import read_recordings
+from driftwalk.cli.inputs.study_recording import opening_note
+from driftwalk.cli.options.study import StudyOptions
+from driftwalk.conditions import read_recordings, unstated_warning
+from driftwalk.core.study_keys import FIT_KEYS
 from driftwalk.model import Study
 from driftwalk.record import save_trajectory
 
@@ -93,3 +96,43 @@ def test_a_body_that_never_moves_is_refused_from_python(call: Any) -> None:
     empty["x"][:] = np.nan
     with pytest.raises(dw.InputError, match="holds 0 positions"):
         call(empty)
+
+
+def test_a_run_says_who_stated_its_block_and_its_tank(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "study.toml"
+    file.write_text('[block]\nmass_kg = "24g"\ndepth = "archimedes"\n', encoding="utf-8")
+    given = StudyOptions(file, {"block.side_m": 0.04}, FIT_KEYS)
+    recording = stored(tmp_path, circle(0.4))
+    study = read_recordings([recording], given.study(), tank="unsaid").study
+    opening_note(study, given, block=True)()
+    # Floating, 24 g of water fill 1.5 cm under 16 cm².
+    assert capsys.readouterr().err == (
+        f"driftwalk: block of side 4 cm (--side); mass 24 g ({file}); wetted depth 1.5 cm ({file});"
+        " force redrawn every 10 ms (default); tank: circle of diameter 0.4 m (recording)\n"
+    )
+    assert unstated_warning(study) is None
+
+
+@pytest.mark.parametrize(
+    ("stated", "said"),
+    [
+        ({}, "mass, side and tank: the defaults, 11.6 g, 3 cm and a circle of diameter 0.3 m, are"),
+        ({"block.side_m": 0.03, "tank.diameter_m": 0.3}, "mass: the default, 11.6 g, is assumed"),
+        ({"block.side_m": 0.03, "block.mass_kg": 0.0116}, "tank: the default, a circle of"),
+    ],
+)
+def test_a_default_that_decides_a_number_is_warned_of(stated: dict[str, float], said: str) -> None:
+    warning = unstated_warning(dw.apply_overrides(dw.Study(), stated))
+    assert warning is not None
+    assert warning.startswith(f"nobody stated the {said}")
+
+
+def test_a_recording_may_state_its_block(tmp_path: Path) -> None:
+    recording = dw.tank30_recording()
+    study = dw.conditions.study_for([recording])
+    assert unstated_warning(study) is None
+    heavy = dw.apply_overrides(dw.Study(), {"block.mass_kg": 0.02})
+    with pytest.raises(dw.InputError, match=r"block of 0.0116 kg, and the study says 0.02 kg"):
+        dw.conditions.study_for([recording], heavy)
