@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import numpy as np
 import typer
 
-from driftwalk.cli.inputs.assembly_source import load_flow_for
+from driftwalk.cli.inputs.assembly_source import RUN_HELP, load_flow_for
+from driftwalk.cli.inputs.found_source import FoundSource, open_run
 from driftwalk.cli.options.model import (
     KnownModel,
     ModelName,
@@ -17,7 +18,7 @@ from driftwalk.cli.options.model import (
     known_model,
 )
 from driftwalk.cli.options.recording import RecordingOptions
-from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.shared import Json, flow_of_run
 from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
 from driftwalk.cli.terminal.output import print_json, print_note, require_place
 from driftwalk.core.errors import InputError
@@ -43,13 +44,17 @@ OF_THE_BLOCK: Final = (
 def simulate(
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.nc", help="File to write.")],
     given: StudyOptions,
+    run: Annotated[
+        Path | None, typer.Argument(metavar="RUN", help=RUN_HELP, show_default=False)
+    ] = None,
     flow: Annotated[
         Path | None,
         typer.Option(
             "--flow",
             metavar="FILE",
-            help="Flow field: NetCDF, or CSV with x, y, u, v. For the block, and for a --model "
-            "that has a use for it.",
+            help="Flow field: NetCDF, or CSV with x, y, u, v; or the run directory that holds it. "
+            "For the block, and for a --model that has a use for it.",
+            callback=flow_of_run,
             show_default=False,
         ),
     ] = None,
@@ -85,8 +90,9 @@ def simulate(
 ) -> None:
     """Simulate the motion of the block, or of another motion model.
 
-    With --model: a body that moves by itself, or a model of one's own; every parameter gets a
-    value. It starts where the recording of --like does, otherwise anywhere in the tank, at rest.
+    With a RUN: its model, with the values, the study and the flow field of the run. With --model: a
+    body that moves by itself, or a model of one's own; every parameter gets a value. It starts
+    where the recording of --like does, otherwise anywhere in the tank, at rest.
     """
     from driftwalk.core.atomic import write_atomic
     from driftwalk.motion import feels_others
@@ -100,15 +106,16 @@ def simulate(
     others = feels_others(model)
     kept = None if others else body
     recording = None if like is None else RecordingOptions(body=kept).load(like)
-    if model is not None:
+    source = None if run is None else open_run(run, given, model, parameters_from)
+    if model is not None or (source is not None and not source.is_block):
         if backend != "cpu":
-            raise InputError("--backend is for the block: leave it out with --model")
-        known = known_model(model, parameters, parameters_from)
-        result = _of_model(known, given, flow, recording, body)
+            raise InputError("--backend is for the block: leave it out with another model")
+        known = known_model(model, parameters, run or parameters_from)
+        result = _of_model(known, given, source, flow, recording, body)
     elif parameters or parameters_from is not None:
         raise InputError("--parameter and --parameters-from belong to a --model")
     else:
-        result = _of_block(given, flow, recording, body, backend=backend)
+        result = _of_block(given, source, flow, recording, body, backend=backend)
     write_atomic(out, netcdf_bytes(result))
     facts = summary(result)
     if json:
@@ -125,6 +132,7 @@ def simulate(
 
 def _of_block(
     given: StudyOptions,
+    source: FoundSource | None,
     flow: Path | None,
     recording: xr.Dataset | None,
     body: str | None,
@@ -135,9 +143,15 @@ def _of_block(
     from driftwalk.flow import load_flow
     from driftwalk.simulation import simulate as run
 
-    if flow is None:
-        raise InputError("the flow of the water is missing: give a flow field (--flow)")
-    chosen, field = given.study(), load_flow(flow)
+    if source is not None:
+        chosen, field = source.block(flow)
+    elif flow is None:
+        raise InputError(
+            "the flow of the water is missing: give a flow field (--flow), or the run directory of "
+            "a fit or a calibration"
+        )
+    else:
+        chosen, field = given.study(), load_flow(flow)
     if recording is None:
         return run(chosen, field, backend="reference" if backend == "reference" else "cpu")
     return simulate_like(study_for([recording], chosen, body=body), field, recording)
@@ -146,6 +160,7 @@ def _of_block(
 def _of_model(
     known: KnownModel,
     given: StudyOptions,
+    source: FoundSource | None,
     flow: Path | None,
     recording: xr.Dataset | None,
     body: str | None,
@@ -154,14 +169,17 @@ def _of_model(
     from driftwalk.motion import simulate_motion
 
     _refuse_block(given)
-    chosen = given.study()
+    chosen = given.study() if source is None else source.study()
     if recording is not None:
         chosen = study_for([recording], chosen, body=body)
-    field = None if flow is None else load_flow_for(flow, chosen)
+    if source is not None:
+        field = source.flow_for(known.model, chosen, flow)
+    else:
+        field = None if flow is None else load_flow_for(flow, chosen)
     result = simulate_motion(
         known.model, known.values, chosen, flow=field, like=recording, body=body
     )
-    if recording is None and not given.states_tank:
+    if recording is None and source is None and not given.states_tank:
         print_note(f"the tank is the default study's, a {chosen.tank.describe()}")
     for warning in known.warnings:
         print_note(f"warning: {warning}")
