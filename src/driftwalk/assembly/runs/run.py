@@ -209,7 +209,7 @@ def assemble_drawn(
         plan,
         drag_coefficient=drawn.drag_coefficient,
         force_std=drawn.force_std,
-        flow_correlated_over=_knot_distance(calibration, flow) if is_fit else None,
+        flow_correlated_over=_knot_distance(calibration, flow) if is_fit and moves else None,
         law=law,
         flow_draw=np.arange(settings.runs) // RUNS_PER_FLOW if moves else None,
     )
