@@ -257,12 +257,17 @@ def _of_block(
 def _of_run(
     folder: Path, given: StudyOptions, named: str | None
 ) -> tuple[Study, xr.Dataset | None, dict[str, Path]]:
-    """Return the truth that a run has found: its study with the options, flow and files."""
+    """Return the truth that a run has found: its study with its camera and options; flow, files."""
     from driftwalk.cli.inputs.assembly_source import load_flow_for
+    from driftwalk.conditions import study_as_seen
     from driftwalk.runs import read_found
+    from driftwalk.schema import body_track
 
     found = read_found(folder)
-    own = found.block_study(why="a recovery study of another model names it (`--model`)")
+    own = found.block_study(why="a recovery study of another model names it (--model)")
+    recording = found.recording()
+    if recording is not None:
+        own = study_as_seen(own, recording, body_track(recording, found.body))
     study = given.over(own, base=f"the study of {folder}")
     if named is None:
         return study, found.flow(own), found.inputs

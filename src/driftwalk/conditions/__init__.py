@@ -4,7 +4,7 @@ How a recording is read when a study says so, and what is refused; the tank and 
 reconciled with the study; times and gaps, start and camera; the flow.
 """
 
-from driftwalk.conditions.camera import possible_noises, recorded_camera
+from driftwalk.conditions.camera import possible_noises, recorded_camera, study_as_seen
 from driftwalk.conditions.like import simulate_like
 from driftwalk.conditions.neighbours import Neighbours, neighbours_of
 from driftwalk.conditions.own_flow import recording_flow
@@ -38,6 +38,7 @@ __all__ = [
     "require_motion",
     "require_positions",
     "simulate_like",
+    "study_as_seen",
     "study_for",
     "study_in_arena",
 ]
