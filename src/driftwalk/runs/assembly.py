@@ -23,7 +23,7 @@ DRAWN_TRIAL: Final = 1
 """The two kinds of runs have random numbers of their own, so that they can be compared."""
 LABELS: Final = ("parameters found", "parameters drawn")
 REGION: Final = ("region_drag_coefficient", "region_force_std", "refined_surface")
-"""What parameters are drawn from in a calibration."""
+"""Variables of a calibration that parameters are drawn from."""
 PATH_RUNS: Final = 4
 PATH_INTERVAL_S: Final = 0.1
 PATH_SAMPLES: Final = 6000

@@ -1,4 +1,4 @@
-"""What a finished run has found: its directory or its dataset, as the start of further work."""
+"""Read a finished run, its directory or its dataset, as the start of further work."""
 
 from __future__ import annotations
 
@@ -73,12 +73,12 @@ class FoundRun:
 
     @property
     def words(self) -> str:
-        """What a sentence calls the dataset."""
+        """Name of the dataset in a sentence."""
         return WORDS.get(self.kind, self.kind)
 
     @property
     def name(self) -> str:
-        """What a sentence calls this run: its directory or file, or its kind."""
+        """Name of this run in a sentence: its directory or file, or its kind."""
         place = self.folder or self.file
         return f"the {self.words}" if place is None else str(place)
 
@@ -107,7 +107,7 @@ class FoundRun:
 
     @property
     def warnings(self) -> list[str]:
-        """What a user should know who simulates the block with these values."""
+        """Sentences for a user who simulates the block with these values."""
         said = [f"of the {self.words}: {text}" for text in sentences(self.found, "warning")]
         if "number" in self.found.coords:
             names = [str(name) for name in self.found["number"].values]
@@ -290,7 +290,7 @@ class FoundRun:
 
     @property
     def _specification(self) -> dict[str, Any]:
-        """What determined the numbers of the run; empty where nothing says it."""
+        """Everything that determined the numbers of the run; empty where nothing says it."""
         stored = {} if self.folder is None else read_manifest(self.folder / MANIFEST_FILE)
         found = stored.get("specification")
         return dict(found) if isinstance(found, Mapping) else {}
@@ -343,7 +343,19 @@ def read_found(source: Path | xr.Dataset, *, give: str = GIVE) -> FoundRun:
 
 
 def run_folder(found: xr.Dataset) -> Path | None:
-    """Return the run directory that a dataset was read from, None where it is from none."""
+    """Return the run directory that a dataset was read from, None where it is from none.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        Any dataset.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> run_folder(xr.Dataset()) is None
+    True
+    """
     source = found.encoding.get("source")
     if source is None:
         return None
