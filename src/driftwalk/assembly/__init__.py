@@ -32,7 +32,7 @@ from driftwalk.assembly.outcomes.l1 import (
 )
 from driftwalk.assembly.outcomes.survival import SurvivalCurve, class_times, survival_curve
 from driftwalk.assembly.recordings import classify
-from driftwalk.assembly.runs.parameters import draw_parameters
+from driftwalk.assembly.runs.parameters import draw_parameters, has_uncertainty
 from driftwalk.assembly.runs.path_recording import path_recording
 from driftwalk.assembly.runs.run import assemble, assemble_drawn, assembly_path, check_assembly
 from driftwalk.assembly.sensitivity.indices import check_indices, sensitivity_indices
@@ -65,6 +65,7 @@ __all__ = [
     "classify",
     "disconnected_alignment",
     "draw_parameters",
+    "has_uncertainty",
     "l1_distance",
     "l1_in_floors",
     "l1_noise_floor",

@@ -189,7 +189,7 @@ def calibrate(
     result = _Calibration(problem, keep, say, executor).run()
     is_block = isinstance(searched, BlockModel)
     in_tank = is_block or is_family_name(searched.name)
-    unstated = unstated_warning(chosen, block=is_block) if in_tank else None
+    unstated = unstated_warning(chosen, about="block" if is_block else "tank") if in_tank else None
     of_wall = wall_warning(track, chosen) if is_block else None
     steadiness = steadiness_of(problem)
     of_time = None if steadiness is None else steadiness.warning

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from driftwalk.cli.inputs.assembly_source import (
+    RUN_HELP,
     RUN_NAMES,
     refuse_found,
-    source_from_calibration,
     source_from_flow,
+    source_from_run,
 )
+from driftwalk.cli.inputs.study_recording import opening_note
 from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
 from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
@@ -37,9 +39,7 @@ def assemble(
     given: StudyOptions,
     run: Annotated[
         Path | None,
-        typer.Argument(
-            metavar="RUN", help="Run directory of a finished calibration.", show_default=False
-        ),
+        typer.Argument(metavar="RUN", help=RUN_HELP, show_default=False),
     ] = None,
     flow: FlowFile = None,
     film: Annotated[
@@ -53,9 +53,9 @@ def assemble(
 ) -> None:
     """Simulate self-assembly of many blocks, and report how often each structure forms.
 
-    With a calibration RUN, uses its flow field and simulates twice: with the parameters that it
-    found, and with parameters drawn from its joint region. The difference shows the remaining
-    uncertainty of the calibration. Without RUN, uses the parameters of a study and a flow field
+    With the RUN of a fit or a calibration, uses its flow field and simulates twice: with the
+    parameters that it found, and with parameters drawn from what it leaves open. The difference
+    shows its remaining uncertainty. Without RUN, uses the parameters of a study and a flow field
     (--flow). After a kill, the same command continues.
     """
     from driftwalk.runs import AssemblyWork, run_assembly
@@ -65,17 +65,13 @@ def assemble(
         source = source_from_flow(given, flow)
     else:
         refuse_found(run, given.overrides, also=[] if given.file is None else ["--study"])
-        source = source_from_calibration(run, flow, given)
-    warnings = list(source.warnings)
-    if run is not None and source.region is None:
-        warnings.append(
-            "the calibration has no joint region (--bootstrap 0): only the parameters that it "
-            "found are simulated"
-        )
-    work = AssemblyWork(source.study, source.flow, source.region, source.inputs, threads)
+        source = source_from_run(run, flow, given)
+    work = AssemblyWork(source.study, source.flow, source.uncertainty, source.inputs, threads)
+    opening_note(source.study, given, about="simulation", otherwise=str(run))()
     with Workers(cluster, cluster_options).reported("assemble") as told:
         result = run_assembly(work, out, film=film, overwrite=overwrite, **told)
-    warnings = [*warnings, *_left_out(result)]
+    drawn = [] if source.not_drawn is None else [source.not_drawn]
+    warnings = [*source.warnings, *drawn, *_left_out(result)]
     if json:
         print_json({**summary(work.study, result), "warnings": warnings})
         return

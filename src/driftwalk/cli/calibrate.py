@@ -66,7 +66,7 @@ def calibrate(
     work = CalibrationWork(
         read.trajectories[0], read.study, field, body, inputs, threads, chosen, posterior
     )
-    begun = opening_note(read.study, given, block=model is None)
+    begun = opening_note(read.study, given, about="block" if model is None else "tank")
     with Workers(cluster, cluster_options).reported("calibrate") as told:
         found = run_calibration(work, out, overwrite=overwrite, begun=begun, **told)
     many = found.attrs["kind"] == "model_calibration"

@@ -70,7 +70,7 @@ def compare_models(
     work = ModelComparisonWork(
         read.trajectories[0], chosen, read.study, field, body, inputs, threads
     )
-    begun = opening_note(read.study, given, block="block" in chosen)
+    begun = opening_note(read.study, given, about="block" if "block" in chosen else "tank")
     with Workers(cluster, cluster_options).reported("compare models") as told:
         found = run_model_comparison(work, out, overwrite=overwrite, begun=begun, **told)
     if json:

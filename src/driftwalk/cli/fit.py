@@ -73,7 +73,7 @@ def fit(
     work = FitWork(
         read.trajectories, read.study, how.body, inputs, not no_check, compare_laws, wall
     )
-    begun = opening_note(read.study, given, block=True)
+    begun = opening_note(read.study, given, about="block")
     with reported("fit") as told:
         found = run_fit(work, out, overwrite=overwrite, begun=begun, **told)
     if json:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from driftwalk.cli.inputs.assembly_source import RUN_HELP
+from driftwalk.cli.inputs.found_source import FoundSource, open_run
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.model import (
     KnownModel,
@@ -36,6 +38,9 @@ BLOCKS = 4
 @with_study_options(ASSEMBLY_KEYS, "tank_diameter", "blocks", "seed")
 def play(
     given: StudyOptions,
+    run: Annotated[
+        Path | None, typer.Argument(metavar="RUN", help=RUN_HELP, show_default=False)
+    ] = None,
     flow: FlowFile = None,
     model: ModelName = None,
     parameters: PlayedParameters = None,
@@ -68,27 +73,36 @@ def play(
 ) -> None:
     """Turn the knobs of the model while the tank moves.
 
-    Study, flow and recording default to those of the bundled example. In a tank without a flow
+    With a RUN: its model, values, study, flow field and recording. Otherwise study, flow and
+    recording default to those of the bundled example. In a tank without a flow
     field the water moves in a random flow. With --model: bodies of that model, with a slider for
     each of its parameters. Ctrl-C ends the server.
     """
     from driftwalk.viewer import PlaySource, hello_line, require_server
 
     require_server()
-    if model is not None:
+    found = None if run is None else open_run(run, given, model, parameters_from)
+    if model is not None or (found is not None and not found.is_block):
         if live is not None:
-            raise InputError("--live publishes a tank of blocks: leave it out with --model")
-        known = playable_model(model, parameters, parameters_from)
-        show(_of_model(known, given, flow, recording, body), host=host, port=port, open=open)
+            raise InputError("--live publishes a tank of blocks: leave it out with another model")
+        known = playable_model(model, parameters, run or parameters_from)
+        shown = _of_model(known, given, found, flow, recording, body)
+        show(shown, host=host, port=port, open=open)
         return
     if parameters or parameters_from is not None:
         raise InputError("--parameter and --parameters-from belong to a --model")
-    bundled = not given.states_tank and flow is None
-    chosen = given.over(_bundled(), base="the bundled example") if bundled else given.study()
+    bundled = not given.states_tank and flow is None and found is None
+    if found is not None:
+        chosen, field = found.block(flow)
+        beside, body = _of_run(found, recording, chosen, body)
+    else:
+        chosen = given.over(_bundled(), base="the bundled example") if bundled else given.study()
+        field = _flow(flow, chosen, bundled=bundled)
+        beside = _recording(recording, chosen, body, bundled=bundled)
     source = PlaySource(
         chosen,
-        _flow(flow, chosen, bundled=bundled),
-        recording=_recording(recording, chosen, body, bundled=bundled),
+        field,
+        recording=beside,
         body=body,
         seed=chosen.assembly.seed,
     )
@@ -105,6 +119,7 @@ def play(
 def _of_model(
     known: KnownModel,
     given: StudyOptions,
+    found: FoundSource | None,
     flow: Path | None,
     recording: Path | None,
     body: str | None,
@@ -114,12 +129,16 @@ def _of_model(
     from driftwalk.viewer import ModelPlaySource
 
     _refuse_blocks(given)
-    chosen, beside = given.study(), None
-    if recording is not None:
+    chosen, beside = given.study() if found is None else found.study(), None
+    if found is not None:
+        beside, body = _of_run(found, recording, chosen, body)
+    elif recording is not None:
         beside = _recording(recording, chosen, body, bundled=not given.states_tank)
         chosen = study_for([] if beside is None else [beside], chosen, body=body)
     field = None
-    if flow is not None or known.model.needs_flow:
+    if found is not None:
+        field = found.flow_for(known.model, chosen, flow)
+    elif flow is not None or known.model.needs_flow:
         field = _flow(flow, chosen, bundled=False)
     for warning in known.warnings:
         print_note(f"warning: {warning}")
@@ -132,6 +151,15 @@ def _of_model(
         body=body,
         seed=chosen.assembly.seed,
     )
+
+
+def _of_run(
+    found: FoundSource, path: Path | None, study: Study, body: str | None
+) -> tuple[xr.Dataset | None, str | None]:
+    """Return the recording to compare with, a given one or that of the run, and its body."""
+    if path is not None:
+        return _recording(path, study, body, bundled=False), body
+    return found.found.recording(), body or found.found.body
 
 
 def _refuse_blocks(given: StudyOptions) -> None:

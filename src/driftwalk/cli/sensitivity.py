@@ -10,13 +10,15 @@ import numpy as np
 import typer
 
 from driftwalk.cli.inputs.assembly_source import (
+    RUN_HELP,
     RUN_NAMES,
     Source,
     load_flow_for,
     refuse_found,
-    source_from_calibration,
     source_from_flow,
+    source_from_run,
 )
+from driftwalk.cli.inputs.study_recording import opening_note
 from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
 from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
@@ -37,9 +39,7 @@ def sensitivity(
     given: StudyOptions,
     run: Annotated[
         Path | None,
-        typer.Argument(
-            metavar="RUN", help="Run directory of a finished calibration.", show_default=False
-        ),
+        typer.Argument(metavar="RUN", help=RUN_HELP, show_default=False),
     ] = None,
     flow: FlowFile = None,
     vary: Vary = None,
@@ -63,8 +63,8 @@ def sensitivity(
 
     Simulates self-assembly at every setting of a map over the drag coefficient and the stochastic
     force, or over the axes that --vary names. Measures how far the outcomes lie from those of a
-    reference, which has the parameters of a calibration RUN or of a study (--flow). After a kill,
-    the same command continues.
+    reference, which has the parameters of a RUN or of a study (--flow). After a kill, the same
+    command continues.
     """
     from driftwalk.runs import SensitivityWork, run_sensitivity
 
@@ -73,7 +73,7 @@ def sensitivity(
         source = source_from_flow(given, flow)
     else:
         refuse_found(run, given.overrides)
-        source = source_from_calibration(run, flow, given)
+        source = source_from_run(run, flow, given)
     named = VARY_KEYS["vary flow"] in given.overrides
     paths = _flow_paths(source.study, Path() if named or given.file is None else given.file.parent)
     work = SensitivityWork(
@@ -84,6 +84,7 @@ def sensitivity(
         inputs={**source.inputs, **{f"flow {name}": path for name, path in paths.items()}},
         threads=threads,
     )
+    opening_note(source.study, given, about="simulation", otherwise=str(run))()
     with Workers(cluster, cluster_options).reported("sensitivity") as told:
         result = run_sensitivity(work, out, overwrite=overwrite, **told)
     warnings = [*source.warnings, *_warnings(source, result)]

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import numpy as np
 import typer
 
-from driftwalk.cli.inputs.assembly_source import load_flow_for
+from driftwalk.cli.inputs.assembly_source import RUN_HELP, load_flow_for
+from driftwalk.cli.inputs.found_source import FoundSource, open_run
 from driftwalk.cli.inputs.study_recording import opening_note
 from driftwalk.cli.options.model import (
     KnownModel,
@@ -18,7 +19,7 @@ from driftwalk.cli.options.model import (
     known_model,
 )
 from driftwalk.cli.options.recording import RecordingOptions
-from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.shared import Json, flow_of_run
 from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
 from driftwalk.cli.terminal.output import print_json, print_note, require_place
 from driftwalk.core.errors import InputError
@@ -27,6 +28,9 @@ from driftwalk.core.study_keys import STUDY_KEYS
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from driftwalk.conditions import About
+    from driftwalk.model import Study
 
 OF_THE_BLOCK: Final = (
     *("drag_coefficient", "force_std_N", "force_interval_s", "force_noise_intensity_N2_s"),
@@ -44,13 +48,17 @@ OF_THE_BLOCK: Final = (
 def simulate(
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.nc", help="File to write.")],
     given: StudyOptions,
+    run: Annotated[
+        Path | None, typer.Argument(metavar="RUN", help=RUN_HELP, show_default=False)
+    ] = None,
     flow: Annotated[
         Path | None,
         typer.Option(
             "--flow",
             metavar="FILE",
-            help="Flow field: NetCDF, or CSV with x, y, u, v. For the block, and for a --model "
-            "that has a use for it.",
+            help="Flow field: NetCDF, or CSV with x, y, u, v; or the run directory that holds it. "
+            "For the block, and for a --model that has a use for it.",
+            callback=flow_of_run,
             show_default=False,
         ),
     ] = None,
@@ -86,8 +94,9 @@ def simulate(
 ) -> None:
     """Simulate the motion of the block, or of another motion model.
 
-    With --model: a body that moves by itself, or a model of one's own; every parameter gets a
-    value. It starts where the recording of --like does, otherwise anywhere in the tank, at rest.
+    With a RUN: its model, with the values, the study and the flow field of the run. With --model: a
+    body that moves by itself, or a model of one's own; every parameter gets a value. It starts
+    where the recording of --like does, otherwise anywhere in the tank, at rest.
     """
     from driftwalk.core.atomic import write_atomic
     from driftwalk.motion import feels_others
@@ -101,15 +110,16 @@ def simulate(
     others = feels_others(model)
     kept = None if others else body
     recording = None if like is None else RecordingOptions(body=kept).load(like)
-    if model is not None:
+    source = None if run is None else open_run(run, given, model, parameters_from)
+    if model is not None or (source is not None and not source.is_block):
         if backend != "cpu":
-            raise InputError("--backend is for the block: leave it out with --model")
-        known = known_model(model, parameters, parameters_from)
-        result = _of_model(known, given, flow, recording, body)
+            raise InputError("--backend is for the block: leave it out with another model")
+        known = known_model(model, parameters, run or parameters_from)
+        result = _of_model(known, given, source, flow, recording, body)
     elif parameters or parameters_from is not None:
         raise InputError("--parameter and --parameters-from belong to a --model")
     else:
-        result = _of_block(given, flow, recording, body, backend=backend)
+        result = _of_block(given, source, flow, recording, body, backend=backend)
     write_atomic(out, netcdf_bytes(result))
     facts = summary(result)
     if json:
@@ -126,6 +136,7 @@ def simulate(
 
 def _of_block(
     given: StudyOptions,
+    source: FoundSource | None,
     flow: Path | None,
     recording: xr.Dataset | None,
     body: str | None,
@@ -136,17 +147,38 @@ def _of_block(
     from driftwalk.flow import load_flow
     from driftwalk.simulation import simulate as run
 
-    if flow is None:
-        raise InputError("the flow of the water is missing: give a flow field (--flow)")
-    chosen, field = given.study(), load_flow(flow)
+    if source is not None:
+        chosen, field = source.block(flow)
+    elif flow is None:
+        raise InputError(
+            "the flow of the water is missing: give a flow field (--flow), or the run directory of "
+            "a fit or a calibration"
+        )
+    else:
+        chosen, field = given.study(), load_flow(flow)
+    if recording is not None:
+        chosen = study_for([recording], chosen, body=body)
+    _open(chosen, given, source, about="simulation")
     if recording is None:
         return run(chosen, field, backend="reference" if backend == "reference" else "cpu")
-    return simulate_like(study_for([recording], chosen, body=body), field, recording)
+    return simulate_like(chosen, field, recording)
+
+
+def _open(study: Study, given: StudyOptions, source: FoundSource | None, *, about: About) -> None:
+    """Say which body and tank are simulated, and warn of those that nobody stated."""
+    from driftwalk.conditions import unstated_warning
+
+    otherwise = "recording" if source is None else str(source.folder)
+    opening_note(study, given, about=about, otherwise=otherwise)()
+    warning = unstated_warning(study, about=about)
+    if warning is not None:
+        print_note(f"warning: {warning}")
 
 
 def _of_model(
     known: KnownModel,
     given: StudyOptions,
+    source: FoundSource | None,
     flow: Path | None,
     recording: xr.Dataset | None,
     body: str | None,
@@ -155,14 +187,17 @@ def _of_model(
     from driftwalk.motion import simulate_motion
 
     _refuse_block(given)
-    chosen = given.study()
+    chosen = given.study() if source is None else source.study()
     if recording is not None:
         chosen = study_for([recording], chosen, body=body)
-    field = None if flow is None else load_flow_for(flow, chosen)
+    if source is not None:
+        field = source.flow_for(known.model, chosen, flow)
+    else:
+        field = None if flow is None else load_flow_for(flow, chosen)
+    _open(chosen, given, source, about="tank")
     result = simulate_motion(
         known.model, known.values, chosen, flow=field, like=recording, body=body
     )
-    opening_note(chosen, given, block=False)()
     for warning in known.warnings:
         print_note(f"warning: {warning}")
     return result

@@ -11,6 +11,7 @@ import typer
 
 from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
 from driftwalk.cli.options.model import (
+    GIVE_VALUES,
     KnownModel,
     KnownParameters,
     ModelName,
@@ -63,8 +64,8 @@ def recover(
         typer.Option(
             "--truth",
             metavar="FILE",
-            help="Study file with the true values and \\[recover]; with --model its tank, camera "
-            "and \\[recover].",
+            help="Study file with the true values and \\[recover], or the run directory of a fit "
+            "or a calibration; with --model its tank, camera and \\[recover].",
             show_default=False,
         ),
     ] = None,
@@ -111,7 +112,7 @@ def recover(
     open but the --known ones. The directory holds the result, figures and manifest.json. After a
     kill, the same command continues.
     """
-    from driftwalk.runs import read_found_values
+    from driftwalk.runs import read_found
 
     given = replace(given, file=truth)
     workers = Workers(cluster, cluster_options)
@@ -119,7 +120,9 @@ def recover(
         _refuse(given, OF_THE_BLOCK, "about the block, which --model replaces; leave it out")
         of_model = [name for name in known or () if name != NOISE]
         chosen = partly_known_model(model, parameters, parameters_from, of_model)
-        found = None if parameters_from is None else read_found_values(parameters_from).file
+        found = (
+            None if parameters_from is None else read_found(parameters_from, give=GIVE_VALUES).file
+        )
         inputs = {"truth": truth, "parameters": found, "like": like}
         noise: Noise = "known" if NOISE in (known or ()) else "estimated"
         set_up = _SetUp(given, sample_rate, like, body, _files(inputs), threads, noise)
@@ -234,11 +237,14 @@ def _of_block(
     from driftwalk.cli.terminal.recover_answer import print_answer, summary
     from driftwalk.runs import RecoveryWork, run_recovery
 
-    chosen = given.study()
-    _require_stated(truth)
     named = given.overrides.get(RECOVER_KEYS["flow"])
-    field, flow_file = _flow(chosen, truth, None if named is None else Path(named))
-    inputs = _files({"truth": truth, "flow": flow_file})
+    if truth.is_dir():
+        chosen, field, inputs = _of_run(truth, given, named)
+    else:
+        chosen = given.study()
+        _require_stated(truth)
+        field, flow_file = _flow(chosen, truth, None if named is None else Path(named))
+        inputs = _files({"truth": truth, "flow": flow_file})
     work = RecoveryWork(chosen, field, inputs, threads)
     with workers.reported("recover") as told:
         found = run_recovery(work, out, overwrite=overwrite, **told)
@@ -246,6 +252,29 @@ def _of_block(
         print_json(summary(found))
     else:
         print_answer(found, out)
+
+
+def _of_run(
+    folder: Path, given: StudyOptions, named: str | None
+) -> tuple[Study, xr.Dataset | None, dict[str, Path]]:
+    """Return the truth that a run has found: its study with its camera and options; flow, files."""
+    from driftwalk.cli.inputs.assembly_source import load_flow_for
+    from driftwalk.conditions import study_as_seen
+    from driftwalk.runs import read_found
+    from driftwalk.schema import body_track
+
+    found = read_found(folder)
+    own = found.block_study(why="a recovery study of another model names it (--model)")
+    recording = found.recording()
+    if recording is not None:
+        own = study_as_seen(own, recording, body_track(recording, found.body))
+    study = given.over(own, base=f"the study of {folder}")
+    if named is None:
+        return study, found.flow(own), found.inputs
+    if named == RANDOM:
+        return study, None, found.inputs
+    path = Path(named)
+    return study, load_flow_for(path, study), {**found.inputs, "flow": path}
 
 
 def _files(roles: dict[str, Path | None]) -> dict[str, Path]:

@@ -4,7 +4,7 @@ How a recording is read when a study says so, and what is refused; the tank and 
 reconciled with the study; times and gaps, start and camera; the flow.
 """
 
-from driftwalk.conditions.camera import possible_noises, recorded_camera
+from driftwalk.conditions.camera import possible_noises, recorded_camera, study_as_seen
 from driftwalk.conditions.like import simulate_like
 from driftwalk.conditions.neighbours import Neighbours, neighbours_of
 from driftwalk.conditions.own_flow import recording_flow
@@ -17,14 +17,22 @@ from driftwalk.conditions.reading import (
 from driftwalk.conditions.recorded import Conditions, recorded_conditions
 from driftwalk.conditions.refuse import require_motion, require_positions
 from driftwalk.conditions.start import recorded_start
-from driftwalk.conditions.study import estimated_study, study_for, unstated_warning
+from driftwalk.conditions.study import (
+    About,
+    estimated_study,
+    is_stated,
+    study_for,
+    unstated_warning,
+)
 from driftwalk.conditions.tank import require_inside, study_in_arena
 
 __all__ = [
+    "About",
     "Conditions",
     "Neighbours",
     "ReadRecordings",
     "estimated_study",
+    "is_stated",
     "load_for_run",
     "load_with_study",
     "neighbours_of",
@@ -38,6 +46,7 @@ __all__ = [
     "require_motion",
     "require_positions",
     "simulate_like",
+    "study_as_seen",
     "study_for",
     "study_in_arena",
     "unstated_warning",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from driftwalk.conditions.tank import OUTLINE, require_inside, study_in_arena
 from driftwalk.core.errors import InputError
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
+About = Literal["tank", "block", "simulation"]
+"""What decides the numbers of some work: the tank, the block in it too, or its forces as well."""
 LAW_KEYS: Final = {
     "added_mass_share": "added_mass_share",
     "linear_drag_kg_s": "linear_drag",
@@ -175,42 +177,71 @@ def _fitted_wall(found: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def unstated_warning(study: Study, *, block: bool = True) -> str | None:
-    """Return the warning that nobody stated the body or the tank of a study, None where all are.
+def unstated_warning(study: Study, *, about: About) -> str | None:
+    """Return the warning that nobody stated what decides the numbers of some work.
 
     Parameters
     ----------
     study : Study
         As the work is done with it: what a recording states counts as stated.
-    block : bool
-        Whether the work is about the block, whose mass and side decide C_d and σ_F.
+    about : {"tank", "block", "simulation"}
+        Whether the tank alone decides them; mass and side of the block too, to which C_d and σ_F
+        belong; or C_d and σ_F as well.
+
+    Returns
+    -------
+    str or None
+        None where all of it is stated.
 
     Examples
     --------
     >>> import driftwalk as dw
-    >>> unstated_warning(dw.Study(), block=False)[:60]
+    >>> unstated_warning(dw.Study(), about="tank")[:60]
     'nobody stated the tank: the default, a circle of diameter 0.'
-    >>> unstated_warning(dw.conditions.study_for([dw.tank30_recording()])) is None
+    >>> study = dw.conditions.study_for([dw.tank30_recording()])
+    >>> unstated_warning(study, about="block") is None
     True
     """
-    body, tank = study.block, study.tank
-    assumed = {}
-    if block and "mass_kg" not in body.model_fields_set:
-        assumed["mass", "block.mass_kg"] = f"{1e3 * body.mass_kg:.4g} g"
-    if block and "side_m" not in body.model_fields_set:
-        assumed["side", "block.side_m"] = f"{100 * body.side_m:.4g} cm"
-    scale = ", and C_d and σ_F are right for that body alone" if assumed else ""
-    if tank.model_fields_set.isdisjoint(OUTLINE):
-        assumed["tank", "tank.diameter_m"] = f"a {tank.describe()}"
+    block, forces, tank = study.block, study.forces, study.tank
+    force = f"{1e3 * forces.force_std_N:.4g} mN every {1e3 * forces.force_interval_s:.4g} ms"
+    decisive = {
+        "block.mass_kg": ("mass", f"{1e3 * block.mass_kg:.4g} g"),
+        "block.side_m": ("side", f"{100 * block.side_m:.4g} cm"),
+        "forces.drag_coefficient": ("drag coefficient", f"{forces.drag_coefficient:.4g}"),
+        "forces.force_std_N": ("force", force),
+        "tank.diameter_m": ("tank", f"a {tank.describe()}"),
+    }
+    sections = {"tank": {"tank"}, "block": {"tank", "block"}}.get(about)
+    assumed = {
+        key: said
+        for key, said in decisive.items()
+        if (sections is None or key.partition(".")[0] in sections) and not is_stated(study, key)
+    }
     if not assumed:
         return None
-    names, keys = zip(*assumed, strict=True)
-    values = list(assumed.values())
-    one = len(values) == 1
+    names, values = zip(*assumed.values(), strict=True)
+    are = "the default, {}, is" if len(values) == 1 else "the defaults, {}, are"
     return (
-        f"nobody stated the {_listed(names)}: the default{'' if one else 's'}, {_listed(values)},"
-        f" {'is' if one else 'are'} assumed{scale}; state " + _listed([f"`{key}`" for key in keys])
+        f"nobody stated the {_listed(names)}: {are.format(_listed(values))} assumed, and the "
+        f"result holds for {'it' if len(values) == 1 else 'them'} alone; state "
+        + _listed([f"`{key}`" for key in assumed])
     )
+
+
+def is_stated(study: Study, key: str) -> bool:
+    """Return whether somebody stated a key of a study; of a tank, its outline.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> study = dw.apply_overrides(dw.Study(), {"block.side_m": "4cm"})
+    >>> is_stated(study, "block.side_m"), is_stated(study, "block.mass_kg")
+    (True, False)
+    """
+    section, _, name = key.partition(".")
+    same = {"tank": OUTLINE, "block.depth_m": ("depth", "depth_m")}
+    names = same["tank"] if section == "tank" else same.get(key, (name,))
+    return not getattr(study, section).model_fields_set.isdisjoint(names)
 
 
 def _listed(words: Sequence[str]) -> str:

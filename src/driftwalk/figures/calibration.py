@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-FOOTER = "recording simulated by another engine (ODE)"
+FOOTER = "simulated recording, not measured"
 # Length of the sample of the path that is drawn [s].
 EXCERPT_S = 60.0
 

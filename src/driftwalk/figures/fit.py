@@ -106,7 +106,7 @@ def write_fit_figures(
     body : str, optional
         Body of the recording; may be left out when there is only one.
     simulated : bool, optional
-        Whether the recording was simulated by another engine, which the figures then say.
+        Whether the recording was simulated, which the figures then say.
     formats : sequence of {"png", "svg", "pdf"}
         File formats.
 

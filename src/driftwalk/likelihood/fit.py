@@ -181,7 +181,7 @@ def fit_motion(
         facts=facts,
     )
     shares = visited_shares(fit)
-    unstated = unstated_warning(chosen)
+    unstated = unstated_warning(chosen, about="block")
     warnings = [
         *([] if unstated is None else [unstated]),
         *warnings_of(facts, whiteness, shares, intervals, side_m=chosen.block.side_m),

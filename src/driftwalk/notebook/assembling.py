@@ -34,8 +34,9 @@ def assemble(
     Parameters
     ----------
     model : Study or xarray.Dataset
-        A study, a `fit` or a `calibration`. With `folder`, a calibration that has a joint region is
-        simulated with parameters drawn from it, too.
+        A study, a `fit`, a `calibration`, or a `model_comparison` whose best model is the block.
+        With `folder`, a fit, or a calibration that has a joint region, is simulated with parameters
+        drawn from its uncertainty, too.
     flow : xarray.Dataset, optional
         The water's velocity, a `flow_field`; a fit brings its own.
     folder : path-like, optional
@@ -89,11 +90,8 @@ def assemble(
             progress=lambda done, total: say(done, total, "runs"),
         )
     place = Path(folder)
-    region = found.calibration
-    if region is not None and "region_level" not in region:
-        region = None
     run_assembly(
-        AssemblyWork(found.study, found.flow, region, {}, threads),
+        AssemblyWork(found.study, found.flow, found.uncertainty, {}, threads),
         place,
         overwrite=overwrite,
         executor=executor,

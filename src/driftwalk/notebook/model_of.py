@@ -1,9 +1,8 @@
-"""Study and flow that an answer stands on: what a fit or a calibration found."""
+"""Study and flow that an answer stands on: what a finished run found, or a study says."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from driftwalk.core.errors import InputError
@@ -20,8 +19,8 @@ class FoundModel(NamedTuple):
     study: Study
     flow: xr.Dataset
     """A `flow_field`."""
-    calibration: xr.Dataset | None
-    """The `calibration`, where the model is from one."""
+    uncertainty: xr.Dataset | None
+    """The `fit` or `calibration` where parameters can be drawn from it."""
 
 
 def model_of(
@@ -29,12 +28,12 @@ def model_of(
     flow: xr.Dataset | None,
     overrides: Mapping[str, Any],
 ) -> FoundModel:
-    """Return the model of a study, a fit or a calibration.
+    """Return the model of a study, or of what a run found.
 
     Parameters
     ----------
     source : Study or xarray.Dataset
-        A study, a `fit` or a `calibration`.
+        A study, a `fit`, a `calibration`, or a `model_comparison` whose best model is the block.
     flow : xarray.Dataset or None
         A `flow_field` or a `fit`. A fit has its own; a calibration in a run directory has the one
         that is stored there.
@@ -46,11 +45,8 @@ def model_of(
     InputError
         When there is no flow, or the dataset is of another kind.
     """
-    from driftwalk.conditions import estimated_study
-    from driftwalk.likelihood import fitted_flow
     from driftwalk.model import Study, apply_overrides
-    from driftwalk.schema.calibration import is_block
-    from driftwalk.schema.earlier import current_form
+    from driftwalk.runs import RUN_KINDS, read_found
 
     if isinstance(source, Study):
         return FoundModel(apply_overrides(source, overrides), _flow(flow), None)
@@ -59,22 +55,15 @@ def model_of(
             f"a study, a fit or a calibration is needed, got {source!r}; `motion_model` makes a "
             "motion model of a name"
         )
-    source = current_form(source)
     kind = source.attrs.get("kind")
-    if kind not in ("fit", "calibration"):
+    if kind not in RUN_KINDS:
         raise InputError(
             f"a study, a fit or a calibration is needed, got a dataset of kind {kind!r}"
         )
-    if kind == "calibration" and not is_block(source):
-        raise InputError(
-            f"the calibration is about the model {source.attrs.get('model', 'of a user')}: the "
-            "tank simulates blocks, so give a calibration of the block"
-        )
-    study = estimated_study(source, overrides)
-    if kind == "fit":
-        return FoundModel(study, fitted_flow(source) if flow is None else _flow(flow), None)
-    field = _stored_flow(source, study) if flow is None else _flow(flow)
-    return FoundModel(study, field, source)
+    found = read_found(source)
+    study = found.block_study(overrides)
+    field = found.flow(study) if flow is None else _flow(flow)
+    return FoundModel(study, field, found.uncertainty)
 
 
 def flow_field_of(flow: xr.Dataset) -> xr.Dataset:
@@ -88,25 +77,3 @@ def _flow(flow: xr.Dataset | None) -> xr.Dataset:
     if flow is None:
         raise InputError("a study says nothing of the water: give `flow`, a flow field or a fit")
     return flow_field_of(flow)
-
-
-def _stored_flow(calibration: xr.Dataset, study: Study) -> xr.Dataset:
-    """Return the flow field that is stored with a calibration in its run directory."""
-    from driftwalk.flow import load_flow
-
-    folder = run_folder(calibration)
-    if folder is None:
-        raise InputError(
-            "a calibration does not hold the flow field that it used: give `flow`, or calibrate "
-            "with `folder`"
-        )
-    return load_flow(folder / "flow.nc", arena=study.tank.to_arena(), own_flags="keep")
-
-
-def run_folder(found: xr.Dataset) -> Path | None:
-    """Return the run directory that a dataset was read from, None where it is from none."""
-    source = found.encoding.get("source")
-    if source is None:
-        return None
-    folder = Path(source).parent
-    return folder if (folder / "manifest.json").is_file() else None

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from driftwalk.core.errors import InputError
-from driftwalk.notebook.model_of import run_folder
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,7 +52,7 @@ def report(
     """
     import xarray as xr
 
-    from driftwalk.page import joined_page, write_report
+    from driftwalk.page import joined_page, name_apart, write_report
 
     if isinstance(results, (xr.Dataset, str, PathLike)):
         many: list[Any] = [results]
@@ -63,7 +62,7 @@ def report(
         raise InputError("no result given: report needs one at least")
     pages = [_page(one) for one in many]
     if len(pages) > 1:
-        _name_apart(pages)
+        name_apart(pages)
         return write_report(joined_page(pages, title=title), Path(path), existing=existing)
     return write_report(pages[0], Path(path), existing=existing)
 
@@ -74,6 +73,7 @@ def _page(result: Any) -> dict[str, Any]:
 
     from driftwalk.page import dataset_page, recording_page, report_page
     from driftwalk.record import describe
+    from driftwalk.runs import run_folder
 
     if not isinstance(result, xr.Dataset):
         return report_page(Path(result))
@@ -83,12 +83,3 @@ def _page(result: Any) -> dict[str, Any]:
     if result.attrs.get("kind", "trajectory") == "trajectory":
         return recording_page(result, describe(result))
     return dataset_page(result)
-
-
-def _name_apart(pages: list[dict[str, Any]]) -> None:
-    """Give every page a name of its own, which the sections of the joined page begin with."""
-    seen: dict[str, int] = {}
-    for page in pages:
-        name = str(page["subtitle"] or page["title"].lower())
-        seen[name] = seen.get(name, 0) + 1
-        page["subtitle"] = name if seen[name] == 1 else f"{name} {seen[name]}"

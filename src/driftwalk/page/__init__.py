@@ -2,7 +2,13 @@
 
 from driftwalk.page.arrays import decode_array, encode_array
 from driftwalk.page.html import report_html, write_report
-from driftwalk.page.run_page import dataset_page, joined_page, recording_page, report_page
+from driftwalk.page.run_page import (
+    dataset_page,
+    joined_page,
+    name_apart,
+    recording_page,
+    report_page,
+)
 from driftwalk.page.sections.assembly import assembly_sections
 from driftwalk.page.sections.calibration import (
     bootstrap_section,
@@ -33,6 +39,7 @@ __all__ = [
     "map_section",
     "model_recovery_sections",
     "model_sections",
+    "name_apart",
     "profile_sections",
     "recording_page",
     "recovery_sections",

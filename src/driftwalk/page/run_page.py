@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -243,6 +244,29 @@ def joined_page(pages: Sequence[Mapping[str, Any]], *, title: str) -> dict[str, 
         created=max((page["created_utc"] for page in pages if page["created_utc"]), default=None),
         sections=sections,
     )
+
+
+def name_apart(pages: Sequence[dict[str, Any]]) -> None:
+    """Give pages to join names of their own, where two runs have the same or none.
+
+    Parameters
+    ----------
+    pages : sequence of dict
+        Results of `report_page`, `dataset_page` or `recording_page`; their subtitles change.
+
+    Examples
+    --------
+    >>> pages = [{"title": "Fit", "subtitle": "run"}, {"title": "Fit", "subtitle": "run"}]
+    >>> name_apart(pages)
+    >>> [page["subtitle"] for page in pages]
+    ['run', 'run 2']
+    """
+    seen: set[str] = set()
+    for page in pages:
+        name = str(page["subtitle"] or page["title"].lower())
+        others = (f"{name} {number}" for number in itertools.count(2))
+        page["subtitle"] = next(one for one in itertools.chain([name], others) if one not in seen)
+        seen.add(page["subtitle"])
 
 
 def _page(

@@ -1,11 +1,10 @@
 """Run directories: long work that resumes, with its figures and its manifest."""
 
 from driftwalk.runs.assembly import LABELS, AssemblyResult, AssemblyWork, run_assembly
-from driftwalk.runs.calibrated import Calibrated, read_calibrated
 from driftwalk.runs.calibration import CalibrationWork, result_file, run_calibration
 from driftwalk.runs.fit import Fitted, FitWork, run_fit, steady_flows
 from driftwalk.runs.folder import Progress
-from driftwalk.runs.found_values import FoundValues, read_found_values
+from driftwalk.runs.found import RUN_KINDS, FoundRun, read_found, run_folder
 from driftwalk.runs.model_comparison import ModelComparisonWork, run_model_comparison
 from driftwalk.runs.model_recovery import ModelRecoveryWork, run_model_recovery
 from driftwalk.runs.recovery import RecoveryWork, run_recovery
@@ -19,13 +18,13 @@ from driftwalk.schema.netcdf import netcdf_bytes
 
 __all__ = [
     "LABELS",
+    "RUN_KINDS",
     "AssemblyResult",
     "AssemblyWork",
-    "Calibrated",
     "CalibrationWork",
     "FitWork",
     "Fitted",
-    "FoundValues",
+    "FoundRun",
     "ModelComparisonWork",
     "ModelRecoveryWork",
     "Progress",
@@ -34,12 +33,12 @@ __all__ = [
     "SensitivityWork",
     "draw_sensitivity",
     "netcdf_bytes",
-    "read_calibrated",
-    "read_found_values",
+    "read_found",
     "result_file",
     "run_assembly",
     "run_calibration",
     "run_fit",
+    "run_folder",
     "run_model_comparison",
     "run_model_recovery",
     "run_recovery",

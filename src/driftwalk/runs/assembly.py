@@ -22,6 +22,8 @@ FIXED_TRIAL: Final = 0
 DRAWN_TRIAL: Final = 1
 """The two kinds of runs have random numbers of their own, so that they can be compared."""
 LABELS: Final = ("parameters found", "parameters drawn")
+REGION: Final = ("region_drag_coefficient", "region_force_std", "refined_surface")
+"""Variables of a calibration that parameters are drawn from."""
 PATH_RUNS: Final = 4
 PATH_INTERVAL_S: Final = 0.1
 PATH_SAMPLES: Final = 6000
@@ -39,7 +41,7 @@ class AssemblyWork:
     flow : xarray.Dataset
         The flow field.
     calibration : xarray.Dataset or None
-        Draw parameters from its region too.
+        A `calibration` or a `fit` to draw parameters from, too.
     inputs : mapping of str to Path
         The files that were read, by their role.
     threads : int or None
@@ -223,13 +225,12 @@ def _write_film(run: RunDirectory, film: str, progress: Progress) -> None:
 def _specification(work: AssemblyWork) -> dict[str, Any]:
     """Return what determines the numbers of a run."""
     found = work.calibration
+    is_fit = found is not None and found.attrs.get("kind") == "fit"
     names = ("u", "v", *(f"{part}_standard_error" for part in "uv"))
     return {
         "study": work.study.to_dict(),
         "flow_sha256": dataset_hash(work.flow, tuple(n for n in names if n in work.flow)),
         "calibration_sha256": None
         if found is None
-        else dataset_hash(
-            found, ("region_drag_coefficient", "region_force_std", "refined_surface")
-        ),
+        else dataset_hash(found, ("estimate", "covariance") if is_fit else REGION),
     }

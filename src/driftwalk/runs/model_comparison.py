@@ -63,8 +63,9 @@ def run_model_comparison(
 ) -> xr.Dataset:
     """Compare motion models in a run directory and return the comparison.
 
-    Writes ``comparison.nc``, ``recording.nc``, ``figures/`` and, last, ``manifest.json``. Killed at
-    any moment and started again it continues with the model that it was at.
+    Writes ``comparison.nc``, ``recording.nc``, the given flow as ``flow.nc``, ``figures/`` and,
+    last, ``manifest.json``. Killed at any moment and started again it continues with the model that
+    it was at.
 
     Parameters
     ----------
@@ -121,6 +122,8 @@ def run_model_comparison(
         if begun is not None:
             begun()
         run.write("recording.nc", netcdf_bytes(work.recording))
+        if work.flow is not None:
+            run.write("flow.nc", netcdf_bytes(work.flow))
 
         def stores(name: str, fingerprint: dict[str, Any]) -> Store:
             return run.store(name, fingerprint=fingerprint)

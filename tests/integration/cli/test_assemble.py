@@ -255,12 +255,12 @@ def test_a_calibration_that_cannot_be_used(calibrated: Path, tmp_path: Path) -> 
     shutil.copytree(calibrated, wrong)
     shutil.copy(calibrated / "flow.nc", wrong / "calibration.nc")
     says = {
-        unfinished: "holds a calibration that is not finished: run its command again",
+        unfinished: "holds a run that is not finished: run its command again",
         empty: "is not a run directory",
         tmp_path / "nowhere": "does not exist",
         RECORDING: "is not a run directory",
-        other: "no calibration: its calibration (calibration.nc) is not there",
-        fit: f"holds a fit, not a calibration: calibrate on its flow {fit / 'flow.nc'} (--flow)",
+        other: "no fit, calibration or comparison of models: give the directory",
+        fit: "fit.nc: is not a NetCDF file",
         damaged: "cannot be read as NetCDF",
         wrong: "is not a calibration: its kind is 'flow_field'",
     }
@@ -274,7 +274,7 @@ def test_a_calibration_that_cannot_be_used(calibrated: Path, tmp_path: Path) -> 
 def test_what_does_not_go_together(calibrated: Path, tmp_path: Path) -> None:
     for options in (["--study", "x.toml"], ["--force-std", "1mN"], ["--force-interval", "16ms"]):
         line = refusal(here("assemble", calibrated, *options, "-o", tmp_path / "run"))
-        assert f"{options[0]}: not with a calibration run" in line
+        assert f"{options[0]}: not with a finished run" in line
     assert "or a flow field (--flow)" in refusal(here("assemble", "-o", tmp_path / "run"))
     missing = here("assemble", "--flow", tmp_path / "no.nc", "-o", tmp_path / "run")
     assert "no such file" in refusal(missing)

@@ -143,7 +143,7 @@ def test_a_study_file_says_what_is_simulated(calibrated: Path, tmp_path: Path) -
     assert_same_bits(first.drop_attrs(), second.drop_attrs())
     study.write_text('[tank]\ndiameter_m = "25cm"\n', encoding="utf-8")
     line = refusal(here("sensitivity", calibrated, "--study", study, "-o", tmp_path / "c"))
-    assert f"[tank] diameter_m is 0.25, and {calibrated} was calibrated with 0.3" in line
+    assert f"[tank] diameter_m is 0.25, and {calibrated} was made with 0.3" in line
 
 
 def test_flows_of_a_study_lie_beside_it(tmp_path: Path) -> None:
@@ -236,7 +236,7 @@ def test_sources_that_cannot_be_used(calibrated: Path, tmp_path: Path) -> None:
     assert "not finished: run its command again" in refusal(here("sensitivity", unfinished, *out))
     assert "or a flow field (--flow)" in refusal(here("sensitivity", *out))
     line = refusal(here("sensitivity", calibrated, "--force-std", "1mN", *out))
-    assert "--force-std: not with a calibration run" in line
+    assert "--force-std: not with a finished run" in line
     assert not (tmp_path / "run").exists()
 
 

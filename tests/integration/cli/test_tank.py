@@ -106,13 +106,13 @@ def test_a_run_says_who_stated_its_block_and_its_tank(
     given = StudyOptions(file, {"block.side_m": 0.04}, FIT_KEYS)
     recording = stored(tmp_path, circle(0.4))
     study = read_recordings([recording], given.study(), tank="unsaid").study
-    opening_note(study, given, block=True)()
+    opening_note(study, given, about="block")()
     # Floating, 24 g of water fill 1.5 cm under 16 cm².
     assert capsys.readouterr().err == (
-        f"driftwalk: block of side 4 cm (--side); mass 24 g ({file}); wetted depth 1.5 cm ({file});"
-        " force redrawn every 10 ms (default); tank: circle of diameter 0.4 m (recording)\n"
+        "driftwalk: tank: circle of diameter 0.4 m (recording); block of side 4 cm (--side); "
+        f"mass 24 g ({file}); wetted depth 1.5 cm ({file}); force redrawn every 10 ms (default)\n"
     )
-    assert unstated_warning(study) is None
+    assert unstated_warning(study, about="block") is None
 
 
 @pytest.mark.parametrize(
@@ -124,7 +124,7 @@ def test_a_run_says_who_stated_its_block_and_its_tank(
     ],
 )
 def test_a_default_that_decides_a_number_is_warned_of(stated: dict[str, float], said: str) -> None:
-    warning = unstated_warning(dw.apply_overrides(dw.Study(), stated))
+    warning = unstated_warning(dw.apply_overrides(dw.Study(), stated), about="block")
     assert warning is not None
     assert warning.startswith(f"nobody stated the {said}")
 
@@ -132,7 +132,7 @@ def test_a_default_that_decides_a_number_is_warned_of(stated: dict[str, float], 
 def test_a_recording_may_state_its_block(tmp_path: Path) -> None:
     recording = dw.tank30_recording()
     study = dw.conditions.study_for([recording])
-    assert unstated_warning(study) is None
+    assert unstated_warning(study, about="block") is None
     heavy = dw.apply_overrides(dw.Study(), {"block.mass_kg": 0.02})
     with pytest.raises(dw.InputError, match=r"block of 0.0116 kg, and the study says 0.02 kg"):
         dw.conditions.study_for([recording], heavy)

@@ -108,7 +108,7 @@ def test_a_simulated_recording_is_named_so(
     seen: list[int] = []
 
     def count(figure, stem, formats):
-        seen.append(_texts(figure).count("recording simulated by another engine (ODE)"))
+        seen.append(_texts(figure).count("simulated recording, not measured"))
         return []
 
     monkeypatch.setattr(write, "_save", count)

@@ -14,7 +14,7 @@ from user_calibration import one_parameter, two_parameters
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.provenance import MANIFEST_KIND
 from driftwalk.model import Study
-from driftwalk.runs.calibrated import read_calibrated
+from driftwalk.runs import read_found
 from driftwalk.schema.calibration import is_block, stored_parameters
 from driftwalk.schema.contents import check_contents
 
@@ -65,4 +65,4 @@ def test_self_assembly_takes_no_calibration_of_another_model(tmp_path):
     (folder / "flow.nc").write_bytes(b"")
     (folder / "manifest.json").write_text(json.dumps({"kind": MANIFEST_KIND}))
     with pytest.raises(InputError, match="about the model tumble, and self-assembly"):
-        read_calibrated(folder)
+        read_found(folder).block_study()

@@ -26,6 +26,12 @@ if TYPE_CHECKING:
 Arrays = dict[str, npt.NDArray[Any]]
 Floats = npt.NDArray[np.float64]
 
+LAW_NAMES: Final = {
+    "linear_drag_kg_s": "linear_drag",
+    "drag_power": "drag_power",
+    "force_memory_s": "force_memory",
+}
+"""Names of the drawn numbers of a force law, by their keys in [forces]."""
 DECIMALS: Final = 9
 """Times are kept to a nanosecond."""
 
@@ -203,4 +209,4 @@ def _parameters(plan: Plan) -> dict[str, Any]:
     }
     if plan.flow_draw is not None:
         known["flow_draw"] = ("run", plan.flow_draw.astype(np.int32))
-    return known
+    return known | {LAW_NAMES[key]: ("run", values) for key, values in plan.law.items()}

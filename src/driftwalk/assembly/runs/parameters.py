@@ -1,13 +1,15 @@
-"""Parameters drawn from what a calibration leaves open.
+"""Parameters drawn from what a calibration or a fit leaves open.
 
-A draw is a point of the calibration's joint region. Where D is the smooth surface of distances, m
-its minimum, L its level at the border and c the confidence of the region, a point is drawn with a
-weight of ``(1 - c) ** ((D - m) / (L - m))``: 1 at the optimum, 1 - c at the border. If what chance
-does to D - m has an exponential tail, as it has for a quadratic surface in two parameters, this is
-the likelihood, and the region would hold the share c of it; the tail beyond the border is left out.
-So draws follow the valley whatever its shape, and widen with the region where the model does not
-quite explain the recording. The bootstrap's optima would do neither: they lie on a lattice, about
-the optimum, as if the model were true.
+A draw from a calibration is a point of its joint region. Where D is the smooth surface of
+distances, m its minimum, L its level at the border and c the confidence of the region, a point is
+drawn with a weight of ``(1 - c) ** ((D - m) / (L - m))``: 1 at the optimum, 1 - c at the border. If
+what chance does to D - m has an exponential tail, as it has for a quadratic surface in two
+parameters, this is the likelihood, and the region would hold the share c of it; the tail beyond the
+border is left out. So draws follow the valley whatever its shape, and widen with the region where
+the model does not quite explain the recording. The bootstrap's optima would do neither: they lie on
+a lattice, about the optimum, as if the model were true.
+
+A draw from a fit is one of its Gaussian posterior, `driftwalk.assembly.runs.posterior`.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.runs.address import stream_keys
+from driftwalk.assembly.runs.posterior import draw_posterior, has_covariance
 from driftwalk.core.errors import InputError
 from driftwalk.schema.earlier import current_form
 
@@ -55,12 +58,12 @@ class _Region(NamedTuple):
 def draw_parameters(
     calibration: xr.Dataset, *, runs: int, seed: int = 1, trial: int = 0
 ) -> DrawnParameters:
-    """Draw drag coefficient and stochastic force from a calibration's joint region.
+    """Draw drag coefficient and stochastic force from the uncertainty of a calibration or a fit.
 
     Parameters
     ----------
     calibration : xarray.Dataset
-        A `calibration` with its region, that is made with a bootstrap.
+        A `calibration` with its region, that is made with a bootstrap; or a `fit`.
     runs : int
         How many to draw, one per run.
     seed, trial : int
@@ -69,13 +72,15 @@ def draw_parameters(
     Returns
     -------
     DrawnParameters
-        ``drag_coefficient`` and ``force_std`` [N], shape (runs,) each; every pair lies in the
-        region, with a weight that falls from 1 at the optimum to 1 - confidence at the border.
+        ``drag_coefficient`` and ``force_std`` [N], shape (runs,) each. Of a calibration every pair
+        lies in the region, with a weight that falls from 1 at the optimum to 1 - confidence at the
+        border. Of a fit they are log-normal about its estimate, with its covariance; where its
+        force law has further uncertain numbers, every 25 runs share a draw.
 
     Raises
     ------
     InputError
-        When the calibration has no region.
+        When the calibration has no region, or the fit no covariance.
 
     Examples
     --------
@@ -84,6 +89,9 @@ def draw_parameters(
     >>> draw_parameters(calibration, runs=2).drag_coefficient  # doctest: +SKIP
     array([0.3874, 0.3921])
     """
+    if calibration.attrs.get("kind") == "fit":
+        numbers = draw_posterior(calibration, runs=runs, seed=seed, trial=trial)
+        return DrawnParameters(numbers["drag_coefficient"], numbers["force_std_N"])
     region = _region_of(calibration)
     index = np.arange(runs)
     parts = [
@@ -92,6 +100,24 @@ def draw_parameters(
     ]
     drawn = np.concatenate(parts)
     return DrawnParameters(np.ascontiguousarray(drawn[:, 0]), np.ascontiguousarray(drawn[:, 1]))
+
+
+def has_uncertainty(found: xr.Dataset) -> bool:
+    """Return whether parameters can be drawn from a dataset.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        A `calibration` or a `fit`; there is nothing to draw from in another kind.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> has_uncertainty(xr.Dataset(attrs={"kind": "model_comparison"}))
+    False
+    """
+    kind = found.attrs.get("kind")
+    return has_covariance(found) if kind == "fit" else kind == "calibration" and has_region(found)
 
 
 def has_region(calibration: xr.Dataset) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
@@ -43,6 +44,10 @@ class Plan:
     force_std: Floats
     flow_draw: Indices | None
     """Which drawn flow a run has; None: the flow as it is."""
+    flow_correlated_over: float | None
+    """Distance over which the errors of a drawn flow go together [m]; None: each node alone."""
+    law: Mapping[str, Floats]
+    """Drawn numbers of the force law by their keys in [forces]; the study has the others."""
     threads: int
     backend: Backend
 
@@ -107,6 +112,8 @@ def make_plan(
         ),
         force_std=_of_each("force_std", force_std, forces.force_std_N, runs.size),
         flow_draw=None,
+        flow_correlated_over=None,
+        law={},
         threads=threads or default_threads(),
         backend=backend,
     )

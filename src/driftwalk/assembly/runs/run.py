@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.runs.dataset import build_assembly, build_path
+from driftwalk.assembly.runs.dataset import LAW_NAMES, build_assembly, build_path
 from driftwalk.assembly.runs.drawn_flow import RUNS_PER_FLOW, draw_flow, has_standard_error
 from driftwalk.assembly.runs.parameters import draw_parameters
 from driftwalk.assembly.runs.plan import (
@@ -23,6 +23,7 @@ from driftwalk.assembly.runs.plan import (
     simulate_rows,
     start_poses,
 )
+from driftwalk.assembly.runs.posterior import draw_posterior
 from driftwalk.core.errors import InputError
 from driftwalk.sweep import (
     Store,
@@ -149,18 +150,20 @@ def assemble_drawn(
     threads: int | None = None,
     executor: Executor | None = None,
 ) -> xr.Dataset:
-    """Simulate self-assembly with parameters drawn from the uncertainty of a calibration.
+    """Simulate self-assembly with parameters drawn from the uncertainty of a calibration or a fit.
 
     Every run has its own drag coefficient and stochastic force, drawn from the calibration's joint
-    region (`draw_parameters`). Where the flow field states standard errors, every 25 runs have
-    their own flow field too: its measured nodes are moved at random by them, each on its own.
+    region or from the fit's posterior (`draw_parameters`); with a fit whose force law has further
+    uncertain numbers, every 25 runs share a draw of all of them. Where the flow field states
+    standard errors, every 25 runs have their own flow field too: its measured nodes are moved at
+    random by them, each on its own, those of a fit's own flow smoothly over its knots.
 
     Parameters
     ----------
     study, flow, blocks, runs, duration, start, seed, store, progress, threads, executor
         As in `assemble`.
     calibration : xarray.Dataset
-        A `calibration` with its joint region.
+        A `calibration` with its joint region, or a `fit`.
     trial : int
         As in `assemble`; 1, so that these runs are independent of those of `assemble`.
     flow_draws : {"standard_error", "none"}
@@ -169,13 +172,13 @@ def assemble_drawn(
     Returns
     -------
     xarray.Dataset
-        As of `assemble`; ``drag_coefficient``, ``force_std`` of each run, and where flows were
-        drawn ``flow_draw``, the index of its flow.
+        As of `assemble`; ``drag_coefficient``, ``force_std`` of each run, drawn numbers of the
+        force law, and where flows were drawn ``flow_draw``, the index of its flow.
 
     Raises
     ------
     InputError
-        As `assemble`, and when the calibration has no region.
+        As `assemble`, and when the calibration has no region or the fit no covariance.
 
     Examples
     --------
@@ -196,16 +199,25 @@ def assemble_drawn(
         threads=threads_of_unit(threads, executor),
     )
     settings = plan.study.assembly
-    drawn = draw_parameters(calibration, runs=settings.runs, seed=settings.seed, trial=trial)
+    address = {"runs": settings.runs, "seed": settings.seed, "trial": trial}
+    drawn = draw_parameters(calibration, **address)
+    is_fit = calibration.attrs.get("kind") == "fit"
+    numbers = draw_posterior(calibration, **address) if is_fit else {}
+    law = {key: values for key, values in numbers.items() if key in LAW_NAMES}
     moves = flow_draws == "standard_error" and has_standard_error(flow)
     plan = replace(
         plan,
         drag_coefficient=drawn.drag_coefficient,
         force_std=drawn.force_std,
+        flow_correlated_over=_knot_distance(calibration, flow) if is_fit and moves else None,
+        law=law,
         flow_draw=np.arange(settings.runs) // RUNS_PER_FLOW if moves else None,
     )
-    what = "drag_coefficient force_std" + (" flow" if moves else "")
-    return _run(plan, start, store=store, progress=progress, executor=executor, drawn=what)
+    what = ["drag_coefficient", "force_std", *(LAW_NAMES[key] for key in law)]
+    what += ["flow"] if moves else []
+    return _run(
+        plan, start, store=store, progress=progress, executor=executor, drawn=" ".join(what)
+    )
 
 
 def assembly_path(
@@ -306,6 +318,12 @@ def check_assembly(
     start_poses(make_plan(study, flow, settings={}, trial=trial, threads=threads), None)
 
 
+def _knot_distance(fit: xr.Dataset, flow: xr.Dataset) -> float | None:
+    """Return the distance of the knots [m] where a flow is the fit's own."""
+    own = all(np.array_equal(fit[axis].values, flow[axis].values) for axis in ("x", "y"))
+    return float(fit["spline_spacing"]) if own else None
+
+
 def _run(
     plan: Plan,
     start: npt.ArrayLike | None,
@@ -332,8 +350,8 @@ class _Runs:
 
     def __call__(self, unit: WorkUnit) -> Arrays:
         parts = [
-            simulate_rows(self.plan, self.poses, rows, flow)
-            for rows, flow in _by_flow(self.plan, unit.start, unit.stop)
+            simulate_rows(plan, self.poses, rows, plan.flow)
+            for rows, plan in _by_draw(self.plan, unit.start, unit.stop)
         ]
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
@@ -344,17 +362,31 @@ def runs_per_unit(plan: Plan) -> int:
     return settings_per_unit(plan.index.size, block_steps, multiple=RUNS_TOGETHER)
 
 
-def _by_flow(plan: Plan, first: int, last: int) -> Sequence[tuple[slice, xr.Dataset]]:
-    """Return the rows of a unit that share a flow, and that flow."""
-    if plan.flow_draw is None:
-        return [(slice(first, last), plan.flow)]
-    draws = plan.flow_draw[first:last]
+def _by_draw(plan: Plan, first: int, last: int) -> Sequence[tuple[slice, Plan]]:
+    """Return the rows of a unit that share a flow and a force law, and their plan."""
+    if plan.flow_draw is None and not plan.law:
+        return [(slice(first, last), plan)]
+    draws = np.arange(first, last) // RUNS_PER_FLOW
     edges = [0, *(np.flatnonzero(np.diff(draws)) + 1).tolist(), draws.size]
-    seed = plan.study.assembly.seed
     return [
-        (
-            slice(first + low, first + high),
-            draw_flow(plan.flow, seed=seed, trial=plan.trial, draw=int(draws[low])),
-        )
+        (slice(first + low, first + high), _drawn(plan, first + low))
         for low, high in pairwise(edges)
     ]
+
+
+def _drawn(plan: Plan, row: int) -> Plan:
+    """Return the plan with the drawn flow and the drawn force law of a row."""
+    from driftwalk.model import apply_overrides
+
+    law = {f"forces.{key}": float(values[row]) for key, values in plan.law.items()}
+    study, flow = apply_overrides(plan.study, law) if law else plan.study, plan.flow
+    if plan.flow_draw is not None:
+        draw, seed = int(plan.flow_draw[row]), plan.study.assembly.seed
+        flow = draw_flow(
+            plan.flow,
+            seed=seed,
+            trial=plan.trial,
+            draw=draw,
+            correlated_over=plan.flow_correlated_over,
+        )
+    return replace(plan, study=study, flow=flow)

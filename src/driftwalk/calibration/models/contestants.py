@@ -89,7 +89,9 @@ def contestants(
             warnings.append(f"{what} is left out: {error}")
     if not found:
         raise InputError("; ".join(warnings))
-    unstated = unstated_warning(study, block=any(one.name == BLOCK for one in models))
+    unstated = unstated_warning(
+        study, about="block" if any(one.name == BLOCK for one in models) else "tank"
+    )
     return found, warnings if unstated is None else [unstated, *warnings]
 
 

@@ -17,13 +17,14 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
-FOUND_BY_CALIBRATION: Final = (
+FOUND_BY_A_RUN: Final = (
     "forces.drag_coefficient",
     "forces.force_std_N",
     "forces.force_interval_s",
 )
-SEARCHED: Final = FOUND_BY_CALIBRATION[:2]
-"""Parameters that a calibration finds: a study file may hold any value for them."""
+SEARCHED: Final = FOUND_BY_A_RUN[:2]
+"""Parameters that a run finds: a study file may hold any value for them."""
+RUN_HELP: Final = "Run directory of a finished fit, calibration or comparison of models."
 RUN_NAMES: Final = (
     *("blocks", "duration", "tank_diameter", "side", "mass", "depth"),
     *("drag_coefficient", "force_std", "force_interval"),
@@ -33,7 +34,7 @@ RUN_NAMES: Final = (
 )
 """Options for keys of a study that every command on self-assembly takes."""
 MODEL_KEYS: Final = ("block", "tank", "water", "forces", "simulation.time_step_s")
-"""Sections that a study file must not contradict when a calibration gives the model."""
+"""Sections that a study file must not contradict when a run gives the model."""
 
 
 @dataclass(frozen=True)
@@ -46,19 +47,22 @@ class Source:
         The study with the options over it.
     flow : xarray.Dataset
         The flow field.
-    region : xarray.Dataset or None
-        The calibration where it has a joint region.
+    uncertainty : xarray.Dataset or None
+        The fit or calibration where parameters can be drawn from it.
     inputs : dict of str to Path
         The files that were read, by their role.
     warnings : list of str
         Warnings for the user.
+    not_drawn : str or None
+        Why no parameters can be drawn from a run, None where they can or there is no run.
     """
 
     study: Study
     flow: xr.Dataset
-    region: xr.Dataset | None
+    uncertainty: xr.Dataset | None
     inputs: dict[str, Path]
     warnings: list[str]
+    not_drawn: str | None = None
 
 
 def source_from_flow(given: StudyOptions, flow_file: Path | None) -> Source:
@@ -76,39 +80,43 @@ def source_from_flow(given: StudyOptions, flow_file: Path | None) -> Source:
     InputError
         When there is no flow field, or a file or option is wrong.
     """
+    from driftwalk.conditions import unstated_warning
+
     if flow_file is None:
         raise InputError(
-            "the flow of the water is missing: give the run directory of a "
-            "calibration, or a flow field (--flow)"
+            "the flow of the water is missing: give the run directory of a fit or a calibration, "
+            "or a flow field (--flow)"
         )
     chosen = given.study()
     inputs = {"flow": flow_file, **({} if given.file is None else {"study": given.file})}
-    return Source(chosen, load_flow_for(flow_file, chosen), None, inputs, [])
+    warning = unstated_warning(chosen, about="simulation")
+    field = load_flow_for(flow_file, chosen)
+    return Source(chosen, field, None, inputs, [] if warning is None else [warning])
 
 
 def refuse_found(folder: Path, overrides: Mapping[str, Any], *, also: Sequence[str] = ()) -> None:
-    """Refuse options for what a calibration has found.
+    """Refuse options for what a run has found.
 
     Raises
     ------
     InputError
         Names the options.
     """
-    refused = [*(option_name(key) for key in FOUND_BY_CALIBRATION if key in overrides), *also]
+    refused = [*(option_name(key) for key in FOUND_BY_A_RUN if key in overrides), *also]
     if refused:
         raise InputError(
-            f"{', '.join(refused)}: not with a calibration run, whose own values are used; to give "
-            f"them, take the run's flow field alone: --flow {folder / 'flow.nc'}"
+            f"{', '.join(refused)}: not with a finished run, whose own values are used; to give "
+            f"them, take the run's flow field alone: --flow {folder}"
         )
 
 
-def source_from_calibration(folder: Path, flow_file: Path | None, given: StudyOptions) -> Source:
-    """Return the model that a calibration has found, in its flow field.
+def source_from_run(folder: Path, flow_file: Path | None, given: StudyOptions) -> Source:
+    """Return the model of the block that a run has found, in its flow field.
 
     Parameters
     ----------
     folder : Path
-        The run directory of the calibration.
+        The run directory of a fit, a calibration or a comparison of models.
     flow_file : Path or None
         Another flow field.
     given : StudyOptions
@@ -118,22 +126,22 @@ def source_from_calibration(folder: Path, flow_file: Path | None, given: StudyOp
     Raises
     ------
     InputError
-        When the calibration cannot be used, the study file says another model, or a file or option
-        is wrong.
+        When the run cannot be used, the study file says another model, or a file or option is
+        wrong.
     """
-    from driftwalk.runs import read_calibrated
+    from driftwalk.runs import read_found
 
-    found = read_calibrated(folder)
-    base, study, inputs = f"the study of {folder}", found.study, dict(found.files)
+    found = read_found(folder)
+    base, study, inputs = f"the study of {folder}", found.block_study(), found.inputs
     if given.file is not None:
-        base, study = str(given.file), _with_sections(found.study, given.file, folder)
+        base, study = str(given.file), _with_sections(study, given.file, folder)
         inputs["study"] = given.file
     chosen = given.over(study, base=base)
-    warnings = [f"of the calibration: {warning}" for warning in found.warnings]
-    field = found.flow
-    if flow_file is not None:
+    if flow_file is None:
+        field = found.flow(study)
+    else:
         field, inputs["flow"] = load_flow_for(flow_file, chosen), flow_file
-    return Source(chosen, field, found.region, inputs, warnings)
+    return Source(chosen, field, found.uncertainty, inputs, found.warnings, found.not_drawn)
 
 
 def load_flow_for(path: Path, study: Study) -> xr.Dataset:
@@ -159,7 +167,7 @@ def _with_sections(study: Study, path: Path, folder: Path) -> Study:
             if stated and getattr(theirs, key) != getattr(ours, key):
                 raise InputError(
                     f"{path}: [{section}] {key} is {getattr(theirs, key)}, and {folder} was "
-                    f"calibrated with {getattr(ours, key)}; leave it out of the file, or take "
-                    f"the run's flow field alone: --flow {folder / 'flow.nc'}"
+                    f"made with {getattr(ours, key)}; leave it out of the file, or take the run's "
+                    f"flow field alone: --flow {folder}"
                 )
     return study.model_copy(update={"assembly": given.assembly, "sensitivity": given.sensitivity})

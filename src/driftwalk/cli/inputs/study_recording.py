@@ -15,7 +15,7 @@ from driftwalk.cli.terminal.output import print_note
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.conditions import ReadRecordings
+    from driftwalk.conditions import About, ReadRecordings
     from driftwalk.conditions.reading import Bodies
     from driftwalk.model import Study
 
@@ -106,7 +106,7 @@ def read_with_flow(
 
 
 def opening_note(
-    study: Study, given: StudyOptions, *, block: bool, otherwise: str = "recording"
+    study: Study, given: StudyOptions, *, about: About, otherwise: str = "recording"
 ) -> Callable[[], None]:
     """Return what says, when a run begins, which body and tank it takes, and who stated them.
 
@@ -116,37 +116,41 @@ def opening_note(
         As the run is made with it.
     given : StudyOptions
         The options and the study file.
-    block : bool
-        Whether the run is about the block.
+    about : {"tank", "block", "simulation"}
+        As in `driftwalk.conditions.unstated_warning`.
     otherwise : str
         Who stated what neither an option nor the study file does.
     """
-    from driftwalk.conditions.tank import OUTLINE
-    from driftwalk.model import load_study
+    from driftwalk.conditions import is_stated
+    from driftwalk.model import Study, load_study
 
-    file = None if given.file is None else load_study(given.file)
+    file = Study() if given.file is None else load_study(given.file)
 
-    def stated(text: str, section: str, *keys: str) -> str:
-        options = [key for key in keys if f"{section}.{key}" in given.overrides]
-        in_file = file is not None and not getattr(file, section).model_fields_set.isdisjoint(keys)
-        if options:
-            source = option_name(f"{section}.{options[0]}", keys=given.keys)
-        elif in_file:
+    def stated(key: str, text: str) -> str:
+        same = ("block.depth", "block.depth_m") if key == "block.depth_m" else (key,)
+        option = next((one for one in same if one in given.overrides), None)
+        if option is not None:
+            source = option_name(option, keys=given.keys)
+        elif is_stated(file, key):
             source = str(given.file)
         else:
-            is_set = not getattr(study, section).model_fields_set.isdisjoint(keys)
-            source = otherwise if is_set else "default"
+            source = otherwise if is_stated(study, key) else "default"
         return f"{text} ({source})"
 
-    body, depth_m = study.block, study.block.wetted_depth_m(study.water.density_kg_m3)
-    lines = []
-    if block:
-        lines += [
-            stated(f"block of side {100 * body.side_m:.4g} cm", "block", "side_m"),
-            stated(f"mass {1e3 * body.mass_kg:.4g} g", "block", "mass_kg"),
-            stated(f"wetted depth {100 * depth_m:.4g} cm", "block", "depth", "depth_m"),
-        ]
-        interval = f"force redrawn every {1e3 * study.forces.force_interval_s:g} ms"
-        lines.append(stated(interval, "forces", "force_interval_s"))
-    lines.append(stated(f"tank: {study.tank.describe()}", "tank", *OUTLINE))
-    return lambda: print_note("; ".join(lines))
+    block, forces = study.block, study.forces
+    depth_cm = 100 * block.wetted_depth_m(study.water.density_kg_m3)
+    texts = {"tank.diameter_m": f"tank: {study.tank.describe()}"}
+    if about != "tank":
+        texts |= {
+            "block.side_m": f"block of side {100 * block.side_m:.4g} cm",
+            "block.mass_kg": f"mass {1e3 * block.mass_kg:.4g} g",
+            "block.depth_m": f"wetted depth {depth_cm:.4g} cm",
+        }
+    if about == "simulation":
+        texts["forces.drag_coefficient"] = f"C_d {forces.drag_coefficient:.4g}"
+        texts["forces.force_std_N"] = f"σ_F {1e3 * forces.force_std_N:.4g} mN"
+    if about != "tank":
+        every = f"{1e3 * forces.force_interval_s:g} ms"
+        texts["forces.force_interval_s"] = f"force redrawn every {every}"
+    line = "; ".join(stated(key, text) for key, text in texts.items())
+    return lambda: print_note(line)

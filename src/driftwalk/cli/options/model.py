@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
 import typer
 
 from driftwalk.core.did_you_mean import did_you_mean
-from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.errors import ConfigurationError, InputError
 
 if TYPE_CHECKING:
     from driftwalk.motion import MotionModel
+    from driftwalk.runs import FoundRun
+
+GIVE_VALUES: Final = "give the directory of a finished calibration"
 
 ModelName = Annotated[
     str | None,
@@ -85,25 +88,33 @@ class KnownModel(NamedTuple):
     warnings: list[str]
 
 
-def known_model(name: str, choices: Sequence[str] | None, place: Path | None) -> KnownModel:
+def known_model(name: str | None, choices: Sequence[str] | None, place: Path | None) -> KnownModel:
     """Return a motion model and the values of its parameters: those of a run, others over them.
+
+    Without a name it is the model that the run is about. Only a model of the family is made of what
+    a run says of itself: a file or a program is executed if the user names it.
 
     Raises
     ------
     ConfigurationError
         When there is no such model or parameter, or a choice is no number.
     InputError
-        When the run holds no values of this model.
+        When the run holds no values of this model, or is about a model of the user's that is not
+        named.
     """
     from driftwalk.motion import is_family_name, motion_model
-    from driftwalk.runs import read_found_values
+    from driftwalk.runs import read_found
 
     given = {one: _value(one, choice) for one, choice in _choices(choices).items()}
-    found = None if place is None else read_found_values(place)
-    known = {} if found is None else found.known
+    found = None if place is None else read_found(place, give=GIVE_VALUES)
+    if name is None and found is not None:
+        name = _family_name(found)
+    if name is None:
+        raise ConfigurationError("name a motion model (--model)")
     options: dict[str, Any] = {}
     if is_family_name(name):
         # No parameter of the motion: how far the recorded point stays from the wall.
+        known = {} if found is None else found.known(name)
         options["clearance"] = given.pop("clearance", known.get("clearance"))
     model = motion_model(name, **options)
     if found is None:
@@ -111,10 +122,29 @@ def known_model(name: str, choices: Sequence[str] | None, place: Path | None) ->
     warnings = []
     if found.is_outdated(model):
         warnings.append(f"the source of {name} has changed since the values of {place} were found")
-    return KnownModel(model, {**found.of(model), **given}, warnings)
+    return KnownModel(model, {**found.values(model), **given}, warnings)
 
 
-def playable_model(name: str, choices: Sequence[str] | None, place: Path | None) -> KnownModel:
+def _family_name(found: FoundRun) -> str:
+    """Return the name of the run's model, which has to be one of driftwalk's own."""
+    from driftwalk.motion import is_family_name, motion_model
+
+    name, is_own = found.model, "model_source_sha256" not in found.found.attrs
+    try:
+        if is_own and is_family_name(name):
+            motion_model(name)
+            return name
+    except ConfigurationError:
+        pass
+    raise InputError(
+        f"{found.name} is about the model {name}, which is none of driftwalk's own: name its file "
+        "or program again (--model)"
+    )
+
+
+def playable_model(
+    name: str | None, choices: Sequence[str] | None, place: Path | None
+) -> KnownModel:
     """Return a motion model with values or ranges for some of its parameters.
 
     As `known_model`; a choice may also be a range, which the model then has.
@@ -124,6 +154,7 @@ def playable_model(name: str, choices: Sequence[str] | None, place: Path | None)
     known = known_model(name, values, place)
     if not ranges:
         return known
+    name = name or known.model.name
     from driftwalk.motion import is_family_name, motion_model
 
     clearance = getattr(known.model, "clearance", 0.0)

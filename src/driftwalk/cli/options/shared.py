@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.uncertain import Uncertain, split_uncertain
 from driftwalk.core.units import parse_quantity
 
@@ -56,6 +56,19 @@ def quantity_option(name: str, unit: str, help: str, *, panel: str = PANEL) -> A
     )
 
 
+def flow_of_run(path: Path | None) -> Path | None:
+    """Return the flow field in a run directory; any other path as it is."""
+    if path is None or not path.is_dir():
+        return path
+    stored = path / "flow.nc"
+    if not stored.is_file():
+        raise InputError(
+            f"{path} holds no flow field ({stored.name}): name the file of one, or the run "
+            "directory of a fit or of a calibration"
+        )
+    return stored
+
+
 StudyFile = Annotated[
     Path | None,
     typer.Option(
@@ -67,7 +80,13 @@ StudyFile = Annotated[
 ]
 FlowFile = Annotated[
     Path | None,
-    typer.Option("--flow", metavar="FILE", help="Flow field to use.", show_default=False),
+    typer.Option(
+        "--flow",
+        metavar="FILE",
+        help="Flow field to use, or the run directory that holds it.",
+        callback=flow_of_run,
+        show_default=False,
+    ),
 ]
 FrameInterval = Annotated[
     float | None,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -17,10 +17,11 @@ from driftwalk.core.errors import InputError
 
 @with_recording_options
 def report(
-    run: Annotated[
-        Path,
+    runs: Annotated[
+        list[Path],
         typer.Argument(
-            metavar="RUN", help="Run directory, finished or not, a recording, or a simulation."
+            metavar="RUN...",
+            help="Run directories, finished or not, recordings, or simulations.",
         ),
     ],
     how: RecordingOptions,
@@ -32,20 +33,25 @@ def report(
         bool, typer.Option("--overwrite", help="Replace a file that exists.")
     ] = False,
 ) -> None:
-    """Write a report of a run or a recording: one HTML file that loads nothing from anywhere.
+    """Write a report of runs or recordings: one HTML file that loads nothing from anywhere.
 
-    Takes a run directory of calibrate, compare-models, fit, assemble, sensitivity or study recover.
+    Takes run directories of calibrate, compare-models, fit, assemble, sensitivity or study recover;
+    several come one after the other on one page, which shows what they have in common once.
     The report has the answer in words with its uncertainty, recording, flow, maps to click,
     outcomes to replay, the manifest and how to cite. It opens with a double click, without a
     network. For a simulation it shows one replicate. The options on reading are for a
     recording.
     """
-    from driftwalk.page import write_report
+    from driftwalk.page import joined_page, name_apart, write_report
 
-    existing = "replace" if overwrite else "error"
+    existing: Literal["error", "replace"] = "replace" if overwrite else "error"
     require_place(out, existing=existing)
-    page = _page(run, how, tank_diameter)
-    write_report(page, out, existing="replace" if overwrite else "error")
+    pages = [_page(run, how, tank_diameter) for run in runs]
+    page = pages[0]
+    if len(pages) > 1:
+        name_apart(pages)
+        page = joined_page(pages, title="Report")
+    write_report(page, out, existing=existing)
     if page["state"]["words"] is not None:
         print_note(page["state"]["words"])
     megabytes = out.stat().st_size / 1e6

@@ -68,7 +68,7 @@ def print_row(label: str, text: object) -> None:
 def print_origin(found: xr.Dataset) -> None:
     """Say that a recording was simulated, where it was."""
     if found.attrs.get("simulated_recording") == "yes":
-        print("This recording was simulated by another engine (ODE).")
+        print("This recording was simulated, not measured.")
 
 
 def print_estimates(found: xr.Dataset, *parameters: str) -> None:

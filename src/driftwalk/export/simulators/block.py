@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.run_layout import state_of
 from driftwalk.export.target import Source
 
 if TYPE_CHECKING:
@@ -161,43 +160,12 @@ def _read(source: Source) -> tuple[Study, xr.Dataset, str]:
 
 
 def _of_run(source: Source) -> tuple[Study, xr.Dataset, str]:
-    from driftwalk.conditions import estimated_study
+    from driftwalk.runs import read_found
 
-    found, kind = _estimates(source.path)
-    study = estimated_study(found, source=f"{source.path}: its study")
-    flow = source.flow if source.flow is not None else source.path / "flow.nc"
-    if not flow.is_file():
-        raise InputError(f"{flow} is not there: give a flow field (`flow`)")
-    name = source.path.resolve().name
-    return study, _flow(flow, study), f"the {kind} in {name}"
-
-
-def _estimates(folder: Path) -> tuple[xr.Dataset, str]:
-    from driftwalk.schema.calibration import is_block
-    from driftwalk.schema.contents import check_contents
-    from driftwalk.schema.netcdf import open_netcdf
-
-    state = state_of(folder)
-    if state == "unfinished":
-        raise InputError(
-            f"{folder} holds a run that is not finished: run its command again, which continues it"
-        )
-    if state == "new":
-        raise InputError(f"{folder} is not a run directory: {TAKEN}")
-    for kind, file in (("calibration", "calibration.nc"), ("fit", "fit.nc")):
-        path = folder / file
-        if not path.is_file():
-            continue
-        found = check_contents(open_netcdf(path), path)
-        if found.attrs.get("kind") != kind:
-            raise InputError(f"{path} is not a {kind}: its kind is {found.attrs.get('kind')!r}")
-        if kind == "calibration" and not is_block(found):
-            raise InputError(
-                f"{folder} is about the model {found.attrs.get('model', 'of a user')}, and another "
-                f"simulator gets the block in stirred water: {TAKEN}"
-            )
-        return found, kind
-    raise InputError(f"{folder} holds a finished run, but no calibration or fit: {TAKEN}")
+    found = read_found(source.path, give=TAKEN)
+    study = found.block_study(why=f"another simulator gets the block in stirred water: {TAKEN}")
+    flow = found.flow(study) if source.flow is None else _flow(source.flow, study)
+    return study, flow, f"the {found.words} in {source.path.resolve().name}"
 
 
 def _flow(path: Path, study: Study) -> xr.Dataset:

@@ -7,6 +7,7 @@ from typing import Final
 from driftwalk.schema.description import ARENA, SOURCE, STUDY, Attribute, Kind, Variable
 from driftwalk.schema.kinds.motion import WORLD_STATUS
 
+_LAW: Final = "drawn from a fit whose force law has it"
 _CONNECTOR: Final = "latching by a connector"
 SETTINGS: Final = (
     Attribute("blocks", "number", "blocks in the tank"),
@@ -105,6 +106,9 @@ ASSEMBLY: Final = Kind(
         Variable("assembly", "run block", None, _LOWEST, "int"),
         Variable("drag_coefficient", "run", "1", "drag coefficient"),
         Variable("force_std", "run", "N", "standard deviation of the force"),
+        Variable("linear_drag", "run", "kg s-1", "linear drag of the block", when=_LAW),
+        Variable("drag_power", "run", "1", "power of the speed in the drag", when=_LAW),
+        Variable("force_memory", "run", "s", "correlation time of the force", when=_LAW),
         Variable(
             "flow_draw", "run", None, "which drawn flow field the run had", "int",
             when="flow fields were drawn",

@@ -1,0 +1,86 @@
+"""Where simulate and play take their model from, where a run is given."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from driftwalk.cli.inputs.assembly_source import load_flow_for, refuse_found
+from driftwalk.cli.options.study import StudyOptions
+from driftwalk.cli.terminal.output import print_note
+from driftwalk.core.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+    from driftwalk.motion import MotionModel
+    from driftwalk.runs import FoundRun
+
+
+@dataclass(frozen=True)
+class FoundSource:
+    """A run, with the options of the command over its study.
+
+    Attributes
+    ----------
+    folder : Path
+        The run directory.
+    found : FoundRun
+        What it has found.
+    given : StudyOptions
+        The options.
+    """
+
+    folder: Path
+    found: FoundRun
+    given: StudyOptions
+
+    @property
+    def is_block(self) -> bool:
+        """Whether the run is about the block in stirred water."""
+        from driftwalk.motion import BlockModel
+
+        return self.found.model == BlockModel.name
+
+    def study(self) -> Study:
+        """Return the study of the run, with the options over it."""
+        own = self.found.block_study() if self.is_block else self.found.study()
+        return self.given.over(own, base=f"the study of {self.folder}")
+
+    def block(self, flow: Path | None) -> tuple[Study, xr.Dataset]:
+        """Return study and flow of the block; a given flow field goes over that of the run."""
+        for warning in self.found.warnings:
+            print_note(f"warning: {warning}")
+        chosen = self.study()
+        if flow is not None:
+            return chosen, load_flow_for(flow, chosen)
+        return chosen, self.found.flow(self.found.block_study())
+
+    def flow_for(self, model: MotionModel, study: Study, flow: Path | None) -> xr.Dataset | None:
+        """Return the flow for a motion model, None where it has no use for any."""
+        if flow is not None:
+            return load_flow_for(flow, study)
+        return self.found.flow(study) if model.needs_flow else None
+
+
+def open_run(
+    folder: Path, given: StudyOptions, model: str | None, parameters_from: Path | None
+) -> FoundSource:
+    """Return a run that the user has named as the model.
+
+    Raises
+    ------
+    InputError
+        When it cannot be used, or another option says the model too.
+    """
+    from driftwalk.runs import read_found
+
+    if parameters_from is not None:
+        raise InputError(f"{folder} and --parameters-from both give the values: leave one out")
+    refuse_found(folder, given.overrides, also=[] if given.file is None else ["--study"])
+    source = FoundSource(folder, read_found(folder), given)
+    if model is not None and source.found.kind in ("fit", "calibration") and source.is_block:
+        raise InputError(f"{folder} is about the block, and not about {model}: leave out --model")
+    return source
