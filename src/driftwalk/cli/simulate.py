@@ -158,13 +158,18 @@ def _of_block(
         chosen, field = given.study(), load_flow(flow)
     if recording is not None:
         chosen = study_for([recording], chosen, body=body)
-    _open(chosen, given, source, about="simulation")
     if recording is None:
-        return run(chosen, field, backend="reference" if backend == "reference" else "cpu")
-    return simulate_like(chosen, field, recording)
+        result = run(chosen, field, backend="reference" if backend == "reference" else "cpu")
+    else:
+        result = simulate_like(chosen, field, recording)
+    # What was refused needs no such words.
+    _say_what(chosen, given, source, about="simulation")
+    return result
 
 
-def _open(study: Study, given: StudyOptions, source: FoundSource | None, *, about: About) -> None:
+def _say_what(
+    study: Study, given: StudyOptions, source: FoundSource | None, *, about: About
+) -> None:
     """Say which body and tank are simulated, and warn of those that nobody stated."""
     from driftwalk.conditions import unstated_warning
 
@@ -194,10 +199,10 @@ def _of_model(
         field = source.flow_for(known.model, chosen, flow)
     else:
         field = None if flow is None else load_flow_for(flow, chosen)
-    _open(chosen, given, source, about="tank")
     result = simulate_motion(
         known.model, known.values, chosen, flow=field, like=recording, body=body
     )
+    _say_what(chosen, given, source, about="tank")
     for warning in known.warnings:
         print_note(f"warning: {warning}")
     return result
