@@ -249,7 +249,7 @@ def test_a_source_that_has_changed_since_is_said(
     found = xr.Dataset({"estimate": estimate}, attrs={"kind": "calibration", **model.facts({})})
     found.to_netcdf("found.nc", engine="h5netcdf")
     words = ("--model", "mine.py:diffuse", "--parameters-from", "found.nc", "--duration", "5s")
-    assert "warning" not in simulated(tmp_path / "a.nc", *words)[0].err
+    assert "has changed since" not in simulated(tmp_path / "a.nc", *words)[0].err
     Path("mine.py").write_text(f"# another one\n{FILE}", encoding="utf-8")
     done, run = simulated(tmp_path / "b.nc", *words)
     assert "warning: the source of mine.py:diffuse has changed since" in done.err
