@@ -44,7 +44,7 @@ from driftwalk.calibration.steadiness import Steadiness, steadiness_of
 from driftwalk.calibration.surface import Optimum, at_settings
 from driftwalk.calibration.wall import wall_warning
 from driftwalk.comparison import Statistic, StepDistance
-from driftwalk.conditions import neighbours_of, recorded_camera, study_in_arena
+from driftwalk.conditions import jump_warnings, neighbours_of, recorded_camera, study_in_arena
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.run_stages import share_of_map, share_of_windows, tell_nobody
 from driftwalk.motion import BlockModel, Details, MotionModel
@@ -186,6 +186,7 @@ def calibrate(
     steadiness = steadiness_of(problem)
     of_time = None if steadiness is None else steadiness.warning
     of_flow = own_flow_warning(searched, result.quality) if flow is None else None
+    result.warnings += jump_warnings(recording, body, track=track)
     result.warnings += [text for text in (of_flow, of_wall, of_time) if text is not None]
 
     def finish(halves: Halves | None) -> xr.Dataset:

@@ -71,6 +71,7 @@ _COUNTS = {
     "unsorted": "times out of order, sorted",
     "outside_window": "outside --from and --to",
     "jumps_removed": "jumps made gaps",
+    "impossible_steps": "impossible steps left",
     "samples": "samples left",
 }
 

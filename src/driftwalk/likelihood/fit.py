@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from driftwalk.conditions import jump_warnings
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.agreement import angle_given_facts
@@ -180,7 +181,12 @@ def fit_motion(
         facts=facts,
     )
     shares = visited_shares(fit)
-    warnings = warnings_of(facts, whiteness, shares, intervals, side_m=chosen.block.side_m)
+    warnings = [
+        sentence
+        for recording, track in zip(many, ready.tracks, strict=True)
+        for sentence in jump_warnings(recording, body, track=track)
+    ]
+    warnings += warnings_of(facts, whiteness, shares, intervals, side_m=chosen.block.side_m)
     return described(
         fit.assign(visited_share=((), min(shares))).assign_coords(
             warning=("warning", texts(warnings))

@@ -6,6 +6,12 @@ says what a recording holds; `save_trajectory` keeps it.
 
 from driftwalk.record.arena import PlacedArena, place_arena
 from driftwalk.record.circle import CircleFit, fit_circle, tank_radius_bound
+from driftwalk.record.impossible import (
+    Impossible,
+    arena_diagonal,
+    impossible_steps,
+    impossible_warning,
+)
 from driftwalk.record.info import describe
 from driftwalk.record.io import load, readable_formats
 from driftwalk.record.noise import (
@@ -18,12 +24,16 @@ from driftwalk.record.write import save_trajectory
 
 __all__ = [
     "CircleFit",
+    "Impossible",
     "NoiseBound",
     "NoiseEstimate",
     "PlacedArena",
+    "arena_diagonal",
     "describe",
     "estimate_tracking_noise",
     "fit_circle",
+    "impossible_steps",
+    "impossible_warning",
     "load",
     "noise_bound",
     "place_arena",

@@ -20,6 +20,7 @@ from driftwalk.record.clean import Counts, clean_body
 from driftwalk.record.clock import check_clock
 from driftwalk.record.convert_units import convert_units
 from driftwalk.record.extent import refuse_many_bodies, refuse_sparse
+from driftwalk.record.impossible import arena_diagonal, impossible_steps, impossible_warning
 from driftwalk.record.origin import origin_of
 from driftwalk.record.pose.listed import listed
 from driftwalk.record.pose.markers import join_markers
@@ -269,15 +270,17 @@ def _assemble(
     block_side: float | None,
 ) -> xr.Dataset:
     """Place the bodies in their arena and on one clock, and write down what was done."""
-    notes = list(raw.notes)
+    notes, arena = list(raw.notes), None
     if block_side is not None:
         attrs["block_side_m"] = block_side
     if tank is not None:
         placed = _place(tank, bodies, block_side=block_side)
         _shift(bodies, placed)
+        arena = placed.arena
         before = parse_json(attrs.get("origin_shift_m", "[0.0, 0.0]"))
         attrs |= arena_attributes(placed, shifted_before=before)
         notes += placed.notes
+    jumps = _count_impossible(bodies, counts, arena)
     totals = {
         key: sum(getattr(found, key) for found in counts.values()) for key in Counts().as_dict()
     }
@@ -286,7 +289,7 @@ def _assemble(
         attrs["sample_rate_Hz"] = _usual_rate(bodies)
     if twice := totals["times_in_two_places"]:
         notes.append(f"times with rows in different places, of which the last is kept: {twice}")
-    notes += plausibility_warnings(bodies)
+    notes += [*plausibility_warnings(bodies), *jumps]
     attrs["counts"] = json.dumps(
         {
             "rows_in_file": raw.rows,
@@ -302,6 +305,20 @@ def _assemble(
         recording[name] = (("time", "body", *meaning.dims), values, meaning.attrs)
         recording = recording.assign_coords(meaning.coords)
     return recording
+
+
+def _count_impossible(
+    bodies: list[RawBody], counts: dict[str, Counts], arena: dict[str, Any] | None
+) -> list[str]:
+    """Count the impossible steps of each body; return what to say of them."""
+    diagonal = arena_diagonal([body.x for body in bodies], [body.y for body in bodies], arena)
+    said = []
+    for body in bodies:
+        steps = impossible_steps(body.clock, body.x, body.y, diagonal=diagonal)
+        if steps is not None:
+            counts[body.name].impossible_steps = steps.count
+            said.append(impossible_warning(body.name, steps))
+    return said
 
 
 def _place(tank: str, bodies: list[RawBody], *, block_side: float | None) -> PlacedArena:
