@@ -1,4 +1,4 @@
-"""Whether a body jumps in its recording, as no body moves: a warning for what is worked out of it."""
+"""Whether a body jumps in its recording as no body moves: a warning for all that uses it."""
 
 from __future__ import annotations
 

@@ -6,19 +6,20 @@ says what a recording holds; `save_trajectory` keeps it.
 
 from driftwalk.record.arena import PlacedArena, place_arena
 from driftwalk.record.circle import CircleFit, fit_circle, tank_radius_bound
-from driftwalk.record.impossible import (
+from driftwalk.record.info import describe
+from driftwalk.record.io import load, readable_formats
+from driftwalk.record.jumps import (
     Impossible,
     arena_diagonal,
     impossible_steps,
     impossible_warning,
 )
-from driftwalk.record.info import describe
-from driftwalk.record.io import load, readable_formats
 from driftwalk.record.noise import (
     NoiseBound,
     NoiseEstimate,
     estimate_tracking_noise,
     noise_bound,
+    noise_reach,
 )
 from driftwalk.record.write import save_trajectory
 
@@ -36,6 +37,7 @@ __all__ = [
     "impossible_warning",
     "load",
     "noise_bound",
+    "noise_reach",
     "place_arena",
     "readable_formats",
     "save_trajectory",

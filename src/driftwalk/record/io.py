@@ -20,7 +20,8 @@ from driftwalk.record.clean import Counts, clean_body
 from driftwalk.record.clock import check_clock
 from driftwalk.record.convert_units import convert_units
 from driftwalk.record.extent import refuse_many_bodies, refuse_sparse
-from driftwalk.record.impossible import arena_diagonal, impossible_steps, impossible_warning
+from driftwalk.record.jumps import arena_diagonal, impossible_steps, impossible_warning
+from driftwalk.record.noise import noise_reach
 from driftwalk.record.origin import origin_of
 from driftwalk.record.pose.listed import listed
 from driftwalk.record.pose.markers import join_markers
@@ -29,7 +30,7 @@ from driftwalk.record.raw import DELIMITERS, Array, RawBody, RawRecording, ReadO
 from driftwalk.record.registry import PLAIN
 from driftwalk.record.text import DAMAGED_GZIP
 from driftwalk.record.warn import angle_warnings, plausibility_warnings
-from driftwalk.schema import build_trajectory
+from driftwalk.schema import Track, build_trajectory
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -322,10 +323,21 @@ def _count_impossible(
 
 
 def _place(tank: str, bodies: list[RawBody], *, block_side: float | None) -> PlacedArena:
+    def reach(size: float) -> float:
+        return max(noise_reach(_track(body), size=size) for body in bodies)
+
     if len(bodies) == 1:
-        return place_arena(tank, bodies[0].x, bodies[0].y, block_side=block_side)
-    x, y = (np.concatenate([getattr(body, axis) for body in bodies]) for axis in ("x", "y"))
-    return place_arena(tank, x, y, block_side=block_side)
+        x, y = bodies[0].x, bodies[0].y
+    else:
+        x, y = (np.concatenate([getattr(body, axis) for body in bodies]) for axis in ("x", "y"))
+    return place_arena(tank, x, y, block_side=block_side, reach=reach)
+
+
+def _track(body: RawBody) -> Track:
+    """Return the samples of a body that have a position, without its angle."""
+    known = np.isfinite(body.x)
+    x, y = body.x[known], body.y[known]
+    return Track(body.clock[known], x, y, np.full(x.size, np.nan))
 
 
 def _shift(bodies: list[RawBody], placed: PlacedArena) -> None:

@@ -66,13 +66,15 @@ class FoundValues:
         return known is not None and own != known
 
 
-def read_found_values(place: Path) -> FoundValues:
+def read_found_values(place: Path, model: str | None = None) -> FoundValues:
     """Read the values that a calibration has found.
 
     Parameters
     ----------
     place : Path
         The run directory of a finished calibration or comparison of models, or its dataset.
+    model : str, optional
+        Name of the model, of which a comparison has several.
 
     Returns
     -------
@@ -96,7 +98,7 @@ def read_found_values(place: Path) -> FoundValues:
     found = open_netcdf(file)
     if "estimate" not in found:
         raise InputError(f"{file} holds no estimate of parameters: give that of a calibration")
-    return FoundValues(file, found, _known(folder))
+    return FoundValues(file, found, _known(folder, model))
 
 
 def _dataset_in(folder: Path) -> Path:
@@ -114,12 +116,12 @@ def _dataset_in(folder: Path) -> Path:
     raise InputError(f"{folder} holds a finished run, but no calibration of a motion model")
 
 
-def _known(folder: Path) -> dict[str, float]:
+def _known(folder: Path, name: str | None) -> dict[str, float]:
     """Return what a run was given: the known values of its model, with the clearance."""
     if state_of(folder) != "finished":
         return {}
     specification = read_manifest(folder / MANIFEST_FILE).get("specification")
-    model = specification.get("model") if isinstance(specification, Mapping) else None
+    model = _described(specification, name) if isinstance(specification, Mapping) else None
     if not isinstance(model, Mapping):
         return {}
     fixed = model.get("fixed")
@@ -130,6 +132,15 @@ def _known(folder: Path) -> dict[str, float]:
     if (folder / "model_calibration.nc").is_file():
         given |= json.loads(open_netcdf(folder / "model_calibration.nc").attrs["fixed"])
     return {name: float(one) for name, one in given.items() if _is_number(one)}
+
+
+def _described(specification: Mapping[str, Any], name: str | None) -> Any:
+    """Return what a run says of its model, or of the one of this name."""
+    several = specification.get("models")
+    if not isinstance(several, list) or name is None:
+        return specification.get("model")
+    named = [one for one in several if isinstance(one, Mapping)]
+    return next((one for one in named if one.get("name") == name.replace("-", "_")), None)
 
 
 def _is_number(value: Any) -> bool:
