@@ -12,7 +12,7 @@ import numpy as np
 
 from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.record.circle import fit_circle, tank_radius_bound
+from driftwalk.record.circle import ENOUGH_VISITED, fit_circle, tank_radius_bound
 from driftwalk.record.raw import Array
 
 INSIDE = 0.999
@@ -148,7 +148,7 @@ def _fitted(x: Array, y: Array, *, block_side: float | None) -> PlacedArena:
             f"centres reach {fit.radius:.4g} m, so the tank's radius is at least {radius:.4g} m, "
             "and this if a face of the block lay against the wall"
         ]
-    if fit.coverage < 0.5:
+    if fit.coverage < ENOUGH_VISITED:
         notes.append(
             f"the body came near the rim in {fit.coverage:.0%} of the directions only: "
             "the fitted circle is uncertain"

@@ -180,7 +180,7 @@ def load(
         refuse_many_bodies([one.name for one in raw.bodies])
         _refuse_unused(options, raw, origin.format)
         raw.notes += [*origin.notes(), *check_clock(raw), *angle_warnings(raw)]
-        bodies, attrs = convert_units(raw, options, y_axis=y_axis)
+        bodies, attrs = convert_units(raw, options, y_axis=y_axis, tank=tank)
         clean = partial(
             clean_body,
             sort=sort,
@@ -317,7 +317,7 @@ def _count_impossible(
     for body in bodies:
         steps = impossible_steps(body.clock, body.x, body.y, diagonal=diagonal)
         if steps is not None:
-            counts[body.name].impossible_steps = steps.count
+            counts[body.name].impossible_steps = steps.number
             said.append(impossible_warning(body.name, steps))
     return said
 

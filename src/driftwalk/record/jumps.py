@@ -116,7 +116,7 @@ def _best_chain(
 class Impossible(NamedTuple):
     """The impossible steps of one body."""
 
-    count: int
+    number: int
     longest: float
     """[m]"""
     first: float
@@ -141,7 +141,7 @@ def impossible_steps(time: Array, x: Array, y: Array, *, diagonal: float) -> Imp
     --------
     >>> x = np.append(np.arange(20.0), np.arange(20.0))
     >>> impossible_steps(np.arange(40.0), x, 0.0 * x, diagonal=19.0)
-    Impossible(count=1, longest=19.0, first=19.0, between=4.4)
+    Impossible(number=1, longest=19.0, first=19.0, between=4.4)
     """
     if diagonal < math.sqrt(2.0) * SMALLEST_EXTENT_M:
         return None  # at rest, or in a wrong unit: `plausibility_warnings` speaks of it
@@ -227,7 +227,7 @@ def impossible_warning(name: str, steps: Impossible) -> str:
     >>> impossible_warning("0", Impossible(178, 0.371, 3.2, 1.2))[:44]
     "body '0' jumps 178 times between two samples"
     """
-    times = "once" if steps.count == 1 else f"{steps.count} times"
+    times = "once" if steps.number == 1 else f"{steps.number} times"
     return (
         f"body '{name}' jumps {times} between two samples, by up to {steps.longest:.3g} m, first "
         f"at {steps.first:.6g} s, and moves slowly before and after: several bodies? Name the "
