@@ -28,19 +28,23 @@ def new(
         Path | None,
         typer.Argument(metavar="[FILE]", help="File to write (default: -, stdout)."),
     ] = None,
+    full: Annotated[
+        bool, typer.Option("--full", help="List every parameter with its unit and meaning.")
+    ] = False,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a file that exists.")
     ] = False,
 ) -> None:
-    """Print a study file that lists every parameter with its unit, default and meaning."""
+    """Print a study file with what differs from tank to tank, or with --full every parameter."""
     from driftwalk.core.atomic import write_atomic
-    from driftwalk.model import study_template
+    from driftwalk.model import short_study_template, study_template
 
+    text = study_template() if full else short_study_template()
     if path is None or str(path) == "-":
-        typer.echo(study_template(), nl=False)
+        typer.echo(text, nl=False)
         return
     require_place(path, existing="replace" if overwrite else "error")
-    write_atomic(path, study_template().encode())
+    write_atomic(path, text.encode())
     print_note(f"wrote {path}")
 
 
