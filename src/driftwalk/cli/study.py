@@ -12,6 +12,8 @@ from driftwalk.cli.options.shared import Json
 from driftwalk.cli.study_recover import recover
 from driftwalk.cli.terminal.output import print_json, print_note, require_place
 
+ALL_PARAMETERS = "\n# All parameters, with their units and meanings: driftwalk study new --full\n"
+
 study_app = typer.Typer(name="study", add_completion=False, help="Write and check study files.")
 
 
@@ -39,7 +41,7 @@ def new(
     from driftwalk.core.atomic import write_atomic
     from driftwalk.model import short_study_template, study_template
 
-    text = study_template() if full else short_study_template()
+    text = study_template() if full else f"{short_study_template()}{ALL_PARAMETERS}"
     if path is None or str(path) == "-":
         typer.echo(text, nl=False)
         return

@@ -18,7 +18,7 @@ some of what it holds."""
 _TWICE: Final = re.compile(
     r"(?:Cannot declare (?P<table>\(.*?\)) twice|Cannot overwrite a value) \(at line (?P<line>\d+)"
 )
-"""What the reader says of a table, or of a key, that stands twice."""
+"""Message of the reader about a table, or a key, that stands twice."""
 _LARGE: Final = "an integer has more than 64 bits"
 
 

@@ -30,8 +30,8 @@ _HEAD = """\
 _SHORT_HEAD = """\
 # Study file of driftwalk: the block and the tank. Each "# key =" line shows the default, which is
 # the paper's. Where yours differs, take the "# " away, before the name in [ ] too, and write your
-# value: in SI units, or text with a unit, such as "3cm" or "11.6g". A key that you leave out has its
-# default. All parameters: driftwalk study new --full
+# value: in SI units, or text with a unit, such as "3cm" or "11.6g". A key that you leave out has
+# its default.
 """
 FIRST: Final = {"block": ("side_m", "mass_kg"), "tank": ("diameter_m", "wall_friction")}
 """Parameters that no two tanks share, and that every result depends on."""
