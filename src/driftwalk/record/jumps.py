@@ -145,10 +145,15 @@ def impossible_steps(time: Array, x: Array, y: Array, *, diagonal: float) -> Imp
     """
     if diagonal < math.sqrt(2.0) * SMALLEST_EXTENT_M:
         return None  # at rest, or in a wrong unit: `plausibility_warnings` speaks of it
-    length = np.hypot(np.diff(x), np.diff(y))
-    far = np.flatnonzero(length > ARENA_SHARE * diagonal)
+    # Squares first: a long recording mostly has no long step, and roots take time.
+    square, across = np.diff(x), np.diff(y)
+    square *= square
+    across *= across
+    square += across
+    far = np.flatnonzero(square > (ARENA_SHARE * diagonal) ** 2)
     if not far.size:
         return None
+    length = np.sqrt(square)
     interval = np.diff(time)
     near = interval <= NEIGHBOURS * np.median(interval)
     length[~near] = np.nan
