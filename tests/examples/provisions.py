@@ -580,7 +580,7 @@ PAGES: dict[str, Page] = {
             "calibrate recording.csv --study study.toml": "calibrate recording.csv "
             "--study small.toml"
         },
-        not_run={"make test": INSTALLS, ". .venv/bin/activate": INSTALLS},
+        not_run={"make demo": INSTALLS, ". .venv/bin/activate": INSTALLS},
         numbers=Numbers.SAME,
         # Both simulate in a fitted flow; of half an hour in one world chance makes what it likes.
         numbers_of={"driftwalk fit *": Numbers.CLOSE, "driftwalk compare *": Numbers.ANY},

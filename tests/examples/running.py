@@ -144,8 +144,15 @@ def _copy(sources: list[str], target: str) -> None:
 
 
 def edited(study: str, changes: str) -> str:
-    """Return the text of a study file with the values of some keys changed, as a reader would."""
+    """Return the text of a study file with the values of some keys changed, as a reader would.
+
+    A table that the file does not have is written at its end.
+    """
     for section, keys in tomllib.loads(changes).items():
+        if f"[{section}]" not in study.splitlines():
+            (table,) = re.findall(rf"^\[{section}\]$.*?(?=^\[|\Z)", changes, re.M | re.S)
+            study += f"\n{table}"
+            continue
         for key in keys:
             (line,) = re.findall(rf"^{key} = .*$", changes, re.MULTILINE)
             place = rf"(^\[{section}\]$(?:(?!^\[).)*?)^(?:# )?{key} = [^\n]*$"

@@ -19,7 +19,7 @@ from driftwalk.calibration.models.contestants import (
 from driftwalk.calibration.models.recorded import body_motion
 from driftwalk.calibration.models.result import build_comparison
 from driftwalk.calibration.stages import Searches, Stages, Tell
-from driftwalk.conditions import study_in_arena
+from driftwalk.conditions import jump_warnings, study_in_arena
 from driftwalk.core.run_stages import tell_nobody
 from driftwalk.motion import MotionModel, ParticleModel
 from driftwalk.sweep import threads_of_unit
@@ -125,6 +125,7 @@ def compare_models(
     )
     entries, warnings = contestants(made_models(models, motion, chosen), motion, chosen)
     entries += walks(motion)
+    warnings += jump_warnings(recording, body)
     search = chosen.calibration
     worlds = search.bootstrap if search.refine == "auto" else 0
     work = Searches(entries, motion, search.seed, budget or Budget())

@@ -45,6 +45,7 @@ from driftwalk.calibration.surface import Optimum, at_settings
 from driftwalk.calibration.wall import wall_warning
 from driftwalk.comparison import Statistic, StepDistance
 from driftwalk.conditions import (
+    jump_warnings,
     neighbours_of,
     recorded_camera,
     study_in_arena,
@@ -194,6 +195,7 @@ def calibrate(
     steadiness = steadiness_of(problem)
     of_time = None if steadiness is None else steadiness.warning
     of_flow = own_flow_warning(searched, result.quality) if flow is None else None
+    result.warnings += jump_warnings(recording, body, track=track)
     said = (unstated, of_flow, of_wall, of_time)
     result.warnings += [text for text in said if text is not None]
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated
 
 import typer
 
 from driftwalk.cli.inputs.study_recording import opening_note, read_with_flow
 from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
+from driftwalk.cli.options.model import ComparedParameters, parameter_choices
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
@@ -38,6 +40,7 @@ def compare_models(
             show_default=False,
         ),
     ] = None,
+    parameters: ComparedParameters = None,
     flow: FlowFile = None,
     threads: Threads = None,
     cluster: ClusterAt = None,
@@ -53,15 +56,16 @@ def compare_models(
     recording. After a kill, the same command continues.
     """
     from driftwalk.calibration import ALL_MODELS, DEFAULT_MODELS
-    from driftwalk.motion import feels_others
+    from driftwalk.motion import feels_others, models_knowing
     from driftwalk.runs import ModelComparisonWork, run_model_comparison
 
     if models is None:
-        chosen: tuple[str, ...] = DEFAULT_MODELS
+        named: Sequence[str] = DEFAULT_MODELS
     elif models.strip() == "all":
-        chosen = ALL_MODELS
+        named = ALL_MODELS
     else:
-        chosen = tuple(name for name in map(str.strip, models.split(",")) if name)
+        named = [name for name in map(str.strip, models.split(",")) if name]
+    chosen = models_knowing(named, parameter_choices(parameters))
     others = any(map(feels_others, chosen))
     read, field, inputs = read_with_flow(
         recording, flow, given, how, bodies="all" if others else "named"

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json
 from driftwalk.cli.options.study import Side, TankDiameter
 from driftwalk.cli.terminal.argument_names import to_options
-from driftwalk.cli.terminal.output import print_json, print_note, print_table
+from driftwalk.cli.terminal.output import command_text, print_json, print_note, print_table
 
 SIDE_BY_SIDE = 5
 """Bodies shown as columns; more are shown as rows, with fewer numbers."""
+FIT_TANK = 0.5
+"""Share of the rim that was visited from which on the tank can be taken from the positions."""
 
 _ROWS: list[tuple[str, str, float]] = [
     ("samples", "samples", 1),
@@ -71,6 +74,7 @@ _COUNTS = {
     "unsorted": "times out of order, sorted",
     "outside_window": "outside --from and --to",
     "jumps_removed": "jumps made gaps",
+    "impossible_steps": "impossible steps left",
     "samples": "samples left",
 }
 
@@ -117,6 +121,22 @@ def info(
     _print_counts(described["counts"])
     for warning in described["warnings"]:
         print_note(f"warning: {warning}")
+    tank = [] if tank_diameter is None else ["--tank-diameter", f"{tank_diameter:.12g}"]
+    block = [] if side is None else ["--side", f"{side:.12g}"]
+    print()
+    print(f"next: {_next_command(recording, described, [*how.words(), *tank, *block])}")
+
+
+def _next_command(recording: Path, described: dict[str, Any], given: list[str]) -> str:
+    """Return the command that most users type next: a fit of this recording, read in this way."""
+    name, body = next(iter(described["bodies"].items()))
+    words = list(given)
+    if len(described["bodies"]) > 1:
+        words += ["--body", name]
+    circle = body["circle_of_centers"]
+    if described["arena"] is None and circle and circle["sectors_visited_share"] >= FIT_TANK:
+        words += ["--arena", "fit"]
+    return command_text("fit", recording, *words, "-o", f"{recording.stem}-fit")
 
 
 def _print_field(described: dict[str, Any], *, json: bool) -> None:

@@ -12,6 +12,8 @@ from driftwalk.cli.options.shared import Json
 from driftwalk.cli.study_recover import recover
 from driftwalk.cli.terminal.output import print_json, print_note, require_place
 
+ALL_PARAMETERS = "\n# All parameters, with their units and meanings: driftwalk study new --full\n"
+
 study_app = typer.Typer(name="study", add_completion=False, help="Write and check study files.")
 
 
@@ -28,19 +30,23 @@ def new(
         Path | None,
         typer.Argument(metavar="[FILE]", help="File to write (default: -, stdout)."),
     ] = None,
+    full: Annotated[
+        bool, typer.Option("--full", help="List every parameter with its unit and meaning.")
+    ] = False,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a file that exists.")
     ] = False,
 ) -> None:
-    """Print a study file that lists every parameter with its unit, default and meaning."""
+    """Print a study file with what differs from tank to tank, or with --full every parameter."""
     from driftwalk.core.atomic import write_atomic
-    from driftwalk.model import study_template
+    from driftwalk.model import short_study_template, study_template
 
+    text = study_template() if full else f"{short_study_template()}{ALL_PARAMETERS}"
     if path is None or str(path) == "-":
-        typer.echo(study_template(), nl=False)
+        typer.echo(text, nl=False)
         return
     require_place(path, existing="replace" if overwrite else "error")
-    write_atomic(path, study_template().encode())
+    write_atomic(path, text.encode())
     print_note(f"wrote {path}")
 
 

@@ -5,6 +5,7 @@ reconciled with the study; times and gaps, start and camera; the flow.
 """
 
 from driftwalk.conditions.camera import possible_noises, recorded_camera, study_as_seen
+from driftwalk.conditions.jumps import jump_warnings
 from driftwalk.conditions.like import simulate_like
 from driftwalk.conditions.neighbours import Neighbours, neighbours_of
 from driftwalk.conditions.own_flow import recording_flow
@@ -33,6 +34,7 @@ __all__ = [
     "ReadRecordings",
     "estimated_study",
     "is_stated",
+    "jump_warnings",
     "load_for_run",
     "load_with_study",
     "neighbours_of",

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from driftwalk.core.errors import InputError
+from driftwalk.flow.arena import outline_of
+from driftwalk.record import noise_reach
 from driftwalk.schema import body_track
 
 if TYPE_CHECKING:
@@ -17,7 +19,8 @@ if TYPE_CHECKING:
 OUTLINE: Final = ("shape", "diameter_m", "width_m", "height_m", "vertices_m")
 """Keys of a tank that state its outline; the others are about its wall."""
 MOST_OUTSIDE = 0.01
-"""Share of positions outside the tank from which on the tank cannot be right."""
+"""Share of positions outside the tank, farther than noise takes them, from which on the tank cannot
+be right."""
 
 
 def study_in_arena(study: Study, recording: xr.Dataset) -> Study:
@@ -61,8 +64,9 @@ def study_in_arena(study: Study, recording: xr.Dataset) -> Study:
 def require_inside(study: Study, recording: xr.Dataset, body: str | None) -> None:
     """Refuse a tank that does not hold the recorded positions.
 
-    A simulated recording in its own tank is not looked at: the body kept to it, and the noise of
-    the camera alone carries positions over the wall.
+    The camera's noise shows a body at the wall beyond it: by four standard deviations at most, of
+    the study's noise or of the one that is estimated (`driftwalk.record.noise_reach`). A simulated
+    recording in its own tank is not looked at: the body kept to it.
 
     Parameters
     ----------
@@ -76,7 +80,7 @@ def require_inside(study: Study, recording: xr.Dataset, body: str | None) -> Non
     Raises
     ------
     InputError
-        When more than 1 % of the positions lie outside.
+        When more than 1 % of the positions lie farther outside than noise takes them.
 
     Examples
     --------
@@ -88,15 +92,23 @@ def require_inside(study: Study, recording: xr.Dataset, body: str | None) -> Non
     if "arena" in recording.attrs and recording.attrs.get("simulated") == "yes" and own == tank:
         return
     track = body_track(recording, body)
-    if tank.radius_m is not None:
-        outside = np.hypot(track.x, track.y) > tank.radius_m
-    else:
-        points = zip(track.x.tolist(), track.y.tolist(), strict=True)
-        outside = np.array([not tank.contains(x, y) for x, y in points])
-    if outside.size and outside.mean() > MOST_OUTSIDE:
+    outline = outline_of(tank.to_arena())
+    beyond = -outline.depth(track.x, track.y)
+    if np.mean(beyond > 0.0) <= MOST_OUTSIDE:
+        return
+    x_min, y_min, x_max, y_max = outline.bounds
+    stated = study.observation.position_noise_m
+    reach = noise_reach(
+        track,
+        None if isinstance(stated, str) else stated,
+        size=min(x_max - x_min, y_max - y_min),
+    )
+    share = np.mean(beyond > reach)
+    if share > MOST_OUTSIDE:
         raise InputError(
-            f"{outside.mean():.0%} of the positions lie outside the tank, a {tank.describe()} "
-            f"about the origin: the recording spans x {track.x.min():.3g} to "
-            f"{track.x.max():.3g} m, y {track.y.min():.3g} to {track.y.max():.3g} m; "
+            f"{share:.0%} of the positions lie outside the tank, a {tank.describe()} "
+            f"about the origin, farther than noise takes them ({1e3 * reach:.2g} mm): the "
+            f"recording spans x {track.x.min():.3g} to {track.x.max():.3g} m, y "
+            f"{track.y.min():.3g} to {track.y.max():.3g} m; "
             "state the tank with `tank.diameter_m`, `tank` of `load` or [tank] in a study file"
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,6 +15,10 @@ from driftwalk.core.nesting import refuse_deep
 MOST_BYTES: Final = MIB
 """Largest such file, including comments: its reader takes time that grows with the square of
 some of what it holds."""
+_TWICE: Final = re.compile(
+    r"(?:Cannot declare (?P<table>\(.*?\)) twice|Cannot overwrite a value) \(at line (?P<line>\d+)"
+)
+"""Message of the reader about a table, or a key, that stands twice."""
 _LARGE: Final = "an integer has more than 64 bits"
 
 
@@ -51,7 +56,8 @@ def parse_toml(text: str | bytes, *, path: str | Path | None = None) -> dict[str
     {'side_m': 0.03}
     """
     try:
-        values = tomllib.loads(text if isinstance(text, str) else text.decode("utf-8-sig"))
+        plain = text if isinstance(text, str) else text.decode("utf-8-sig")
+        values = tomllib.loads(plain)
     except UnicodeDecodeError as error:
         raise FormatError(f"not a text file in UTF-8 ({error.reason})", path=path) from error
     except RecursionError:
@@ -59,11 +65,38 @@ def parse_toml(text: str | bytes, *, path: str | Path | None = None) -> dict[str
     except ValueError as error:
         # The syntax; a date that no calendar has; an integer of more digits than Python converts.
         reason = _LARGE if "Exceeds the limit" in str(error) else str(error)
+        lines = (
+            text.splitlines() if isinstance(text, str) else text.decode("utf-8-sig").splitlines()
+        )
+        reason = _twice(str(error), lines) or reason
         raise FormatError(f"not a TOML file: {reason}", path=path) from error
     refuse_deep(values, path=path)
     if any(isinstance(value, int) and not -(2**63) <= value < 2**63 for value in _leaves(values)):
         raise FormatError(f"not a TOML file: {_LARGE}", path=path)
     return values
+
+
+def _twice(reason: str, lines: list[str]) -> str | None:
+    """Return where a table or a key that stands twice does, None where it is another fault."""
+    match = _TWICE.search(reason)
+    if match is None:
+        return None
+    second = int(match["line"])
+    if match["table"]:
+        name = match["table"].strip("(), ").replace("'", "").replace(", ", ".")
+        header = rf"\s*(\[+\s*{re.escape(name)}\s*\]+|{re.escape(name)}\s*\.)"
+        what, advice = f"the table [{name}]", "write the keys of both below the first"
+        earlier = range(second - 1)
+    else:
+        key = lines[second - 1].partition("=")[0].strip()
+        header, what = rf"\s*{re.escape(key)}\s*=", f"the key {key}"
+        advice = "leave one out"
+        headers = [at for at in range(second - 1) if lines[at].lstrip().startswith("[")]
+        earlier = range(max(headers, default=0), second - 1)
+    first = next((at + 1 for at in earlier if re.match(header, lines[at])), None)
+    if first is None:
+        return None
+    return f"{what} stands twice, in line {first} and in line {second}: {advice}"
 
 
 def _leaves(value: Any) -> Iterator[Any]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from driftwalk.conditions import unstated_warning
+from driftwalk.conditions import jump_warnings, unstated_warning
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.agreement import angle_given_facts
@@ -182,10 +182,13 @@ def fit_motion(
     )
     shares = visited_shares(fit)
     unstated = unstated_warning(chosen, about="block")
-    warnings = [
-        *([] if unstated is None else [unstated]),
-        *warnings_of(facts, whiteness, shares, intervals, side_m=chosen.block.side_m),
+    warnings = [] if unstated is None else [unstated]
+    warnings += [
+        sentence
+        for recording, track in zip(many, ready.tracks, strict=True)
+        for sentence in jump_warnings(recording, body, track=track)
     ]
+    warnings += warnings_of(facts, whiteness, shares, intervals, side_m=chosen.block.side_m)
     return described(
         fit.assign(visited_share=((), min(shares))).assign_coords(
             warning=("warning", texts(warnings))

@@ -15,7 +15,7 @@ from driftwalk.model.simulation import Pose, Simulation
 from driftwalk.model.steps import Steps
 from driftwalk.model.study import Study, apply_overrides, load_study, parse_study
 from driftwalk.model.tank import FieldOfView, Tank
-from driftwalk.model.template import parameter_table, study_template
+from driftwalk.model.template import parameter_table, short_study_template, study_template
 from driftwalk.model.water import Water
 
 __all__ = [
@@ -43,5 +43,6 @@ __all__ = [
     "load_study",
     "parameter_table",
     "parse_study",
+    "short_study_template",
     "study_template",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator
+from typing import Final
 
 from driftwalk.model.section import (
     Quantity,
@@ -24,6 +25,16 @@ _HEAD = """\
 # as "0.55mN", "16ms" or "30cm". A key that you leave out has its default; an unknown key is an
 # error.
 """
+
+
+_SHORT_HEAD = """\
+# Study file of driftwalk: the block and the tank. Each "# key =" line shows the default, which is
+# the paper's. Where yours differs, take the "# " away, before the name in [ ] too, and write your
+# value: in SI units, or text with a unit, such as "3cm" or "11.6g". A key that you leave out has
+# its default.
+"""
+FIRST: Final = {"block": ("side_m", "mass_kg"), "tank": ("diameter_m", "wall_friction")}
+"""Parameters that no two tanks share, and that every result depends on."""
 
 
 def study_template(study: Study | None = None) -> str:
@@ -48,6 +59,34 @@ def study_template(study: Study | None = None) -> str:
             lines += _commented_parameter(section, key)
         parts.append("\n".join(lines) + "\n")
     return "\n".join(parts)
+
+
+def short_study_template() -> str:
+    """Return a study file with what differs from tank to tank; it states nothing yet.
+
+    All of its lines are comments, so that a table can be written below them.
+
+    Examples
+    --------
+    >>> print(short_study_template().splitlines()[5])
+    # [block]
+    """
+    parts = [_SHORT_HEAD]
+    for name, keys in FIRST.items():
+        section = getattr(Study(), name)
+        lines = [f"# [{name}]"]
+        for key in keys:
+            note = type(section).model_fields[key].description or ""
+            meaning, *_ = note.partition(". ")
+            lines += [*_comment(meaning.rstrip(".") + "."), f"# {key} = {_value(section, key)}"]
+        parts.append("\n".join(lines) + "\n")
+    return "\n".join(parts)
+
+
+def _value(section: Section, key: str) -> str:
+    """Return the value of a parameter, or one that could stand there."""
+    value = getattr(section, key)
+    return _example(type(section), key) if value is None else toml_text(value)
 
 
 def parameter_table(name: str) -> str:

@@ -5,6 +5,7 @@ from driftwalk.motion.camera import observe_worlds
 from driftwalk.motion.choose import feels_others, is_family_name, motion_model
 from driftwalk.motion.family import MEMBERS, PARTS, Member, Part, ParticleModel, models
 from driftwalk.motion.function import FunctionModel, Scene
+from driftwalk.motion.known import models_knowing
 from driftwalk.motion.program import ProgramModel
 from driftwalk.motion.protocol import Details, MotionModel, Scores, ScoresItself, Worlds
 from driftwalk.motion.random import WorldRandom
@@ -36,6 +37,7 @@ __all__ = [
     "known_values",
     "model_start",
     "models",
+    "models_knowing",
     "motion_model",
     "observe_worlds",
     "score_worlds",

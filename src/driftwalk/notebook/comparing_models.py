@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from os import PathLike
 from pathlib import Path
@@ -25,6 +25,7 @@ def compare_models(
     recording: xr.Dataset,
     models: Sequence[str | MotionModel] | Literal["usual", "all"] = "usual",
     *,
+    parameters: Mapping[str, float | tuple[float, float]] | None = None,
     study: Study | None = None,
     flow: xr.Dataset | None = None,
     body: str | None = None,
@@ -44,6 +45,10 @@ def compare_models(
     models : sequence of str or MotionModel, "usual" or "all"
         Names such as "block" and "run_tumble+wall", or models of `motion_model`. The usual ones are
         the block and the family with an interaction with the wall.
+    parameters : mapping, optional
+        From the name of a parameter to a value that is known, or to a range of the search, in SI
+        units: for each of the named models that has it. ``clearance`` is the distance of the
+        recorded point from the wall at contact [m]. Models of `motion_model` hold their own.
     study : Study, optional
         Tank, camera, step interval and seed; default: the paper's.
     flow : xarray.Dataset, optional
@@ -77,7 +82,7 @@ def compare_models(
     InputError
         When the recording cannot be compared, or it and the study state two tanks or blocks.
     ConfigurationError
-        When there is no such model, or one is given twice.
+        When there is no such model, one is given twice, or none has a parameter that is given.
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
 
@@ -90,19 +95,19 @@ def compare_models(
     'block'
     """
     from driftwalk.calibration import ALL_MODELS, DEFAULT_MODELS, compare_models as compare
+    from driftwalk.motion import models_knowing
     from driftwalk.notebook.result import as_result
     from driftwalk.runs import ModelComparisonWork, run_model_comparison
     from driftwalk.runs.folder import silent
     from driftwalk.schema.netcdf import open_netcdf
 
     named = {"usual": DEFAULT_MODELS, "all": ALL_MODELS}
-    chosen = named.get(models, (models,)) if isinstance(models, str) else tuple(models)
+    asked = named.get(models, (models,)) if isinstance(models, str) else models
+    chosen = models_knowing(asked, parameters or {})
     given: dict[str, Any] = dict(settings)
     require_motion(recording, body=body)
     overrides = study_overrides(keys=CALIBRATION_KEYS, **given)
-    conditions = study_for(
-        [recording], study, overrides, body=body, needs_tank=chosen == ("block",)
-    )
+    conditions = study_for([recording], study, overrides, body=body, needs_tank=chosen == ["block"])
     field = None if flow is None else flow_field_of(flow)
     say = progress or silent
     if folder is None:

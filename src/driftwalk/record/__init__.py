@@ -8,24 +8,36 @@ from driftwalk.record.arena import PlacedArena, place_arena
 from driftwalk.record.circle import CircleFit, fit_circle, tank_radius_bound
 from driftwalk.record.info import describe
 from driftwalk.record.io import load, readable_formats
+from driftwalk.record.jumps import (
+    Impossible,
+    arena_diagonal,
+    impossible_steps,
+    impossible_warning,
+)
 from driftwalk.record.noise import (
     NoiseBound,
     NoiseEstimate,
     estimate_tracking_noise,
     noise_bound,
+    noise_reach,
 )
 from driftwalk.record.write import save_trajectory
 
 __all__ = [
     "CircleFit",
+    "Impossible",
     "NoiseBound",
     "NoiseEstimate",
     "PlacedArena",
+    "arena_diagonal",
     "describe",
     "estimate_tracking_noise",
     "fit_circle",
+    "impossible_steps",
+    "impossible_warning",
     "load",
     "noise_bound",
+    "noise_reach",
     "place_arena",
     "readable_formats",
     "save_trajectory",

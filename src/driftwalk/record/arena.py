@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,11 +12,13 @@ import numpy as np
 
 from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.record.circle import fit_circle, tank_radius_bound
+from driftwalk.record.circle import ENOUGH_VISITED, fit_circle, tank_radius_bound
 from driftwalk.record.raw import Array
 
 INSIDE = 0.999
 """Share of the samples that must lie within an arena for its centre to be the file's origin."""
+MOST_BEYOND = 0.001
+"""Share of the samples that may lie farther beyond the wall than noise takes them."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,18 @@ class PlacedArena:
     notes: list[str] = field(default_factory=list)
 
 
-def place_arena(text: str, x: Array, y: Array, *, block_side: float | None = None) -> PlacedArena:
+Reach = Callable[[float], float]
+"""From the size of a tank [m] to how far beyond its wall noise may show a body [m]."""
+
+
+def place_arena(
+    text: str,
+    x: Array,
+    y: Array,
+    *,
+    block_side: float | None = None,
+    reach: Reach = lambda _: 0.0,
+) -> PlacedArena:
     """Read the outline of a tank and place it over the positions.
 
     Parameters
@@ -46,6 +59,9 @@ def place_arena(text: str, x: Array, y: Array, *, block_side: float | None = Non
     block_side : float, optional
         Side of a square block [m]; with ``fit`` it turns the circle of the centres into a lower
         bound of the tank's radius.
+    reach : callable, optional
+        From the size of the tank [m] to how far beyond its wall noise may show a body [m]. Called
+        where positions lie outside.
 
     Returns
     -------
@@ -74,10 +90,10 @@ def place_arena(text: str, x: Array, y: Array, *, block_side: float | None = Non
     if kind == "fit" and not rest:
         return _fitted(x, y, block_side=block_side)
     if kind == "circle" and size:
-        return _circle(_length(size, text), x, y, center=_center(center, text))
+        return _circle(_length(size, text), x, y, center=_center(center, text), reach=reach)
     if kind in ("rect", "rectangle") and size.count("x") == 1:
         width, height = (_length(part, text) for part in size.split("x"))
-        return _rectangle(width, height, x, y, center=_center(center, text))
+        return _rectangle(width, height, x, y, center=_center(center, text), reach=reach)
     if kind == "polygon" and rest:
         return _polygon(Path(rest))
     raise InputError(f"`tank` is circle:D, rect:WxH, polygon:FILE or fit; got '{text}'")
@@ -132,7 +148,7 @@ def _fitted(x: Array, y: Array, *, block_side: float | None) -> PlacedArena:
             f"centres reach {fit.radius:.4g} m, so the tank's radius is at least {radius:.4g} m, "
             "and this if a face of the block lay against the wall"
         ]
-    if fit.coverage < 0.5:
+    if fit.coverage < ENOUGH_VISITED:
         notes.append(
             f"the body came near the rim in {fit.coverage:.0%} of the directions only: "
             "the fitted circle is uncertain"
@@ -142,7 +158,7 @@ def _fitted(x: Array, y: Array, *, block_side: float | None) -> PlacedArena:
 
 
 def _circle(
-    diameter: float, x: Array, y: Array, *, center: tuple[float, float] | None
+    diameter: float, x: Array, y: Array, *, center: tuple[float, float] | None, reach: Reach
 ) -> PlacedArena:
     found: dict[str, Any] = {"by": "given"}
     radius = 0.5 * diameter
@@ -157,13 +173,20 @@ def _circle(
             "sectors_visited_share": fit.coverage,
         }
     found["center_m"] = list(center)
-    outside = int((np.hypot(x - center[0], y - center[1]) > radius).sum())
+    beyond = np.hypot(x - center[0], y - center[1]) - radius
     arena = {"shape": "circle", "diameter_m": diameter, "center_m": [0.0, 0.0]}
-    return PlacedArena(arena, center, {**found, "samples_outside": outside}, _outside(outside, x))
+    found["samples_outside"] = int((beyond > 0.0).sum())
+    return PlacedArena(arena, center, found, _outside(beyond, diameter, reach))
 
 
 def _rectangle(
-    width: float, height: float, x: Array, y: Array, *, center: tuple[float, float] | None
+    width: float,
+    height: float,
+    x: Array,
+    y: Array,
+    *,
+    center: tuple[float, float] | None,
+    reach: Reach,
 ) -> PlacedArena:
     found: dict[str, Any] = {"by": "given"}
     if center is None and _inside((np.abs(x) <= width / 2) & (np.abs(y) <= height / 2)):
@@ -175,21 +198,26 @@ def _rectangle(
         middle = [float(np.percentile(v, [0.05, 99.95]).mean()) for v in (x, y)]
         center, found = (middle[0], middle[1]), {"by": "fit"}
     found["center_m"] = list(center)
-    inside = (np.abs(x - center[0]) <= width / 2) & (np.abs(y - center[1]) <= height / 2)
-    outside = int((~inside).sum())
+    beyond = np.maximum(np.abs(x - center[0]) - width / 2, np.abs(y - center[1]) - height / 2)
     arena = {"shape": "rectangle", "width_m": width, "height_m": height, "center_m": [0.0, 0.0]}
-    return PlacedArena(arena, center, {**found, "samples_outside": outside}, _outside(outside, x))
+    found["samples_outside"] = int((beyond > 0.0).sum())
+    return PlacedArena(arena, center, found, _outside(beyond, min(width, height), reach))
 
 
 def _inside(inside: np.ndarray[Any, np.dtype[np.bool_]]) -> bool:
     return bool(inside.size) and float(inside.mean()) >= INSIDE
 
 
-def _outside(outside: int, x: Array) -> list[str]:
-    if outside <= 0.001 * x.size:
+def _outside(beyond: Array, size: float, reach: Reach) -> list[str]:
+    """Return what to say where more positions lie beyond the wall than noise takes there."""
+    if (beyond > 0.0).sum() <= MOST_BEYOND * beyond.size:
+        return []
+    outside = int((beyond > reach(size)).sum())
+    if outside <= MOST_BEYOND * beyond.size:
         return []
     return [
-        f"{outside} of {x.size} positions lie outside the arena: its size, or the scale, is wrong"
+        f"{outside} of {beyond.size} positions lie outside the arena: its size, or the scale, is "
+        "wrong"
     ]
 
 

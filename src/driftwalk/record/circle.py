@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import InputError
-from driftwalk.record.raw import Array
+from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.units import parse_quantity
+from driftwalk.record.raw import Array, RawBody
 
 DIRECTIONS = 72
 SECTORS = 36
@@ -22,6 +24,8 @@ OUTER = 0.9
 """Share of the directions in which the fitted circle encloses the samples."""
 RIM = 0.85
 """A sector counts as visited when a sample lies beyond this share of the radius."""
+ENOUGH_VISITED = 0.5
+"""Share of the sectors of a circle from which on it says something about the tank."""
 
 
 class CircleFit(NamedTuple):
@@ -156,3 +160,40 @@ def _quantile_fit(design: Array, values: Array, share: float) -> tuple[float, fl
         weights = np.where(error > 0, share, 1.0 - share) / np.maximum(np.abs(error), 1e-6 * scale)
     x, y, radius = solution.tolist()
     return x, y, radius
+
+
+def implied_scale(bodies: Sequence[RawBody], tank: str | None) -> str:
+    """Return what scale the circle of the positions implies, for a file that does not say it.
+
+    Parameters
+    ----------
+    bodies : sequence of RawBody
+        In the units of the file.
+    tank : str or None
+        The tank as `load` takes it.
+
+    Examples
+    --------
+    >>> turn = np.linspace(0.0, 40.0, 5000)
+    >>> body = RawBody("0", turn, 200 * np.cos(turn), 200 * np.sin(turn))
+    >>> implied_scale([body], "circle:30cm").partition(", ")[2]
+    'in a tank of 0.3 m: a unit is 0.00075 m at most'
+    """
+    try:
+        fit = fit_circle(*(np.concatenate([getattr(one, axis) for one in bodies]) for axis in "xy"))
+    except (InputError, ValueError):
+        return ""
+    if fit.coverage < ENOUGH_VISITED:
+        return ""
+    across = f"the positions fill a circle of {2.0 * fit.radius:.4g} units across"
+    kind, _, size = (tank or "").partition("@")[0].partition(":")
+    try:
+        diameter = parse_quantity(size, "m") if kind == "circle" else 0.0
+    except ConfigurationError:
+        diameter = 0.0
+    if not diameter > 0.0:
+        return (
+            f'{across}: state the tank, as in `tank="circle:30cm"`, for the scale that they imply'
+        )
+    bound = 0.5 * diameter / fit.radius  # the body's centre does not reach the rim
+    return f"{across}, in a tank of {diameter:g} m: a unit is {bound:.3g} m at most"

@@ -41,6 +41,8 @@ class Counts:
     """Rows before `start` or after `stop`, dropped."""
     jumps_removed: int = 0
     """Samples beyond `max_speed`, turned into gaps."""
+    impossible_steps: int = 0
+    """Steps that are left and that no body makes: see `driftwalk.record.impossible_steps`."""
     missing: int = 0
     """Rows without a position, before jumps were removed."""
     samples: int = 0

@@ -8,6 +8,7 @@ import numpy as np
 
 from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import InputError
+from driftwalk.record.circle import implied_scale
 from driftwalk.record.extent import refuse_far
 from driftwalk.record.quantum import common_quantum
 from driftwalk.record.raw import (
@@ -26,7 +27,11 @@ EPOCH_S = 1e8
 
 
 def convert_units(
-    raw: RawRecording, options: ReadOptions, *, y_axis: str | None = None
+    raw: RawRecording,
+    options: ReadOptions,
+    *,
+    y_axis: str | None = None,
+    tank: str | None = None,
 ) -> tuple[list[RawBody], dict[str, object]]:
     """Return the bodies in s, m and rad with y up, and the attributes that say what was done.
 
@@ -40,6 +45,8 @@ def convert_units(
         Frame rate, scale and unit.
     y_axis : {"up", "down"}, optional
         Direction of y in the file, for positions and angles; None: as the format has it.
+    tank : str, optional
+        The tank as `load` takes it; for the error, which says what scale a known one implies.
 
     Raises
     ------
@@ -49,6 +56,11 @@ def convert_units(
     """
     if y_axis not in (None, "up", "down"):
         raise InputError(f"`y_axis` is 'up' or 'down', got '{y_axis}'")
+    scale_text = scale_wanted(raw.length_unit, raw.bare_length_is_si, options)
+    rate_text = _rate_wanted(raw, options)
+    if scale_text or rate_text:
+        implied = implied_scale(raw.bodies, tank) if scale_text else ""
+        raise InputError("; ".join(text for text in (scale_text, rate_text, implied) if text))
     scale, in_pixels = _length_scale(raw, options)
     ticks, rate = _ticks(raw, options)
     refuse_far(raw.bodies, scale)
@@ -76,6 +88,39 @@ def convert_units(
     return bodies, attrs
 
 
+def scale_wanted(length_unit: str, bare_is_si: bool, options: ReadOptions) -> str:
+    """Return what is to be given so that lengths are known, empty where nothing is.
+
+    Parameters
+    ----------
+    length_unit : str
+        Unit in the file, empty where it names none.
+    bare_is_si : bool
+        Whether positions without a unit are in metres.
+    options : ReadOptions
+        Scale and unit that are given.
+    """
+    unit = options.length_unit or length_unit
+    if options.metres_per_pixel is not None or (not unit and bare_is_si):
+        return ""
+    if unit == "px":
+        return "the positions are in pixels: give the scale with `metres_per_pixel`"
+    if unit:
+        return ""
+    return (
+        "the file does not name the unit of its positions: give `metres_per_pixel` for pixels, "
+        "or `length_unit` m, cm or mm"
+    )
+
+
+def _rate_wanted(raw: RawRecording, options: ReadOptions) -> str:
+    """Return what is to be given so that times are known, empty where nothing is."""
+    rates = (options.frame_rate_hz, raw.frame_rate_hz)
+    if raw.clock_unit != "frame" or any(rate is not None for rate in rates):
+        return ""
+    return "the file counts frames: give their rate in Hz with `frame_rate`"
+
+
 def _length_scale(raw: RawRecording, options: ReadOptions) -> tuple[float, bool]:
     """Return (metres per unit of the file, whether that unit is the pixel)."""
     unit = options.length_unit
@@ -92,14 +137,7 @@ def _length_scale(raw: RawRecording, options: ReadOptions) -> tuple[float, bool]
     if not unit and raw.bare_length_is_si:
         unit = "m"
     if unit == "px":
-        if options.metres_per_pixel is None:
-            raise InputError("the positions are in pixels: give the scale with `metres_per_pixel`")
         return _positive(options.metres_per_pixel, "metres_per_pixel"), True
-    if not unit:
-        raise InputError(
-            "the file does not name the unit of its positions: give `metres_per_pixel` for pixels, "
-            "or `length_unit` m, cm or mm"
-        )
     if options.metres_per_pixel is not None:
         raise InputError(
             f"`metres_per_pixel` is for positions in pixels, and these are in {unit}: leave it out"
@@ -114,13 +152,11 @@ def _ticks(raw: RawRecording, options: ReadOptions) -> tuple[float, float | None
             raise InputError("the file has its own clock: leave `frame_rate` out")
         return CLOCK_UNITS[raw.clock_unit], None
     rate = options.frame_rate_hz if options.frame_rate_hz is not None else raw.frame_rate_hz
-    if rate is None:
-        raise InputError("the file counts frames: give their rate in Hz with `frame_rate`")
     return _positive(rate, "frame_rate"), rate
 
 
-def _positive(value: float, argument: str) -> float:
-    if not (np.isfinite(value) and value > 0):
+def _positive(value: float | None, argument: str) -> float:
+    if value is None or not (np.isfinite(value) and value > 0):
         raise InputError(f"`{argument}` must be a number above zero, got {value}")
     return float(value)
 

@@ -20,6 +20,8 @@ from driftwalk.record.clean import Counts, clean_body
 from driftwalk.record.clock import check_clock
 from driftwalk.record.convert_units import convert_units
 from driftwalk.record.extent import refuse_many_bodies, refuse_sparse
+from driftwalk.record.jumps import arena_diagonal, impossible_steps, impossible_warning
+from driftwalk.record.noise import noise_reach
 from driftwalk.record.origin import origin_of
 from driftwalk.record.pose.listed import listed
 from driftwalk.record.pose.markers import join_markers
@@ -28,7 +30,7 @@ from driftwalk.record.raw import DELIMITERS, Array, RawBody, RawRecording, ReadO
 from driftwalk.record.registry import PLAIN
 from driftwalk.record.text import DAMAGED_GZIP
 from driftwalk.record.warn import angle_warnings, plausibility_warnings
-from driftwalk.schema import build_trajectory
+from driftwalk.schema import Track, build_trajectory
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -178,7 +180,7 @@ def load(
         refuse_many_bodies([one.name for one in raw.bodies])
         _refuse_unused(options, raw, origin.format)
         raw.notes += [*origin.notes(), *check_clock(raw), *angle_warnings(raw)]
-        bodies, attrs = convert_units(raw, options, y_axis=y_axis)
+        bodies, attrs = convert_units(raw, options, y_axis=y_axis, tank=tank)
         clean = partial(
             clean_body,
             sort=sort,
@@ -269,15 +271,17 @@ def _assemble(
     block_side: float | None,
 ) -> xr.Dataset:
     """Place the bodies in their arena and on one clock, and write down what was done."""
-    notes = list(raw.notes)
+    notes, arena = list(raw.notes), None
     if block_side is not None:
         attrs["block_side_m"] = block_side
     if tank is not None:
         placed = _place(tank, bodies, block_side=block_side)
         _shift(bodies, placed)
+        arena = placed.arena
         before = parse_json(attrs.get("origin_shift_m", "[0.0, 0.0]"))
         attrs |= arena_attributes(placed, shifted_before=before)
         notes += placed.notes
+    jumps = _count_impossible(bodies, counts, arena)
     totals = {
         key: sum(getattr(found, key) for found in counts.values()) for key in Counts().as_dict()
     }
@@ -286,7 +290,7 @@ def _assemble(
         attrs["sample_rate_Hz"] = _usual_rate(bodies)
     if twice := totals["times_in_two_places"]:
         notes.append(f"times with rows in different places, of which the last is kept: {twice}")
-    notes += plausibility_warnings(bodies)
+    notes += [*plausibility_warnings(bodies), *jumps]
     attrs["counts"] = json.dumps(
         {
             "rows_in_file": raw.rows,
@@ -304,11 +308,36 @@ def _assemble(
     return recording
 
 
+def _count_impossible(
+    bodies: list[RawBody], counts: dict[str, Counts], arena: dict[str, Any] | None
+) -> list[str]:
+    """Count the impossible steps of each body; return what to say of them."""
+    diagonal = arena_diagonal([body.x for body in bodies], [body.y for body in bodies], arena)
+    said = []
+    for body in bodies:
+        steps = impossible_steps(body.clock, body.x, body.y, diagonal=diagonal)
+        if steps is not None:
+            counts[body.name].impossible_steps = steps.number
+            said.append(impossible_warning(body.name, steps))
+    return said
+
+
 def _place(tank: str, bodies: list[RawBody], *, block_side: float | None) -> PlacedArena:
+    def reach(size: float) -> float:
+        return max(noise_reach(_track(body), size=size) for body in bodies)
+
     if len(bodies) == 1:
-        return place_arena(tank, bodies[0].x, bodies[0].y, block_side=block_side)
-    x, y = (np.concatenate([getattr(body, axis) for body in bodies]) for axis in ("x", "y"))
-    return place_arena(tank, x, y, block_side=block_side)
+        x, y = bodies[0].x, bodies[0].y
+    else:
+        x, y = (np.concatenate([getattr(body, axis) for body in bodies]) for axis in ("x", "y"))
+    return place_arena(tank, x, y, block_side=block_side, reach=reach)
+
+
+def _track(body: RawBody) -> Track:
+    """Return the samples of a body that have a position, without its angle."""
+    known = np.isfinite(body.x)
+    x, y = body.x[known], body.y[known]
+    return Track(body.clock[known], x, y, np.full(x.size, np.nan))
 
 
 def _shift(bodies: list[RawBody], placed: PlacedArena) -> None:

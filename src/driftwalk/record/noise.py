@@ -25,6 +25,10 @@ STILLEST = (0.01, 0.02, 0.05, 0.1, 0.2)
 """Shares of the steps from one sample to the next, the shortest, that bound the noise."""
 SURE = 5.0
 """Standard errors by which the estimate has to be above the bound before it gives way."""
+REACH = 4.0
+"""Standard deviations by which noise may show a body beyond a wall: one of 30,000 lies farther."""
+MOST_REACH = 0.05
+"""Share of the tank's size that such noise may have: with more, the tank or the scale is wrong."""
 
 
 class NoiseEstimate(NamedTuple):
@@ -98,6 +102,28 @@ def estimate_tracking_noise(track: Track) -> NoiseEstimate:
         acceleration_intensity_m2_s3=position.intensity,
         windows=position.windows,
     )
+
+
+def noise_reach(track: Track, noise: float | None = None, *, size: float = np.inf) -> float:
+    """Return how far beyond a wall the camera's noise shows a body that is within it [m].
+
+    Parameters
+    ----------
+    track : Track
+        One body.
+    noise : float, optional
+        Standard deviation of a position, per axis [m]; default: estimated.
+    size : float
+        Of the tank [m]: the reach is a twentieth of it at most, however noisy the track.
+
+    Examples
+    --------
+    >>> time = np.arange(10.0)
+    >>> noise_reach(Track(time, time, time, time), 3e-4)
+    0.0012
+    """
+    known = estimate_tracking_noise(track).position_noise_m if noise is None else noise
+    return min(REACH * known, MOST_REACH * size) if np.isfinite(known) else 0.0
 
 
 class NoiseBound(NamedTuple):

@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
-from command_line import RECORDING, here, refusal
+from command_line import RECORDING, here, leave_out_figures, refusal
 from few_simulations import compare_after_little
 from redrawn import assert_drawn_alike
 
+import driftwalk as dw
 from driftwalk.calibration import DEFAULT_MODELS
 from driftwalk.cli.terminal.models_answer import print_answer
+from driftwalk.runs import read_found
 from driftwalk.schema.netcdf import open_netcdf
 
 SHORT = (
@@ -87,3 +90,86 @@ def test_the_usual_models_begin_with_the_block() -> None:
 
 def test_its_figures_are_drawn_again_alike(run: tuple[Path, dict], tmp_path: Path) -> None:
     assert_drawn_alike(run[0], tmp_path / "out")
+
+
+def test_what_is_known_is_not_searched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    compare_after_little(monkeypatch)
+    leave_out_figures(monkeypatch)
+    folder = tmp_path / "run"
+    given = ("--parameter", "speed=0.02", "--parameter", "clearance=0.01")
+    done = here("compare-models", *SHORT, *given, "-o", folder, "--json")
+    assert done.code == 0, done.err
+    estimates = {one["model"]: one["estimate"] for one in json.loads(done.out)["models"]}
+    assert set(estimates["active"]) == {"rotational_diffusion", "turn_rate"}
+    assert set(estimates["inertial"]) == {"speed_std", "memory_time", "turn_rate"}
+    models = json.loads((folder / "manifest.json").read_text())["specification"]["models"]
+    assert [one["clearance_m"] for one in models] == [0.01, 0.01]
+    assert models[1]["fixed"] == {"speed": 0.02}
+    # A simulation of the model takes what was known as well as what was found.
+    known = read_found(folder).known("active")
+    assert known == {"speed": 0.02, "clearance": 0.01}
+    simulated = here(
+        *("simulate", "--model", "active", "--parameters-from", folder, "--duration", "2s"),
+        *("-o", tmp_path / "simulated.nc"),
+    )
+    assert simulated.code == 0, simulated.err
+
+
+def test_a_parameter_that_no_model_has_is_named(tmp_path: Path) -> None:
+    words = ("compare-models", *SHORT, "-o", tmp_path / "run", "--parameter")
+    said = refusal(here(*words, "sped=0.02"))
+    assert "--parameter sped: none of the named models has it" in said
+    assert "did you mean 'speed'" in said
+    assert "expected NAME=VALUE" in refusal(here(*words, "speed"))
+
+
+def test_the_notebook_takes_what_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    compare_after_little(monkeypatch)
+    recording = dw.load(RECORDING, stop=30.0, tank="circle:30cm")
+    found = dw.compare_models(recording, ["active"], parameters={"speed": 0.02}, bootstrap=0)
+    assert "speed" not in found["parameter"].values
+    with pytest.raises(dw.ConfigurationError, match="none of the named models has it"):
+        dw.compare_models(recording, ["active"], parameters={"spee": 0.02}, bootstrap=0)
+
+
+@pytest.fixture(scope="module")
+def at_the_wall(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a point that goes along the wall of 30 cm, seen with a noise of 0.5 mm."""
+    random = np.random.default_rng(1)
+    time = np.arange(2000) / 20.0
+    angle = np.cumsum(random.normal(0.02, 0.02, time.size))
+    radius = 0.15 - 0.05 * np.clip(np.sin(time / 8.0) - 0.2, 0.0, 1.0)
+    noise = random.normal(0.0, 5e-4, (2, time.size))
+    x, y = radius * np.cos(angle) + noise[0], radius * np.sin(angle) + noise[1]
+    assert 0.15 < np.mean(np.hypot(x, y) > 0.15) < 0.4
+    path = tmp_path_factory.mktemp("wall") / "wall.csv"
+    np.savetxt(path, np.stack([time, x, y], 1), delimiter=",", header="t_s,x_m,y_m", comments="")
+    return path
+
+
+def test_all_doors_allow_the_noise_of_a_body_at_the_wall(at_the_wall: Path) -> None:
+    recording = dw.load(at_the_wall, tank="circle:30cm")
+    assert not [text for text in dw.record.describe(recording)["warnings"] if "outside" in text]
+    assert dw.conditions.study_for([recording]).tank.diameter_m == 0.3
+    # The noise that the study states counts, where it states one.
+    with pytest.raises(dw.InputError, match="outside the tank"):
+        dw.conditions.study_for([recording], None, {"observation.position_noise_m": 1e-5})
+
+
+def test_all_doors_refuse_a_tank_that_is_too_small(at_the_wall: Path) -> None:
+    recording = dw.load(at_the_wall, tank="circle:28cm")
+    (warning,) = (one for one in dw.record.describe(recording)["warnings"] if "outside" in one)
+    assert "its size, or the scale, is wrong" in warning
+    with pytest.raises(dw.InputError, match="lie outside the tank"):
+        dw.conditions.study_for([recording])
+
+
+@pytest.mark.slow
+def test_a_body_at_the_wall_is_compared(
+    at_the_wall: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compare_after_little(monkeypatch)
+    leave_out_figures(monkeypatch)
+    words = ("--tank-diameter", "30cm", "--models", "active", "--bootstrap", "0")
+    done = here("compare-models", at_the_wall, *words, "-o", tmp_path / "run", "--json")
+    assert done.code == 0, done.err

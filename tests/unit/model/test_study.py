@@ -17,10 +17,13 @@ from driftwalk.model import (
     load_study,
     parameter_table,
     parse_study,
+    short_study_template,
     study_template,
 )
 from driftwalk.model.section import Section, quantity_of
 from driftwalk.record import load
+
+DOCS = Path(__file__).parents[3] / "docs"
 
 
 def test_defaults_are_the_papers_block_and_tank() -> None:
@@ -345,3 +348,37 @@ def test_study_reads_the_bundled_recording() -> None:
     trajectory = load(path, **Study().load_options())
     assert trajectory.sizes["time"] == 18001
     assert Tank.from_arena(trajectory.attrs["arena"]) == Tank()
+
+
+def test_the_short_template_states_nothing_and_takes_the_tables_of_a_page() -> None:
+    short = short_study_template()
+    assert len(short.splitlines()) < 25
+    study = parse_study(short)
+    assert study == Study()
+    assert study.tank.model_fields_set == set()
+    page = (DOCS / "tutorials" / "first-calibration.md").read_text(encoding="utf-8")
+    snippet = page.split("```toml\n")[1].split("```")[0]
+    assert "[tank]" in snippet
+    assert parse_study(short + snippet).tank.wall_friction == 1.0
+
+
+def test_the_short_template_without_its_signs_is_the_default_study() -> None:
+    lines = [line.removeprefix("# ") for line in short_study_template().splitlines()]
+    kept = [line for line in lines if line.startswith("[") or " = " in line]
+    study = parse_study("\n".join(kept))
+    assert study == Study()
+    assert {"side_m", "mass_kg"} <= study.block.model_fields_set
+    assert "diameter_m" in study.tank.model_fields_set
+
+
+def test_a_table_or_a_key_that_stands_twice_is_named_with_its_lines() -> None:
+    full = study_template()
+    first = full.splitlines().index("[tank]") + 1
+    second = len(full.splitlines()) + 1
+    where = f"in line {first} and in line {second}"
+    with pytest.raises(InputError, match=rf"the table \[tank\] stands twice, {where}"):
+        parse_study(full + "[tank]\nwall_friction = 1.0\n")
+    with pytest.raises(InputError, match="the key mass_kg stands twice, in line 2 and in line 4"):
+        parse_study("[block]\nmass_kg = 1\nside_m = 1\nmass_kg = 2\n")
+    with pytest.raises(InputError, match=r"\[tank\] stands twice, in line 1 and in line 2"):
+        parse_study("tank.diameter_m = 1\n[tank]\nwall_friction = 1\n")

@@ -10,6 +10,7 @@ from driftwalk.calibration.estimation.result import build_model_calibration
 from driftwalk.calibration.estimation.run import Stores, Tell, estimate
 from driftwalk.calibration.models.contestants import contestants
 from driftwalk.calibration.models.recorded import body_motion
+from driftwalk.conditions import jump_warnings
 from driftwalk.motion import MotionModel
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ def calibrate_many(
     """
     motion = body_motion(recording, study, flow=flow, body=body, threads=threads)
     entries, warnings = contestants([at_the_wall(model, motion)], motion, study)
+    warnings += jump_warnings(recording, body)
     search = study.calibration
     found = estimate(
         entries[0],

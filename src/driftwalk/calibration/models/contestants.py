@@ -18,7 +18,6 @@ from driftwalk.motion import (
     BlockModel,
     MotionModel,
     ParticleModel,
-    is_family_name,
     motion_model,
 )
 from driftwalk.schema import Parameter, Track
@@ -109,13 +108,13 @@ def walks(motion: RecordedMotion) -> list[Contestant]:
 
 
 def _made(one: Chosen, motion: RecordedMotion, study: Study) -> MotionModel:
-    if not isinstance(one, str):
-        return one
     if one == BLOCK:
         return BlockModel(study)
+    model = motion_model(one) if isinstance(one, str) else one
     # Only the family leaves its distance from the wall to the recording.
-    clearance = motion.clearance if is_family_name(one) else None
-    return motion_model(one, clearance=clearance)
+    if isinstance(model, ParticleModel) and not model.states_clearance:
+        return model.with_clearance(motion.clearance)
+    return model
 
 
 def _within_reach(parameter: Parameter, motion: RecordedMotion) -> Parameter:

@@ -97,7 +97,11 @@ def read_with_flow(
     InputError
         As `read_for_run`, and when the flow field cannot be read.
     """
+    from driftwalk.conditions import jump_warnings
+
     read = read_for_run([recording], given, how, bodies=bodies)
+    for warning in jump_warnings(read.trajectories[0], read.body):
+        print_note(f"warning: {warning}")  # before the work, which may take hours
     inputs = {"recording": recording, "flow": flow, "study": given.file}
     field = None if flow is None else load_flow_for(flow, read.study)
     return ReadForModel(

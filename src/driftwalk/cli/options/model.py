@@ -36,6 +36,16 @@ ParameterChoices = Annotated[
         show_default=False,
     ),
 ]
+ComparedParameters = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--parameter",
+        metavar="NAME=VALUE|LOW,HIGH",
+        help="Known value, or range of the search, of a parameter of each of the --models that has "
+        "it; repeat for others.",
+        show_default=False,
+    ),
+]
 
 ParameterValues = Annotated[
     list[str] | None,
@@ -105,7 +115,7 @@ def known_model(name: str | None, choices: Sequence[str] | None, place: Path | N
     from driftwalk.motion import is_family_name, motion_model
     from driftwalk.runs import read_found
 
-    given = {one: _value(one, choice) for one, choice in _choices(choices).items()}
+    given = {one: _value(one, choice) for one, choice in parameter_choices(choices).items()}
     found = None if place is None else read_found(place, give=GIVE_VALUES)
     if name is None and found is not None:
         name = _family_name(found)
@@ -159,7 +169,7 @@ def playable_model(
 
     clearance = getattr(known.model, "clearance", 0.0)
     options: dict[str, Any] = {"clearance": clearance} if is_family_name(name) else {}
-    options |= _choices(ranges)
+    options |= parameter_choices(ranges)
     return known._replace(model=motion_model(name, **options))
 
 
@@ -209,11 +219,18 @@ def chosen_model(name: str | None, choices: Sequence[str] | None) -> MotionModel
         if choices:
             raise ConfigurationError("--parameter belongs to a --model; the block has options")
         return None
-    given: dict[str, Any] = _choices(choices)
+    given: dict[str, Any] = parameter_choices(choices)
     return motion_model(name, **given)
 
 
-def _choices(texts: Sequence[str] | None) -> dict[str, float | tuple[float, float]]:
+def parameter_choices(texts: Sequence[str] | None) -> dict[str, float | tuple[float, float]]:
+    """Return the value, or the range, of each parameter that is named.
+
+    Raises
+    ------
+    ConfigurationError
+        When a choice is no number and no range, or a parameter is named twice.
+    """
     given = dict(_choice(text) for text in texts or ())
     if len(given) < len(texts or ()):
         raise ConfigurationError("--parameter names a parameter twice")

@@ -182,6 +182,22 @@ class RecordingOptions:
             given["tank"] = given.pop("arena")
         return given
 
+    def words(self) -> list[str]:
+        """Return the options that are given, as a user types them."""
+        hints = get_type_hints(RecordingOptions, include_extras=True)
+        words: list[str] = []
+        for field in fields(self):
+            value, option = getattr(self, field.name), hints[field.name].__metadata__[0]
+            # In an annotation, the name of an option is where a default would be elsewhere.
+            name = str(option.default)
+            for one in value if isinstance(value, list) else [value]:
+                if one is True:
+                    words.append(name)
+                elif one is not None and one is not False:
+                    text = f"{one:.12g}" if isinstance(one, float) else str(one)
+                    words += [name, text]
+        return words
+
     def load(
         self, path: Path, *, tank_diameter: float | None = None, side: float | None = None
     ) -> xr.Dataset:

@@ -92,9 +92,10 @@ def _values(word: str, axis: Axis) -> Iterator[Any]:
     if not axis.unit:
         yield word
         return
-    numbers = [parse_quantity(part, axis.unit) for part in word.split(":")]
+    parts = word.split(":")
+    numbers = [parse_quantity(part, axis.unit) for part in parts]
     if len(numbers) == 3:
-        numbers = _range(*numbers)
+        numbers = _range(*numbers, parts=parts, unit=axis.unit)
     elif len(numbers) != 1:
         raise ConfigurationError(f"expected a number or FROM:TO:STEP, got '{word}'")
     for number in numbers:
@@ -102,11 +103,34 @@ def _values(word: str, axis: Axis) -> Iterator[Any]:
         yield int(number) if axis.whole and number.is_integer() else number
 
 
-def _range(first: float, last: float, step: float) -> list[float]:
+def _range(
+    first: float, last: float, step: float, *, parts: Sequence[str], unit: str
+) -> list[float]:
     """Return the numbers of a range, end included, rounded to the decimals of the step."""
+    shown = [f"{number:g}" + ("" if unit == "1" else f" {unit}") for number in (first, last, step)]
+    bare = [_is_bare(part) for part in parts]
+    # "0.4:0.6mN:0.2mN": whoever writes this means 0.4 mN.
+    advice = "".join(
+        f"; '{part}' without a unit is {text}"
+        for part, text, alone in zip(parts, shown, bare, strict=True)
+        if alone and not all(bare) and float(part)
+    )
     if not (step > 0 and last >= first):
-        raise ConfigurationError(f"no value from {first:g} to {last:g} in steps of {step:g}")
+        raise ConfigurationError(
+            f"no value from {shown[0]} to {shown[1]} in steps of {shown[2]}{advice}"
+        )
     steps = (last - first) / step
     if steps > MOST_VALUES:
-        raise ConfigurationError(f"a step of {step:g} gives more than {MOST_VALUES} values")
+        raise ConfigurationError(
+            f"a step of {shown[2]} gives more than {MOST_VALUES} values{advice}"
+        )
     return [float(f"{first + k * step:.12g}") for k in range(math.floor(steps + 1e-6) + 1)]
+
+
+def _is_bare(part: str) -> bool:
+    """Whether a text is a number without a unit."""
+    try:
+        float(part)
+    except ValueError:
+        return False
+    return True

@@ -92,6 +92,20 @@ def print_note(text: str) -> None:
     print(f"driftwalk: {' '.join(to_options(text).split())}", file=sys.stderr)
 
 
+def command_text(name: str, path: Path, *words: str) -> str:
+    """Return a command about a file or folder with its options, for a person to copy.
+
+    Examples
+    --------
+    >>> command_text("fit", Path("my tracks.csv"), "--frame-rate", "30")
+    "driftwalk fit 'my tracks.csv' --frame-rate 30"
+    """
+    place = str(path)
+    # A name that begins with a dash would be taken for an option.
+    place = f"./{place}" if place.startswith("-") else place
+    return shlex.join(["driftwalk", name, place, *words])
+
+
 def report_command(folder: Path) -> str:
     """Return the command that makes the report of a run, for a person to copy.
 
@@ -102,10 +116,7 @@ def report_command(folder: Path) -> str:
     >>> report_command(Path("-run"))
     'driftwalk report ./-run -o report.html'
     """
-    name = str(folder)
-    # A name that begins with a dash would be taken for an option.
-    name = f"./{name}" if name.startswith("-") else name
-    return f"driftwalk report {shlex.quote(name)} -o report.html"
+    return command_text("report", folder, "-o", "report.html")
 
 
 def require_place(path: Path, *, existing: str) -> None:

@@ -56,8 +56,7 @@ class ExcelLoader:
         with _opened(path) as book:
             titles = [sheet.title for sheet in book.worksheets]
         sources = [
-            SheetSource(partial(_rows, path, title), path, title, options.header_line)
-            for title in titles
+            SheetSource(partial(_rows, path, title), path, title, options) for title in titles
         ]
         filled = {one.sheet: one for one in sources if not one.is_blank}
         return recording_of(the_one_that_fits(filled, options, path, "sheet"), options)

@@ -9,6 +9,7 @@ import numpy as np
 from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.column_names import ColumnMap, map_columns, unit_of_name
+from driftwalk.record.convert_units import scale_wanted
 from driftwalk.record.layout import TableLayout
 from driftwalk.record.raw import ANGLE_UNITS, Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.space.columns import body_in_plane, plane_of_columns
@@ -146,7 +147,8 @@ def _require_rows_are_frames(
             f"add {frame} if it counts frames, {time} if it holds times"
         )
     if options.frame_rate_hz is None:
-        raise source.error(NAME_THE_CLOCK)
+        scale = scale_wanted(columns.length_unit, bare_is_si=False, options=options)
+        raise source.error(NAME_THE_CLOCK + (f"; {scale}" if scale else ""))
 
 
 def _unread_angles(columns: ColumnMap, labels: list[str]) -> list[str]:

@@ -12,6 +12,7 @@ import numpy as np
 from driftwalk.core.errors import FormatError
 from driftwalk.record.head import is_numeric_row
 from driftwalk.record.layout import TableLayout
+from driftwalk.record.raw import ReadOptions
 from driftwalk.record.tables.cells import (
     CellError,
     Values,
@@ -22,6 +23,7 @@ from driftwalk.record.tables.cells import (
     text_of_cell,
 )
 from driftwalk.record.tables.growing import GrowingColumn
+from driftwalk.record.tables.heading import ROWS_LOOKED_AT, header_advice, heading_of
 from driftwalk.record.tables.stamps import (
     StampError,
     StampForm,
@@ -40,7 +42,7 @@ _MOST_BLANK: Final = 1 << 20
 
 
 class SheetSource:
-    """A table in a sheet; the first row that is not blank is its header, if it is one.
+    """A table in a sheet; the first row that names positions is its header, if there is one.
 
     Parameters
     ----------
@@ -50,8 +52,8 @@ class SheetSource:
         The workbook.
     sheet : str
         Name of the sheet, for errors.
-    header_line : int, optional
-        Row, from 1, that names the columns.
+    options : ReadOptions
+        What is known about the table: the row, from 1, that names the columns.
     """
 
     def __init__(
@@ -59,18 +61,30 @@ class SheetSource:
         rows: Callable[[], Iterator[Row]],
         path: Path,
         sheet: str,
-        header_line: int | None = None,
+        options: ReadOptions,
     ) -> None:
         self._rows = rows
         self._path = path
         self.sheet = sheet
-        wanted = (row for row in _numbered(rows()) if row[0] == (header_line or row[0]))
-        self._header, first = next(wanted, (0, ()))
-        texts = [text_of_cell(cell) for cell in first]
-        while texts and not texts[-1]:
-            texts.pop()
-        self.has_header = header_line is not None or not is_numeric_row(texts)
-        self.names = texts if self.has_header else [""] * len(texts)
+        begin = options.header_line or 1
+        below = (entry for entry in _numbered(rows()) if entry[0] >= begin)
+        lines, texts = [], []
+        for line, row in islice(below, ROWS_LOOKED_AT):
+            lines.append(line)
+            texts.append(_texts(row))
+        stated = options.header_line is not None and lines[:1] == [options.header_line]
+        first = texts[0] if texts and (stated or options.header_line is None) else []
+        self.has_header = stated or (bool(first) and not is_numeric_row(first))
+        self.names = first if self.has_header else [""] * len(first)
+        self._header, self._advice = (lines[0] if lines else 0), ""
+        if self.has_header and not stated:
+            for at in range(len(texts)):
+                found = heading_of(texts[at : at + 3], options)
+                if found is not None:
+                    self.names, self._header = found.names, lines[at + found.rows - 1]
+                    break
+            else:
+                self._advice = header_advice(texts, lines[0])
 
     @property
     def is_blank(self) -> bool:
@@ -94,7 +108,9 @@ class SheetSource:
                 reading.add([row for _, row in piece])
             except (CellError, StampError) as error:
                 raise FormatError(
-                    f"{error} (sheet '{self.sheet}')", path=self._path, line=lines[error.row]
+                    f"{error} (sheet '{self.sheet}'){self._advice}",
+                    path=self._path,
+                    line=lines[error.row],
                 ) from error
         if not reading.rows:
             raise self.error("holds no rows of data")
@@ -102,7 +118,7 @@ class SheetSource:
 
     def error(self, message: str) -> FormatError:
         """Return an error about the sheet."""
-        return FormatError(f"sheet '{self.sheet}': {message}", path=self._path)
+        return FormatError(f"sheet '{self.sheet}': {message}{self._advice}", path=self._path)
 
     def _data(self) -> Iterator[tuple[int, Row]]:
         """Yield the rows below the header that are not blank, with their numbers from 1."""
@@ -149,6 +165,14 @@ class _Reading:
             clock_origin=self._origin or 0,
             calendar=calendar_of(list(self._stamps.values())),
         )
+
+
+def _texts(row: Row) -> list[str]:
+    """Return the cells of a row as texts, up to the last that is filled."""
+    texts = [text_of_cell(cell) for cell in row]
+    while texts and not texts[-1]:
+        texts.pop()
+    return texts
 
 
 def _column(rows: list[Row], column: int) -> Values:
