@@ -1,15 +1,22 @@
-"""Files of a run directory, and the moves, removals and the lock that keep it whole."""
+"""Files of a run directory, and the moves, removals and the lock that keep it whole.
+
+A run directory may come from someone else. So a path or a link that is found in one is data: it is
+followed inside the directory, and nothing is read or written through it anywhere else.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import itertools
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal
 
 from driftwalk.core.atomic import remove_partials, rename, write_atomic
-from driftwalk.core.errors import DriftwalkError, RunDirectoryError
+from driftwalk.core.bounded import read_bounded
+from driftwalk.core.errors import DriftwalkError, InputError, RunDirectoryError
+from driftwalk.core.file_names import path_inside
 from driftwalk.core.provenance import MANIFEST_KIND, read_manifest, utc_now
 from driftwalk.core.shards import make_folder, remove_shards
 
@@ -24,6 +31,9 @@ SHARD_FOLDER: Final = ".shards"
 LOCK_FILE: Final = ".lock"
 MOVING_FILE: Final = ".moving"
 PREVIOUS_FOLDER: Final = "previous"
+# The names that `move_aside` gives: 20110925T120000Z, 20110925T120000Z-2.
+_MOVED: Final = re.compile(r"\d{8}T\d{6}Z(-\d{1,6})?", re.ASCII)
+_JOURNAL_BYTES: Final = 64
 
 
 def state_of(path: str | Path) -> State:
@@ -57,6 +67,42 @@ def refuse_foreign(path: Path) -> None:
             f"{path} holds files but no run of driftwalk ({foreign[0].name}, ...); choose an empty "
             "or a new directory"
         )
+
+
+def refuse_leading_out(path: Path) -> None:
+    """Refuse to write into a folder where a link leads out, or a pipe or a device lies.
+
+    What was moved aside is not looked at: nothing is written there.
+    """
+    folders = [path]
+    while folders:
+        for entry in _entries_if_there(folders.pop()):
+            name = entry.relative_to(path).as_posix()
+            linked, is_folder = entry.is_symlink(), entry.is_dir()
+            # A folder of Windows may be a junction, which is no symbolic link.
+            if (linked or is_folder) and path_inside(path, name) is None:
+                raise RunDirectoryError(_leads_out(entry))
+            if is_folder and not linked and name != PREVIOUS_FOLDER:
+                folders.append(entry)
+            elif entry.exists() and not (is_folder or entry.is_file()):
+                raise RunDirectoryError(f"{entry} is no regular file; remove it")
+
+
+def _entries_if_there(folder: Path) -> list[Path]:
+    """Return what lies in a folder, which the process that works there may just have removed."""
+    try:
+        return entries(folder)
+    except RunDirectoryError:
+        if folder.exists():
+            raise
+        return []
+
+
+def _leads_out(entry: Path) -> str:
+    return (
+        f"{entry} is a link that leads out of the run directory, or nowhere; remove it, or put in "
+        "its place what it leads to"
+    )
 
 
 def entries(path: Path) -> list[Path]:
@@ -126,17 +172,41 @@ def complete_move(path: Path) -> None:
     journal = path / MOVING_FILE
     if not journal.exists():
         return
-    target = path / PREVIOUS_FOLDER / journal.read_text(encoding="utf-8").strip()
+    target = path / PREVIOUS_FOLDER / _moved_name(journal)
     make_folder(target)
+    if path_inside(path, f"{PREVIOUS_FOLDER}/{target.name}") is None:
+        raise RunDirectoryError(_leads_out(target))
     hidden = [p for p in (path / SHARD_FOLDER, path / RECORD_FILE) if p.exists()]
     try:
         for entry in [*visible(path), *hidden]:
-            rename(entry, target / entry.name)
+            place = target / entry.name
+            # What a kill left behind is not there yet: a file of the same name is another one.
+            if place.is_symlink() or place.exists():
+                raise RunDirectoryError(
+                    f"cannot move {entry} to {place}, which exists; move one of them away"
+                )
+            rename(entry, place)
         journal.unlink()
+    except RunDirectoryError:
+        raise
     except OSError as error:
         raise RunDirectoryError(
             f"cannot move the results in {path} to {target}: {error.strerror}"
         ) from error
+
+
+def _moved_name(journal: Path) -> str:
+    """Return the name that `move_aside` wrote; anything else may lead anywhere."""
+    try:
+        name = read_bounded(journal, most=_JOURNAL_BYTES).decode("ascii").strip()
+    except (InputError, OSError, UnicodeDecodeError):
+        name = ""
+    if _MOVED.fullmatch(name) is None:
+        raise RunDirectoryError(
+            f"{journal} does not say where earlier results are being moved to, such as "
+            "20110925T120000Z: remove it, or choose another directory"
+        )
+    return name
 
 
 def remove_traces(path: Path) -> None:
