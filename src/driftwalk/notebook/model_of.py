@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from driftwalk.core.errors import InputError
+from driftwalk.core.run_layout import MANIFEST_FILE, run_file
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -100,7 +101,10 @@ def _stored_flow(calibration: xr.Dataset, study: Study) -> xr.Dataset:
             "a calibration does not hold the flow field that it used: give `flow`, or calibrate "
             "with `folder`"
         )
-    return load_flow(folder / "flow.nc", arena=study.tank.to_arena(), own_flags="keep")
+    path = run_file(folder, "flow.nc")
+    if path is None:
+        raise InputError(f"{folder} lacks flow.nc: give `flow`")
+    return load_flow(path, arena=study.tank.to_arena(), own_flags="keep")
 
 
 def run_folder(found: xr.Dataset) -> Path | None:
@@ -109,4 +113,4 @@ def run_folder(found: xr.Dataset) -> Path | None:
     if source is None:
         return None
     folder = Path(source).parent
-    return folder if (folder / "manifest.json").is_file() else None
+    return None if run_file(folder, MANIFEST_FILE) is None else folder

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.run_layout import state_of
+from driftwalk.core.run_layout import faults_of, run_file, state_of
 from driftwalk.schema.calibration import is_block
 from driftwalk.schema.contents import check_contents
 from driftwalk.schema.facts import sentences
@@ -85,7 +85,8 @@ def read_calibrated(folder: Path) -> Calibrated:
     study = estimated_study(found, source=f"{files['calibration']}: its study")
     flow = load_flow(files["flow"], arena=study.tank.to_arena(), own_flags="keep")
     region = found if "region_level" in found else None
-    return Calibrated(study, flow, found, region, files, sentences(found, "warning"))
+    faults = faults_of(folder, [path.name for path in files.values()])
+    return Calibrated(study, flow, found, region, files, [*faults, *sentences(found, "warning")])
 
 
 def _require_finished(folder: Path, files: dict[str, Path]) -> None:
@@ -109,7 +110,7 @@ def _require_finished(folder: Path, files: dict[str, Path]) -> None:
             "`forces.force_interval_s`)"
         )
     for role, path in files.items():
-        if not path.is_file():
+        if run_file(folder, path.name) is None:
             raise InputError(
                 f"{folder} holds a finished run, but no calibration: its {role} ({path.name}) is "
                 "not there"

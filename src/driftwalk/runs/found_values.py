@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.provenance import read_manifest
-from driftwalk.core.run_layout import MANIFEST_FILE, state_of
+from driftwalk.core.run_layout import MANIFEST_FILE, faults_of, run_file, run_files, state_of
 from driftwalk.motion import MotionModel, estimated_values
 from driftwalk.schema.netcdf import kind_of, open_netcdf
 
@@ -32,11 +32,14 @@ class FoundValues:
     known : dict of str to float
         Values that the run was given, by the name of the parameter; of a body of the family with
         its ``clearance`` [m]. Empty for a file that lies in no run directory.
+    faults : list of str
+        What the manifest of the run says against the file.
     """
 
     file: Path
     found: xr.Dataset
     known: dict[str, float] = field(default_factory=dict)
+    faults: list[str] = field(default_factory=list)
 
     def of(self, model: MotionModel) -> dict[str, float]:
         """Return the values of a model, by the names of its parameters.
@@ -96,7 +99,7 @@ def read_found_values(place: Path) -> FoundValues:
     found = open_netcdf(file)
     if "estimate" not in found:
         raise InputError(f"{file} holds no estimate of parameters: give that of a calibration")
-    return FoundValues(file, found, _known(folder))
+    return FoundValues(file, found, _known(folder), faults_of(folder, [file.name]))
 
 
 def _dataset_in(folder: Path) -> Path:
@@ -108,7 +111,7 @@ def _dataset_in(folder: Path) -> Path:
     if state == "new":
         what = "is not a run directory" if folder.exists() else "does not exist"
         raise InputError(f"{folder} {what}: give the directory of a finished calibration")
-    for path in sorted(folder.glob("*.nc")):
+    for path in run_files(folder, "*.nc"):
         if kind_of(path) in ("calibration", "model_calibration", "model_comparison"):
             return path
     raise InputError(f"{folder} holds a finished run, but no calibration of a motion model")
@@ -127,8 +130,9 @@ def _known(folder: Path) -> dict[str, float]:
     if "clearance_m" in model:
         given["clearance"] = model["clearance_m"]
     # With many parameters it may come from the recording.
-    if (folder / "model_calibration.nc").is_file():
-        given |= json.loads(open_netcdf(folder / "model_calibration.nc").attrs["fixed"])
+    path = run_file(folder, "model_calibration.nc")
+    if path is not None:
+        given |= json.loads(open_netcdf(path).attrs["fixed"])
     return {name: float(one) for name, one in given.items() if _is_number(one)}
 
 

@@ -108,7 +108,7 @@ def known_model(name: str, choices: Sequence[str] | None, place: Path | None) ->
     model = motion_model(name, **options)
     if found is None:
         return KnownModel(model, given, [])
-    warnings = []
+    warnings = [f"of {place}: {fault}" for fault in found.faults]
     if found.is_outdated(model):
         warnings.append(f"the source of {name} has changed since the values of {place} were found")
     return KnownModel(model, {**found.of(model), **given}, warnings)

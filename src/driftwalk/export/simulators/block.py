@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.run_layout import state_of
+from driftwalk.core.run_layout import run_file, state_of
 from driftwalk.export.target import Source
 
 if TYPE_CHECKING:
@@ -165,9 +165,10 @@ def _of_run(source: Source) -> tuple[Study, xr.Dataset, str]:
 
     found, kind = _estimates(source.path)
     study = estimated_study(found, source=f"{source.path}: its study")
-    flow = source.flow if source.flow is not None else source.path / "flow.nc"
-    if not flow.is_file():
-        raise InputError(f"{flow} is not there: give a flow field (`flow`)")
+    flow = source.flow if source.flow is not None else run_file(source.path, "flow.nc")
+    if flow is None or not flow.is_file():
+        place = source.path / "flow.nc" if flow is None else flow
+        raise InputError(f"{place} is not there: give a flow field (`flow`)")
     name = source.path.resolve().name
     return study, _flow(flow, study), f"the {kind} in {name}"
 
@@ -185,8 +186,8 @@ def _estimates(folder: Path) -> tuple[xr.Dataset, str]:
     if state == "new":
         raise InputError(f"{folder} is not a run directory: {TAKEN}")
     for kind, file in (("calibration", "calibration.nc"), ("fit", "fit.nc")):
-        path = folder / file
-        if not path.is_file():
+        path = run_file(folder, file)
+        if path is None:
             continue
         found = check_contents(open_netcdf(path), path)
         if found.attrs.get("kind") != kind:
