@@ -162,10 +162,11 @@ def _write_page(out: Path, *runs: str) -> None:
 def _require_own(out: Path) -> None:
     """Refuse a directory with anything in it that no demo made, before any work."""
     from driftwalk.core.errors import RunDirectoryError
-    from driftwalk.core.run_layout import visible
+    from driftwalk.core.run_layout import refuse_leading_out, visible
     from driftwalk.core.shards import make_folder
 
     make_folder(out)
+    refuse_leading_out(out)
     foreign = [entry for entry in visible(out) if entry.name not in (FIT, CALIBRATION, PAGE)]
     if foreign:
         raise RunDirectoryError(

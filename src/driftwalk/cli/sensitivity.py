@@ -26,6 +26,7 @@ from driftwalk.cli.options.vary import VARY_KEYS, Vary, vary_overrides
 from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.output import print_json
 from driftwalk.cli.terminal.sensitivity_answer import print_answer, summary
+from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import SENSITIVITY_KEYS
 
 if TYPE_CHECKING:
@@ -75,6 +76,12 @@ def sensitivity(
         refuse_found(run, given.overrides)
         source = source_from_run(run, flow, given)
     named = VARY_KEYS["vary flow"] in given.overrides
+    if run is not None and not named and given.file is None and source.study.sensitivity.flow:
+        # A run may be someone else's: it does not say which files of this machine are read.
+        raise InputError(
+            f"the study of {run} names flow files ({', '.join(source.study.sensitivity.flow)}): "
+            "name the files again, --vary flow=FILE,FILE, or give the study file, --study FILE"
+        )
     paths = _flow_paths(source.study, Path() if named or given.file is None else given.file.parent)
     work = SensitivityWork(
         study=source.study,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.output import print_note
 from driftwalk.core.errors import InputError
 
@@ -62,7 +63,11 @@ def view(
     if (run is None) == (live is None):
         raise InputError("name a run directory, or a stream to watch (--live ADDRESS:PORT)")
     require_server()
-    source: Source = LiveSource(*address_of(live)) if live is not None else RunSource(run or "")
+    source: Source = (
+        RunSource(run or "", tell=lambda text: print_warnings([text]))
+        if live is None
+        else LiveSource(*address_of(live))
+    )
     show(source, host=host, port=port, open=open)
 
 

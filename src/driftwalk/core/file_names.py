@@ -1,8 +1,8 @@
-"""Names of files as text that a dataset, a manifest or a page can hold."""
+"""Names of files: as text that a dataset or a page can hold, and where one in a folder may lead."""
 
 from __future__ import annotations
 
-from pathlib import PurePath
+from pathlib import Path, PurePath
 
 
 def text_of_name(name: str | PurePath) -> str:
@@ -25,3 +25,27 @@ def text_of_name(name: str | PurePath) -> str:
     K\xe4fer.csv
     """
     return str(name).encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+
+
+def path_inside(folder: Path, name: str) -> Path | None:
+    """Return where a name leads, links followed; None when out of the folder, or nowhere.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder. It may be reached through a link itself: the user named it.
+    name : str
+        What lies in it, parts joined by "/". It may come from a browser or from a file.
+
+    Examples
+    --------
+    >>> path_inside(Path("."), "../secret") is None, path_inside(Path("."), "/etc") is None
+    (True, True)
+    """
+    try:
+        root = folder.resolve(strict=True)
+        path = root.joinpath(name).resolve(strict=True)
+    except (OSError, ValueError, RuntimeError):
+        # No such file, a name that no file has, a ring of links.
+        return None
+    return path if path.is_relative_to(root) else None

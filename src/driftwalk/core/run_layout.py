@@ -1,16 +1,23 @@
-"""Files of a run directory, and the moves, removals and the lock that keep it whole."""
+"""Files of a run directory, and the moves, removals and the lock that keep it whole.
+
+A run directory may come from someone else. So a path or a link that is found in one is data: it is
+followed inside the directory, and nothing is read or written through it anywhere else.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import itertools
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from driftwalk.core.atomic import remove_partials, rename, write_atomic
-from driftwalk.core.errors import DriftwalkError, RunDirectoryError
-from driftwalk.core.provenance import MANIFEST_KIND, read_manifest, utc_now
+from driftwalk.core.bounded import read_bounded
+from driftwalk.core.errors import DriftwalkError, FormatError, InputError, RunDirectoryError
+from driftwalk.core.file_names import path_inside
+from driftwalk.core.provenance import MANIFEST_KIND, file_sha256, read_manifest, utc_now
 from driftwalk.core.shards import make_folder, remove_shards
 
 if TYPE_CHECKING:
@@ -24,10 +31,19 @@ SHARD_FOLDER: Final = ".shards"
 LOCK_FILE: Final = ".lock"
 MOVING_FILE: Final = ".moving"
 PREVIOUS_FOLDER: Final = "previous"
+# The names that `move_aside` gives: 20110925T120000Z, 20110925T120000Z-2.
+_MOVED: Final = re.compile(r"\d{8}T\d{6}Z(-\d{1,6})?", re.ASCII)
+_JOURNAL_BYTES: Final = 64
+_MOST_FAULTS: Final = 8
 
 
 def state_of(path: str | Path) -> State:
     """Return what a folder holds: a "finished" run, an "unfinished" one, or none ("new").
+
+    Raises
+    ------
+    InputError
+        When the manifest is damaged, or leads out of the folder.
 
     Examples
     --------
@@ -35,16 +51,110 @@ def state_of(path: str | Path) -> State:
     'new'
     """
     path = Path(path)
-    if _is_manifest(path / MANIFEST_FILE):
-        return "finished"
-    return "unfinished" if (path / RECORD_FILE).is_file() else "new"
-
-
-def _is_manifest(path: Path) -> bool:
     try:
-        return read_manifest(path).get("kind") == MANIFEST_KIND
-    except DriftwalkError:
-        return False
+        manifest = run_file(path, MANIFEST_FILE)
+        if manifest is not None and read_manifest(manifest).get("kind") == MANIFEST_KIND:
+            return "finished"
+    except DriftwalkError as error:
+        raise InputError(f"the manifest of the run is damaged: {error}") from error
+    return "new" if run_file(path, RECORD_FILE) is None else "unfinished"
+
+
+def run_file(folder: Path, name: str) -> Path | None:
+    """Return a file of a run to read, None when there is none of this name.
+
+    Every reader of run directories takes its files from here.
+
+    Parameters
+    ----------
+    folder : Path
+        The run directory.
+    name : str
+        Path in it, parts joined by "/".
+
+    Raises
+    ------
+    FormatError
+        When what has the name leads out of the directory, or is no regular file: a pipe that is
+        opened waits for a writer.
+
+    Examples
+    --------
+    >>> run_file(Path("run"), "fit.nc") is None
+    True
+    """
+    path = folder / name
+    if not _is_there(path):
+        return None
+    found = path_inside(folder, name)
+    if found is None:
+        raise FormatError("leads out of the run directory, or nowhere", path=path)
+    if not found.is_file():
+        raise FormatError("is no regular file", path=path)
+    return path
+
+
+def run_files(folder: Path, pattern: str) -> list[Path]:
+    """Return the files of a run whose names match a pattern, sorted; each as of `run_file`."""
+    found = (run_file(folder, path.name) for path in sorted(folder.glob(pattern)))
+    return [path for path in found if path is not None]
+
+
+def faults_of(folder: Path, read: Iterable[str] = (), *, unread: bool = False) -> list[str]:
+    """Return what is wrong with the files of a finished run by its manifest, a sentence each.
+
+    Parameters
+    ----------
+    folder : Path
+        The run directory; of one that is not finished nothing is known.
+    read : iterable of str
+        Names of the files that are read.
+    unread : bool
+        Whether the others that the manifest lists are looked at too.
+
+    Examples
+    --------
+    >>> faults_of(Path("run"), ["fit.nc"])
+    []
+    """
+    if state_of(folder) != "finished":
+        return []
+    files = read_manifest(folder / MANIFEST_FILE).get("files")
+    if not isinstance(files, list):
+        return []
+    listed = {str(one.get("path")): one for one in files if isinstance(one, Mapping)}
+    names = dict.fromkeys([*read, *(listed if unread else ())])
+    faults = [one for name in names if (one := _fault(folder, name, listed.get(name))) is not None]
+    more = len(faults) - _MOST_FAULTS
+    return (
+        faults
+        if more < 2
+        else [*faults[:_MOST_FAULTS], f"{more} more files are missing or changed"]
+    )
+
+
+def _fault(folder: Path, name: str, listed: Mapping[str, Any] | None) -> str | None:
+    shown = name if name.isprintable() else ascii(name)
+    try:
+        path = run_file(folder, name)
+        if path is None:
+            return None if listed is None else f"{shown} is missing"
+        if listed is None:
+            return f"{shown} is not in the manifest: it was put there after the run"
+        # The size first: what has another one need not be read.
+        same = path.stat().st_size == listed.get("size_bytes")
+        if same and file_sha256(path) == listed.get("sha256"):
+            return None
+    except FormatError as error:
+        return f"{shown} {error.reason}"
+    except (InputError, OSError) as error:
+        return f"{shown} cannot be read: {getattr(error, 'strerror', None) or error}"
+    return f"{shown} is not the file that the run wrote: its hash is not that of the manifest"
+
+
+def _is_there(path: Path) -> bool:
+    """Return whether anything has the name, a link that leads nowhere among them."""
+    return path.is_symlink() or path.exists()
 
 
 def refuse_foreign(path: Path) -> None:
@@ -57,6 +167,42 @@ def refuse_foreign(path: Path) -> None:
             f"{path} holds files but no run of driftwalk ({foreign[0].name}, ...); choose an empty "
             "or a new directory"
         )
+
+
+def refuse_leading_out(path: Path) -> None:
+    """Refuse to write into a folder where a link leads out, or a pipe or a device lies.
+
+    The runs in ``previous`` are left out, as nothing is written into them.
+    """
+    folders = [path]
+    while folders:
+        for entry in _entries_if_there(folders.pop()):
+            name = entry.relative_to(path).as_posix()
+            linked, is_folder = entry.is_symlink(), entry.is_dir()
+            # A folder of Windows may be a junction, which is no symbolic link.
+            if (linked or is_folder) and path_inside(path, name) is None:
+                raise RunDirectoryError(_leads_out(entry))
+            if is_folder and not linked and name != PREVIOUS_FOLDER:
+                folders.append(entry)
+            elif entry.exists() and not (is_folder or entry.is_file()):
+                raise RunDirectoryError(f"{entry} is no regular file; remove it")
+
+
+def _entries_if_there(folder: Path) -> list[Path]:
+    """Return what lies in a folder, which the process that works there may just have removed."""
+    try:
+        return entries(folder)
+    except RunDirectoryError:
+        if folder.exists():
+            raise
+        return []
+
+
+def _leads_out(entry: Path) -> str:
+    return (
+        f"{entry} is a link that leads out of the run directory, or nowhere; remove it, or put in "
+        "its place what it leads to"
+    )
 
 
 def entries(path: Path) -> list[Path]:
@@ -126,17 +272,41 @@ def complete_move(path: Path) -> None:
     journal = path / MOVING_FILE
     if not journal.exists():
         return
-    target = path / PREVIOUS_FOLDER / journal.read_text(encoding="utf-8").strip()
+    target = path / PREVIOUS_FOLDER / _moved_name(journal)
     make_folder(target)
+    if path_inside(path, f"{PREVIOUS_FOLDER}/{target.name}") is None:
+        raise RunDirectoryError(_leads_out(target))
     hidden = [p for p in (path / SHARD_FOLDER, path / RECORD_FILE) if p.exists()]
     try:
         for entry in [*visible(path), *hidden]:
-            rename(entry, target / entry.name)
+            place = target / entry.name
+            # What a kill left behind is not there yet: a file of the same name is another one.
+            if _is_there(place):
+                raise RunDirectoryError(
+                    f"cannot move {entry} to {place}, which exists; move one of them away"
+                )
+            rename(entry, place)
         journal.unlink()
+    except RunDirectoryError:
+        raise
     except OSError as error:
         raise RunDirectoryError(
             f"cannot move the results in {path} to {target}: {error.strerror}"
         ) from error
+
+
+def _moved_name(journal: Path) -> str:
+    """Return the name that `move_aside` wrote; anything else may lead anywhere."""
+    try:
+        name = read_bounded(journal, most=_JOURNAL_BYTES).decode("ascii").strip()
+    except (InputError, OSError, UnicodeDecodeError):
+        name = ""
+    if _MOVED.fullmatch(name) is None:
+        raise RunDirectoryError(
+            f"{journal} does not say where earlier results are being moved to, such as "
+            "20110925T120000Z: remove it, or choose another directory"
+        )
+    return name
 
 
 def remove_traces(path: Path) -> None:

@@ -4,6 +4,9 @@ While a run is under way its folder holds ``.run.json`` (what determines the num
 ``.shards/`` (finished work units). A finished run holds its results and ``manifest.json``, which is
 written last: its presence is what "finished" means. ``.lock`` is an empty file that stays;
 ``.moving`` names the place that earlier results are being moved to.
+
+A directory may come from someone else: nothing is written through a link that lies in it, nor read
+or moved out of it.
 """
 
 from __future__ import annotations
@@ -35,6 +38,7 @@ from driftwalk.core.run_layout import (
     lock_folder,
     move_aside,
     refuse_foreign,
+    refuse_leading_out,
     remove_leftovers,
     remove_traces,
     state_of,
@@ -120,6 +124,8 @@ class RunDirectory:
 
     def __enter__(self) -> Self:
         make_folder(self.path)
+        # Before anything is opened: the lock is a file of the directory too.
+        refuse_leading_out(self.path)
         if not (self.path / LOCK_FILE).exists():
             refuse_foreign(self.path)
         self._lock = lock_folder(self.path)

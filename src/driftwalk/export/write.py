@@ -9,6 +9,7 @@ from pathlib import Path
 
 from driftwalk.core.atomic import PARTIAL, rename, storage_error
 from driftwalk.core.errors import InputError
+from driftwalk.core.run_layout import faults_of
 from driftwalk.export.target import Source, Target
 
 
@@ -41,6 +42,8 @@ def export_run(source: Source, target: Target, folder: Path) -> list[Path]:
     """
     require_empty(folder)
     require_used(source, target)
+    for fault in faults_of(source.path, unread=True):
+        source.tell(fault)
     made = folder.parent / f".{folder.name}{PARTIAL}{os.getpid()}-{secrets.token_hex(4)}"
     try:
         made.mkdir()

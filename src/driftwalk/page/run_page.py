@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import InputError
+from driftwalk.core.run_stages import tell_nobody
 from driftwalk.page.parts import (
     FOUND_TITLE,
     SIMULATED,
@@ -56,7 +57,7 @@ _BESIDE_CONTENT: Final = ("id", "note", "facts")
 """Keys in which two pages may differ about one thing, such as the noise of a recording."""
 
 
-def report_page(folder: str | Path) -> dict[str, Any]:
+def report_page(folder: str | Path, *, tell: Callable[[str], None] = tell_nobody) -> dict[str, Any]:
     """Return the page data of a run directory, finished or not.
 
     Parameters
@@ -64,6 +65,9 @@ def report_page(folder: str | Path) -> dict[str, Any]:
     folder : path-like
         A run directory of `driftwalk calibrate`, `compare-models`, `fit`, `assemble`,
         `sensitivity` or `study recover`.
+    tell : callable
+        Called with each sentence that the page says of the files themselves: one that is missing,
+        damaged, leads out of the directory or is not the one of the manifest.
 
     Returns
     -------
@@ -85,13 +89,16 @@ def report_page(folder: str | Path) -> dict[str, Any]:
     """
     run = open_run_folder(Path(folder))
     sections = _sections_of(run)
-    if run.state == "finished" and run.read == 0:
-        reason = "; ".join(run.problems) or "it holds no result that driftwalk can show"
+    if run.state == "finished" and not run.read:
+        reason = "; ".join(run.problems.values()) or "it holds no result that driftwalk can show"
         raise InputError(f"{run.folder} holds a finished run, but {reason}")
     words = _words_of_state(run)
     if words is not None:
         sections = [_state_section(words), *sections]
-    sections = _with_remarks(sections, _remarks(run))
+    remarks = _remarks(run)
+    for remark in remarks:
+        tell(remark)
+    sections = _with_remarks(sections, remarks)
     sections.append(manifest_section(run.manifest))
     return _page(
         title=TITLES[run.kind],
@@ -321,7 +328,8 @@ def _remarks(run: Run) -> list[str]:
     """Return what a reader has to know of the files themselves."""
     from driftwalk import __version__
 
-    remarks = [f"{problem}: its contents are not shown" for problem in run.problems]
+    remarks = [f"{problem}: its contents are not shown" for problem in run.problems.values()]
+    remarks += run.faults()
     if run.version is not None and run.version != __version__:
         remarks.append(
             f"made by driftwalk {run.version} and shown by {__version__}: the page "

@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.core.errors import DriftwalkError, FormatError, InputError
 from driftwalk.core.file_names import text_of_name
 from driftwalk.core.provenance import read_manifest, refuse_other_version
-from driftwalk.core.run_layout import MANIFEST_FILE, RECORD_FILE, State, state_of, visible
+from driftwalk.core.run_layout import (
+    MANIFEST_FILE,
+    RECORD_FILE,
+    State,
+    faults_of,
+    run_file,
+    state_of,
+    visible,
+)
 from driftwalk.core.shards import read_specification
 from driftwalk.schema.netcdf import open_netcdf
 
@@ -44,17 +52,18 @@ class Run:
         A key of `MAIN_FILES`; None when nothing says it.
     manifest : dict
         The manifest; of an unfinished run its specification and when it was started.
-    problems : list of str
-        Parts that could not be read, filled by `dataset`.
+    problems : dict of str to str
+        Why parts could not be read, by the name of the file, filled by `dataset`.
+    read : list of str
+        The names of those that were read.
     """
 
     folder: Path
     state: State
     kind: str | None
     manifest: dict[str, Any]
-    problems: list[str] = field(default_factory=list)
-    read: int = 0
-    """How many datasets were read."""
+    problems: dict[str, str] = field(default_factory=dict)
+    read: list[str] = field(default_factory=list)
 
     @property
     def name(self) -> str:
@@ -83,23 +92,35 @@ class Run:
 
     def dataset(self, name: str) -> xr.Dataset | None:
         """Return a dataset of the run, None when it is not there or cannot be read."""
-        path = self.folder / name
-        if not path.is_file():
-            return None
         try:
+            path = run_file(self.folder, name)
+            if path is None:
+                return None
             found = open_netcdf(path)
         except FormatError as error:
-            self.problems.append(f"{path.name} cannot be read: it {error.reason}")
+            self.problems[name] = f"{name} cannot be read: it {error.reason}"
             return None
-        self.read += 1
+        self.read.append(name)
         return found
+
+    def faults(self) -> list[str]:
+        """Return what the manifest says against files of the run, apart from the problems."""
+        found = faults_of(self.folder, self.read, unread=True)
+        return [one for one in found if one.partition(" ")[0] not in self.problems]
 
     def recordings(self) -> list[xr.Dataset]:
         """Return the recordings of the run, in their order."""
         names = ["recording.nc"]
-        while (self.folder / f"recording-{len(names) + 1}.nc").is_file():
+        while self.holds(f"recording-{len(names) + 1}.nc"):
             names.append(f"recording-{len(names) + 1}.nc")
         return [found for name in names if (found := self.dataset(name)) is not None]
+
+    def holds(self, name: str) -> bool:
+        """Return whether anything has the name, which `dataset` may refuse."""
+        try:
+            return run_file(self.folder, name) is not None
+        except FormatError:
+            return True
 
 
 def open_run_folder(folder: Path) -> Run:
@@ -130,7 +151,7 @@ def open_run_folder(folder: Path) -> Run:
         manifest = {key: stored[key] for key in ("started_utc", "specification") if key in stored}
         manifest["study"] = stored["specification"].get("study")
     run = Run(folder, state, None, manifest)
-    run.kind = next((kind for kind, name in MAIN_FILES.items() if (folder / name).is_file()), None)
+    run.kind = next((kind for kind, name in MAIN_FILES.items() if run.holds(name)), None)
     if run.kind is None:
         run.kind = _kind_of(run.specification)
     return run

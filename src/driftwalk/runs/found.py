@@ -13,7 +13,7 @@ import numpy as np
 
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.provenance import read_manifest
-from driftwalk.core.run_layout import MANIFEST_FILE, state_of
+from driftwalk.core.run_layout import MANIFEST_FILE, faults_of, run_file, state_of
 from driftwalk.motion import MotionModel, estimated_values
 from driftwalk.schema.calibration import is_block
 from driftwalk.schema.contents import check_contents
@@ -108,7 +108,8 @@ class FoundRun:
     @property
     def warnings(self) -> list[str]:
         """Sentences for a user who simulates the block with these values."""
-        said = [f"of the {self.words}: {text}" for text in sentences(self.found, "warning")]
+        said = [*self.faults]
+        said += [f"of the {self.words}: {text}" for text in sentences(self.found, "warning")]
         if "number" in self.found.coords:
             names = [str(name) for name in self.found["number"].values]
             if any(name.startswith(OF_THE_FLOW) for name in names):
@@ -117,6 +118,14 @@ class FoundRun:
                     "simulated with its mean strength"
                 )
         return said
+
+    @property
+    def faults(self) -> list[str]:
+        """What the manifest of the run says against its files, a sentence each."""
+        if self.folder is None:
+            return []
+        names = [path.name for path in self.inputs.values()]
+        return [f"of {self.folder}: {fault}" for fault in faults_of(self.folder, names)]
 
     @property
     def not_drawn(self) -> str | None:
@@ -285,8 +294,7 @@ class FoundRun:
 
     def _stored(self, name: str) -> Path | None:
         """Return a file of the run directory, None where it is not there."""
-        path = None if self.folder is None else self.folder / name
-        return path if path is not None and path.is_file() else None
+        return None if self.folder is None else run_file(self.folder, name)
 
     @property
     def _specification(self) -> dict[str, Any]:
@@ -360,7 +368,7 @@ def run_folder(found: xr.Dataset) -> Path | None:
     if source is None:
         return None
     folder = Path(source).parent
-    return folder if (folder / MANIFEST_FILE).is_file() else None
+    return None if run_file(folder, MANIFEST_FILE) is None else folder
 
 
 def _dataset_in(folder: Path, give: str) -> tuple[xr.Dataset, Path]:
@@ -373,8 +381,8 @@ def _dataset_in(folder: Path, give: str) -> tuple[xr.Dataset, Path]:
         what = "is not a run directory" if folder.exists() else "does not exist"
         raise InputError(f"{folder} {what}: {give}")
     for kind, name in RUN_FILES.items():
-        path = folder / name
-        if path.is_file():
+        path = run_file(folder, name)
+        if path is not None:
             found = check_contents(open_netcdf(path), path)
             if found.attrs.get("kind") != kind:
                 raise InputError(f"{path} is not a {kind}: its kind is {found.attrs.get('kind')!r}")

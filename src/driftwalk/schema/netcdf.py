@@ -207,7 +207,49 @@ def _declared_hdf5(path: Path) -> int:
     import h5py
 
     with h5py.File(path, "r") as file:
+        refuse_elsewhere(file, path)
         return sum(declared_bytes(file[name]) for name in file)
+
+
+def refuse_elsewhere(file: Any, path: Path) -> None:
+    """Refuse an HDF5 file that names other files for its contents.
+
+    It may name any: what lies there would be read, and shown to others, as if it were the file's.
+
+    Parameters
+    ----------
+    file : h5py.File
+        The open file, of which nothing has been read.
+    path : Path
+        Where it is, for the message.
+
+    Raises
+    ------
+    FormatError
+        When an entry is a link to another file, or the values of an array lie in one.
+    """
+    import h5py
+
+    found: list[bytes | str] = []
+
+    def note_link(name: bytes, link: Any) -> None:
+        if link.type == h5py.h5l.TYPE_EXTERNAL:
+            found.append(name)
+
+    def note_array(name: str, entry: Any) -> None:
+        if isinstance(entry, h5py.Dataset) and (entry.external or entry.is_virtual):
+            found.append(name)
+
+    # Neither visit follows a link.
+    file.id.links.visit(note_link, info=True)
+    file.visititems(note_array)
+    if found:
+        name = found[0].decode("utf-8", "replace") if isinstance(found[0], bytes) else found[0]
+        raise FormatError(
+            f"takes '{name}' from another file, which it names: only what lies in the file itself "
+            "is read; copy the values into it",
+            path=path,
+        )
 
 
 def declared_bytes(entry: Any) -> int:

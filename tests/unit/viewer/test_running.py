@@ -487,7 +487,7 @@ def test_a_finished_run_that_cannot_be_shown_is_read_once(
     assert "cannot be read" in page(source)["state"]["words"]
     looked = []
 
-    def report_page(folder: Path) -> dict[str, Any]:
+    def report_page(folder: Path, **_: Any) -> dict[str, Any]:
         looked.append(folder)
         return page_frame("report", "Calibration")
 

@@ -129,7 +129,7 @@ def known_model(name: str | None, choices: Sequence[str] | None, place: Path | N
     model = motion_model(name, **options)
     if found is None:
         return KnownModel(model, given, [])
-    warnings = []
+    warnings = found.faults
     if found.is_outdated(model):
         warnings.append(f"the source of {name} has changed since the values of {place} were found")
     return KnownModel(model, {**found.values(model), **given}, warnings)

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.run_layout import run_file
 from driftwalk.core.uncertain import Uncertain, split_uncertain
 from driftwalk.core.units import parse_quantity
 
@@ -60,10 +61,10 @@ def flow_of_run(path: Path | None) -> Path | None:
     """Return the flow field in a run directory; any other path as it is."""
     if path is None or not path.is_dir():
         return path
-    stored = path / "flow.nc"
-    if not stored.is_file():
+    stored = run_file(path, "flow.nc")
+    if stored is None:
         raise InputError(
-            f"{path} holds no flow field ({stored.name}): name the file of one, or the run "
+            f"{path} holds no flow field (flow.nc): name the file of one, or the run "
             "directory of a fit or of a calibration"
         )
     return stored

@@ -9,10 +9,11 @@ from typing import Annotated, Any
 import typer
 
 from driftwalk.cli.options.shared import Json
+from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.output import print_json
 from driftwalk.core.errors import InputError
 from driftwalk.core.provenance import read_manifest, refuse_other_version
-from driftwalk.core.run_layout import MANIFEST_FILE, state_of
+from driftwalk.core.run_layout import MANIFEST_FILE, faults_of, state_of
 from driftwalk.schema.citation import bibtex, citation, methods_used
 from driftwalk.schema.netcdf import is_netcdf, open_netcdf
 
@@ -51,6 +52,7 @@ def _of_run(folder: Path) -> dict[str, Any]:
         )
     manifest = read_manifest(folder / MANIFEST_FILE)
     refuse_other_version(folder, manifest)
+    print_warnings(faults_of(folder, unread=True))
     specification = _mapping(manifest.get("specification"))
     version = str(_mapping(manifest.get("software")).get("driftwalk", ""))
     results = [path.name for path in folder.iterdir() if path.is_file()]

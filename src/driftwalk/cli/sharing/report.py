@@ -11,6 +11,7 @@ import typer
 from driftwalk.cli.inputs.motion import load_simulation
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.study import TankDiameter
+from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.output import print_note, require_place
 from driftwalk.core.errors import InputError
 
@@ -66,7 +67,7 @@ def _page(path: Path, how: RecordingOptions, tank_diameter: float | None) -> dic
     if not path.is_file():
         if path.is_dir():
             _refuse_reading_options(f"{path} is a directory, read as a run", how, tank_diameter)
-        return report_page(path)
+        return report_page(path, tell=lambda text: print_warnings([text]))
     trajectory = load_simulation(path, replicate=how.replicate or 0)
     if trajectory is None:
         trajectory = how.load(path, tank_diameter=tank_diameter)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.json_text import read_json
-from driftwalk.core.run_layout import MANIFEST_FILE, state_of
+from driftwalk.core.run_layout import MANIFEST_FILE, run_file, run_files, state_of
 from driftwalk.core.toml_text import parse_toml
 from driftwalk.schema.netcdf import kind_of, open_netcdf
 
@@ -64,7 +64,7 @@ def find_motions(source: Path, *, world: int | None = None) -> list[Motion]:
     """
     if state_of(source) == "new":
         return _of_file(source, world)
-    files = [*sorted(source.glob("recording*.nc")), *sorted(source.glob("path.nc"))]
+    files = [*run_files(source, "recording*.nc"), *run_files(source, "path.nc")]
     if not files:
         raise InputError(
             f"{source} holds no motion: neither a recording (recording.nc) nor runs of blocks "
@@ -135,7 +135,8 @@ def _side_of_simulation(stored: xr.Dataset) -> float | None:
 
 
 def _side_of_run(folder: Path) -> float | None:
-    manifest = read_json(folder / MANIFEST_FILE) if (folder / MANIFEST_FILE).is_file() else {}
+    path = run_file(folder, MANIFEST_FILE)
+    manifest = {} if path is None else read_json(path)
     if not isinstance(manifest, dict):
         return None
     specification = manifest.get("specification")

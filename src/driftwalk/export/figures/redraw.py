@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.provenance import read_manifest
-from driftwalk.core.run_layout import MANIFEST_FILE, state_of
+from driftwalk.core.run_layout import MANIFEST_FILE, run_file, state_of
 from driftwalk.schema.contents import check_contents
 from driftwalk.schema.netcdf import open_netcdf
 
@@ -65,8 +65,8 @@ class _Stored:
 
     def find(self, name: str) -> xr.Dataset | None:
         """Return a dataset, None where the run has none of this name."""
-        path = self.folder / name
-        return check_contents(open_netcdf(path), path) if path.is_file() else None
+        path = run_file(self.folder, name)
+        return None if path is None else check_contents(open_netcdf(path), path)
 
     def need(self, name: str) -> xr.Dataset:
         """Return a dataset that the run must have."""

@@ -16,7 +16,7 @@ from driftwalk.flow.readers.raw import RawField
 from driftwalk.flow.readers.text import masked_rows
 from driftwalk.schema.heap import refuse_endless_texts
 from driftwalk.schema.matlab import HDF5_BASED, OLD, matlab_variables, read_old
-from driftwalk.schema.netcdf import HDF5, declared_bytes, refuse_huge
+from driftwalk.schema.netcdf import HDF5, declared_bytes, refuse_elsewhere, refuse_huge
 
 Array = npt.NDArray[np.float64]
 
@@ -117,6 +117,7 @@ def _opened(path: Path) -> Iterator[_File]:
 
         refuse_endless_texts(path)
         with h5py.File(path, "r") as file:
+            refuse_elsewhere(file, path)
             refuse_huge(_declared(file), path)
             yield _File(list(file), lambda name: _hdf5_arrays(file, name))
     except FormatError:

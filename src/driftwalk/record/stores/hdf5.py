@@ -13,7 +13,7 @@ import numpy.typing as npt
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.raw import Array
 from driftwalk.schema.heap import refuse_endless_texts
-from driftwalk.schema.netcdf import HDF5, declared_bytes, refuse_huge
+from driftwalk.schema.netcdf import HDF5, declared_bytes, refuse_elsewhere, refuse_huge
 
 if TYPE_CHECKING:
     import h5py
@@ -109,6 +109,7 @@ def opened_hdf5(path: Path) -> Iterator[Hdf5Contents]:
     try:
         refuse_endless_texts(path)
         with h5py.File(path, "r") as file:
+            refuse_elsewhere(file, path)
             for name in file:
                 # A damaged entry is found here, before the attributes.
                 file[name]

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import DriftwalkError
+from driftwalk.core.run_layout import run_file
 from driftwalk.core.run_stages import CALIBRATION_STAGES, MORE, share_of_map, share_of_windows
 from driftwalk.page import bootstrap_section, encode_array, map_section, profile_sections
 from driftwalk.schema import Parameter
@@ -211,7 +212,8 @@ class RunningCalibration:
 
         if self._loaded is None:
             with contextlib.suppress(DriftwalkError, OSError):
-                self._loaded = load(self._folder / "recording.nc")
+                path = run_file(self._folder, "recording.nc")
+                self._loaded = None if path is None else load(path)
         return self._loaded
 
     @property
@@ -234,8 +236,9 @@ class RunningCalibration:
             self._still["recording"] = trajectory_section(self._recording, body=self._body)
         if "flow" not in self._still:
             with contextlib.suppress(DriftwalkError, OSError):
-                flow = load_flow(self._folder / "flow.nc", own_flags="keep")
-                self._still["flow"] = flow_section(flow)
+                path = run_file(self._folder, "flow.nc")
+                if path is not None:
+                    self._still["flow"] = flow_section(load_flow(path, own_flags="keep"))
         return list(self._still.values())
 
     def _map_section(self) -> Section:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import DriftwalkError, InputError, RunDirectoryError
-from driftwalk.core.file_names import text_of_name
+from driftwalk.core.file_names import path_inside, text_of_name
 from driftwalk.core.provenance import read_manifest, refuse_other_version
 from driftwalk.core.run_layout import MANIFEST_FILE, RECORD_FILE, state_of
+from driftwalk.core.run_stages import tell_nobody
 from driftwalk.core.shards import read_specification
 from driftwalk.viewer.hub import Content, Publish, Source
 from driftwalk.viewer.shell import page_frame
@@ -36,6 +37,8 @@ class RunSource(Source):
     ----------
     folder : path-like
         The run directory.
+    tell : callable
+        Called with each sentence on files of a finished run that are missing or damaged.
 
     Raises
     ------
@@ -51,8 +54,9 @@ class RunSource(Source):
 
     view = "run"
 
-    def __init__(self, folder: str | Path) -> None:
+    def __init__(self, folder: str | Path, *, tell: Callable[[str], None] = tell_nobody) -> None:
         self._folder = Path(folder)
+        self._tell = tell
         require_run(self._folder)
         self.title = text_of_name(self._folder.resolve().name)
         self._page = page_frame(self.view, self.title)
@@ -119,7 +123,7 @@ class RunSource(Source):
 
         # Should it fail, then not again before something has changed.
         self._refused = stamp
-        self._page = {**report_page(self._folder), "view": self.view}
+        self._page = {**report_page(self._folder, tell=self._tell), "view": self.view}
         self._running, self._shown, self._refused = None, stamp, ()
         return [{"type": "page", "page": self._page}]
 
@@ -230,19 +234,9 @@ def require_run(folder: Path) -> None:
     elif state == "unfinished":
         unfinished_specification(folder)
     else:
-        _require_whole_manifest(folder / MANIFEST_FILE)
         inside = [path.name for path in sorted(folder.iterdir()) if _holds_run(path)]
         hint = f"; there are runs in it: {', '.join(inside[:MOST_NAMED])}" if inside else ""
         raise InputError(f"{folder}: this directory holds no run of driftwalk{hint}")
-
-
-def _require_whole_manifest(path: Path) -> None:
-    """Refuse a manifest that is there and cannot be read: it says more than that none is there."""
-    if path.is_file():
-        try:
-            read_manifest(path)
-        except DriftwalkError as error:
-            raise InputError(f"the manifest of the run is damaged: {error}") from error
 
 
 def unfinished_specification(folder: Path) -> dict[str, Any]:
@@ -287,15 +281,11 @@ def file_in(folder: Path, name: str) -> Path | None:
     parts = name.split("/")
     if any(part in ("", "..") or part[0] == "." or "\\" in part for part in parts):
         return None
-    try:
-        root = folder.resolve(strict=True)
-        path = root.joinpath(*parts).resolve(strict=True)
-        inside = path.is_relative_to(root) and path.is_file()
-    except (OSError, ValueError, RuntimeError):
+    path = path_inside(folder, name)
+    if path is None or not path.is_file():
         return None
-    if not inside or any(part[0] == "." for part in path.relative_to(root).parts):
-        return None
-    return path
+    hidden = any(part[0] == "." for part in path.relative_to(folder.resolve()).parts)
+    return None if hidden else path
 
 
 def _ids(page: Mapping[str, Any]) -> list[str]:
@@ -303,7 +293,10 @@ def _ids(page: Mapping[str, Any]) -> list[str]:
 
 
 def _holds_run(path: Path) -> bool:
-    return path.is_dir() and state_of(path) != "new"
+    try:
+        return path.is_dir() and state_of(path) != "new"
+    except DriftwalkError:
+        return False
 
 
 def _results(folder: Path) -> list[str]:

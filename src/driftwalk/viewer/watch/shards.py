@@ -9,8 +9,9 @@ from collections.abc import Container, Iterator
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from driftwalk.core.errors import RunDirectoryError
-from driftwalk.core.run_layout import RECORD_FILE, SHARD_FOLDER
+from driftwalk.core.errors import DriftwalkError
+from driftwalk.core.file_names import path_inside
+from driftwalk.core.run_layout import RECORD_FILE, SHARD_FOLDER, run_file
 from driftwalk.core.shards import (
     SHARD_SUFFIX,
     SPECIFICATION_FILE,
@@ -48,12 +49,15 @@ class StoreReader:
 
     Raises
     ------
+    FormatError
+        When its specification leads out of the folder.
     RunDirectoryError
         When the folder says not yet, or no more, what it holds.
     """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        run_file(folder, SPECIFICATION_FILE)
         stored = read_specification(folder / SPECIFICATION_FILE)
         self.sweep: Any = stored["specification"].get("sweep")
         self._fingerprint = str(stored["fingerprint"])
@@ -68,9 +72,10 @@ class StoreReader:
             if name in self._seen or match is None:
                 continue
             try:
+                run_file(self.folder, path.name)
                 arrays = unpack_shard(path.read_bytes(), name, self._fingerprint)
-            except OSError:
-                # The run may have ended in between, and removed it.
+            except (DriftwalkError, OSError):
+                # The run may have ended in between, and removed it; or it is none of the run's.
                 continue
             if arrays is not None:
                 self._seen.add(name)
@@ -99,14 +104,18 @@ class RunReader:
     def look(self) -> None:
         """Find the sweeps that have begun since the last call."""
         try:
-            folders = [path for path in (self._run / SHARD_FOLDER).iterdir() if path.is_dir()]
+            folders = [
+                path
+                for path in (self._run / SHARD_FOLDER).iterdir()
+                if path.is_dir() and path_inside(self._run, f"{SHARD_FOLDER}/{path.name}")
+            ]
             began = {path: (path / SPECIFICATION_FILE).stat().st_mtime_ns for path in folders}
         except OSError:
             # Between two steps of the run a folder may have no specification yet, or be gone.
             return
         for path in sorted(began, key=began.__getitem__):
             if path.name not in self.sweeps:
-                with contextlib.suppress(RunDirectoryError):
+                with contextlib.suppress(DriftwalkError):
                     self.sweeps[path.name] = StoreReader(path)
 
     def new_units(self, names: Container[str] | None = None) -> Iterator[tuple[str, FinishedUnit]]:
