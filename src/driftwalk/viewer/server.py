@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import logging
 import socket
 from collections.abc import Callable
 from typing import Any, Final
@@ -54,6 +55,7 @@ def serve(
     """
     uvicorn = require_server()
     from driftwalk.viewer.app import make_app
+    from driftwalk.viewer.patience import PatientHTTP, without_undecodable
 
     # As an address has it, in brackets.
     host = host.removeprefix("[").removesuffix("]")
@@ -77,6 +79,7 @@ def serve(
                 log_level="warning",
                 access_log=False,
                 lifespan="on",
+                http=PatientHTTP,
                 ws="websockets-sansio",
                 ws_max_size=LONGEST_MESSAGE,
                 ws_per_message_deflate=False,
@@ -85,6 +88,7 @@ def serve(
                 timeout_graceful_shutdown=round(PATIENCE_S),
             )
         )
+        logging.getLogger("uvicorn.error").addFilter(without_undecodable)
         # Ctrl-C is how one ends it.
         with contextlib.suppress(KeyboardInterrupt):
             server.run(sockets=[listener])

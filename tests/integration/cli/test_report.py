@@ -81,7 +81,7 @@ def test_a_calibration(run: Path, tmp_path: Path) -> None:
     assert {"trajectory", "flow", "map", "lines", "table", "manifest"} <= set(kinds.values())
     found = calibration(run)
     part = part_of(page, "map")
-    np.testing.assert_array_equal(values(part["value"]), found["ks_distance"].values)
+    np.testing.assert_array_equal(values(part["value"]), found["ks_distance"].values.T)
     excerpt = part["cells"]["excerpt_x"]
     np.testing.assert_allclose(
         values(excerpt), found["excerpt_x"].values, rtol=0, atol=0.5001 * excerpt["scale"]
@@ -119,7 +119,7 @@ def test_the_example_of_the_docs_reads_it(
     text = (DOCS / "reference" / "page-data.md").read_text(encoding="utf-8")
     names: dict[str, Any] = {}
     exec(text.split("```python\n")[1].split("```")[0], names)
-    np.testing.assert_array_equal(names["values"], calibration(run)["ks_distance"].values)
+    np.testing.assert_array_equal(names["values"], calibration(run)["ks_distance"].values.T)
     np.testing.assert_array_equal(decode_array(names["array"]), names["values"])
 
 
@@ -184,7 +184,7 @@ def test_a_sensitivity_analysis(run: Path, tmp_path: Path) -> None:
     assert "empty" not in kinds.values()
     found = xr.load_dataset(tmp_path / "map" / "sensitivity.nc", engine="h5netcdf")
     part = part_of(page, "l1")
-    np.testing.assert_allclose(values(part["value"]), found["l1_distance"].values, rtol=1e-6)
+    np.testing.assert_allclose(values(part["value"]), found["l1_distance"].values.T, rtol=1e-6)
     np.testing.assert_allclose(values(part["shares"]), found["proportion"].values, rtol=1e-6)
 
 
