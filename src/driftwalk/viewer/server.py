@@ -54,8 +54,7 @@ def serve(
     http://127.0.0.1:8765/
     """
     uvicorn = require_server()
-    from driftwalk.viewer.app import make_app
-    from driftwalk.viewer.patience import PatientHTTP, without_undecodable
+    from driftwalk.viewer.app import PatientHTTP, make_app
 
     # As an address has it, in brackets.
     host = host.removeprefix("[").removesuffix("]")
@@ -94,6 +93,18 @@ def serve(
             server.run(sockets=[listener])
     if errors:
         raise errors[0]
+
+
+def without_undecodable(record: logging.LogRecord) -> bool:
+    """Return whether a record is for the user: bad UTF-8 of a browser ends its connection alone.
+
+    Parameters
+    ----------
+    record : logging.LogRecord
+        What uvicorn has to say.
+    """
+    error = record.exc_info[1] if record.exc_info else None
+    return not isinstance(error, UnicodeDecodeError)
 
 
 def require_server() -> Any:

@@ -79,9 +79,9 @@ def test_a_calibration(run: Path, tmp_path: Path) -> None:
     kinds = kinds_of(page)
     assert "empty" not in kinds.values()
     assert {"trajectory", "flow", "map", "lines", "table", "manifest"} <= set(kinds.values())
-    found = calibration(run)
+    found = calibration(run).transpose("force_std", "drag_coefficient", ...)
     part = part_of(page, "map")
-    np.testing.assert_array_equal(values(part["value"]), found["ks_distance"].values.T)
+    np.testing.assert_array_equal(values(part["value"]), found["ks_distance"].values)
     excerpt = part["cells"]["excerpt_x"]
     np.testing.assert_allclose(
         values(excerpt), found["excerpt_x"].values, rtol=0, atol=0.5001 * excerpt["scale"]
@@ -183,8 +183,9 @@ def test_a_sensitivity_analysis(run: Path, tmp_path: Path) -> None:
     kinds = kinds_of(page)
     assert "empty" not in kinds.values()
     found = xr.load_dataset(tmp_path / "map" / "sensitivity.nc", engine="h5netcdf")
+    found = found.transpose("force_std", "drag_coefficient", ...)
     part = part_of(page, "l1")
-    np.testing.assert_allclose(values(part["value"]), found["l1_distance"].values.T, rtol=1e-6)
+    np.testing.assert_allclose(values(part["value"]), found["l1_distance"].values, rtol=1e-6)
     np.testing.assert_allclose(values(part["shares"]), found["proportion"].values, rtol=1e-6)
 
 

@@ -146,7 +146,7 @@ def test_bad_utf_8_ends_only_its_sender_and_is_not_told(finished: Path) -> None:
     assert words == "driftwalk: Ctrl-C ends it\n"
 
 
-QUICK = "from driftwalk.viewer import patience\npatience.REQUEST_S = 0.5\n"
+QUICK = "from driftwalk.viewer import app\napp.REQUEST_S = 0.5\n"
 
 
 def send_slowly(raw: socket.socket) -> None:

@@ -39,7 +39,7 @@ TESTED: Final = {
 }
 """Words for the numbers that score tests look at."""
 CHANCE_SIGMAS: Final = 2.0
-"""What chance alone gives to one number in twenty [standard deviations]."""
+"""Chance exceeds this in one test of twenty [standard deviations]."""
 
 
 def law_sections(fit: xr.Dataset) -> list[Section]:
