@@ -11,11 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from synthetic_calibration import bundled_recording, synthetic_calibration
 
 import driftwalk as dw
 from browser.all_kinds import every_kind, page_of, with_texts
 from browser.conftest import PHONE, Visit
 from browser.pictures import assert_same_path, drawn_share, path_points, pixels
+from driftwalk.page import map_section
+from driftwalk.schema.calibration import BLOCK
 
 pytestmark = pytest.mark.browser
 
@@ -32,8 +35,9 @@ def report(finished: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def calibration(finished: Path) -> xr.Dataset:
-    """Return what the run found."""
-    return xr.load_dataset(finished / "calibration.nc", engine="h5netcdf")
+    """Return what the run found, on (y, x): the drag lies along x."""
+    found = xr.load_dataset(finished / "calibration.nc", engine="h5netcdf")
+    return found.transpose("force_std", "drag_coefficient", ...)
 
 
 @pytest.fixture
@@ -63,8 +67,8 @@ def test_a_click_shows_the_setting_s_own_motion(
     shown = page.locator("[data-part=map]")
     said = {name: float(shown.get_attribute(f"data-{name}")) for name in ("value", "x", "y")}
     assert said["value"] == float(calibration["ks_distance"][row, column])
-    assert said["x"] == float(calibration["force_std"][column])
-    assert said["y"] == float(calibration["drag_coefficient"][row])
+    assert said["x"] == float(calibration["drag_coefficient"][column])
+    assert said["y"] == float(calibration["force_std"][row])
     # The recording's excerpt is the first of the two pictures, the setting's the second.
     trails = page.locator(".map-setting .excerpt .trail")
     assert trails.count() == 2
@@ -86,6 +90,66 @@ def test_settings_differ(page: Any, calibration: xr.Dataset) -> None:
     other = [calibration[f"excerpt_{axis}"].values[1, 1] for axis in "xy"]
     with pytest.raises(AssertionError):
         assert_same_path(points, *other)
+
+
+def test_a_click_near_the_optimum_shows_that_setting(
+    visit: Callable[..., Visit], picture: Callable[..., Path], tmp_path: Path
+) -> None:
+    """The right side follows tab, click and keys, and says that the motion is a neighbour's."""
+    found = synthetic_calibration()
+    sections = [map_section(found.assign(excerpts(found)), bundled_recording(rows=400))]
+    path = tmp_path / "report.html"
+    dw.write_report(page_of(sections), path)
+    page = visit(path.as_uri()).open(path.as_uri())
+    page.get_by_text("near the optimum").click()
+    shown = page.locator("[data-part=map]")
+    page.wait_for_selector("[data-part=map][data-view=refined]")
+    fine = found["refined_ks_distance"].values.T
+    rows, columns = fine.shape
+    began = page.locator(".map-setting h3").inner_text()
+
+    def said() -> tuple[float, float, float]:
+        x, y, value = (float(shown.get_attribute(f"data-{name}")) for name in ("x", "y", "value"))
+        return x, y, value
+
+    # First what was found, then what is clicked.
+    off = abs(found["refined_force_std"].values - sections[0]["found"]["y"])
+    assert said()[1] == float(found["refined_force_std"][int(off.argmin())])
+    row, column = rows - 2, 1
+    click_cell(page, row, column, (rows, columns))
+    page.wait_for_selector(f'.map-setting[data-shown="{row},{column}"]')
+    picked = zip(BLOCK, (column, row), strict=True)
+    drag, force = (float(found[f"refined_{name}"][k]) for name, k in picked)
+    assert said() == pytest.approx((drag, force, fine[row, column]), rel=1e-6)
+    assert page.locator(".map-setting h3").inner_text() != began
+    assert page.locator(".map-figure .selected").count() == 2
+    words = page.locator(".map-setting").inner_text()
+    near = [
+        int(abs(found[name].values - at).argmin())
+        for name, at in zip(BLOCK, (drag, force), strict=True)
+    ]
+    assert "nearest setting of the whole box" in words
+    assert f" = {float(found[BLOCK[0]][near[0]]):.4g}, " in words.split("whole box")[1]
+    trail = path_points(page.locator(".map-setting .excerpt .trail").nth(1))
+    excerpt = excerpts(found)
+    assert_same_path(trail, *(excerpt[f"excerpt_{axis}"][1][tuple(near)] for axis in "xy"))
+    picture(page, "near-the-optimum")
+    page.locator(".map-figure").focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("Enter")
+    page.wait_for_selector(f'.map-setting[data-shown="{row},{column + 1}"]')
+    page.get_by_text("whole box").first.click()
+    page.wait_for_selector("[data-part=map][data-view=whole]")
+    assert "nearest setting" not in page.locator(".map-setting").inner_text()
+
+
+def excerpts(found: xr.Dataset) -> dict[str, Any]:
+    """Return paths of every setting of a made-up calibration, in the tank."""
+    plane = ("drag_coefficient", "force_std")
+    steps = np.random.default_rng(2).normal(0.0, 2e-3, (2, *(found.sizes[n] for n in plane), 60))
+    paths = dict(zip(("excerpt_x", "excerpt_y"), steps.cumsum(axis=-1), strict=True))
+    kept = {name: ((*plane, "excerpt_sample"), path) for name, path in paths.items()}
+    return {**kept, "excerpt_time": ("excerpt_sample", 0.1 * np.arange(60))}
 
 
 def test_the_keyboard_does_the_same(page: Any, calibration: xr.Dataset) -> None:

@@ -73,7 +73,7 @@ def click_cell(page: Any, row: int, column: int) -> None:
 
 def shares_of(found: xr.Dataset, row: int, column: int) -> np.ndarray:
     """Return the shares of a setting, (class, time)."""
-    one = found.isel(drag_coefficient=row, force_std=column)
+    one = found.isel(drag_coefficient=column, force_std=row)
     return (one["count_over_time"] / one["runs"]).transpose("class_over_time", "time").values
 
 
@@ -232,7 +232,7 @@ def test_a_running_analysis_shows_the_settings_that_are_there(
                 assert_areas_are(charts.nth(0), shares_of(found, row, column))
                 assert_areas_are(charts.nth(1), found["reference_over_time"].values.T)
                 bars = page.locator(".map-setting svg.classes").get_attribute("aria-label")
-                ends = 100 * found["proportion"].values[row, column]
+                ends = 100 * found["proportion"].values[column, row]
                 told = (f"{n} {share:.3g} %" for n, share in zip(NAMES, ends, strict=True))
                 assert bars == f"Outcomes of this setting: {', '.join(told)}"
             picture(page, "sensitivity-under-way")

@@ -26,10 +26,10 @@ class Answer(NamedTuple):
 class PageServer:
     """A command that serves a page."""
 
-    def __init__(self, *words: object, port: int = 0) -> None:
+    def __init__(self, *words: object, port: int = 0, before: str = "") -> None:
         # No warning of a library reaches a user.
         strict = os.environ | {"PYTHONWARNINGS": "error"}
-        self.process = start(*words, "--port", port, "--no-open", env=strict)
+        self.process = start(*words, "--port", port, "--no-open", before=before, env=strict)
         assert self.process.stdout is not None
         self.address = self.process.stdout.readline().strip()
         if not self.address:
@@ -69,9 +69,9 @@ class PageServer:
 
 
 @contextlib.contextmanager
-def served(*words: object, port: int = 0) -> Iterator[PageServer]:
+def served(*words: object, port: int = 0, before: str = "") -> Iterator[PageServer]:
     """Serve a page, and end the server afterwards."""
-    server = PageServer(*words, port=port)
+    server = PageServer(*words, port=port, before=before)
     try:
         yield server
     finally:

@@ -79,6 +79,12 @@ def show(source: Source, *, host: str, port: int, open: bool | None) -> None:
 
     def ready(address: str) -> None:
         print(address, flush=True)
+        # It holds a token where other machines reach it.
+        if "?" in address:
+            print_note(
+                "other machines reach this page by its whole address. It is not encrypted: whoever "
+                "can read the network traffic can read the page and its token"
+            )
         print_note("Ctrl-C ends it")
         if wanted:
             open_browser(address)

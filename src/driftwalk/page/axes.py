@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.page.parts import axis, require, value_of
@@ -11,8 +12,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 AXES: Final = {
-    "force_std": ("stochastic force σ_F", "N", "_N"),
     "drag_coefficient": ("drag coefficient C_d", "1", ""),
+    "force_std": ("stochastic force σ_F", "N", "_N"),
     "tank_diameter": ("tank diameter", "m", "_m"),
     "blocks": ("number of blocks", "1", ""),
 }
@@ -27,11 +28,21 @@ def require_axes(sensitivity: xr.Dataset) -> None:
 
 
 def map_axes(part: xr.Dataset) -> tuple[str, str | None]:
-    """Return which axis is x and which is y: the force lies along x, as in the paper's figures."""
-    order = [*AXES]
-    names = [str(dim) for dim in part["l1_distance"].dims]
-    ranked = sorted(names, key=lambda name: order.index(name) if name in order else len(order))
+    """Return which axis is x and which is y."""
+    ranked = ranked_axes([str(dim) for dim in part["l1_distance"].dims])
     return ranked[0], ranked[1] if len(ranked) > 1 else None
+
+
+def ranked_axes(names: Sequence[str]) -> list[str]:
+    """Return axes in the order from x to y: the drag lies along x, as in the figures of a run.
+
+    Examples
+    --------
+    >>> ranked_axes(["latching", "force_std", "drag_coefficient"])
+    ['drag_coefficient', 'force_std', 'latching']
+    """
+    order = [*AXES]
+    return sorted(names, key=lambda name: order.index(name) if name in order else len(order))
 
 
 def is_words(part: xr.Dataset, name: str) -> bool:

@@ -153,18 +153,35 @@ def open_run_folder(folder: Path) -> Run:
     run = Run(folder, state, None, manifest)
     run.kind = next((kind for kind, name in MAIN_FILES.items() if run.holds(name)), None)
     if run.kind is None:
-        run.kind = _kind_of(run.specification)
+        run.kind = kind_of_run(run.specification)
     return run
 
 
-def _kind_of(specification: Mapping[str, Any]) -> str | None:
-    """Return the kind of a run that has no result yet, from what determines its numbers."""
+def kind_of_run(specification: Mapping[str, Any]) -> str | None:
+    """Return the kind of a run that has no result yet.
+
+    Parameters
+    ----------
+    specification : mapping
+        Everything that determines its numbers.
+
+    Returns
+    -------
+    str or None
+        A key of `MAIN_FILES`; None when nothing says it.
+
+    Examples
+    --------
+    >>> kind_of_run({"kind": "model_comparison", "recording_sha256": "5f3a"})
+    'model_comparison'
+    """
     if specification.get("kind") in MAIN_FILES:
         return str(specification["kind"])
+    # Those whose specification does not name it.
     telling = {
         "recording_sha256": "calibration",
         "calibration_sha256": "assembly",
-        "sobol_samples": "sensitivity",
+        "flows_sha256": "sensitivity",
     }
     return next((kind for key, kind in telling.items() if key in specification), None)
 

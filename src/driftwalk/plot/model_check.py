@@ -275,7 +275,9 @@ def _draw_means(ax: Axes, check: xr.Dataset) -> None:
     for row, column in np.argwhere(known & (distance > limit)):
         corner = (x[column] - 0.5 * size, y[row] - 0.5 * size)
         ax.add_patch(Rectangle(corner, size, size, fill=False, edgecolor=ORANGE, lw=1.4, zorder=5))
-    add_colorbar(mesh, ax, f"distance from zero (sd)\nframed: above {limit:.1f}")
+    # The limit is that of the largest of all cells.
+    framed = f"framed: above {limit:.1f}, by chance\nin one recording of twenty"
+    add_colorbar(mesh, ax, f"distance from zero (sd)\n{framed}")
 
 
 def _draw_noise(ax: Axes, check: xr.Dataset) -> None:

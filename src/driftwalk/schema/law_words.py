@@ -9,6 +9,10 @@ from typing import Any, Final, NamedTuple
 
 LEAST_EVIDENCE: Final = 3.0
 """Difference of the logarithms of the evidence for two laws, below which both may be right."""
+OPENED_SIGMAS: Final = 6.0
+"""A number is opened when its score test finds it so far from the model [standard deviations],"""
+MEMORY_SIGMAS: Final = 4.0
+"""or so far for the memory of the force, of which a fit says more than its test."""
 NOT_SEARCHED: Final = "as stated; the fit tried no other"
 LINEAR_DRAG_ALONE: Final = "none, as the drag is linear"
 """Stands where C_d would."""

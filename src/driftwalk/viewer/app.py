@@ -1,6 +1,6 @@
-"""The routes: the page, its front end, the files of a run, and the WebSocket.
+"""The routes: the page, its front end, the files of a run, the WebSocket; and who is too slow.
 
-FastAPI is imported here, so this module is imported when a server is started.
+FastAPI and uvicorn are imported here, so this module is imported when a server is started.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from fastapi.responses import FileResponse, HTMLResponse, PlainTextResponse, Res
 from starlette.datastructures import Headers, QueryParams
 from starlette.types import ASGIApp, Message as AsgiMessage, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
+from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
 from driftwalk.core.errors import FormatError
 from driftwalk.core.json_text import parse_json
@@ -25,6 +26,12 @@ from driftwalk.viewer.shell import BUNDLE, bundle_file, html_shell, page_frame
 
 TRY_LATER: Final = 1013
 """Close code of a WebSocket: too many browsers."""
+REQUEST_S: Final = 10.0
+"""For how long a connection may take to send a whole request [s].
+
+The head of one has some hundred bytes: a phone on a bad line needs a second or two. Whoever sends
+half of it and waits would otherwise hold an open file of the server without end.
+"""
 
 Failed = Callable[[BaseException], None]
 
@@ -156,6 +163,39 @@ def parsed(text: str) -> dict[str, Any] | None:
     except FormatError:
         return None
     return content if isinstance(content, dict) else None
+
+
+class PatientHTTP(AutoHTTPProtocol):  # type: ignore[misc, valid-type]
+    """HTTP of uvicorn, which closes a connection that is slow to ask, whatever trickles in."""
+
+    _deadline: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: Any) -> None:
+        """Begin to wait for the first request."""
+        super().connection_made(transport)
+        self._wait()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Wait no longer."""
+        if self._deadline is not None:
+            self._deadline.cancel()
+        super().connection_lost(exc)
+
+    def on_response_complete(self) -> None:
+        """Begin to wait for the next request."""
+        self._wait()
+        super().on_response_complete()
+
+    def _wait(self) -> None:
+        if self._deadline is not None:
+            self._deadline.cancel()
+        self._deadline = self.loop.call_later(REQUEST_S, self._give_up)
+
+    def _give_up(self) -> None:
+        # An answer that is on its way may take longer, and a WebSocket has taken over for good.
+        answering = self.cycle is not None and not self.cycle.response_complete
+        if not answering and self.transport.get_protocol() is self:
+            self.transport.abort()
 
 
 class _Guard:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import logging
 import socket
 from collections.abc import Callable
 from typing import Any, Final
@@ -53,7 +54,7 @@ def serve(
     http://127.0.0.1:8765/
     """
     uvicorn = require_server()
-    from driftwalk.viewer.app import make_app
+    from driftwalk.viewer.app import PatientHTTP, make_app
 
     # As an address has it, in brackets.
     host = host.removeprefix("[").removesuffix("]")
@@ -77,6 +78,7 @@ def serve(
                 log_level="warning",
                 access_log=False,
                 lifespan="on",
+                http=PatientHTTP,
                 ws="websockets-sansio",
                 ws_max_size=LONGEST_MESSAGE,
                 ws_per_message_deflate=False,
@@ -85,11 +87,24 @@ def serve(
                 timeout_graceful_shutdown=round(PATIENCE_S),
             )
         )
+        logging.getLogger("uvicorn.error").addFilter(without_undecodable)
         # Ctrl-C is how one ends it.
         with contextlib.suppress(KeyboardInterrupt):
             server.run(sockets=[listener])
     if errors:
         raise errors[0]
+
+
+def without_undecodable(record: logging.LogRecord) -> bool:
+    """Return whether a record is for the user: bad UTF-8 of a browser ends its connection alone.
+
+    Parameters
+    ----------
+    record : logging.LogRecord
+        What uvicorn has to say.
+    """
+    error = record.exc_info[1] if record.exc_info else None
+    return not isinstance(error, UnicodeDecodeError)
 
 
 def require_server() -> Any:

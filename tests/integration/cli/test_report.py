@@ -79,7 +79,7 @@ def test_a_calibration(run: Path, tmp_path: Path) -> None:
     kinds = kinds_of(page)
     assert "empty" not in kinds.values()
     assert {"trajectory", "flow", "map", "lines", "table", "manifest"} <= set(kinds.values())
-    found = calibration(run)
+    found = calibration(run).transpose("force_std", "drag_coefficient", ...)
     part = part_of(page, "map")
     np.testing.assert_array_equal(values(part["value"]), found["ks_distance"].values)
     excerpt = part["cells"]["excerpt_x"]
@@ -119,7 +119,7 @@ def test_the_example_of_the_docs_reads_it(
     text = (DOCS / "reference" / "page-data.md").read_text(encoding="utf-8")
     names: dict[str, Any] = {}
     exec(text.split("```python\n")[1].split("```")[0], names)
-    np.testing.assert_array_equal(names["values"], calibration(run)["ks_distance"].values)
+    np.testing.assert_array_equal(names["values"], calibration(run)["ks_distance"].values.T)
     np.testing.assert_array_equal(decode_array(names["array"]), names["values"])
 
 
@@ -183,6 +183,7 @@ def test_a_sensitivity_analysis(run: Path, tmp_path: Path) -> None:
     kinds = kinds_of(page)
     assert "empty" not in kinds.values()
     found = xr.load_dataset(tmp_path / "map" / "sensitivity.nc", engine="h5netcdf")
+    found = found.transpose("force_std", "drag_coefficient", ...)
     part = part_of(page, "l1")
     np.testing.assert_allclose(values(part["value"]), found["l1_distance"].values, rtol=1e-6)
     np.testing.assert_allclose(values(part["shares"]), found["proportion"].values, rtol=1e-6)

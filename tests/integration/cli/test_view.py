@@ -8,6 +8,7 @@ import os
 import shutil
 import socket
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -59,7 +60,9 @@ def test_page_of_a_finished_run(server: PageServer, finished: Path) -> None:
     assert sent["state"]["finished"] is True
     found = xr.load_dataset(finished / "calibration.nc", engine="h5netcdf")
     section = next(part for part in sent["sections"] if part["kind"] == "map")
-    np.testing.assert_allclose(dw.page.decode_array(section["value"]), found["ks_distance"].values)
+    distance = found["ks_distance"].values
+    # The first parameter lies along x.
+    np.testing.assert_allclose(dw.page.decode_array(section["value"]), distance.T)
 
 
 def test_files_and_report(server: PageServer, finished: Path) -> None:
@@ -125,6 +128,59 @@ def test_nonsense_on_the_socket_is_survived(server: PageServer) -> None:
             pass
     with server.socket() as channel:
         received(channel, "page")
+
+
+def test_bad_utf_8_ends_only_its_sender_and_is_not_told(finished: Path) -> None:
+    with served("view", finished) as started:
+        with started.socket() as other, started.socket() as channel:
+            received(channel, "page")
+            # A text frame, masked with zeros, of two bytes that no UTF-8 has.
+            channel.socket.sendall(b"\x81\x82\x00\x00\x00\x00\xff\xfe")
+            with pytest.raises(ConnectionClosedError, match="1007"):
+                received(channel, "never")
+            received(other, "page")
+            say(other, type="cell", id="map", row=0, column=0)
+            received(other, "cell")
+        code, words = started.stop()
+    assert code == 0
+    assert words == "driftwalk: Ctrl-C ends it\n"
+
+
+QUICK = "from driftwalk.viewer import app\napp.REQUEST_S = 0.5\n"
+
+
+def send_slowly(raw: socket.socket) -> None:
+    """Send a byte now and then, for half a minute."""
+    for _ in range(300):
+        raw.sendall(b"x")
+        time.sleep(0.1)
+
+
+def test_half_a_request_is_not_waited_for(finished: Path) -> None:
+    """Nothing, half of a head, a byte now and then: all are closed; who has asked stays."""
+    with served("view", finished, before=QUICK) as started, started.socket() as channel:
+        received(channel, "page")
+        head = f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{started.port}\r\n".encode()
+        whole = head + b"\r\n"
+        with contextlib.ExitStack() as opened:
+            slow = []
+            for sent in (b"", head, b"G", whole + head):
+                raw = opened.enter_context(socket.create_connection(("127.0.0.1", started.port)))
+                raw.settimeout(30.0)
+                raw.sendall(sent)
+                slow.append(raw)
+            trickle = opened.enter_context(socket.create_connection(("127.0.0.1", started.port)))
+            trickle.sendall(head + b"X: ")
+            with pytest.raises((ConnectionResetError, BrokenPipeError)):
+                send_slowly(trickle)
+            for raw in slow:
+                with contextlib.suppress(ConnectionResetError):
+                    while raw.recv(65536):
+                        pass
+        # A WebSocket is no request that is waited for.
+        say(channel, type="cell", id="map", row=0, column=0)
+        received(channel, "cell")
+        assert started.get("/").status == 200
 
 
 def test_a_browser_that_goes_away_is_forgotten(server: PageServer) -> None:
@@ -200,6 +256,7 @@ def test_away_from_loopback_a_token_is_asked_for(finished: Path) -> None:
             pass
         code, words = started.stop()
         assert code == 0
+        assert "not encrypted" in words
         # It stands in the address that was printed, and nowhere else.
         assert token.removeprefix("token=") not in words
 

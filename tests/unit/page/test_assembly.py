@@ -225,17 +225,18 @@ def test_the_map_of_distances_and_the_shares_of_each_setting() -> None:
     study = sensitivity(points=(5, 4))
     made = sensitivity_sections(sensitivity=study, components=components(study))
     part = part_of(made, "l1")
-    assert (part["x"]["name"], part["y"]["name"]) == ("force_std", "drag_coefficient")
-    assert part["x"]["values"] == study["force_std"].values.tolist()
-    assert "redrawn every 16 ms" in part["x"]["label"]
-    np.testing.assert_allclose(values(part["value"]), study["l1_distance"].values, rtol=1e-6)
-    np.testing.assert_allclose(values(part["shares"]), study["proportion"].values, rtol=1e-6)
+    assert (part["x"]["name"], part["y"]["name"]) == ("drag_coefficient", "force_std")
+    assert part["y"]["values"] == study["force_std"].values.tolist()
+    assert "redrawn every 16 ms" in part["y"]["label"]
+    shown = study.transpose("force_std", "drag_coefficient", ...)
+    np.testing.assert_allclose(values(part["value"]), shown["l1_distance"], rtol=1e-6)
+    np.testing.assert_allclose(values(part["shares"]), shown["proportion"], rtol=1e-6)
     assert part["classes"] == study["class"].values.tolist()
     assert part["cells"] == [cells_of(name) for name in part["classes"]]
-    assert part["reference"] == {"x": 0.55e-3, "y": 0.45}
+    assert part["reference"] == {"x": 0.45, "y": 0.55e-3}
     assert part["noise"] == 0.18
     complete = part_of(made, "complete")
-    np.testing.assert_allclose(values(complete["value"]), study["complete"].values, rtol=1e-6)
+    np.testing.assert_allclose(values(complete["value"]), shown["complete"], rtol=1e-6)
 
 
 def test_the_biplot_keeps_scores_and_the_direction_of_loadings() -> None:
@@ -277,7 +278,7 @@ def test_a_study_of_three_axes_has_a_map_for_each_value_of_the_third() -> None:
     made = sensitivity_sections(sensitivity=both)
     assert part_of(made, "l1")["title"] == "Distance to the reference, latching collision"
     part = part_of(made, "l1-2")
-    np.testing.assert_allclose(values(part["value"]), study["l1_distance"].values, rtol=1e-6)
+    np.testing.assert_allclose(values(part["value"]), study["l1_distance"].values.T, rtol=1e-6)
 
 
 def test_distances_that_are_not_to_be_had_are_counted() -> None:

@@ -34,6 +34,11 @@ def calibration() -> xr.Dataset:
     ).assign_attrs(kind="calibration", confidence=0.9, recording_pairs=17999, step_interval_s=0.1)
 
 
+def on_map(calibration: xr.Dataset, name: str) -> np.ndarray:
+    """Return a variable on (y, x) of the map: the drag lies along x."""
+    return calibration[name].transpose("force_std", "drag_coefficient", ...).values
+
+
 @pytest.fixture(scope="module")
 def sections(calibration: xr.Dataset) -> list[dict[str, Any]]:
     return calibration_sections(calibration, recording=bundled_recording(rows=1000))
@@ -43,17 +48,17 @@ def test_the_map_is_that_of_the_dataset(
     calibration: xr.Dataset, sections: list[dict[str, Any]]
 ) -> None:
     part = part_of(sections, "map")
-    assert part["x"]["values"] == calibration["force_std"].values.tolist()
-    assert part["y"]["values"] == calibration["drag_coefficient"].values.tolist()
-    assert part["x"]["unit"] == "N"
-    assert "redrawn every 16 ms" in part["x"]["label"]
-    distance = calibration["ks_distance"].values
+    assert part["x"]["values"] == calibration["drag_coefficient"].values.tolist()
+    assert part["y"]["values"] == calibration["force_std"].values.tolist()
+    assert part["y"]["unit"] == "N"
+    assert "redrawn every 16 ms" in part["y"]["label"]
+    distance = on_map(calibration, "ks_distance")
     # Bit for bit.
     np.testing.assert_array_equal(values(part["value"]), distance)
     np.testing.assert_allclose(
-        values(part["standard_error"]), calibration["ks_distance_standard_error"], rtol=1e-6
+        values(part["standard_error"]), on_map(calibration, "ks_distance_standard_error"), rtol=1e-6
     )
-    status = calibration["status"].values
+    status = on_map(calibration, "status")
     np.testing.assert_array_equal(values(part["status"]), status)
     assert part["statuses"] == {
         "1": "no motion (D = 1)",
@@ -64,17 +69,16 @@ def test_the_map_is_that_of_the_dataset(
         np.argmin(np.where((status == 0) & np.isfinite(distance), distance, 9.0)), status.shape
     )
     assert part["best"] == {
-        "x": calibration["force_std"].values[column],
-        "y": calibration["drag_coefficient"].values[row],
+        "x": calibration["drag_coefficient"].values[column],
+        "y": calibration["force_std"].values[row],
         "value": distance[row, column],
     }
-    assert part["found"] == {"x": 0.61e-3, "y": 0.39}
+    assert part["found"] == {"x": 0.39, "y": 0.61e-3}
     assert part["noise_floor"] == 0.032
     assert part["region"]["confidence"] == 0.9
-    assert part["region"]["x"] == calibration["region_force_std"].values.tolist()
-    np.testing.assert_allclose(
-        values(part["refined"]["value"]), calibration["refined_ks_distance"], rtol=1e-6
-    )
+    assert part["region"]["x"] == calibration["region_drag_coefficient"].values.tolist()
+    refined = calibration["refined_ks_distance"].values
+    np.testing.assert_allclose(values(part["refined"]["value"]), refined.T, rtol=1e-6)
 
 
 def test_a_click_shows_what_is_kept_of_the_setting(
@@ -83,21 +87,21 @@ def test_a_click_shows_what_is_kept_of_the_setting(
     cells = part_of(sections, "map")["cells"]
     for name in ("excerpt_x", "excerpt_y", "density"):
         kept = {"density": "step_density"}.get(name, name)
-        exact = calibration[kept].values
+        exact = on_map(calibration, kept)
         assert cells[name]["scale"] <= np.ptp(exact) / 2000
         np.testing.assert_allclose(
             values(cells[name]), exact, rtol=0, atol=0.5001 * cells[name]["scale"]
         )
     assert values(cells["excerpt_time"]).tolist() == calibration["excerpt_time"].values.tolist()
-    distance = calibration["ks_distance_replicate"].values
-    mean = calibration["ks_distance"].values
+    distance = on_map(calibration, "ks_distance_replicate")
+    mean = on_map(calibration, "ks_distance")
     for name in ("ks_step_length", "ks_turning_angle"):
         found = values(cells[name])
         for index in np.ndindex(mean.shape):
             if not np.isfinite(mean[index]):
                 continue
             nearest = min(range(4), key=lambda k: abs(distance[index][k] - mean[index]))
-            expected = calibration[name].values[index][nearest]
+            expected = on_map(calibration, name)[index][nearest]
             assert found[index] == pytest.approx(expected, rel=1e-6)
 
 
@@ -121,9 +125,9 @@ def test_a_cell_without_distance_and_cause_was_not_computed(calibration: xr.Data
     distance = calibration["ks_distance"].copy()
     distance[3, 4] = np.nan
     part = map_section(calibration.assign(ks_distance=distance))
-    assert values(part["status"])[3, 4] == 8
+    assert values(part["status"])[4, 3] == 8
     assert part["statuses"]["8"] == "not computed"
-    assert np.isnan(values(part["value"])[3, 4])
+    assert np.isnan(values(part["value"])[4, 3])
 
 
 def test_several_causes_are_all_named(calibration: xr.Dataset) -> None:
@@ -212,13 +216,13 @@ def test_the_bootstrap_and_the_closed_region(
 ) -> None:
     part = part_of(sections, "bootstrap")
     cloud, region = part["series"]
-    np.testing.assert_allclose(values(cloud["x"]), calibration["bootstrap_force_std"], rtol=1e-12)
     np.testing.assert_allclose(
-        values(cloud["y"]), calibration["bootstrap_drag_coefficient"], rtol=1e-6
+        values(cloud["x"]), calibration["bootstrap_drag_coefficient"], rtol=1e-12
     )
+    np.testing.assert_allclose(values(cloud["y"]), calibration["bootstrap_force_std"], rtol=1e-6)
     assert values(region["x"])[0] == values(region["x"])[-1]
     assert len(values(region["x"])) == calibration.sizes["region_vertex"] + 1
-    assert part["marks"] == [{"label": "estimate", "x": 0.61e-3, "y": 0.39}]
+    assert part["marks"] == [{"label": "estimate", "x": 0.39, "y": 0.61e-3}]
 
 
 def test_halves_are_shown_where_they_are(calibration: xr.Dataset) -> None:

@@ -108,6 +108,14 @@ def test_a_tenth_that_the_fit_absorbed_has_no_point() -> None:
     assert np.isnan(values(part["series"][0]["y"])[1])
 
 
+def test_a_cell_beyond_chance_says_how_often_chance_gives_one() -> None:
+    """The limit is a level of 95 %, so one right model in twenty has a cell beyond it."""
+    note = part_of(fit_sections(None, check=made_up_check()), "check-place")["note"]
+    assert "below 3.8 in 95 % of recordings" in note
+    assert "no evidence against the model" in note
+    assert "Chance alone stays below" not in note
+
+
 def test_a_fit_that_was_not_checked_says_so() -> None:
     made = fit_sections(made_up_fit())
     assert part_of(made, "check")["kind"] == "empty"

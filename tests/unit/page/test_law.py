@@ -78,8 +78,33 @@ def test_what_is_printed_stands_on_the_page(capsys: pytest.CaptureFixture[str]) 
 
 
 def test_what_was_tested_is_a_table() -> None:
-    rows: list[list[Any]] = part_of(fit_sections(fit_of()), "tested")["rows"]
-    assert rows == [["orientation offset", 3.0], ["strength of the flow, cosine 1", -2.0]]
+    part = part_of(fit_sections(fit_of()), "tested")
+    assert [row[:2] for row in part["rows"]] == [
+        ["orientation offset", 3.0],
+        ["strength of the flow, cosine 1", -2.0],
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "sigmas", "reason"),
+    [
+        ("force_memory", 1.4, "as near as chance brings it"),
+        ("force_memory", 3.2, "too weak: fitted from 4 on"),
+        ("angle_offset", -3.2, "too weak: fitted from 6 on"),
+        ("force_memory", 4.5, "too small to matter, of the wrong sign, or not found by the fit"),
+        ("water_spin", 7.0, "the two force laws were compared as a whole"),
+        ("strength_3", 4.0, "the cosines are tested together"),
+        ("marker_x", np.nan, "it has no estimate"),
+    ],
+)
+def test_what_was_tested_says_why_it_is_not_in_the_fit(
+    name: str, sigmas: float, reason: str
+) -> None:
+    fit = fit_of().isel(departure=[0]).assign_coords(departure=[name])
+    fit["departure_estimate"].values[:] = sigmas * fit["departure_std"].values
+    part = part_of(fit_sections(fit), "tested")
+    assert part["rows"][0][2].startswith(reason)
+    assert len(part["columns"]) == len(part["rows"][0])
 
 
 def test_a_linear_law_has_no_drag_coefficient(capsys: pytest.CaptureFixture[str]) -> None:

@@ -148,7 +148,7 @@ def test_an_unfinished_run_shows_what_is_there(
         ({"kind": "fit"}, "Likelihood fit"),
         ({"kind": "recovery"}, "Recovery study"),
         ({"calibration_sha256": None}, "Self-assembly"),
-        ({"sobol_samples": None}, "Sensitivity of self-assembly"),
+        ({"flows_sha256": {}}, "Sensitivity of self-assembly"),
         ({"something": 1}, "Run"),
     ],
 )

@@ -82,28 +82,33 @@ def the_map(source: RunSource) -> dict[str, Any]:
     return next(section for section in page(source)["sections"] if section["id"] == "map")
 
 
+def by_setting(array: dict[str, Any]) -> np.ndarray:
+    """Return values of a map in the order of the settings: the first parameter lies along x."""
+    return dw.page.decode_array(array).T
+
+
 def test_map_fills_as_units_are_finished(run: RunDirectory) -> None:
     source = RunSource(run.path)
     assert page(source)["state"]["progress"] == 0.0
-    assert np.isnan(dw.page.decode_array(the_map(source)["value"])).all()
+    assert np.isnan(by_setting(the_map(source)["value"])).all()
     store, done = coarse(run), 0
     for unit in UNITS:
         store.write(unit, arrays(unit))
         done += unit.size
         kinds = [content["type"] for content in source.look()]
         assert kinds == ["section", "state"]
-        value = dw.page.decode_array(the_map(source)["value"]).reshape(-1)
+        value = by_setting(the_map(source)["value"]).reshape(-1)
         np.testing.assert_allclose(value[:done], DISTANCE.mean(axis=1)[:done])
         assert np.isnan(value[done:]).all()
         assert page(source)["state"]["progress"] == pytest.approx(0.26 * 0.9 * done / 12)
         assert source.look() == []
     error = DISTANCE.std(axis=1, ddof=1) / np.sqrt(2)
     np.testing.assert_allclose(
-        dw.page.decode_array(the_map(source)["standard_error"]).reshape(-1), error, rtol=1e-6
+        by_setting(the_map(source)["standard_error"]).reshape(-1), error, rtol=1e-6
     )
     best = int(DISTANCE.mean(axis=1).argmin())
-    assert the_map(source)["best"]["y"] == DRAG[best // 4]
-    assert the_map(source)["best"]["x"] == FORCE[best % 4]
+    assert the_map(source)["best"]["x"] == DRAG[best // 4]
+    assert the_map(source)["best"]["y"] == FORCE[best % 4]
 
 
 def test_units_may_come_in_any_order(run: RunDirectory) -> None:
@@ -112,7 +117,7 @@ def test_units_may_come_in_any_order(run: RunDirectory) -> None:
         store.write(unit, arrays(unit))
         source.look()
     np.testing.assert_allclose(
-        dw.page.decode_array(the_map(source)["value"]).reshape(-1), DISTANCE.mean(axis=1)
+        by_setting(the_map(source)["value"]).reshape(-1), DISTANCE.mean(axis=1)
     )
 
 
@@ -129,9 +134,7 @@ def test_a_setting_without_numbers_is_as_far_as_can_be(run: RunDirectory) -> Non
     broken["ks_distance"] = np.full((5, 2), np.nan)
     store.write(UNITS[0], broken)
     source.look()
-    np.testing.assert_array_equal(
-        dw.page.decode_array(the_map(source)["value"]).reshape(-1)[:5], np.ones(5)
-    )
+    np.testing.assert_array_equal(by_setting(the_map(source)["value"]).reshape(-1)[:5], np.ones(5))
 
 
 def test_a_cell_gives_its_own_excerpt(run: RunDirectory) -> None:
@@ -139,7 +142,7 @@ def test_a_cell_gives_its_own_excerpt(run: RunDirectory) -> None:
     store.write(UNITS[0], arrays(UNITS[0]))
     source.look()
     assert source._running is not None
-    found = source._running.cell(0, 3)
+    found = source._running.cell(3, 0)
     np.testing.assert_allclose(dw.page.decode_array(found["excerpt_x"]), EXCERPT[3], rtol=1e-6)
     np.testing.assert_allclose(dw.page.decode_array(found["excerpt_y"]), -EXCERPT[3], rtol=1e-6)
     assert dw.page.decode_array(found["density"]).sum() == pytest.approx(1.0)
@@ -147,7 +150,7 @@ def test_a_cell_gives_its_own_excerpt(run: RunDirectory) -> None:
     assert found["ks_step_length"] == 3.0
 
 
-@pytest.mark.parametrize(("row", "column"), [(2, 3), (-1, 0), (3, 0), (0, 4), (10**9, 0)])
+@pytest.mark.parametrize(("row", "column"), [(3, 2), (0, -1), (0, 3), (4, 0), (0, 10**9)])
 def test_a_cell_that_is_not_there_is_empty(run: RunDirectory, row: int, column: int) -> None:
     source, store = RunSource(run.path), coarse(run)
     store.write(UNITS[0], arrays(UNITS[0]))
@@ -200,10 +203,8 @@ def test_refined_map_and_bootstrap(run: RunDirectory) -> None:
     refined.write(fine[0], {"ks_distance": np.array([[0.1, 0.3], [0.5, 0.7]])})
     source.look()
     part = the_map(source)["refined"]
-    assert part["y"] == [0.25, 0.3]
-    np.testing.assert_allclose(
-        dw.page.decode_array(part["value"]), [[0.2, 0.6], [np.nan, np.nan]], rtol=1e-6
-    )
+    assert part["x"] == [0.25, 0.3]
+    np.testing.assert_allclose(by_setting(part["value"]), [[0.2, 0.6], [np.nan, np.nan]], rtol=1e-6)
     assert page(source)["state"]["progress"] == pytest.approx(0.26 + 0.34 * 0.25)
     repeats = run.store("bootstrap-x", fingerprint={"count": 4})
     unit = grid(recording=np.arange(4)).units(2)[1]
@@ -213,8 +214,8 @@ def test_refined_map_and_bootstrap(run: RunDirectory) -> None:
     assert [content["type"] for content in source.look()] == ["page"]
     lines = next(s for s in page(source)["sections"] if s["id"] == "bootstrap")
     cloud = lines["series"][0]
-    assert cloud["y"] == pytest.approx([0.3, 0.4])
-    assert cloud["x"] == pytest.approx([1e-4, 2e-4])
+    assert cloud["x"] == pytest.approx([0.3, 0.4])
+    assert cloud["y"] == pytest.approx([1e-4, 2e-4])
     assert page(source)["state"]["progress"] == pytest.approx(0.6 + 0.2 * 0.5)
 
 
@@ -254,10 +255,10 @@ def test_the_map_of_a_users_model_fills_under_its_own_names(tmp_path: Path, coun
         assert part["series"][0]["y"][:2] == pytest.approx([0.2, 0.6])
         assert lines["series"][0]["x"] == pytest.approx([10**-0.5, 10**0.1])
     else:
-        assert (part["y"]["label"], part["x"]["label"]) == ("tumble rate", "speed of a run")
-        assert part["y"]["values"] == pytest.approx([0.1, 1.0, 10.0])
-        assert dw.page.decode_array(part["value"]).ravel()[:2] == pytest.approx([0.2, 0.6])
-        assert lines["series"][0]["y"] == pytest.approx([10**-0.5, 10**0.1])
+        assert (part["x"]["label"], part["y"]["label"]) == ("tumble rate", "speed of a run")
+        assert part["x"]["values"] == pytest.approx([0.1, 1.0, 10.0])
+        assert by_setting(part["value"]).ravel()[:2] == pytest.approx([0.2, 0.6])
+        assert lines["series"][0]["x"] == pytest.approx([10**-0.5, 10**0.1])
 
 
 def test_damaged_and_foreign_shards_are_no_units(run: RunDirectory) -> None:
@@ -326,19 +327,19 @@ def test_sensitivity_fills_its_map(tmp_path: Path) -> None:
         section = page(source)["sections"][0]
         # Eq. 5 by hand: the pooled reference is one half each.
         np.testing.assert_allclose(
-            dw.page.decode_array(section["value"]),
+            by_setting(section["value"]),
             [[0.0, 1.0, 1.0], [0.6, np.nan, np.nan]],
             rtol=1e-6,
         )
         assert section["classes"] == ["2", "1+1"]
         gone = [np.nan, np.nan]
         np.testing.assert_allclose(
-            dw.page.decode_array(section["shares"]),
+            dw.page.decode_array(section["shares"]).swapaxes(0, 1),
             [[[0.5, 0.5], [1.0, 0.0], [0.0, 1.0]], [[0.8, 0.2], gone, gone]],
             rtol=1e-6,
         )
-        assert section["x"]["name"] == "force_std"
-        assert section["y"]["values"] == [0.2, 0.3]
+        assert section["y"]["name"] == "force_std"
+        assert section["x"]["values"] == [0.2, 0.3]
         assert page(source)["state"]["words"] == "6 of 8 settings"
 
 
@@ -371,13 +372,13 @@ def test_a_setting_of_a_running_sensitivity_has_its_classes_over_time(tmp_path: 
             grid(setting=np.arange(12)).units(5)[0], courses(*[(k, 10 * k) for k in range(1, 6)])
         )
         running.look()
-        alone = running.cell(0, 2)["over_time"]
+        alone = running.cell(2, 0)["over_time"]
         assert alone["reference"] is None
         opened.store("reference").write(
             grid(setting=np.arange(2)).units(2)[0], courses((4, 50), (8, 50))
         )
         running.look()
-        for row, column, runs, at in ((0, 0, 1, 10), (0, 2, 3, 30), (1, 1, 5, 50)):
+        for row, column, runs, at in ((0, 0, 1, 10), (2, 0, 3, 30), (1, 1, 5, 50)):
             found = running.cell(row, column)["over_time"]
             json.dumps(found, allow_nan=False)
             assert found["classes"] == ["2", "1+1"]
@@ -394,7 +395,7 @@ def test_a_setting_of_a_running_sensitivity_has_its_classes_over_time(tmp_path: 
             np.testing.assert_allclose(
                 dw.page.decode_array(found["reference"]), [both, 1.0 - both], atol=1e-7
             )
-        for row, column in ((1, 2), (2, 0), (0, 3), (-1, 0), (0, -1), (10**9, 10**9)):
+        for row, column in ((2, 1), (0, 2), (3, 0), (0, -1), (-1, 0), (10**9, 10**9)):
             assert running.cell(row, column)["over_time"] is None
 
 
@@ -515,7 +516,7 @@ def test_a_one_by_one_search(run: RunDirectory, tmp_path: Path) -> None:
         store.write(unit, arrays(unit))
         source.look()
         assert page(source)["state"]["words"] == "map: 90 %"
-        found = dw.page.decode_array(the_map(source)["value"])
+        found = by_setting(the_map(source)["value"])
         np.testing.assert_allclose(found, [[DISTANCE[0].mean()]], rtol=1e-6)
 
 
@@ -530,7 +531,7 @@ def test_a_folder_with_any_name_and_no_right_to_write(run: RunDirectory, tmp_pat
         source = RunSource(odd)
         assert source.look() == []
         assert page(source)["subtitle"] == odd.name
-        assert np.isfinite(dw.page.decode_array(the_map(source)["value"])).sum() == 5
+        assert np.isfinite(by_setting(the_map(source)["value"])).sum() == 5
         # Looking changes nothing; for root no folder is read-only, so this is what is checked.
         assert sorted((path, path.stat().st_mtime_ns) for path in odd.rglob("*")) == before
     finally:

@@ -4,9 +4,8 @@ import { type Cell, type Size, moveCell } from "../keyboard";
 
 export interface GridChoice {
   readonly label: string;
-  readonly size: Size;
-  /** Whether keys mean something now. */
-  enabled(): boolean;
+  /** The size of the grid that is shown now. */
+  size(): Size;
   /** The cell that a first key starts from. */
   here(): Cell;
   /** The cell under the keyboard's cursor, null when there is none. */
@@ -22,12 +21,11 @@ export function useGridKeys(element: HTMLElement, choice: GridChoice): void {
   element.setAttribute("aria-roledescription", "map");
   element.setAttribute("aria-label", `${choice.label}: arrow keys move over the settings, Enter selects one`);
   element.addEventListener("keydown", (event) => {
-    if (!choice.enabled()) return;
     const here = choice.cursor() ?? choice.here();
     if (event.key === "Enter" || event.key === " ") choice.select(here);
     else if (event.key === "Escape") choice.moved(null);
     else {
-      const next = moveCell(here, event.key, choice.size);
+      const next = moveCell(here, event.key, choice.size());
       if (next === null) return;
       choice.moved(next);
     }

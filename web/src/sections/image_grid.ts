@@ -41,8 +41,8 @@ export async function drawImageGrid(section: ImageGridSection, body: HTMLElement
       line.show(
         Number.isFinite(found)
           ? [
-              [shortName(y.label), inUnit(at(y.values, row), yDisplay)],
               [shortName(x.label), inUnit(at(x.values, column), xDisplay)],
+              [shortName(y.label), inUnit(at(y.values, row), yDisplay)],
               [section.label, inUnit(found, display)],
             ]
           : null,

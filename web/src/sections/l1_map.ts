@@ -75,8 +75,7 @@ export async function drawL1Map(section: L1MapSection, body: HTMLElement, contex
   );
   useGridKeys(plot.element, {
     label: `Map of the ${section.label}`,
-    size: map,
-    enabled: () => true,
+    size: () => map,
     here: () => choice.selected ?? first,
     cursor: () => cursor,
     moved,
@@ -177,8 +176,8 @@ function ends(edges: number[]): [number, number] {
 function reading(map: L1Data, { row, column }: Cell): [string, string][] {
   const { x, y, label } = map.section;
   return [
-    [shortName(y.label), inUnit(at(y.values, row), map.yDisplay, 4)],
     [shortName(x.label), inUnit(at(x.values, column), map.xDisplay, 4)],
+    [shortName(y.label), inUnit(at(y.values, row), map.yDisplay, 4)],
     [label, short(distanceAt(map, { row, column }))],
   ];
 }

@@ -1,32 +1,44 @@
 /** The map of 1 − D: hover reads, a click or Enter selects, the selected setting is shown beside. */
 
-import { type Grid, at, decode, nearest } from "../arrays";
 import type { Place } from "../charts/hover";
 import { figure } from "../charts/responsive";
 import { type Context, remembered } from "../context";
-import { el, refill } from "../dom";
+import { type Child, el, refill } from "../dom";
 import type { Cell } from "../keyboard";
 import type { MapSection } from "../page";
 import { type Swatch, choices, details, legend, readout, table } from "../parts";
-import { cellAt, cellEdges } from "../scale";
+import { cellAt } from "../scale";
 import { rich, shortName, spoken } from "../symbols";
 import { inUnit, labelled, percent, short } from "../units";
 import { useGridKeys } from "./grid_keys";
-import { type MapData, decodeMap, distanceAt, errorAt, excerptSource, failureAt } from "./map_data";
-import { drawRefinedMap, drawWholeMap, failures } from "./map_plot";
+import {
+  type MapData,
+  cellNear,
+  decodeMap,
+  decodeRefined,
+  distanceAt,
+  errorAt,
+  excerptSource,
+  failureAt,
+  placeOf,
+} from "./map_data";
+import { type View, drawPart, failures } from "./map_plot";
 import { decodeRecorded, drawSetting } from "./map_setting";
 
 interface Choice {
-  selected: Cell | null;
-  view: "whole" | "refined";
+  readonly selected: Record<View, Cell | null>;
+  view: View;
 }
 
 export async function drawMap(section: MapSection, body: HTMLElement, context: Context): Promise<void> {
   const map = await decodeMap(section);
-  const refined =
-    section.refined === null ? null : { ...section.refined, value: await decode(section.refined.value) };
-  const choice = remembered<Choice>(context, `map ${section.id}`, () => ({ selected: null, view: "whole" }));
+  const refined = await decodeRefined(map);
+  const choice = remembered<Choice>(context, `map ${section.id}`, () => ({
+    selected: { whole: null, refined: null },
+    view: "whole",
+  }));
   if (refined === null) choice.view = "whole";
+  const now = (): MapData => (choice.view === "refined" && refined !== null ? refined : map);
   const shown = el("div", { class: "map-plot" });
   const panel = el("div", { class: "map-setting", "aria-live": "off" });
   const grid = el("div", { class: "map", "data-part": "map" }, shown, panel);
@@ -37,27 +49,29 @@ export async function drawMap(section: MapSection, body: HTMLElement, context: C
   const showSetting = settingPanel(map, panel, context);
   let cursor: Cell | null = null;
   // What is shown at first follows a sweep as its map fills, until the reader chooses.
-  const first = choice.selected ?? startCell(map);
+  const first = { whole: startCell(map), refined: refined === null ? null : startCell(refined) };
+  const selected = (): Cell | null => {
+    const kept = choice.selected[choice.view];
+    // The surface near the optimum may have moved since, and have fewer cells.
+    const there = kept !== null && kept.row < now().rows && kept.column < now().columns;
+    return there ? kept : first[choice.view];
+  };
 
+  const show = async (cell: Cell | null): Promise<void> => {
+    if (cell === null) return;
+    grid.dataset["view"] = choice.view;
+    mark(grid, now(), cell);
+    await showSetting(now(), cell);
+  };
   const select = (cell: Cell): void => {
-    choice.selected = cell;
-    mark(grid, map, cell);
+    choice.selected[choice.view] = cell;
     plot.redraw();
-    void showSetting(cell);
+    void show(cell);
   };
   const pointed = (place: Place | null): void => {
-    const cell = place === null ? null : cellUnder(map, place);
-    line.show(cell === null ? null : reading(map, cell));
+    const cell = place === null ? null : cellUnder(now(), place);
+    line.show(cell === null ? null : reading(now(), cell));
   };
-  const look = (): Parameters<typeof drawWholeMap>[2] => ({
-    selected: choice.selected ?? first,
-    cursor,
-    pointed,
-    pressed: (place) => {
-      const cell = cellUnder(map, place);
-      if (cell !== null) select(cell);
-    },
-  });
 
   if (refined !== null) {
     const views = [
@@ -67,24 +81,33 @@ export async function drawMap(section: MapSection, body: HTMLElement, context: C
     shown.append(
       choices("Part of the map", views, choice.view, (view) => {
         choice.view = view;
+        cursor = null;
         plot.redraw();
+        line.show(null);
+        void show(selected());
       }),
     );
   }
-  const plot = figure(shown, "map-figure", (width) => {
-    if (choice.view === "whole" || refined === null) return drawWholeMap(width, map, look());
-    return drawRefinedMap(width, map, refined, (place) => line.show(refinedReading(map, refined, place)));
-  });
+  const plot = figure(shown, "map-figure", (width) =>
+    drawPart(width, now(), choice.view, {
+      selected: selected(),
+      cursor,
+      pointed,
+      pressed: (place) => {
+        const cell = cellUnder(now(), place);
+        if (cell !== null) select(cell);
+      },
+    }),
+  );
   const moved = (cell: Cell | null): void => {
     cursor = cell;
     plot.redraw();
-    line.show(cell === null ? null : reading(map, cell));
+    line.show(cell === null ? null : reading(now(), cell));
   };
   useGridKeys(plot.element, {
     label: "Map of 1 − D",
-    size: map,
-    enabled: () => choice.view === "whole",
-    here: () => choice.selected ?? first ?? { row: 0, column: 0 },
+    size: now,
+    here: () => selected() ?? { row: 0, column: 0 },
     cursor: () => cursor,
     moved,
     select,
@@ -95,21 +118,17 @@ export async function drawMap(section: MapSection, body: HTMLElement, context: C
     details("Values as a table", () => valueTable(map)),
   );
 
-  if (first === null) {
+  if (selected() === null) {
     panel.append(el("p", { class: "nothing" }, "No setting has been computed yet."));
     return;
   }
-  mark(grid, map, first);
-  await showSetting(first);
+  await show(selected());
 }
 
-/** Returns the cell nearest to what was found, or the best one. */
+/** Returns the cell nearest to the best one, or to what was found. */
 function startCell(map: MapData): Cell | null {
   const wanted = map.section.best ?? map.section.found;
-  if (wanted === null) return null;
-  const row = nearest(map.section.y.values, wanted.y);
-  const column = nearest(map.section.x.values, wanted.x);
-  return row < 0 || column < 0 ? null : { row, column };
+  return wanted === null ? null : cellNear(map, wanted);
 }
 
 function cellUnder(map: MapData, place: Place): Cell | null {
@@ -137,8 +156,8 @@ type Pairs = [label: string, value: string][];
 function settingPairs(map: MapData, { row, column }: Cell): Pairs {
   const { x, y } = map.section;
   return [
-    [shortName(y.label), inUnit(y.values[row] ?? Number.NaN, map.yDisplay, 4)],
     [shortName(x.label), inUnit(x.values[column] ?? Number.NaN, map.xDisplay, 4)],
+    [shortName(y.label), inUnit(y.values[row] ?? Number.NaN, map.yDisplay, 4)],
   ];
 }
 
@@ -155,48 +174,51 @@ function reading(map: MapData, cell: Cell): Pairs {
   return pairs;
 }
 
-function refinedReading(
+/**
+ * Returns what shows a setting of a part of the map in the panel; of several calls the last one counts.
+ * Motion was kept of the settings of the whole box alone: one near the optimum shows that of the nearest.
+ */
+function settingPanel(
   map: MapData,
-  refined: { x: readonly number[]; y: readonly number[]; value: Grid },
-  place: Place | null,
-): Pairs | null {
-  if (place === null) return null;
-  const column = cellAt(cellEdges(refined.x), place.x);
-  const row = cellAt(cellEdges(refined.y), place.y);
-  if (row < 0 || column < 0) return null;
-  return [
-    [shortName(map.section.y.label), inUnit(refined.y[row] ?? Number.NaN, map.yDisplay, 4)],
-    [shortName(map.section.x.label), inUnit(refined.x[column] ?? Number.NaN, map.xDisplay, 4)],
-    ["1 − D", short(1 - at(refined.value.data, row * refined.x.length + column), 3)],
-  ];
-}
-
-/** Returns what shows a setting in the panel; of several calls the last one counts. */
-function settingPanel(map: MapData, panel: HTMLElement, context: Context): (cell: Cell) => Promise<void> {
+  panel: HTMLElement,
+  context: Context,
+): (part: MapData, cell: Cell) => Promise<void> {
   const source = excerptSource(map, context);
   const recorded = decodeRecorded(map);
   let newest = 0;
-  return async (cell) => {
+  return async (part, cell) => {
     newest += 1;
     const mine = newest;
-    const excerpt = source === null ? null : await source(cell.row, cell.column).catch(() => null);
+    const near = part === map ? cell : cellNear(map, placeOf(part, cell));
+    const excerpt =
+      source === null || near === null ? null : await source(near.row, near.column).catch(() => null);
     const beside = await recorded;
     if (mine !== newest) return;
     refill(panel, () => {
-      panel.append(settingHead(map, cell));
+      panel.append(settingHead(part, cell));
       if (excerpt === null) panel.append(el("p", { class: "nothing" }, "No motion of this setting was kept."));
-      else drawSetting(panel, map, beside, excerpt);
+      else {
+        if (part !== map && near !== null) {
+          const words = "The motion is that of the nearest setting of the whole box, ";
+          panel.append(el("p", {}, words, ...settingWords(map, near), "."));
+        }
+        drawSetting(panel, map, beside, excerpt, part === map ? "this setting" : "the nearest setting");
+      }
     });
     panel.dataset["shown"] = `${cell.row},${cell.column}`;
   };
 }
 
-function settingHead(map: MapData, cell: Cell): HTMLElement {
-  const title = settingPairs(map, cell).flatMap(([label, value], index) => [
+/** Returns a setting in words: "C_d = 0.4, σ_F = 0.6 mN". */
+function settingWords(map: MapData, cell: Cell): Child[] {
+  return settingPairs(map, cell).flatMap(([label, value], index) => [
     index > 0 && ", ",
     ...rich(label),
     ` = ${value}`,
   ]);
+}
+
+function settingHead(map: MapData, cell: Cell): HTMLElement {
   const distance = distanceAt(map, cell.row, cell.column);
   const error = errorAt(map, cell.row, cell.column);
   const failure = failureAt(map, cell.row, cell.column);
@@ -204,7 +226,7 @@ function settingHead(map: MapData, cell: Cell): HTMLElement {
   return el(
     "div",
     { class: "setting-head" },
-    el("h3", {}, ...title),
+    el("h3", {}, ...settingWords(map, cell)),
     el(
       "p",
       {},

@@ -1,7 +1,8 @@
 /** The map of 1 − D, decoded, and what is kept of its settings. */
 
-import { type Grid, at, decode, decodeMaybe, part } from "../arrays";
+import { type Grid, at, decode, decodeMaybe, nearest, part } from "../arrays";
 import type { CellExcerpt, Context } from "../context";
+import type { Cell } from "../keyboard";
 import type { MapSection } from "../page";
 import { cellEdges } from "../scale";
 import { type Display, displayFor } from "../units";
@@ -48,6 +49,41 @@ export async function decodeMap(section: MapSection): Promise<MapData> {
     xDisplay: displayFor(section.x.unit, section.x.values),
     yDisplay: displayFor(section.y.unit, section.y.values),
   };
+}
+
+/** Returns the surface near the optimum as a map of its own, null where there is none. */
+export async function decodeRefined(map: MapData): Promise<MapData | null> {
+  const { section } = map;
+  const { refined } = section;
+  if (refined === null) return null;
+  return {
+    ...map,
+    section: {
+      ...section,
+      x: { ...section.x, values: refined.x },
+      y: { ...section.y, values: refined.y },
+      best: null,
+    },
+    distance: await decode(refined.value),
+    error: null,
+    status: null,
+    rows: refined.y.length,
+    columns: refined.x.length,
+    xEdges: cellEdges(refined.x),
+    yEdges: cellEdges(refined.y),
+  };
+}
+
+/** Returns the cell of a map that lies nearest to a place, null in a map without cells. */
+export function cellNear(map: MapData, place: { readonly x: number; readonly y: number }): Cell | null {
+  const row = nearest(map.section.y.values, place.y);
+  const column = nearest(map.section.x.values, place.x);
+  return row < 0 || column < 0 ? null : { row, column };
+}
+
+/** Returns the place of a cell in the units of the axes. */
+export function placeOf(map: MapData, { row, column }: Cell): { x: number; y: number } {
+  return { x: at(map.section.x.values, column), y: at(map.section.y.values, row) };
 }
 
 export function distanceAt(map: MapData, row: number, column: number): number {

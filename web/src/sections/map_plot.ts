@@ -1,6 +1,6 @@
 /** The map of 1 − D itself: cells, failures, region, found point, selected cell. */
 
-import { type Grid, at, extent } from "../arrays";
+import { extent } from "../arrays";
 import { addHatch, cellsPath, drawCells } from "../charts/cells";
 import { BAR_ROOM, drawColourBar } from "../charts/colour_bar";
 import { type Frame, makeFrame } from "../charts/frame";
@@ -8,7 +8,6 @@ import { type Place, onPointer } from "../charts/hover";
 import { type ColourScale, colourScale } from "../colours";
 import { svg } from "../dom";
 import type { Cell } from "../keyboard";
-import { cellEdges } from "../scale";
 import { closedPath } from "../tank/outline";
 import { spoken } from "../symbols";
 import { type MapData, distanceAt, failureAt } from "./map_data";
@@ -17,6 +16,8 @@ const PLAIN = { factor: 1, unit: "" } as const;
 /** Slants of the hatches of different reasons [°]. */
 const SLANTS = [45, -45, 0, 90] as const;
 
+export type View = "whole" | "refined";
+
 interface MapLook {
   readonly selected: Cell | null;
   readonly cursor: Cell | null;
@@ -24,9 +25,9 @@ interface MapLook {
   readonly pressed: (place: Place) => void;
 }
 
-/** Draws the whole box that was searched. */
-export function drawWholeMap(width: number, map: MapData, look: MapLook): Element {
-  const scale = colourScale("score", 0, 1);
+/** Draws the whole box that was searched, or the surface near the optimum with colours of its own. */
+export function drawPart(width: number, map: MapData, view: View, look: MapLook): Element {
+  const scale = view === "whole" ? colourScale("score", 0, 1) : ownScale(map);
   const frame = mapFrame(width, map, map.xEdges, map.yEdges);
   drawCells(frame, map.xEdges, map.yEdges, (column, row) => scale.of(1 - distanceAt(map, row, column)));
   drawFailures(frame, map);
@@ -40,29 +41,11 @@ export function drawWholeMap(width: number, map: MapData, look: MapLook): Elemen
   return frame.svg;
 }
 
-/** Draws the surface near the optimum, with colours of its own. */
-export function drawRefinedMap(
-  width: number,
-  map: MapData,
-  refined: { x: readonly number[]; y: readonly number[]; value: Grid },
-  pointed: (place: Place | null) => void,
-): Element {
-  const [xEdges, yEdges] = [cellEdges(refined.x), cellEdges(refined.y)];
-  const scores = refined.value.data.map((distance) => 1 - distance);
-  const [low, high] = extent(scores) ?? [0, 1];
+/** Returns colours from the lowest score to the highest, or to that of the noise floor. */
+function ownScale(map: MapData): ColourScale {
+  const [low, high] = extent(map.distance.data.map((distance) => 1 - distance)) ?? [0, 1];
   const floor = map.section.noise_floor;
-  const scale = colourScale(
-    "score",
-    low,
-    Math.max(high, floor === null ? high : Math.min(1, 1 - 0.9 * floor)),
-  );
-  const frame = mapFrame(width, map, xEdges, yEdges);
-  drawCells(frame, xEdges, yEdges, (column, row) => scale.of(at(scores, row * refined.x.length + column)));
-  drawRegion(frame, map);
-  drawFound(frame, map);
-  drawBar(frame, map, scale);
-  onPointer(frame, pointed);
-  return frame.svg;
+  return colourScale("score", low, Math.max(high, floor === null ? high : Math.min(1, 1 - 0.9 * floor)));
 }
 
 /** Returns the reasons of failures that occur, in the order of their number, with their cells. */

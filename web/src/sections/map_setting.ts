@@ -35,6 +35,7 @@ export function drawSetting(
   map: MapData,
   recorded: Recorded | null,
   excerpt: Excerpt,
+  whose: string,
 ): void {
   const pair = el("div", { class: "pair-grid" });
   body.append(pair);
@@ -49,7 +50,8 @@ export function drawSetting(
       `Path of the recording${span}`,
     );
   }
-  drawExcerpt(column(pair, "This setting"), arena, excerpt.x, excerpt.y, `Path of this setting${span}`);
+  const head = `${whose.charAt(0).toUpperCase()}${whose.slice(1)}`;
+  drawExcerpt(column(pair, head), arena, excerpt.x, excerpt.y, `Path of ${whose}${span}`);
   const edges = map.section.recording;
   if (recorded === null || edges === null || excerpt.density === null) return;
   const bins = { length: edges.step_length_edges, angle: edges.turning_angle_edges };
@@ -58,7 +60,7 @@ export function drawSetting(
   const densities = el("div", { class: "pair-grid" });
   body.append(densities);
   drawShare(densities, recorded.density, look, "Steps of the recording", cross);
-  drawShare(densities, excerpt.density, look, "Steps of this setting", cross);
+  drawShare(densities, excerpt.density, look, `Steps of ${whose}`, cross);
   const drawn: { swatch: Swatch; colour: string; text: string }[] = [
     { swatch: "dot", colour: "var(--green)", text: `start of the path${span}` },
     { swatch: "dot", colour: "var(--orange)", text: "end" },

@@ -18,13 +18,11 @@ from driftwalk.likelihood.law.found import LawFound
 from driftwalk.likelihood.law.modes import Modes, unless_broken
 from driftwalk.likelihood.law.trial import Trial, find_pulses
 from driftwalk.likelihood.newton import FROM_NEAR, Mode, Weights
+from driftwalk.schema.law_words import MEMORY_SIGMAS, OPENED_SIGMAS
 
-OPENED_SIGMAS: Final = 6.0
-"""A number is opened when its score test finds it so far from the model,"""
-MEMORY_SIGMAS: Final = 4.0
-"""or so far for the memory of the force, of which a fit says more than its test,"""
 KEPT_SIGMAS: Final = 3.0
-"""and stays open when the fit does, with half of what is worth it as an error of the filter;"""
+"""An opened number stays open when the fit finds it so far from the model [standard deviations],
+with half of what is worth it as an error of the filter;"""
 KEPT_MEMORY_SIGMAS: Final = 3.4
 """the memory of the force so far: a flow with more detail than the spline acts like a memory of 0.1
 s."""

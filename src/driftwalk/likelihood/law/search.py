@@ -22,7 +22,7 @@ from driftwalk.likelihood.law.assumptions import FLOATING, Assumptions
 from driftwalk.likelihood.law.departures import DRAG_SHAPES, DRAGS, NUMBERS
 from driftwalk.likelihood.law.found import LawFound
 from driftwalk.likelihood.law.modes import Modes, unless_broken
-from driftwalk.likelihood.law.opening import OPENED_SIGMAS, Opening, is_kept
+from driftwalk.likelihood.law.opening import Opening, is_kept
 from driftwalk.likelihood.law.trial import Trial
 from driftwalk.likelihood.newton import (
     FROM_ANOTHER,
@@ -33,7 +33,7 @@ from driftwalk.likelihood.newton import (
     Tell,
     Weights,
 )
-from driftwalk.schema.law_words import LEAST_EVIDENCE
+from driftwalk.schema.law_words import LEAST_EVIDENCE, OPENED_SIGMAS
 
 DOUBTED_CHI_SQUARED: Final = 30.0
 """The paper's law is in doubt when the numbers of a floating body are so far from its own,"""

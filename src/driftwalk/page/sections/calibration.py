@@ -173,12 +173,12 @@ def bootstrap_section(calibration: xr.Dataset) -> Section:
     )
     if len(parameters) == 1:
         return _shares(calibration, parameters[0], title, note)
-    y, x = estimates
+    x, y = estimates
     drawn = [series("estimates from simulated recordings", x, y, style="points")]
     region = region_part(calibration)
     if region is not None:
         drawn.append(series("joint region", *([*region[n], region[n][0]] for n in "xy")))
-    up, across = parameters
+    across, up = parameters
     best = [value_of(calibration, one.key) for one in (across, up)]
     return chart(
         "bootstrap",

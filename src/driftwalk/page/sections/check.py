@@ -97,7 +97,13 @@ def _mean_errors(check: xr.Dataset) -> Section:
     distance = check["residual_distance"].values
     top = max(LEAST_TOP, float(np.nanmax(distance, initial=0.0)))
     limit = number(check["residual_distance"].attrs.get("limit"))
-    beyond = "" if limit is None else f" Chance alone stays below {limit:.2g} in all cells."
+    beyond = (
+        ""
+        if limit is None
+        else f" If the model is right, all cells stay below {limit:.2g} in 95 % of recordings, and "
+        "one in twenty has a cell beyond it by chance: such a cell alone is no evidence against "
+        "the model. The p value of 'place' above decides."
+    )
     return _field(
         check, distance, f"Distance of the mean error from zero.{beyond}",
         words="distance from zero (standard deviations)", diverging=False, limits=[0.0, top],

@@ -12,6 +12,8 @@ from driftwalk.page.words import percent
 from driftwalk.schema.compared_laws import compared_laws
 from driftwalk.schema.facts import fit_facts
 from driftwalk.schema.law_words import (
+    MEMORY_SIGMAS,
+    OPENED_SIGMAS,
     LawNumber,
     law_limits,
     law_numbers,
@@ -36,6 +38,8 @@ TESTED: Final = {
     **{f"strength_{k}": f"strength of the flow, cosine {k}" for k in range(1, 7)},
 }
 """Words for the numbers that score tests look at."""
+CHANCE_SIGMAS: Final = 2.0
+"""Chance exceeds this in one test of twenty [standard deviations]."""
 
 
 def law_sections(fit: xr.Dataset) -> list[Section]:
@@ -108,18 +112,36 @@ def _tested(fit: xr.Dataset) -> Section | None:
         fit["departure_estimate"].values, std, out=np.full(std.shape, np.nan), where=std > 0.0
     )
     rows: list[list[Any]] = [
-        [TESTED.get(name, name), round(float(value), 2) if isfinite(value) else None]
-        for name, value in zip(names, sigmas, strict=True)
+        [TESTED.get(name, name), round(value, 2) if isfinite(value) else None, _why(name, value)]
+        for name, value in zip(names, sigmas.tolist(), strict=True)
     ]
     note = (
         "The last score tests of the search: estimates of numbers that are not in the fit, in "
-        "their standard deviations; 0 is the model. The fit takes up a number that is far from 0 "
-        "and large enough to matter."
+        f"their standard deviations; 0 is the model. A number is fitted from {OPENED_SIGMAS:g} on "
+        f"(the memory of the force from {MEMORY_SIGMAS:g} on) if it is large enough to matter, and "
+        "stays if the fit finds it too. Small errors of the fitted flow look like less: whether "
+        "something is missing in the model, its check says."
     )
-    columns = ["what was tested", "standard deviations from the model"]
+    columns = ["what was tested", "standard deviations from the model", "why it is not in the fit"]
     return section(
         "tested", "table", "Tested, and not in the fit", note, columns=columns, rows=rows
     )
+
+
+def _why(name: str, sigmas: float) -> str:
+    """Return why a number that was tested is not in the fit."""
+    least = MEMORY_SIGMAS if name == "force_memory" else OPENED_SIGMAS
+    if not isfinite(sigmas):
+        return "it has no estimate"
+    if abs(sigmas) <= CHANCE_SIGMAS:
+        return "as near as chance brings it"
+    if name.startswith("water_"):
+        return "the two force laws were compared as a whole"
+    if name.startswith("strength_"):
+        return "the cosines are tested together, and fitted together or not at all"
+    if abs(sigmas) <= least:
+        return f"too weak: fitted from {least:g} on"
+    return "too small to matter, of the wrong sign, or not found by the fit"
 
 
 def _first_upper(text: str) -> str:

@@ -42,8 +42,8 @@ def map_section(calibration: xr.Dataset, recording: xr.Dataset | None = None) ->
     Returns
     -------
     dict
-        A section of kind "map": y is the first parameter, x the second; of the block the drag
-        coefficient and the stochastic force.
+        A section of kind "map": x is the first parameter, y the second; of the block the drag
+        coefficient and the stochastic force, as in the paper's Fig. 6 and in the figures of a run.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def map_section(calibration: xr.Dataset, recording: xr.Dataset | None = None) ->
 
 
 def plane_of(calibration: xr.Dataset) -> tuple[PageParameter, PageParameter]:
-    """Return the parameters along the rows and the columns of every map of a calibration.
+    """Return the parameters along y (the rows) and x (the columns) of every map of a calibration.
 
     Raises
     ------
@@ -92,7 +92,8 @@ def plane_of(calibration: xr.Dataset) -> tuple[PageParameter, PageParameter]:
     found = page_parameters(calibration)
     if len(found) != 2:
         raise InputError(f"a map shows two parameters, and the calibration has {len(found)}")
-    return found[0], found[1]
+    across, up = found
+    return up, across
 
 
 def region_part(calibration: xr.Dataset) -> dict[str, Any] | None:

@@ -156,13 +156,13 @@ class RunningCalibration:
         return stage.percent(share) / 100.0, f"{stage.words}: {how_far}"
 
     def cell(self, row: int, column: int) -> dict[str, Any]:
-        """Return the kept excerpt and step density of a setting."""
+        """Return the kept excerpt and step density of a setting; the first parameter is along x."""
         found = self._coarse
         if found is None or len(found.shape) != 2:
             return dict(NO_CELL)
-        if not (0 <= row < found.shape[0] and 0 <= column < found.shape[1]):
+        if not (0 <= column < found.shape[0] and 0 <= row < found.shape[1]):
             return dict(NO_CELL)
-        kept = found.details.get(row * found.shape[1] + column)
+        kept = found.details.get(column * found.shape[1] + row)
         if not kept or "excerpt_x" not in kept:
             return dict(NO_CELL)
         time = None if self._recorded is None else self._recorded.excerpt_time

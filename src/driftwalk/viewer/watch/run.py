@@ -198,19 +198,17 @@ def running_view(folder: Path) -> Running:
 
 
 def _view_of(folder: Path, specification: Mapping[str, Any]) -> Running:
-    if "flows_sha256" in specification:
-        from driftwalk.viewer.watch.sensitivity import RunningSensitivity
+    from driftwalk.page.stored_run import kind_of_run
+    from driftwalk.viewer.watch.assembly import RunningAssembly
+    from driftwalk.viewer.watch.calibration import RunningCalibration
+    from driftwalk.viewer.watch.sensitivity import RunningSensitivity
 
-        return RunningSensitivity(folder, specification)
-    if "calibration_sha256" in specification:
-        from driftwalk.viewer.watch.assembly import RunningAssembly
-
-        return RunningAssembly(folder, specification)
-    if "recording_sha256" in specification:
-        from driftwalk.viewer.watch.calibration import RunningCalibration
-
-        return RunningCalibration(folder, specification)
-    return RunningOther(folder, specification)
+    views: dict[str | None, Callable[[Path, Mapping[str, Any]], Running]] = {
+        "assembly": RunningAssembly,
+        "calibration": RunningCalibration,
+        "sensitivity": RunningSensitivity,
+    }
+    return views.get(kind_of_run(specification), RunningOther)(folder, specification)
 
 
 def require_run(folder: Path) -> None:

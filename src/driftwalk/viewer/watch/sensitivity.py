@@ -20,6 +20,7 @@ from driftwalk.assembly.sensitivity.times import (
     kept_times,
 )
 from driftwalk.page import encode_array
+from driftwalk.page.axes import ranked_axes
 from driftwalk.page.sections.classes import cells_of
 from driftwalk.page.sections.sensitivity_times import over_time_part
 from driftwalk.plot.parts.assembly_labels import classes_to_show
@@ -80,23 +81,22 @@ class RunningSensitivity:
         """Return the map up to now: of the last two axes, the others at their first value."""
         names = list(self._axes)
         fixed = names[: max(len(names) - 2, 0)]
-        shape = ([1, 1, *self._shape])[-2:]
-        value = self._distances().reshape(-1, *shape)[0]
         at = ", ".join(f"{LABELS[name][0]} {self._axes[name][0]}" for name in fixed)
-        rows = _axis(names[-2], self._axes[names[-2]]) if len(names) > 1 else _axis("", (0,))
+        across, *up = ranked_axes(names[-2:])
+        rows = _axis(up[0], self._axes[up[0]]) if up else _axis("", (0,))
         return [
             {
                 "id": "l1",
                 "kind": "l1_map",
                 "title": "Distance of the outcomes to the reference",
                 "note": f"Settings appear as they are simulated{f'; here {at}' if at else ''}.",
-                "x": _axis(names[-1], self._axes[names[-1]]),
+                "x": _axis(across, self._axes[across]),
                 "y": rows,
-                "value": encode_array(value),
+                "value": encode_array(self._distances()[self._settings]),
                 "reference": None,
                 "noise": None,
                 "label": "l1 distance",
-                **self._outcomes(tuple(shape)),
+                **self._outcomes(),
             }
         ]
 
@@ -111,10 +111,10 @@ class RunningSensitivity:
 
     def cell(self, row: int, column: int) -> dict[str, Any]:
         """Return the classes of a setting over time, next to those of the reference so far."""
-        rows, columns = ([1, 1, *self._shape])[-2:]
+        rows, columns = self._settings.shape
         if not (0 <= row < rows and 0 <= column < columns):
             return dict(NO_CELL)
-        text = self._courses["map"].get(row * columns + column)
+        text = self._courses["map"].get(int(self._settings[row, column]))
         known = added(map(courses_from_text, self._courses["reference"].values()))
         if text is None:
             return dict(NO_CELL)
@@ -141,11 +141,20 @@ class RunningSensitivity:
             one["reference_over_time"] = (("time", "class_over_time"), share)
         return over_time_part(one, "x", "y")
 
-    def _outcomes(self, shape: tuple[int, ...]) -> dict[str, Any]:
-        """Return the classes of the first settings, as many as a map of a shape has."""
-        found = {k: count for k, count in self._count["map"].items() if k < np.prod(shape)}
+    @property
+    def _settings(self) -> npt.NDArray[np.int64]:
+        """The numbers of the settings that the map shows, (y, x)."""
+        rows, columns = ([1, 1, *self._shape])[-2:]
+        shown = np.arange(rows * columns).reshape(rows, columns)
+        last = list(self._axes)[-2:]
+        return shown.T if len(last) > 1 and ranked_axes(last)[0] == last[0] else shown
+
+    def _outcomes(self) -> dict[str, Any]:
+        """Return the classes of the settings that the map shows."""
+        settings = self._settings
+        found = {k: count for k, count in self._count["map"].items() if k < settings.size}
         names = sort_classes(name for count in found.values() for name in count)
-        share = np.full((int(np.prod(shape)), len(names)), np.nan)
+        share = np.full((settings.size, len(names)), np.nan)
         for setting, count in found.items():
             if count:
                 share[setting] = [count[name] / count.total() for name in names]
@@ -154,7 +163,7 @@ class RunningSensitivity:
         return {
             "classes": [names[index] for index in shown],
             "cells": [cells_of(names[index]) for index in shown],
-            "shares": encode_array(share[:, shown].reshape(*shape, len(shown))) if shown else None,
+            "shares": encode_array(share[settings][..., shown]) if shown else None,
         }
 
     def _distances(self) -> npt.NDArray[np.float64]:

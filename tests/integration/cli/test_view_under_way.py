@@ -1,0 +1,170 @@
+"""The live page of every kind of run, opened at the moments at which a run could be killed.
+
+What a kill leaves is what lies in the folder at that moment, so the page is opened there and then.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from command_line import FLOW, GRID, RECORDING, here, leave_out_figures
+from few_simulations import compare_after_little, simulate_little
+
+from driftwalk.core.rundir import RunDirectory
+from driftwalk.core.shards import ShardStore
+from driftwalk.page import report_page
+from driftwalk.page.run_page import TITLES
+from driftwalk.page.stored_run import MAIN_FILES
+from driftwalk.viewer.watch.run import RunSource
+
+TANK = ("--tank-diameter", "30cm")
+SHORT = (RECORDING, "--to", "30s", *TANK)
+ACTIVE = (
+    *("--model", "active", "--parameter", "speed=0.03", "--parameter", "turn_rate=0.3"),
+    *("--parameter", "rotational_diffusion=0.5", "--known", "turn_rate"),
+    *("--known", "rotational_diffusion", "--truth", "known.toml"),
+)
+VARIED = ("--vary", "drag-coefficient=0.2,0.6", "--vary", "force-std=0.2mN,1mN")
+LITTLE = ("--blocks", "3", "--duration", "20s")
+
+RUNS: dict[str, tuple[tuple[object, ...], str]] = {
+    "calibration": (("calibrate", *SHORT, "--study", "grid.toml"), "A calibration under way"),
+    "model_calibration": (
+        ("calibrate", *SHORT, "--model", "inertial", "--bootstrap", "0"),
+        "A calibration under way",
+    ),
+    "model_comparison": (
+        ("compare-models", *SHORT, "--models", "inertial,active", "--bootstrap", "0"),
+        "A comparison of motion models under way",
+    ),
+    "fit": (("fit", *SHORT, "--spline-spacing", "4cm", "--no-check"), "A fit under way"),
+    "recovery": (("study", "recover", "--truth", "truth.toml"), "A recovery study under way"),
+    "model_recovery": (
+        ("study", "recover", *ACTIVE),
+        "A recovery study under way",
+    ),
+    "assembly": (
+        ("assemble", "--flow", FLOW, *TANK, *LITTLE, "--runs", "20"),
+        "Self-assembly under way",
+    ),
+    "sensitivity": (
+        ("sensitivity", "--flow", FLOW, *TANK, *LITTLE, *VARIED, "--runs", "5"),
+        "A sensitivity analysis under way",
+    ),
+}
+"""By the kind of run: the command, as small as it allows, and the title of its live page."""
+
+KNOWN = """\
+[calibration]
+replicates = 1
+refined_replicates = 1
+bootstrap = 5
+[observation]
+position_noise_m = 3e-4
+orientation_noise_rad = 0.01
+[fit]
+spline_spacing_m = 0.06
+[recover]
+recordings = 2
+durations_s = [40.0]
+sample_interval_s = 0.2
+"""
+TRUTH = f"""\
+{KNOWN.replace("40.0", "20.0")}flow = {json.dumps(str(FLOW))}
+drag_coefficient_precision = 0.5
+[forces]
+drag_coefficient = 0.4
+force_std_N = 6e-4
+"""
+
+
+def test_every_kind_of_run_is_watched() -> None:
+    assert set(RUNS) == set(MAIN_FILES)
+
+
+class Stopped(Exception):
+    """Stands for a kill."""
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a folder with the studies, in which the runs are made."""
+    for name, text in (("grid", GRID), ("known", KNOWN), ("truth", TRUTH)):
+        (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def opened_pages(folder: Path) -> list[dict[str, Any]]:
+    """Return the live page and the report of a run under way."""
+    source = RunSource(folder)
+    live = dict(source.greeting()[0]["page"])
+    assert source.look() == []
+    assert "cannot be read" not in live["state"]["words"]
+    pages = [live, report_page(folder)]
+    for page in pages:
+        json.dumps(page, allow_nan=False)
+        assert not page["state"]["finished"]
+    return pages
+
+
+WIDE = ("calibrate", *SHORT, "--model", "run_rest+wall", "--bootstrap", "10")
+BEGUN = {**RUNS, "model_calibration of eleven parameters": (WIDE, "A calibration under way")}
+
+
+@pytest.mark.parametrize("kind", BEGUN)
+def test_the_page_of_a_run_that_has_just_begun(
+    kind: str, place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words, title = BEGUN[kind]
+
+    def enter(run: RunDirectory) -> RunDirectory:
+        raise Stopped(entered(run).path)
+
+    entered: Callable[..., RunDirectory] = RunDirectory.__enter__
+    monkeypatch.setattr(RunDirectory, "__enter__", enter)
+    with pytest.raises(Stopped):
+        here(*words, "-o", place / "run")
+    live, report = opened_pages(place / "run")
+    assert live["title"] == title
+    assert report["title"] == TITLES[kind.split()[0]]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", RUNS)
+def test_the_page_of_a_run_that_is_further(
+    kind: str, place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After its first work unit, after some more, and when all is there but the manifest."""
+    words, title = RUNS[kind]
+    leave_out_figures(monkeypatch)
+    if kind == "model_comparison":
+        compare_after_little(monkeypatch)
+    else:
+        simulate_little(monkeypatch, matched=True)
+    seen: dict[str, list[dict[str, Any]]] = {}
+    stored: list[object] = []
+
+    def store(*given: Any) -> None:
+        kept(*given)
+        stored.append(given)
+        if len(stored) in (1, 2, 20):
+            seen[f"unit {len(stored)}"] = opened_pages(place / "run")
+
+    def finish(*given: Any) -> None:
+        seen["manifest"] = opened_pages(place / "run")
+        finished(*given)
+
+    kept, finished = ShardStore.write, RunDirectory.finish
+    monkeypatch.setattr(ShardStore, "write", store)
+    monkeypatch.setattr(RunDirectory, "finish", finish)
+    done = here(*words, "-o", place / "run")
+    assert done.code == 0, done.err
+    # A fit is one piece of work and keeps no units.
+    assert set(seen) >= ({"manifest"} if kind == "fit" else {"unit 1", "manifest"})
+    titles = {(live["title"], report["title"]) for live, report in seen.values()}
+    assert titles == {(title, TITLES[kind])}
