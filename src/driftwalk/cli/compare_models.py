@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -11,7 +11,7 @@ from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.models_answer import print_answer, summary
+from driftwalk.cli.terminal.models_answer import Ranking, print_answer, summary
 from driftwalk.cli.terminal.output import print_json
 from driftwalk.core.study_keys import CALIBRATION_KEYS
 
@@ -71,7 +71,10 @@ def compare_models(
         read.trajectories[0], chosen, read.study, field, body, inputs, threads
     )
     with Workers(cluster, cluster_options).reported("compare models") as told:
-        found = run_model_comparison(work, out, overwrite=overwrite, begun=tank_note(read), **told)
+        said: dict[str, Any] = {} if json else {"finished": Ranking(told["progress"])}
+        found = run_model_comparison(
+            work, out, overwrite=overwrite, begun=tank_note(read), **said, **told
+        )
     if json:
         print_json(summary(found))
     else:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from driftwalk.core.run_stages import tell_nobody
 from driftwalk.runs.folder import Progress, naming_recording, open_run, silent
 from driftwalk.runs.stored import dataset_hash
 from driftwalk.schema.netcdf import netcdf_bytes
@@ -58,6 +59,7 @@ def run_model_comparison(
     overwrite: bool = False,
     begun: Callable[[], None] | None = None,
     executor: Executor | None = None,
+    finished: Callable[[str, float, float, int], None] = tell_nobody,
     progress: Progress = silent,
     command: str | Sequence[str] = "driftwalk.runs.run_model_comparison(...)",
 ) -> xr.Dataset:
@@ -78,6 +80,9 @@ def run_model_comparison(
         Called when everything is checked and the work begins.
     executor : concurrent.futures.Executor, optional
         Computes work units elsewhere; the result does not depend on it.
+    finished : callable, optional
+        Called with each model's name, its distance, the standard error of that and the number of
+        models, as soon as it is judged.
     progress : callable, optional
         Called as ``progress(done, total, text)`` while the work goes on.
     command : str, optional
@@ -135,6 +140,7 @@ def run_model_comparison(
             executor=executor,
             stores=stores,
             tell=progress,
+            finished=finished,
         )
         run.write("comparison.nc", netcdf_bytes(found))
         write_model_figures(run.folder("figures"), comparison=found)

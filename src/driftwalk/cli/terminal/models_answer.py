@@ -9,6 +9,7 @@ import numpy as np
 
 from driftwalk.cli.terminal.answer import print_row, print_warnings
 from driftwalk.cli.terminal.output import print_table
+from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.schema.model_words import ASPECT_WORDS
 
 if TYPE_CHECKING:
@@ -83,6 +84,30 @@ def _summaries(one: xr.Dataset) -> dict[str, Any]:
     if "asked" not in one or not bool(one["asked"]):
         return {}
     return {"named": bool(one["named"]), **{name: float(one[name]) for name in SUMMARIES}}
+
+
+class Ranking:
+    """Prints each model as soon as it is judged, its place so far, and how long the rest takes.
+
+    Parameters
+    ----------
+    progress : ProgressReporter
+        Knows the time left.
+    """
+
+    def __init__(self, progress: ProgressReporter) -> None:
+        self._progress = progress
+        self._scores: list[float] = []
+
+    def __call__(self, name: str, score: float, std: float, models: int) -> None:
+        """Print a model."""
+        place = 1 + sum(one < score for one in self._scores)
+        self._scores.append(score)
+        count = len(self._scores)
+        words = f"{name}: distance {score:.2f} ± {std:.2f}, place {place} of {count} so far"
+        rest = f"; {models - count} to go" if models > count else ""
+        left = f"; {self._progress.left}" if self._progress.left else ""
+        print(f"{words}{rest}{left}", flush=True)
 
 
 def print_answer(found: xr.Dataset, folder: Path) -> None:
