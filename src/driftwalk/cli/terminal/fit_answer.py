@@ -141,7 +141,8 @@ def print_found(fit: xr.Dataset, *, wall: bool = False) -> None:
     print_intensity(facts["force_noise_intensity_N2_s"])
     print_law(facts)
     left_out = f"{facts['wall_share']:.1%}, left out"
-    if not wall and fit.attrs["angle"] == "state" and facts["wall_share"] > TELLING_SHARE:
+    asked = wall or "wall_contacts" in facts or "wall_left_out" in facts
+    if not asked and fit.attrs["angle"] == "state" and facts["wall_share"] > TELLING_SHARE:
         left_out += "; --wall estimates restitution and friction from them"
     print_row("intervals at the wall", left_out)
     if "flow" in fit.dims:
