@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -19,7 +20,7 @@ from driftwalk.calibration.models.judge import Judged, judge, without_error
 from driftwalk.calibration.models.recorded import RecordedMotion
 from driftwalk.calibration.models.ties import Asked, Summarised, asked_models
 from driftwalk.core.processors import one_blas_thread
-from driftwalk.core.run_stages import Course, share_of_search, tell_nobody
+from driftwalk.core.run_stages import Course, tell_nobody
 from driftwalk.core.shards import Arrays
 from driftwalk.sweep import MemoryStore, Store, WorkUnit, collect, grid, run_sweep
 
@@ -33,7 +34,7 @@ USUAL_PART: Final = 4
 or find their end soon."""
 USUALLY_ASKED: Final = 3
 """Models whose summaries are usually asked,"""
-SUMMARY_WORK: Final = 2.0
+SUMMARY_WORK: Final = 3.0
 """each setting of which takes as long as so many of the first stage (5 minutes of the bundled
 recording): all blocks of time are simulated."""
 
@@ -200,10 +201,12 @@ class Stages:
         """
         entry = self.work.entries[index]
 
-        def say(done: int, _: int) -> None:
-            inside = share_of_search(done / self._usual(entry))
-            share = share_of_search((number + inside) / planned)
-            self.course.stage("summaries")(share, 1, f"summaries of {entry.model.name}")
+        def say(done: int, most: int) -> None:
+            # Most end at a quarter of the most, some there: the root gives half to either.
+            inside = math.sqrt(done / most)
+            self.course.stage("summaries")(
+                number + inside, planned, f"summaries of {entry.model.name}"
+            )
 
         fingerprint = {
             **self.work.fingerprint(), "asked": index, "answer": answer.tolist(),

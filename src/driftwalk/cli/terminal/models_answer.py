@@ -111,7 +111,7 @@ class Ranking:
 
 
 def print_answer(found: xr.Dataset, folder: Path) -> None:
-    """Print the ranking, the answer in sentences, and where everything is."""
+    """Print the answer, the ranking, what the answer follows from, and where everything is."""
     rows = [
         (
             str(one["model"].values),
@@ -125,13 +125,15 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
         for index, one in enumerate(_each(found))
     ]
     columns = (*COLUMNS[:-1], *(("misfit",) if "asked" in found else ()), COLUMNS[-1])
+    answer, *why = map(str, found["finding"].values)
+    print(f"{answer}.")
     print_table(rows, columns=columns, title="models, the closest first")
     own = ", ".join(
         f"{ASPECT_WORDS.get(str(name), name)} {float(value):.3f}"
         for name, value in zip(found["aspect"].values, found["own_distance"].values, strict=True)
     )
     print(f"D of the recording's own parts: {own}")
-    for text in found["finding"].values:
+    for text in why:
         print(f"{text}.")
     print_warnings(str(text) for text in found["warning"].values)
     print_row("comparison", folder / "comparison.nc")
