@@ -84,7 +84,7 @@ def run_fit(
     begun : callable, optional
         Called when everything is checked and the work begins.
     fitted : callable, optional
-        Called with the fit as soon as it is stored, before all that is done beside it.
+        Called with the fit as soon as it is stored, before all that follows.
     checked : callable, optional
         Called with the whole fit and its check, or None without one, before the figures.
     progress : callable, optional
