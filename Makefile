@@ -6,7 +6,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip install --quiet --no-compile
+# With its bar on a terminal; a log has no use for a line for every package.
+PIP := $(BIN)/python -m pip install $(shell test -t 2 || echo --quiet) --no-compile
 # pip would compile one file after the other, and the packages' own tests too. A file that is no Python
 # of this version is nobody's business until it is imported.
 COMPILE := $(BIN)/python -m compileall -qq -j 0 -x '/tests?/' $(VENV)/lib || true
@@ -164,24 +165,30 @@ $(BIN)/python:
 	@command -v c++ > /dev/null || command -v g++ > /dev/null || command -v clang++ > /dev/null || test -n "$$CXX" || { \
 	  echo "driftwalk needs a C++20 compiler and found none: install g++ or clang++, or name one with: make CXX=..."; \
 	  exit 1; }
+	@echo "Making an environment of Python in $(VENV)."
 	$(PYTHON) -m venv $(VENV)
 
 $(PACKAGE): $(BIN)/python $(NATIVE)
+	@echo "Installing driftwalk and what it needs into $(VENV), and compiling its core: some minutes, once."
 	$(PIP) --editable .
+	@echo "Compiling what was installed to bytecode, so that the first command starts at once."
 	@$(COMPILE)
 	@touch $@
 
 # The package is installed by now, so its extras are all that pip adds.
 $(TEST_TOOLS): $(PACKAGE)
+	@echo "Installing what the tests need into $(VENV)."
 	$(PIP) "driftwalk[test]"
 	@$(COMPILE)
 	@touch $@
 
 $(DEV_TOOLS): $(TEST_TOOLS)
+	@echo "Installing the tools of development into $(VENV)."
 	$(PIP) "driftwalk[dev]"
 	@$(COMPILE)
 	@touch $@
 
 $(CROSS_TOOLS): $(DEV_TOOLS)
+	@echo "Installing the tools of other systems into $(VENV)."
 	$(PIP) "driftwalk[cross]"
 	@touch $@

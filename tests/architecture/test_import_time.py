@@ -6,8 +6,10 @@ import os
 import resource
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+from command_line import FLOW, RECORDING, here
 
 HEAVY = {"xarray", "scipy", "pandas", "cv2", "matplotlib", "dask", "h5netcdf", "optuna", "fastapi"}
 HELP = "from driftwalk.cli.main import main; assert main(['--help']) == 0"
@@ -16,7 +18,9 @@ IMPORT = "import driftwalk; driftwalk.__version__"
 
 
 def loaded_by(code: str) -> set[str]:
-    script = f"{code}\nimport sys\nprint('\\n'.join(sys.modules), file=sys.stderr)"
+    # None stands for a module that is to seem missing.
+    script = f"{code}\nimport sys\nfor name, module in sys.modules.items():\n"
+    script += "    if module is not None:\n        print(name, file=sys.stderr)"
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     )
@@ -36,6 +40,31 @@ def test_nothing_heavy_is_loaded(code: str, absent: set[str]) -> None:
     loaded = loaded_by(code)
     assert "driftwalk" in loaded
     assert not loaded & absent
+
+
+@pytest.mark.parametrize("command", ["info", "report"])
+def test_short_commands_load_what_they_need(command: str, tmp_path: Path) -> None:
+    """Dask, for instance, is loaded by xarray where it is installed, and with it scipy."""
+    if command == "info":
+        words = ["info", str(RECORDING)]
+    else:
+        words = ["report", str(small_run(tmp_path)), "-o", str(tmp_path / "report.html")]
+    code = (
+        f"import sys\nsys.argv[1:] = {words!r}\nfrom driftwalk.cli.main import run\n"
+        "try:\n    run()\nexcept SystemExit as end:\n    assert not end.code, end.code"
+    )
+    loaded = loaded_by(code)
+    assert {"driftwalk", "xarray"} <= loaded
+    assert not loaded & {"dask", "distributed", "matplotlib", "scipy", "cv2", "optuna", "fastapi"}
+
+
+def small_run(folder: Path) -> Path:
+    """Make the run of a short assembly."""
+    out = folder / "run"
+    run = ("--tank-diameter", "30cm", "--blocks", "1", "--runs", "2", "--duration", "1s")
+    done = here("assemble", "--flow", FLOW, *run, "--film", "none", "-o", out)
+    assert done.code == 0, done.err
+    return out
 
 
 def test_the_list_of_modules_would_show_a_heavy_one() -> None:

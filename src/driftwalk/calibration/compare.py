@@ -18,7 +18,7 @@ from driftwalk.calibration.models.contestants import (
 )
 from driftwalk.calibration.models.recorded import body_motion
 from driftwalk.calibration.models.result import build_comparison
-from driftwalk.calibration.stages import Searches, Stages, Tell
+from driftwalk.calibration.stages import Finished, Searches, Stages, Tell
 from driftwalk.conditions import jump_warnings, study_in_arena
 from driftwalk.core.run_stages import tell_nobody
 from driftwalk.motion import MotionModel, ParticleModel
@@ -51,6 +51,7 @@ def compare_models(
     budget: Budget | None = None,
     stores: Stores | None = None,
     tell: Tell | None = None,
+    finished: Finished = tell_nobody,
 ) -> xr.Dataset:
     """Search several motion models on a recording, and say which is closest and which explains it.
 
@@ -97,8 +98,11 @@ def compare_models(
         Returns where finished models of a stage are kept, for what determines their numbers; memory
         when left out.
     tell : callable, optional
-        Called with the settings done, all of them, and the models under way; from several threads,
-        one at a time.
+        Called with the thousandths of the work that are done, 1000, and the models under way; from
+        several threads, one at a time.
+    finished : callable, optional
+        Called with each model's name, its distance, the standard error of that and the number of
+        models, as soon as it is judged.
 
     Returns
     -------
@@ -130,7 +134,7 @@ def compare_models(
     worlds = search.bootstrap if search.refine == "auto" else 0
     work = Searches(entries, motion, search.seed, budget or Budget())
     with threads_beside(motion.like.threads if executor is None else 1) as beside:
-        stages = Stages(work, worlds, stores, executor, tell or tell_nobody, beside)
+        stages = Stages(work, worlds, stores, executor, tell or tell_nobody, beside, finished)
         judged = stages.judged()
         said = stages.summarised(judged)
     stages.finish()

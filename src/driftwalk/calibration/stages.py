@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -15,18 +16,27 @@ from driftwalk.calibration.estimation import Stores
 from driftwalk.calibration.estimation.compared import most_settings, summarised
 from driftwalk.calibration.evolution import Budget
 from driftwalk.calibration.models.contestants import Contestant
-from driftwalk.calibration.models.judge import Judged, judge
+from driftwalk.calibration.models.judge import Judged, judge, without_error
 from driftwalk.calibration.models.recorded import RecordedMotion
-from driftwalk.calibration.models.ties import MOST_ASKED, Asked, Summarised, asked_models
+from driftwalk.calibration.models.ties import Asked, Summarised, asked_models
 from driftwalk.core.processors import one_blas_thread
+from driftwalk.core.run_stages import Course, tell_nobody
 from driftwalk.core.shards import Arrays
 from driftwalk.sweep import MemoryStore, Store, WorkUnit, collect, grid, run_sweep
 
 Tell = Callable[[int, int, str], None]
+Finished = Callable[[str, float, float, int], None]
+"""Hears of a model that was judged: its name, its score, the standard error of that, and how many
+models there are."""
 
 USUAL_PART: Final = 4
 """Searches by summaries simulate a quarter of what they may: most are given up after a few rounds,
 or find their end soon."""
+USUALLY_ASKED: Final = 3
+"""Models whose summaries are usually asked,"""
+SUMMARY_WORK: Final = 3.0
+"""each setting of which takes as long as so many of the first stage (5 minutes of the bundled
+recording): all blocks of time are simulated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,17 +98,17 @@ class Stages:
     tell: Tell
     beside: Executor | None = None
     """Threads of this process, where there is no executor."""
+    finished: Finished = tell_nobody
+    """Hears of each model that was searched and judged."""
 
     def judged(self) -> list[Judged]:
         """Judge every model, one work unit each."""
         entries = self.work.entries
         units = grid(model=np.arange(len(entries))).units(1)
         kept = self._store("models", self.work.fingerprint())
-        arrays = (
-            self._searched_here(units, MemoryStore() if kept is None else kept)
-            if self.executor is None
-            else self._searched_elsewhere(units, kept)
-        )
+        kept = MemoryStore() if kept is None else kept
+        searched = self._searched_here if self.executor is None else self._searched_elsewhere
+        arrays = searched(units, kept, self._each_once(units, kept))
         return [
             _unpacked({name: values[index] for name, values in arrays.items()}, entry)
             for index, entry in enumerate(entries)
@@ -107,28 +117,48 @@ class Stages:
     def summarised(self, judged: Sequence[Judged]) -> dict[int, Summarised]:
         """Ask the summaries of those that tie, and of others while none of them gives them."""
         asked = asked_models(self.work.entries, judged) if self.worlds > 1 else Asked((), 0)
-        before = self._total(self.work.costs(), len(self.work.entries))
         found: dict[int, Summarised] = {}
         for number, index in enumerate(asked.models):
             if number >= asked.tied and any(one.usual for one in found.values()):
                 break
-            found[index] = self._matched(number, index, judged[index].point, before)
-            before += self._total([self._usual(self.work.entries[index])], 1)
+            found[index] = self._matched(number, index, judged[index].point, max(asked.tied, 1))
         return found
 
     def finish(self) -> None:
         """Say that all is done but the figures."""
-        self.tell(self.all_of, self.all_of, "figures")
+        self.course.begin("figures")
 
     @cached_property
-    def all_of(self) -> int:
-        """The work there is: settings here, models where an executor has them."""
+    def course(self) -> Course:
+        """How far all stages are together."""
         able = [one for one in self.work.entries if one.ranges and not one.baseline]
         asks = self.worlds > 1 and len(able) > 1
-        costs = sorted(map(self._usual, able))[-MOST_ASKED:] if asks else []
-        return self._total([*self.work.costs(), *costs], len(self.work.entries) + len(costs))
+        usual = sorted(map(self._usual, able))[-USUALLY_ASKED:] if asks else []
+        parts = {"models": sum(self.work.costs()), "summaries": SUMMARY_WORK * sum(usual)}
+        return Course(self.tell, {**parts, "figures": 0.0})
 
-    def _searched_here(self, units: Sequence[WorkUnit], kept: Store) -> Arrays:
+    def _each_once(self, units: Sequence[WorkUnit], kept: Store) -> Callable[[int, int], None]:
+        """Return what a sweep tells its progress, which hears of each finished model once."""
+        told: set[int] = set()
+
+        def look(_done: int, _total: int) -> None:
+            missing = {unit.start for unit in kept.missing(units)}
+            for unit in units:
+                index = unit.start
+                if index in missing or index in told:
+                    continue
+                told.add(index)
+                entry = self.work.entries[index]
+                arrays = {name: values[0] for name, values in kept.read(unit).items()}
+                one = _unpacked(arrays, entry)
+                std = without_error(one.without)
+                self.finished(entry.model.name, one.score, std, len(units))
+
+        return look
+
+    def _searched_here(
+        self, units: Sequence[WorkUnit], kept: Store, look: Callable[[int, int], None]
+    ) -> Arrays:
         """Search a user's own models, one by one, then those of driftwalk at the same time.
 
         A user's model may fail: that is said before the others take minutes.
@@ -137,7 +167,7 @@ class Stages:
         together = Together(
             [one.model.name for one in entries],
             self.work.costs(),
-            lambda done, names: self.tell(done, self.all_of, names),
+            lambda done, names: self.course.stage("models")(done, sum(self.work.costs()), names),
         )
         missing = [unit.start for unit in kept.missing(units)]
         together.finished([unit.start for unit in units if unit.start not in missing])
@@ -147,27 +177,36 @@ class Stages:
         shared = replace(alone, entries=[sharing(one, len(ours)) for one in entries])
         with together.waiting:
             if others:
-                run_sweep(alone, [units[k] for k in others], store=kept)
+                run_sweep(alone, [units[k] for k in others], store=kept, progress=look)
             if ours:
                 first = [units[k] for k in longest_first(ours, entries)]
-                run_sweep(shared, first, store=kept, executor=self.beside)
+                run_sweep(shared, first, store=kept, executor=self.beside, progress=look)
         return collect(kept, units)
 
-    def _searched_elsewhere(self, units: Sequence[WorkUnit], kept: Store | None) -> Arrays:
+    def _searched_elsewhere(
+        self, units: Sequence[WorkUnit], kept: Store, look: Callable[[int, int], None]
+    ) -> Arrays:
         """Search models where an executor puts them: only whole ones are heard of."""
 
-        def finished(done: int, _: int) -> None:
-            self.tell(done, self.all_of, "models")
+        def finished(done: int, total: int) -> None:
+            self.course.stage("models")(done, total)
+            look(done, total)
 
         return run_sweep(self.work, units, store=kept, executor=self.executor, progress=finished)
 
-    def _matched(self, number: int, index: int, answer: np.ndarray, before: int) -> Summarised:
-        """Match the summaries with one model: units of 16 settings, the rest in this process."""
+    def _matched(self, number: int, index: int, answer: np.ndarray, planned: int) -> Summarised:
+        """Match the summaries with one model: units of 16 settings, the rest in this process.
+
+        So many models as `planned` are asked, or some more.
+        """
         entry = self.work.entries[index]
 
         def say(done: int, most: int) -> None:
-            inside = done * self._usual(entry) // most if self.executor is None else 0
-            self.tell(before + inside, self.all_of, f"summaries of {entry.model.name}")
+            # Most end at a quarter of the most, some there: the root gives half to either.
+            inside = math.sqrt(done / most)
+            self.course.stage("summaries")(
+                number + inside, planned, f"summaries of {entry.model.name}"
+            )
 
         fingerprint = {
             **self.work.fingerprint(), "asked": index, "answer": answer.tolist(),
@@ -190,9 +229,6 @@ class Stages:
     def _usual(self, entry: Contestant) -> int:
         """Return how many settings the summaries of a model usually need."""
         return most_settings(len(entry.ranges), self.worlds) // USUAL_PART
-
-    def _total(self, costs: Sequence[int], units: int) -> int:
-        return sum(costs) if self.executor is None else units
 
 
 def _packed(judged: Judged, most: int, searches: int) -> dict[str, np.ndarray]:

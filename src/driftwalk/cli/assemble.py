@@ -67,9 +67,9 @@ def assemble(
         refuse_found(run, given.overrides, also=[] if given.file is None else ["--study"])
         source = source_from_run(run, flow, given)
     work = AssemblyWork(source.study, source.flow, source.uncertainty, source.inputs, threads)
-    opening_note(source.study, given, about="simulation", otherwise=str(run))()
+    begun = opening_note(source.study, given, about="simulation", otherwise=str(run))
     with Workers(cluster, cluster_options).reported("assemble") as told:
-        result = run_assembly(work, out, film=film, overwrite=overwrite, **told)
+        result = run_assembly(work, out, film=film, overwrite=overwrite, begun=begun, **told)
     drawn = [] if source.not_drawn is None else [source.not_drawn]
     warnings = [*source.warnings, *drawn, *_left_out(result)]
     if json:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -13,7 +13,7 @@ from driftwalk.cli.options.model import ComparedParameters, parameter_choices
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.models_answer import print_answer, summary
+from driftwalk.cli.terminal.models_answer import Ranking, print_answer, summary
 from driftwalk.cli.terminal.output import print_json
 from driftwalk.core.study_keys import CALIBRATION_KEYS
 
@@ -76,7 +76,8 @@ def compare_models(
     )
     begun = opening_note(read.study, given, about="block" if "block" in chosen else "tank")
     with Workers(cluster, cluster_options).reported("compare models") as told:
-        found = run_model_comparison(work, out, overwrite=overwrite, begun=begun, **told)
+        said: dict[str, Any] = {} if json else {"finished": Ranking(told["progress"])}
+        found = run_model_comparison(work, out, overwrite=overwrite, begun=begun, **said, **told)
     if json:
         print_json(summary(found))
     else:

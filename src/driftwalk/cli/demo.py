@@ -21,6 +21,7 @@ from driftwalk.cli.terminal.demo_answer import (
 )
 from driftwalk.cli.terminal.output import print_json, print_note
 from driftwalk.cli.terminal.progress import reported
+from driftwalk.core.run_stages import tell_nobody
 from driftwalk.schema.netcdf import open_netcdf
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def demo(
     recording, study = tank30_recording(), demo_study(quick=quick)
     folder = files("driftwalk.datasets") / "tank30_ode_a"
     with as_file(folder / "recording.csv") as path:
-        tell = _tell_nothing if json else print_fit
+        tell = tell_nobody if json else print_fit
         fitted = Fitted(
             *_fit(recording, study, path, out / FIT, overwrite=overwrite, tell=tell), recording
         )
@@ -101,10 +102,6 @@ def demo_study(*, quick: bool) -> Study:
         "tank.wall_restitution": truth["wall_restitution"],
     }
     return apply_overrides(Study(), {**known, **(QUICK if quick else {})})
-
-
-def _tell_nothing(fit: xr.Dataset) -> None:
-    """Leave the printing to the end."""
 
 
 def _fit(

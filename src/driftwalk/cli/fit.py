@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -64,7 +65,7 @@ def fit(
     (fit.nc), the flow (flow.nc) for every command that takes one, the recording, the check of the
     model (check.nc), figures and manifest.json.
     """
-    from driftwalk.cli.terminal.fit_answer import answer, print_answer
+    from driftwalk.cli.terminal.fit_answer import answer, print_found, print_places, print_verdict
     from driftwalk.runs import FitWork, run_fit
 
     read = read_for_run(recordings, given, how)
@@ -74,9 +75,13 @@ def fit(
         read.trajectories, read.study, how.body, inputs, not no_check, compare_laws, wall
     )
     begun = opening_note(read.study, given, about="block")
+    # Each part of the answer is printed as soon as it is there; JSON at the end, in one piece.
+    said: dict[str, Any] = {"fitted": partial(print_found, wall=wall), "checked": print_verdict}
+    if json:
+        said = {}
     with reported("fit") as told:
-        found = run_fit(work, out, overwrite=overwrite, begun=begun, **told)
+        found = run_fit(work, out, overwrite=overwrite, begun=begun, **said, **told)
     if json:
         print_json(answer(found.fit, found.check))
     else:
-        print_answer(found.fit, found.check, out)
+        print_places(found.fit, out)

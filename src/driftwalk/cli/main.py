@@ -19,6 +19,7 @@ from typer.core import TyperGroup
 from typer.main import get_command as to_click_command
 
 from driftwalk.cli.terminal.errors import PastTyper, exit_code_of
+from driftwalk.core.unneeded import hide_dask
 
 
 class Command(NamedTuple):
@@ -184,6 +185,7 @@ def run() -> None:
     _open_closed_streams()
     _spell_what_cannot_be_encoded()
     _quieten_matplotlib()
+    hide_dask()
     sys.exit(main())
 
 

@@ -91,9 +91,9 @@ def sensitivity(
         inputs={**source.inputs, **{f"flow {name}": path for name, path in paths.items()}},
         threads=threads,
     )
-    opening_note(source.study, given, about="simulation", otherwise=str(run))()
+    begun = opening_note(source.study, given, about="simulation", otherwise=str(run))
     with Workers(cluster, cluster_options).reported("sensitivity") as told:
-        result = run_sensitivity(work, out, overwrite=overwrite, **told)
+        result = run_sensitivity(work, out, overwrite=overwrite, begun=begun, **told)
     warnings = [*source.warnings, *_warnings(source, result)]
     if json:
         print_json({**summary(work.study, result), "warnings": warnings})

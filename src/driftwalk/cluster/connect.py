@@ -15,6 +15,7 @@ from driftwalk.cluster.probe import SameBits
 from driftwalk.cluster.versions import refuse_other_workers
 from driftwalk.core.errors import ClusterError, InputError, reason_of
 from driftwalk.core.run_stages import tell_nobody
+from driftwalk.core.unneeded import show_dask
 from driftwalk.sweep import WorkerExecutor
 
 ANSWER_S: Final = 10.0
@@ -133,6 +134,7 @@ def connect(address: ClusterAddress, *, say: Say | None = None) -> Iterator[Clus
 
 
 def _require_dask() -> None:
+    show_dask()
     try:
         import distributed  # noqa: F401
     except ImportError as error:

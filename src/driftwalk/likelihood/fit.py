@@ -5,19 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.conditions import jump_warnings, unstated_warning
 from driftwalk.core.processors import one_blas_thread
+from driftwalk.core.run_stages import Course, share_of_search, tell_nobody
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.agreement import angle_given_facts
+from driftwalk.likelihood.excerpt import pieces
 from driftwalk.likelihood.filter_pass import Passes, Point
 from driftwalk.likelihood.law.assumptions import Assumptions, assumptions_of
 from driftwalk.likelihood.law.facts import law_facts, side_slopes, stated_drag
 from driftwalk.likelihood.law.found import LawFound
+from driftwalk.likelihood.law.modes import TRIAL_PASSES
 from driftwalk.likelihood.law.search import LawSearch
 from driftwalk.likelihood.mistakes.mirrored import spin_correlation
-from driftwalk.likelihood.newton import Prior, Tell, silent
+from driftwalk.likelihood.newton import Passed, Prior, Tell, work_of_pass
 from driftwalk.likelihood.ready import (
     AngleUse,
     Ready,
@@ -50,6 +53,21 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
+SEARCH: Final = "likelihood"
+RESTRICTED: Final = "drag"
+ANGLE_GIVEN: Final = "angle as given"
+PASSES_FROM_AFAR: Final = 9.0
+"""Passes of the filter that a search usually takes, on the bundled recording and parts of it: from
+afar,"""
+PASSES_OF_PIECES: Final = 7.0
+"""of pieces of a long recording first,"""
+PASSES_FROM_PIECES: Final = 4.0
+"""and then of all of it."""
+PASSES_RESTRICTED: Final = 2.0
+"""Passes of a search that take as long as the restricted likelihood,"""
+PASSES_ANGLE_GIVEN: Final = 3.0
+"""and as the fit with the angle as given."""
+
 
 @one_blas_thread()
 def fit_motion(
@@ -79,7 +97,7 @@ def fit_motion(
     body : str, optional
         The body, where a recording has several.
     tell : callable, optional
-        Called with the number of finished steps, the largest number, and the present task.
+        Called with the thousandths of the work that are done, 1000, and the present task.
 
     Returns
     -------
@@ -116,7 +134,8 @@ def fit_motion(
     passes = Passes(series, body_of(chosen, used_angle), spline, flows)
     start = _start(passes, ready, chosen)
     assumptions = assumptions_of(chosen, used_angle, recordings=len(ready.tracks), flows=flows)
-    law, restricted = _search(passes, start, ready, assumptions, chosen, tell or silent)
+    course = Course(tell or tell_nobody, _usual_parts(passes, used_angle))
+    law, restricted = _search(passes, start, ready, assumptions, chosen, course)
     mode = law.mode
     with solved():
         innovations = passes.innovations(restricted.point)
@@ -128,6 +147,7 @@ def fit_motion(
     )
     facts_given: dict[str, Any] = {}
     if used_angle == "state":
+        course.begin(ANGLE_GIVEN)
         given = series_of(ready.parts, chosen, outline, "given", ready.places)
         facts_given = angle_given_facts(
             Passes(given, body_of(chosen, "given"), spline, flows), mode, restricted, chosen
@@ -233,6 +253,39 @@ def check_fit(
     prepare(as_list(recordings), study if study is not None else Study(), angle, body)
 
 
+def _usual_search(passes: Passes) -> float:
+    """Return the work of a search that ends where most do, in samples."""
+    few = pieces(passes)
+    whole = work_of_pass(passes)
+    if few is None:
+        return (PASSES_FROM_AFAR + TRIAL_PASSES) * whole
+    near = PASSES_OF_PIECES * work_of_pass(replace(passes, series=few))
+    return near + (PASSES_FROM_PIECES + TRIAL_PASSES) * whole
+
+
+def _usual_parts(passes: Passes, angle: str) -> dict[str, float]:
+    """Return the work of each stage of a fit, in samples."""
+    whole = work_of_pass(passes)
+    return {
+        SEARCH: _usual_search(passes),
+        RESTRICTED: PASSES_RESTRICTED * whole,
+        **({ANGLE_GIVEN: PASSES_ANGLE_GIVEN * whole} if angle == "state" else {}),
+    }
+
+
+def _counted(course: Course, usual: float) -> Passed:
+    """Return what hears of the work of the search, of which nobody knows how much there will be."""
+    said, done = course.stage(SEARCH), 0.0
+
+    def passed(work: float) -> None:
+        nonlocal done
+        done += work
+        said(share_of_search(done / usual), 1)
+
+    course.begin(SEARCH)
+    return passed
+
+
 def _longest_in(ready: Ready, flow: int) -> Track:
     """Return the longest part that is in a flow."""
     return max(
@@ -258,14 +311,17 @@ def _search(
     ready: Ready,
     assumptions: Assumptions,
     study: Study,
-    tell: Tell,
+    course: Course,
 ) -> tuple[LawFound, Restricted]:
     """Return the law with the maximum of its likelihood, and that of the restricted one."""
     prior = Prior(passes)
     weights = first_weights(ready.tracks, passes.spline)
     with solved():
-        law = LawSearch(passes, prior, assumptions, study.fit.iterations, tell).find(start, weights)
-        tell(law.mode.iterations, law.mode.iterations, "drag")
+        passed = _counted(course, _usual_search(passes))
+        law = LawSearch(passes, prior, assumptions, study.fit.iterations, passed).find(
+            start, weights
+        )
+        course.begin(RESTRICTED)
         try:
             restricted = restricted_drag(passes, law.mode, prior)
         except BREAKDOWN:

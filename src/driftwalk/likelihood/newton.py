@@ -16,6 +16,7 @@ from typing import Final
 
 import numpy as np
 
+from driftwalk.core.run_stages import tell_nobody
 from driftwalk.likelihood.filter_pass import Passes, Point, Sums
 from driftwalk.likelihood.law.departures import NUMBERS
 from driftwalk.likelihood.solution import cholesky
@@ -161,10 +162,16 @@ def known_numbers_variance(mode: Mode) -> float:
 
 
 Tell = Callable[[int, int, str], None]
+Passed = Callable[[float], None]
+"""Hears of work as it is done, see `work_of_pass`."""
+BESIDE_SAMPLES: Final = 2000
+"""A pass takes as much time besides its samples as that of so many (the bundled recording, and the
+first 100 and 300 s of it)."""
 
 
-def silent(done: int, total: int, what: str) -> None:
-    """Tell nobody."""
+def work_of_pass(passes: Passes) -> float:
+    """Return the work of one pass of the filter with derivatives, in samples."""
+    return float(sum(one.time.size for one in passes.series) + BESIDE_SAMPLES)
 
 
 def find_mode(
@@ -174,7 +181,7 @@ def find_mode(
     prior: Prior,
     *,
     iterations: int,
-    tell: Tell = silent,
+    passed: Passed = tell_nobody,
     held: Held = FROM_AFAR,
     close: float = CLOSE,
     close_nats: float = CLOSE_NATS,
@@ -193,8 +200,8 @@ def find_mode(
         Their forms.
     iterations : int
         Most steps.
-    tell : callable
-        Called with the number of finished steps, the largest number, and the present task.
+    passed : callable
+        Called after every pass of the filter with its work.
     held : sequence of sequence of int
         Parameters that the first steps leave as they are: `FROM_AFAR`, `FROM_ANOTHER` or
         `FROM_NEAR`.
@@ -208,13 +215,13 @@ def find_mode(
     deviance = math.inf
     last = np.zeros(start.coefficients.size + 1 + len(start.extras))
     for index in range(iterations):
-        tell(index, iterations, "likelihood")
         drag = point.coefficients.size
         left = [drag + k for k in (held[index] if index < len(held) else ())]
         left = [one for one in left if one <= drag + len(point.noises)]
         others = range(drag + 1, drag + 1 + len(point.extras))
         moving = "without" if set(others) <= set(left) else "with"
         sums = _of_all(prior.add(passes.sums(point, noise=moving), point, weights), last.size)
+        passed(work_of_pass(passes))
         used, deviance = sums.used, sums.deviance
         covariance = inverse(sums.information)
         step = limited(newton_step(sums, covariance, held=left), drag, list(point.opened))

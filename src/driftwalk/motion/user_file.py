@@ -14,6 +14,7 @@ from types import ModuleType
 
 from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import ConfigurationError, DriftwalkError
+from driftwalk.core.unneeded import show_dask
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ def load_user_file(path: Path) -> UserFile:
         When there is no such file, it is no Python, or it fails.
     """
     source = _read(path)
+    show_dask()
     sha256 = hashlib.sha256(source).hexdigest()
     full = path.resolve()
     # A changed file is another module, and so is a file of the same name elsewhere.

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from driftwalk.core.run_stages import Course, tell_nobody
 from driftwalk.runs.folder import Progress, open_run, silent
 from driftwalk.runs.stored import dataset_hash
 from driftwalk.schema.netcdf import netcdf_bytes, open_netcdf
@@ -80,6 +81,7 @@ def run_assembly(
     *,
     film: str = "none",
     overwrite: bool = False,
+    begun: Callable[[], None] = tell_nobody,
     executor: Executor | None = None,
     progress: Progress = silent,
     command: str | Sequence[str] = "driftwalk.runs.run_assembly(...)",
@@ -100,6 +102,8 @@ def run_assembly(
         Whether the first run is filmed too.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
+    begun : callable, optional
+        Called when everything is checked and the work begins.
     executor : concurrent.futures.Executor, optional
         Computes work units elsewhere; the result does not depend on it.
     progress : callable, optional
@@ -135,10 +139,23 @@ def run_assembly(
         overwrite=overwrite,
         command=command,
     ) as run:
-        result = _simulate(work, run, executor, progress)
+        begun()
+        course = Course(progress, _usual_parts(work, film))
+        result = _simulate(work, run, executor, course)
         if film != "none":
-            _write_film(run, film, progress)
+            course.begin("film")
+            _write_film(run, film)
     return result
+
+
+def _usual_parts(work: AssemblyWork, film: str) -> dict[str, float]:
+    """Return how long each stage takes, of hundred runs: the figures are a small part of it."""
+    return {
+        "runs": 8.0,
+        **({} if work.calibration is None else {"runs, drawn parameters": 8.0}),
+        "figures": 1.0,
+        **({} if film == "none" else {"film": 1.0}),
+    }
 
 
 def _check(work: AssemblyWork) -> None:
@@ -151,7 +168,7 @@ def _check(work: AssemblyWork) -> None:
 
 
 def _simulate(
-    work: AssemblyWork, run: RunDirectory, executor: Executor | None, progress: Progress
+    work: AssemblyWork, run: RunDirectory, executor: Executor | None, course: Course
 ) -> AssemblyResult:
     from driftwalk.assembly import (
         assemble,
@@ -169,7 +186,7 @@ def _simulate(
         work.flow,
         trial=FIXED_TRIAL,
         store=run.store("fixed"),
-        progress=lambda done, total: progress(done, total, "runs"),
+        progress=course.stage("runs"),
         threads=work.threads,
         executor=executor,
     )
@@ -185,7 +202,7 @@ def _simulate(
             work.calibration,
             trial=DRAWN_TRIAL,
             store=run.store("drawn"),
-            progress=lambda done, total: progress(done, total, "runs, drawn parameters"),
+            progress=course.stage("runs, drawn parameters"),
             threads=work.threads,
             executor=executor,
         )
@@ -202,7 +219,7 @@ def _simulate(
         threads=work.threads,
     )
     run.write("path.nc", netcdf_bytes(path))
-    progress(1, 1, "figures")
+    course.begin("figures")
     write_assembly_figures(
         run.folder("figures"),
         distribution=distribution,
@@ -214,11 +231,10 @@ def _simulate(
     return AssemblyResult(distribution, times, drawn)
 
 
-def _write_film(run: RunDirectory, film: str, progress: Progress) -> None:
+def _write_film(run: RunDirectory, film: str) -> None:
     """Film the first run from what is stored of it."""
     from driftwalk.plot import write_animation
 
-    progress(1, 1, "film")
     write_animation(open_netcdf(run.path / "path.nc"), run.folder("figures") / f"run.{film}")
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.core.run_stages import CALIBRATION_STAGES
+from driftwalk.core.run_stages import CALIBRATION_STAGES, Course, tell_nobody
 from driftwalk.runs.folder import Progress, naming_recording, open_run, silent
 from driftwalk.runs.stored import dataset_hash
 from driftwalk.schema.netcdf import netcdf_bytes
@@ -63,7 +63,7 @@ def run_calibration(
     folder: Path,
     *,
     overwrite: bool = False,
-    begun: Callable[[], None] | None = None,
+    begun: Callable[[], None] = tell_nobody,
     executor: Executor | None = None,
     progress: Progress = silent,
     command: str | Sequence[str] = "driftwalk.runs.run_calibration(...)",
@@ -125,11 +125,11 @@ def run_calibration(
         overwrite=overwrite,
         command=command,
     ) as run:
-        if begun is not None:
-            begun()
+        begun()
         if flow is not None:
             run.write("flow.nc", netcdf_bytes(flow))
         run.write("recording.nc", netcdf_bytes(work.recording))
+        tell = Course(progress, {"calibration": 1.0}).stage("calibration")
         found = calibrate(
             work.recording,
             work.model,
@@ -139,10 +139,10 @@ def run_calibration(
             threads=work.threads,
             executor=executor,
             stores=_stores(run),
-            tell=lambda stage, done, total: progress(*_overall(stage, done, total)),
+            tell=lambda stage, done, total: tell(*_overall(stage, done, total)),
             meanwhile=lambda early: _write_figures(early, work, flow, run),
         )
-        progress(100, 100, "results")
+        tell(100, 100, "results")
         run.write(result_file(work.model), netcdf_bytes(found))
         if work.posterior:
             run.write("posterior.csv", _posterior_table(found))
@@ -241,6 +241,6 @@ def _stores(run: RunDirectory) -> Any:
     return store
 
 
-def _overall(name: str, done: int, total: int) -> tuple[int, int, str]:
+def _overall(name: str, done: int, total: int) -> tuple[float, int, str]:
     stage = CALIBRATION_STAGES[name]
-    return round(stage.percent(done / total if total else 1.0)), 100, stage.words
+    return stage.percent(done / total if total else 1.0), 100, stage.words

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from driftwalk.core.run_stages import Course, tell_nobody
 from driftwalk.runs.folder import Progress, open_run, silent
 from driftwalk.runs.stored import dataset_hash
 from driftwalk.schema.netcdf import netcdf_bytes
@@ -61,8 +62,9 @@ def run_fit(
     folder: Path,
     *,
     overwrite: bool = False,
-    begun: Callable[[], None] | None = None,
-    fitted: Callable[[xr.Dataset], None] | None = None,
+    begun: Callable[[], None] = tell_nobody,
+    fitted: Callable[[xr.Dataset], None] = tell_nobody,
+    checked: Callable[[xr.Dataset, xr.Dataset | None], None] = tell_nobody,
     progress: Progress = silent,
     command: str | Sequence[str] = "driftwalk.runs.run_fit(...)",
 ) -> Fitted:
@@ -82,7 +84,9 @@ def run_fit(
     begun : callable, optional
         Called when everything is checked and the work begins.
     fitted : callable, optional
-        Called with the fit as soon as it is stored, before the figures and the check.
+        Called with the fit as soon as it is stored, before all that follows.
+    checked : callable, optional
+        Called with the whole fit and its check, or None without one, before the figures.
     progress : callable, optional
         Called as ``progress(done, total, text)`` while the work goes on.
     command : str, optional
@@ -126,21 +130,32 @@ def run_fit(
         overwrite=overwrite,
         command=command,
     ) as run:
-        if begun is not None:
-            begun()
-        found = fit_motion(work.recordings, work.study, body=work.body, tell=progress)
-        if work.compare_laws:
-            found = compare_laws(found, work.recordings, body=work.body, tell=progress)
-        if work.wall:
-            found = estimate_wall(found, work.recordings, body=work.body, tell=progress)
-        flow = fitted_flow(found)
+        begun()
+        course = Course(progress, _usual_parts(work))
+        course.begin("fit")
+        found = fit_motion(work.recordings, work.study, body=work.body, tell=course.stage("fit"))
         run.write("fit.nc", netcdf_bytes(found))
-        run.write("flow.nc", netcdf_bytes(flow))
+        run.write("flow.nc", netcdf_bytes(fitted_flow(found)))
         for number, recording in enumerate(work.recordings, start=1):
             name = "recording.nc" if number == 1 else f"recording-{number}.nc"
             run.write(name, netcdf_bytes(recording))
-        if fitted is not None:
-            fitted(found)
+        fitted(found)
+        check = None
+        if work.compare_laws:
+            tell = course.stage("laws")
+            found = compare_laws(found, work.recordings, body=work.body, tell=tell)
+        if work.wall:
+            tell = course.stage("wall")
+            found = estimate_wall(found, work.recordings, body=work.body, tell=tell)
+        if work.check:
+            course.begin("check")
+            found, check = judge_fit(found, work.recordings, body=work.body)
+            if check is not None:
+                run.write("check.nc", netcdf_bytes(check))
+        # The fit was stored before; now it says what was found beside it.
+        run.write("fit.nc", netcdf_bytes(found))
+        checked(found, check)
+        course.begin("figures")
         write_fit_figures(
             run.folder("figures"),
             flow=steady_flows(found),
@@ -150,15 +165,9 @@ def run_fit(
         )
         if work.compare_laws:
             write_laws_figure(run.folder("figures"), fit=found)
-        check = None
-        if work.check:
-            progress(int(found["iterations"]), int(found["iterations"]), "check")
-            found, check = judge_fit(found, work.recordings, body=work.body)
-            # The fit was stored before the check; now it says what the check found.
-            run.write("fit.nc", netcdf_bytes(found))
-            if check is not None:
-                run.write("check.nc", netcdf_bytes(check))
-                write_check_figures(run.folder("figures"), check=check)
+        if check is not None:
+            course.begin("figures of the check")
+            write_check_figures(run.folder("figures"), check=check)
     return Fitted(found, check)
 
 
@@ -188,6 +197,20 @@ def steady_flows(fit: xr.Dataset) -> list[xr.Dataset]:
     return [
         fitted_flow(fit, interval=interval_flow.index(flow)) for flow in range(fit.sizes["flow"])
     ]
+
+
+def _usual_parts(work: FitWork) -> dict[str, float]:
+    """Return how long each stage usually takes [s], as on the bundled recording and parts of it."""
+    samples = sum(one.sizes["time"] for one in work.recordings)
+    fit = 2.2 + 7.5e-4 * samples
+    return {
+        "fit": fit,
+        **({"laws": 6.5 * fit} if work.compare_laws else {}),
+        **({"wall": fit} if work.wall else {}),
+        **({"check": 2.2 + 2.2e-4 * samples} if work.check else {}),
+        "figures": 3.8,
+        **({"figures of the check": 2.9} if work.check else {}),
+    }
 
 
 def _specification(work: FitWork) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from driftwalk.core.run_stages import tell_nobody
 from driftwalk.runs.folder import Progress, naming_recording, open_run, silent
 from driftwalk.runs.stored import dataset_hash
 from driftwalk.schema.netcdf import netcdf_bytes
@@ -56,8 +57,9 @@ def run_model_comparison(
     folder: Path,
     *,
     overwrite: bool = False,
-    begun: Callable[[], None] | None = None,
+    begun: Callable[[], None] = tell_nobody,
     executor: Executor | None = None,
+    finished: Callable[[str, float, float, int], None] = tell_nobody,
     progress: Progress = silent,
     command: str | Sequence[str] = "driftwalk.runs.run_model_comparison(...)",
 ) -> xr.Dataset:
@@ -79,6 +81,9 @@ def run_model_comparison(
         Called when everything is checked and the work begins.
     executor : concurrent.futures.Executor, optional
         Computes work units elsewhere; the result does not depend on it.
+    finished : callable, optional
+        Called with each model's name, its distance, the standard error of that and the number of
+        models, as soon as it is judged.
     progress : callable, optional
         Called as ``progress(done, total, text)`` while the work goes on.
     command : str, optional
@@ -119,8 +124,7 @@ def run_model_comparison(
         overwrite=overwrite,
         command=command,
     ) as run:
-        if begun is not None:
-            begun()
+        begun()
         run.write("recording.nc", netcdf_bytes(work.recording))
         if work.flow is not None:
             run.write("flow.nc", netcdf_bytes(work.flow))
@@ -138,6 +142,7 @@ def run_model_comparison(
             executor=executor,
             stores=stores,
             tell=progress,
+            finished=finished,
         )
         run.write("comparison.nc", netcdf_bytes(found))
         write_model_figures(run.folder("figures"), comparison=found)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from driftwalk.core.run_stages import Course
 from driftwalk.runs.folder import Progress, open_run, silent
 from driftwalk.runs.stored import dataset_hash
 from driftwalk.schema.netcdf import netcdf_bytes
@@ -130,7 +131,7 @@ def run_model_recovery(
             threads=work.threads,
             executor=executor,
             store=run.store("recordings"),
-            tell=progress,
+            tell=Course(progress, {"recordings": 1.0}).stage("recordings"),
         )
         run.write("model_recovery.nc", netcdf_bytes(found))
         write_model_recovery_figures(run.folder("figures"), recovery=found)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from itertools import product
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import InputError
+from driftwalk.core.run_stages import Course, tell_nobody
 from driftwalk.runs.folder import Progress, open_run, silent
 from driftwalk.runs.stored import dataset_hash
 from driftwalk.schema.netcdf import netcdf_bytes
@@ -88,6 +89,7 @@ def run_sensitivity(
     folder: Path,
     *,
     overwrite: bool = False,
+    begun: Callable[[], None] = tell_nobody,
     executor: Executor | None = None,
     progress: Progress = silent,
     command: str | Sequence[str] = "driftwalk.runs.run_sensitivity(...)",
@@ -106,6 +108,8 @@ def run_sensitivity(
         The run directory.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
+    begun : callable, optional
+        Called when everything is checked and the work begins.
     executor : concurrent.futures.Executor, optional
         Computes work units elsewhere; the result does not depend on it.
     progress : callable, optional
@@ -141,8 +145,11 @@ def run_sensitivity(
         overwrite=overwrite,
         command=command,
     ) as run:
-        result = _simulate(work, run, executor, _Overall(progress, sizes))
-        progress(1, 1, "figures")
+        begun()
+        # A setting costs the same in each stage.
+        course = Course(progress, {**sizes, "figures": 0.0})
+        result = _simulate(work, run, executor, course)
+        course.begin("figures")
         draw_sensitivity(
             run.folder("figures"),
             reference=result.reference,
@@ -150,25 +157,6 @@ def run_sensitivity(
             components=result.components,
         )
     return result
-
-
-class _Overall:
-    """Tells the progress of all stages as one: a setting costs the same in each."""
-
-    def __init__(self, progress: Progress, sizes: dict[str, int]) -> None:
-        self._progress = progress
-        self._total = sum(sizes.values())
-        names = list(sizes)
-        self._before = {
-            name: sum(sizes[earlier] for earlier in names[:index])
-            for index, name in enumerate(names)
-        }
-
-    def stage(self, name: str) -> Any:
-        """Return what a stage takes as ``progress``."""
-        return lambda done, _: self._progress(
-            self._before[name] + done, self._total, f"settings, {name}"
-        )
 
 
 def _checked_sizes(work: SensitivityWork) -> dict[str, int]:
@@ -186,7 +174,7 @@ def _checked_sizes(work: SensitivityWork) -> dict[str, int]:
 
 
 def _simulate(
-    work: SensitivityWork, run: RunDirectory, executor: Executor | None, overall: _Overall
+    work: SensitivityWork, run: RunDirectory, executor: Executor | None, course: Course
 ) -> SensitivityResult:
     from driftwalk.assembly import sensitivity_indices, sensitivity_map, sensitivity_reference
 
@@ -194,7 +182,7 @@ def _simulate(
         work.study,
         work.flow,
         store=run.store("reference"),
-        progress=overall.stage("reference"),
+        progress=course.stage("reference"),
         threads=work.threads,
         executor=executor,
     )
@@ -205,7 +193,7 @@ def _simulate(
         axes=work.axes,
         reference=reference,
         store=run.store("map"),
-        progress=overall.stage("map"),
+        progress=course.stage("map"),
         threads=work.threads,
         executor=executor,
     )
@@ -220,7 +208,7 @@ def _simulate(
             work.flow,
             samples=work.samples,
             store=run.store("sobol"),
-            progress=overall.stage("Sobol"),
+            progress=course.stage("Sobol"),
             threads=work.threads,
             executor=executor,
         )

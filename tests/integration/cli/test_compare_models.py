@@ -62,12 +62,29 @@ def test_people_read_the_answer(run: tuple[Path, dict], capsys: pytest.CaptureFi
     folder, said = run
     print_answer(open_netcdf(folder / "comparison.nc"), folder)
     out = capsys.readouterr().out
+    assert out.startswith(f"{said['findings'][0]}.\n")
     for one in said["models"]:
         assert one["model"] in out
     for text in said["findings"]:
         assert f"{text}." in out
     assert "the recording's own parts" in out
     assert str(folder / "figures") in out
+
+
+def test_models_are_ranked_as_they_finish(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    compare_after_little(monkeypatch)
+    done = here("compare-models", *SHORT, "-o", tmp_path / "run")
+    assert done.code == 0, done.err
+    first = done.out.splitlines()[:4]
+    assert {line.partition(":")[0] for line in first} == {
+        *("inertial", "active", "resampled steps", "hidden Markov walk")
+    }
+    for number, line in enumerate(first, start=1):
+        assert "distance" in line
+        assert f"of {number} so far" in line
+        assert (f"; {4 - number} to go" in line) == (number < 4)
+    answer = done.out.splitlines()[4]
+    assert "explains the recording" in answer
 
 
 def test_mistakes_are_one_line(tmp_path: Path) -> None:

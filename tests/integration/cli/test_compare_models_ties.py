@@ -38,6 +38,7 @@ def test_summaries_name_the_true_model(tmp_path: Path, capsys: pytest.CaptureFix
     assert by_name["run_rest"]["misfit"] <= by_name["run_rest"]["most_misfit"]
     assert not by_name["burst_coast"]["named"]
     assert "misfit" not in by_name["resampled steps"]
-    assert said["findings"][0].startswith("run_rest is named by the summaries of the motion")
+    assert said["findings"][0].startswith("run_rest explains the recording")
+    assert said["findings"][1].startswith("run_rest is named by the summaries of the motion")
     print_answer(open_netcdf(out / "comparison.nc"), out)
     assert "own below" in capsys.readouterr().out

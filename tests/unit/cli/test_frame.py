@@ -301,7 +301,7 @@ def test_progress_without_a_terminal_is_plain_lines() -> None:
     stream = io.StringIO()
     with ProgressReporter("work", stream=stream, seconds_between_lines=0.0) as progress:
         progress(1, 4)
-        progress.update(4, 4, "last")
+        progress(4, 4, "last")
     assert stream.getvalue() == "work: 1 of 4 (25 %)\nwork: 4 of 4 (100 %): last\n"
 
 
@@ -321,7 +321,7 @@ def test_progress_on_a_terminal_is_a_bar() -> None:
     stream = Terminal()
     with ProgressReporter("work", stream=stream) as progress:
         progress(1, 4)
-        progress.update(2, 4, "now")
+        progress(2, 4, "now")
     assert "work" in stream.getvalue()
     assert "4" in stream.getvalue()
 

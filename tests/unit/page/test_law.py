@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ import xarray as xr
 from made_up_fit import made_up_fit
 from page_reading import numbers_of, part_of
 
-from driftwalk.cli.terminal.fit_answer import print_answer
+from driftwalk.cli.terminal.fit_answer import print_found, print_verdict
 from driftwalk.page import fit_sections
 from driftwalk.schema.facts import fit_facts, fit_variables
 
@@ -54,7 +53,8 @@ def fit_of(**words: str) -> xr.Dataset:
 
 def lines_of(fit: xr.Dataset, capsys: pytest.CaptureFixture[str]) -> dict[str, str]:
     """Return the rows that the command line prints, by their label."""
-    print_answer(fit, None, Path("run"))
+    print_found(fit)
+    print_verdict(fit, None)
     return {line[:22].rstrip(): line[23:] for line in capsys.readouterr().out.splitlines()}
 
 

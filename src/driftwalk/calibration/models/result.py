@@ -12,7 +12,7 @@ from driftwalk.calibration.models.checks import CHECKS, UNITS
 from driftwalk.calibration.models.contestants import Contestant
 from driftwalk.calibration.models.judge import JUDGED, Judged, without_error
 from driftwalk.calibration.models.recorded import RecordedMotion
-from driftwalk.calibration.models.ties import Summarised, naming, said_of, tie_sentence
+from driftwalk.calibration.models.ties import Naming, Summarised, naming, said_of, tie_sentence
 from driftwalk.calibration.models.verdict import Verdict, verdict_of
 from driftwalk.calibration.steadiness import Steadiness, steadiness_of_steps
 from driftwalk.comparison import KsReference
@@ -76,9 +76,11 @@ def build_comparison(
     units, values = _estimates(entries, judged)
     steady = _steadiness(motion)
     said = [*warnings, *_edge_warnings(entries, judged), *steadiness_warnings(motion)]
-    findings = _findings(names, entries, verdicts, closest, tied)
+    why = _findings(names, entries, verdicts, closest, tied)
     if asked:
-        findings.insert(0 if answer.named is not None else 1, tie_sentence(names, asked, answer))
+        why.insert(0 if answer.named is not None else 1, tie_sentence(names, asked, answer))
+    best = answer_sentence(names, verdicts, closest, answer)
+    findings = [best, *(one for one in why if one != best)]
     data: dict[str, Any] = {
         "score": ("model", [one.score for one in judged]),
         "score_std": ("model", [without_error(one.without) for one in judged]),
@@ -215,6 +217,24 @@ def _change(motion: RecordedMotion) -> str:
     )
 
 
+def answer_sentence(
+    names: Sequence[str], verdicts: Sequence[Verdict], closest: int, answer: Naming
+) -> str:
+    """Return the answer in one sentence: the best model, and whether it explains the recording.
+
+    The summaries of the motion decide where they name a model, the distance otherwise; a model that
+    explains the recording is better than one that does not.
+    """
+    first = closest if answer.named is None else answer.named
+    explained = [k for k, one in enumerate(verdicts) if one.explained]
+    if not explained:
+        return f"No model explains the recording; the best one is {names[first]}"
+    best = first if first in explained else explained[0]
+    others = [names[k] for k in explained if k != best]
+    also = f"; so do, less well or no better, {', '.join(others)}" if others else ""
+    return f"{names[best]} explains the recording{also}"
+
+
 def _findings(
     names: Sequence[str],
     entries: Sequence[Contestant],
@@ -222,17 +242,13 @@ def _findings(
     closest: int,
     tied: Sequence[int],
 ) -> list[str]:
-    """Return the answer in sentences."""
-    found = [f"{names[closest]} is the closest model"]
+    """Return what the answer follows from, in sentences."""
+    found = [f"{names[closest]} is the closest in distance"]
     rivals = [names[k] for k in tied if not entries[k].baseline]
     if rivals:
         found[0] += f"; no clear difference from {', '.join(rivals)}"
-    explained = [name for name, one in zip(names, verdicts, strict=True) if one.explained]
-    if explained:
-        verb = "explain" if len(explained) > 1 else "explains"
-        found.append(f"{', '.join(explained)} {verb} the recording")
-    else:
-        found.append(f"No model explains the recording; {names[closest]}: {verdicts[closest].text}")
+    if not any(one.explained for one in verdicts):
+        found.append(f"{names[closest]} does not explain it: {verdicts[closest].text}")
     walks = [names[k] for k in tied if entries[k].baseline]
     nearer = [names[k] for k in range(closest)]
     if nearer:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Annotated, Any, NamedTuple
 
@@ -64,20 +64,9 @@ class Workers(NamedTuple):
         with connect(parse_address(self.at, self.options or ()), say=print_note) as cluster:
             try:
                 with reported(title) as told:
-                    progress = _with_workers(told["progress"], lambda: cluster.words)
-                    yield {**told, "progress": progress, "executor": cluster.executor}
+                    told["progress"].remark = lambda: cluster.words
+                    yield {**told, "executor": cluster.executor}
             finally:
                 befell = cluster.report()
                 if befell:
                     print_note(befell)
-
-
-def _with_workers(
-    progress: Callable[[int, int, str], None], words: Callable[[], str]
-) -> Callable[[int, int, str], None]:
-    """Return a progress that says how many units are done, and how many workers there are."""
-
-    def tell(done: int, total: int, text: str = "") -> None:
-        progress(done, total, f"{text}, {words()}" if text else words())
-
-    return tell

@@ -110,10 +110,8 @@ def print_check(fitted: Fitted) -> None:
 def print_next(page: Path) -> None:
     """Say what comes next; whoever waits may open the page of the fit meanwhile."""
     print(f"Its page: {page}")
-    print(
-        "Next, the paper's method: a map of KS distances in the fitted flow, some 30 s.\n",
-        flush=True,
-    )
+    # How long it takes stands at the bar below, which measures it.
+    print("Next, the paper's method: a map of KS distances in the fitted flow.\n", flush=True)
 
 
 def print_calibration(calibration: xr.Dataset) -> None:

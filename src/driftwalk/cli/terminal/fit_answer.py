@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
@@ -120,8 +121,16 @@ def verdict(check: xr.Dataset | None, fit: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def print_answer(fit: xr.Dataset, check: xr.Dataset | None, folder: Path) -> None:
-    """Print the answer for people: the fit, where the flow is, and the check."""
+def print_found(fit: xr.Dataset, *, wall: bool = False) -> None:
+    """Print the estimates, as soon as they are there.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        A `fit`, checked or not.
+    wall : bool
+        Whether an estimate of the wall follows.
+    """
     facts = fit_facts(fit)
     print_origin(fit)
     if facts.get("drag_law") == "linear":
@@ -131,26 +140,32 @@ def print_answer(fit: xr.Dataset, check: xr.Dataset | None, folder: Path) -> Non
     print_estimates(fit, "force_std", "tracking_noise")
     print_intensity(facts["force_noise_intensity_N2_s"])
     print_law(facts)
-    _print_laws(fit)
     left_out = f"{facts['wall_share']:.1%}, left out"
-    if _may_tell_the_wall(fit, facts):
+    asked = wall or "wall_contacts" in facts or "wall_left_out" in facts
+    if not asked and fit.attrs["angle"] == "state" and facts["wall_share"] > TELLING_SHARE:
         left_out += "; --wall estimates restitution and friction from them"
     print_row("intervals at the wall", left_out)
-    _print_wall(facts)
     if "flow" in fit.dims:
         names = fit["flow"].values[fit["interval_flow"].values]
         times = ", ".join(f"{time:g} s" for time in facts["switching_times_s"])
         print_row("flows", f"{', '.join(names)}, switched at {times}")
-    print_warnings(facts["warnings"])
-    print_row("flow", folder / "flow.nc")
+    # Through a pipe the answer would wait in the buffer for the check and the figures.
+    sys.stdout.flush()
+
+
+def print_verdict(fit: xr.Dataset, check: xr.Dataset | None) -> None:
+    """Print what was found beside the estimates: compared laws, the wall, and the check."""
+    _print_laws(fit)
+    _print_wall(fit_facts(fit))
     _print_verdict(check, fit)
+    sys.stdout.flush()
+
+
+def print_places(fit: xr.Dataset, folder: Path) -> None:
+    """Print the warnings, and where everything is."""
+    print_warnings(fit_facts(fit)["warnings"])
+    print_row("flow", folder / "flow.nc")
     print_page(folder)
-
-
-def _may_tell_the_wall(fit: xr.Dataset, facts: Mapping[str, Any]) -> bool:
-    """Return whether nobody has asked for the wall, and the recording may tell what it does."""
-    asked = "wall_contacts" in facts or "wall_left_out" in facts
-    return not asked and fit.attrs["angle"] == "state" and facts["wall_share"] > TELLING_SHARE
 
 
 def _print_wall(facts: Mapping[str, Any]) -> None:

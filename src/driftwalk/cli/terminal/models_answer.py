@@ -9,6 +9,7 @@ import numpy as np
 
 from driftwalk.cli.terminal.answer import print_row, print_warnings
 from driftwalk.cli.terminal.output import print_table
+from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.schema.model_words import ASPECT_WORDS
 
 if TYPE_CHECKING:
@@ -85,8 +86,32 @@ def _summaries(one: xr.Dataset) -> dict[str, Any]:
     return {"named": bool(one["named"]), **{name: float(one[name]) for name in SUMMARIES}}
 
 
+class Ranking:
+    """Prints each model as soon as it is judged, its place so far, and how long the rest takes.
+
+    Parameters
+    ----------
+    progress : ProgressReporter
+        Knows the time left.
+    """
+
+    def __init__(self, progress: ProgressReporter) -> None:
+        self._progress = progress
+        self._scores: list[float] = []
+
+    def __call__(self, name: str, score: float, std: float, models: int) -> None:
+        """Print a model."""
+        place = 1 + sum(one < score for one in self._scores)
+        self._scores.append(score)
+        count = len(self._scores)
+        words = f"{name}: distance {score:.2f} ± {std:.2f}, place {place} of {count} so far"
+        rest = f"; {models - count} to go" if models > count else ""
+        left = f"; {self._progress.left}" if self._progress.left else ""
+        print(f"{words}{rest}{left}", flush=True)
+
+
 def print_answer(found: xr.Dataset, folder: Path) -> None:
-    """Print the ranking, the answer in sentences, and where everything is."""
+    """Print the answer, the ranking, what the answer follows from, and where everything is."""
     rows = [
         (
             str(one["model"].values),
@@ -100,13 +125,15 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
         for index, one in enumerate(_each(found))
     ]
     columns = (*COLUMNS[:-1], *(("misfit",) if "asked" in found else ()), COLUMNS[-1])
+    answer, *why = map(str, found["finding"].values)
+    print(f"{answer}.")
     print_table(rows, columns=columns, title="models, the closest first")
     own = ", ".join(
         f"{ASPECT_WORDS.get(str(name), name)} {float(value):.3f}"
         for name, value in zip(found["aspect"].values, found["own_distance"].values, strict=True)
     )
     print(f"D of the recording's own parts: {own}")
-    for text in found["finding"].values:
+    for text in why:
         print(f"{text}.")
     print_warnings(str(text) for text in found["warning"].values)
     print_row("comparison", folder / "comparison.nc")

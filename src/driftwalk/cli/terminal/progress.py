@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Self, TextIO
 
+from driftwalk.core.run_stages import WHOLE
+
 SECONDS_BETWEEN_LINES = 10.0
+SECONDS_TO_JUDGE = 1.0
+"""The time left is judged from so much of the work at least."""
 
 
 class ProgressReporter:
@@ -23,6 +27,13 @@ class ProgressReporter:
         Where to write; stderr when left out.
     seconds_between_lines : float
         Where the stream is no terminal, write a line no more often than this [s].
+    clock : callable
+        Returns the time [s].
+
+    Attributes
+    ----------
+    remark : callable
+        Returns what is said behind the present task.
 
     Examples
     --------
@@ -37,11 +48,16 @@ class ProgressReporter:
         *,
         stream: TextIO | None = None,
         seconds_between_lines: float = SECONDS_BETWEEN_LINES,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._title = title
         self._stream = stream if stream is not None else sys.stderr
         self._seconds_between_lines = seconds_between_lines
-        self._began = self._last_line = time.monotonic()
+        self._clock = clock
+        self._last_line = clock()
+        self._first: tuple[float, float] | None = None
+        self._ends: float | None = None
+        self.remark: Callable[[], str] = str
         self._bar: Any = None
         self._task: Any = None
 
@@ -59,48 +75,79 @@ class ProgressReporter:
         if self._bar is not None:
             self._bar.stop()
 
-    def __call__(self, done: int, total: int) -> None:
-        """Say that `done` of `total` parts are complete."""
-        self.update(done, total)
+    @property
+    def left_s(self) -> float | None:
+        """The time left [s], from the work done so far; None while too little is done to say.
 
-    def update(self, done: int, total: int, text: str = "") -> None:
+        What was done before, by a run that was killed, does not count: it took no time now.
+        """
+        return None if self._ends is None else max(self._ends - self._clock(), 0.0)
+
+    @property
+    def left(self) -> str:
+        """The time left in words; empty where nobody knows, or nothing is left."""
+        return f"{duration_text(self.left_s)} left" if self.left_s else ""
+
+    def __call__(self, done: int, total: int, text: str = "") -> None:
         """Say that `done` of `total` parts are complete, and what is under way."""
+        now = self._clock()
+        self._judge(done / total if total > 0 else 0.0, now)
+        text = ", ".join(part for part in (text, self.remark()) if part)
         if self._bar is not None:
             title = f"{self._title} {text}".rstrip()
-            self._bar.update(self._task, completed=done, total=total, description=title)
+            self._bar.update(
+                self._task,
+                completed=done,
+                total=total,
+                description=title,
+                count=_count(done, total),
+            )
             return
-        now = time.monotonic()
         if now - self._last_line >= self._seconds_between_lines:
             self._last_line = now
-            print(self._line(done, total, text, now - self._began), file=self._stream, flush=True)
+            left = f", {self.left}" if self.left else ""
+            remark = f": {text}" if text else ""
+            line = f"{self._title}: {_count(done, total)}{left}{remark}"
+            print(line, file=self._stream, flush=True)
 
-    def _line(self, done: int, total: int, text: str, elapsed_s: float) -> str:
-        share = f" ({100 * done / total:.0f} %)" if total > 0 else ""
-        left = ""
-        if 0 < done < total and elapsed_s >= 1.0:
-            left = f", {duration_text(elapsed_s * (total - done) / done)} left"
-        remark = f": {text}" if text else ""
-        return f"{self._title}: {done} of {total}{share}{left}{remark}"
+    def _judge(self, share: float, now: float) -> None:
+        """Judge when the work will end."""
+        if self._first is None:
+            self._first = share, now
+        before, began = self._first
+        if share > before and now - began >= SECONDS_TO_JUDGE:
+            self._ends = now + (now - began) * (1.0 - share) / (share - before)
 
     def _start_bar(self) -> None:
         from rich.console import Console
         from rich.progress import (
             BarColumn,
-            MofNCompleteColumn,
             Progress,
+            ProgressColumn,
+            Task,
             TextColumn,
-            TimeRemainingColumn,
         )
+        from rich.text import Text
+
+        reporter = self
+
+        class Left(ProgressColumn):
+            """The time left; it runs down between what is told."""
+
+            def render(self, _task: Task) -> Text:
+                return Text(reporter.left)
 
         self._bar = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
-            MofNCompleteColumn(),
-            TimeRemainingColumn(),
+            TextColumn("{task.fields[count]}"),
+            Left(),
             console=Console(file=self._stream),
             transient=True,
+            # What is printed meanwhile stands above the bar, but in a file if stdout is one.
+            redirect_stdout=sys.stdout is not None and sys.stdout.isatty(),
         )
-        self._task = self._bar.add_task(self._title, total=None)
+        self._task = self._bar.add_task(self._title, total=None, count="")
         self._bar.start()
 
 
@@ -114,7 +161,15 @@ def reported(title: str) -> Iterator[dict[str, Any]]:
         What is being done.
     """
     with ProgressReporter(title) as progress:
-        yield {"progress": progress.update, "command": ["driftwalk", *sys.argv[1:]]}
+        yield {"progress": progress, "command": ["driftwalk", *sys.argv[1:]]}
+
+
+def _count(done: int, total: int) -> str:
+    """Return how much is done: a share where stages were added up, units otherwise."""
+    if total <= 0:
+        return f"{done} of {total}"
+    share = f"{100 * done / total:.0f} %"
+    return share if total == WHOLE else f"{done} of {total} ({share})"
 
 
 def duration_text(seconds: float) -> str:

@@ -229,7 +229,7 @@ def tell_progress(progress: ProgressReporter, done: int, total: int, dropped: in
     if dropped:
         remarks.append(f"{dropped} frame{'' if dropped == 1 else 's'} dropped up to now")
     if total:
-        progress.update(done, max(done, total), "; ".join(remarks))
+        progress(done, max(done, total), "; ".join(remarks))
 
 
 @contextlib.contextmanager

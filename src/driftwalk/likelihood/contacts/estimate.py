@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from driftwalk.conditions import estimated_study
+from driftwalk.core.run_stages import tell_nobody
 from driftwalk.likelihood.check.errors import estimate_of
 from driftwalk.likelihood.contacts.lattice import tried_walls
 from driftwalk.likelihood.contacts.parabola import answer, says_nothing
 from driftwalk.likelihood.contacts.particles import Part, Trial
 from driftwalk.likelihood.contacts.passages import passages_of, thinned
 from driftwalk.likelihood.intervals import fitted_intervals
-from driftwalk.likelihood.newton import Tell, silent
+from driftwalk.likelihood.newton import Tell
 from driftwalk.likelihood.result import fitted_flow
 from driftwalk.schema.check import described
 from driftwalk.schema.law_words import WALL_KEYS
@@ -94,7 +95,7 @@ def estimate_wall(
         if len(passages.x)
     ]
     trial = Trial(estimated_study(fit), estimate.point, parts, seed)
-    walls = tried_walls(trial.log_likelihood, tell or silent)
+    walls = tried_walls(trial.log_likelihood, tell or tell_nobody)
     data = answer(walls, float(fit["confidence"]))
     if says_nothing(data):
         return fit.assign_attrs(wall_left_out=_all_alike(count))

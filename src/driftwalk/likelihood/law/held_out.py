@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.processors import one_blas_thread
+from driftwalk.core.run_stages import Course, tell_nobody
 from driftwalk.likelihood.check.errors import Estimate, estimate_of
 from driftwalk.likelihood.filter_pass import Passes, Point, Series, log_densities
 from driftwalk.likelihood.law.assumptions import FLOATING
 from driftwalk.likelihood.law.departures import DRAG_SHAPES, DRAGS
 from driftwalk.likelihood.law.search import evidence_of
-from driftwalk.likelihood.newton import Prior, Tell, find_mode, silent
+from driftwalk.likelihood.newton import Passed, Prior, Tell, find_mode
 from driftwalk.likelihood.solution import BREAKDOWN
 from driftwalk.schema.check import described
 
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
 
 TRAINING_SHARE: Final = 0.7
 """Share of each recording, from its beginning, to which a law is fitted; the rest is predicted."""
+OTHER_PUSH: Final = 3.0
+"""With another push of the water's acceleration than that of the fit a law takes so many times as
+long (the bundled recording: its search does not settle)."""
 LAWS: Final[dict[str, tuple[bool, str]]] = {
     "paper": (False, "quadratic"),
     "paper, linear drag": (False, "linear"),
@@ -68,7 +72,7 @@ def compare_laws(
     body : str, optional
         The body, where a recording has several.
     tell : callable, optional
-        Called with the number of finished laws, their number, and the law at work.
+        Called with the thousandths of the work that are done, 1000, and the law at work.
 
     Returns
     -------
@@ -92,18 +96,36 @@ def compare_laws(
     'paper'
     """
     estimate = estimate_of(fit, recordings, body=body)
-    said = tell or silent
+    course = Course(tell or tell_nobody, _usual_parts(estimate.point))
     found: dict[str, _Compared | None] = {}
-    for index, (name, law) in enumerate(LAWS.items()):
-        said(index, len(LAWS), name)
-        found[name] = _under(estimate, *law)
+    for name, law in LAWS.items():
+        course.begin(name)
+        found[name] = _under(estimate, *law, passed=_counted(course, name, estimate))
     names = np.array(list(found), dtype=np.str_)
     return described(
         fit.assign(_variables(found)).assign_coords(compared_law=("compared_law", names))
     )
 
 
-def _under(estimate: Estimate, floating: bool, drag: str) -> _Compared | None:
+def _usual_parts(point: Point) -> dict[str, float]:
+    """Return how long each law usually takes: another push of the water is `OTHER_PUSH` times."""
+    own = point.number("water_acceleration") != 0.0
+    return {name: 1.0 if floating == own else OTHER_PUSH for name, (floating, _) in LAWS.items()}
+
+
+def _counted(course: Course, name: str, estimate: Estimate) -> Passed:
+    """Return what hears of the passes of one law's search."""
+    said, done = course.stage(name), 0
+
+    def passed(_work: float) -> None:
+        nonlocal done
+        done += 1
+        said(done, estimate.study.fit.iterations)
+
+    return passed
+
+
+def _under(estimate: Estimate, floating: bool, drag: str, *, passed: Passed) -> _Compared | None:
     """Fit a law to the first part and predict the rest; nothing where it has no solution."""
     passes, prior = estimate.passes, Prior(estimate.passes)
     training = replace(passes, series=[one.part(0, _training(one)) for one in passes.series])
@@ -116,6 +138,7 @@ def _under(estimate: Estimate, floating: bool, drag: str) -> _Compared | None:
                 estimate.weights,
                 prior,
                 iterations=estimate.study.fit.iterations,
+                passed=passed,
             )
             scores = _scores(passes, mode.point)
             return _Compared(evidence_of(mode, prior), scores, math.exp(mode.point.log_drag))

@@ -20,15 +20,18 @@ from driftwalk.likelihood.newton import (
     FROM_ANOTHER,
     Held,
     Mode,
+    Passed,
     Prior,
-    Tell,
     Weights,
     find_mode,
+    work_of_pass,
 )
 from driftwalk.likelihood.solution import BREAKDOWN
 
 TRIAL_ITERATIONS: Final = 12
 """Most steps of such a search."""
+TRIAL_PASSES: Final = 2.5
+"""Passes of a search that take as long as the score tests."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +42,8 @@ class Modes:
     prior: Prior
     iterations: int
     """Most steps of a search."""
-    tell: Tell
+    passed: Passed
+    """Hears of the work that is done."""
     close: float = CLOSE
     """A search ends when its steps are below this part of the standard deviations,"""
     close_nats: float = CLOSE_NATS
@@ -66,7 +70,7 @@ class Modes:
             weights,
             self.prior,
             iterations=self.iterations,
-            tell=self.tell,
+            passed=self.passed,
             held=held,
             close=self.close,
             close_nats=self.close_nats,
@@ -90,6 +94,8 @@ class Modes:
             return try_numbers(self.passes, mode, self.prior, names)
         except BREAKDOWN:
             return None
+        finally:
+            self.passed(TRIAL_PASSES * work_of_pass(self.passes))
 
 
 def unless_broken(search: Callable[[], Mode]) -> Mode | None:

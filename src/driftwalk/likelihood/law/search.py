@@ -29,8 +29,8 @@ from driftwalk.likelihood.newton import (
     FROM_NEAR,
     NOTABLE_LEVER,
     Mode,
+    Passed,
     Prior,
-    Tell,
     Weights,
 )
 from driftwalk.schema.law_words import LEAST_EVIDENCE, OPENED_SIGMAS
@@ -63,10 +63,15 @@ class LawSearch:
     """Searches over laws for the recordings of one fit."""
 
     def __init__(
-        self, passes: Passes, prior: Prior, assumptions: Assumptions, iterations: int, tell: Tell
+        self,
+        passes: Passes,
+        prior: Prior,
+        assumptions: Assumptions,
+        iterations: int,
+        passed: Passed,
     ) -> None:
         self.assumptions = assumptions
-        self.modes = Modes(passes, prior, iterations, tell)
+        self.modes = Modes(passes, prior, iterations, passed)
         self.opening = Opening(self.modes, assumptions)
 
     def find(self, start: Point, weights: Weights) -> LawFound:

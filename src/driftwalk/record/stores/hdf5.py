@@ -132,10 +132,10 @@ def names_in(path: Path, head: bytes) -> set[str]:
     head : bytes
         Its start.
     """
-    import h5py
-
     if not head.startswith(HDF5):
         return set()
+    import h5py
+
     try:
         with h5py.File(path, "r") as file:
             return set(map(str, file)) | set(map(str, file.attrs))

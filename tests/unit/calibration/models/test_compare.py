@@ -52,7 +52,7 @@ def test_the_true_model_is_the_closest(found: xr.Dataset) -> None:
     names = found["model"].values.tolist()
     assert set(names) == {"inertial", "run_tumble", "resampled steps", "hidden Markov walk"}
     assert names[0] == "run_tumble"
-    assert str(found["finding"].values[0]).startswith("run_tumble is the closest model")
+    assert str(found["finding"].values[0]).startswith("run_tumble explains the recording")
 
 
 def test_it_is_what_its_schema_says(found: xr.Dataset) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from driftwalk.calibration.models.contestants import Contestant
 from driftwalk.calibration.models.judge import Judged, without_error
+from driftwalk.calibration.models.result import answer_sentence
 from driftwalk.calibration.models.ties import (
     ASKED_SIGMAS,
     MOST_ASKED,
@@ -22,6 +23,7 @@ from driftwalk.calibration.models.ties import (
     said_of,
     tie_sentence,
 )
+from driftwalk.calibration.models.verdict import Verdict
 
 ERROR = 0.05
 
@@ -117,3 +119,19 @@ def test_the_sentence_says_whom_and_why() -> None:
 def test_a_model_that_does_not_give_them_is_told_by_how_much() -> None:
     assert said_of(said(139.0, 0.0)) is None
     assert "a misfit of 300" in str(said_of(said(300.0, 0.0)))
+
+
+@pytest.mark.parametrize(
+    ("explained", "named", "sentence"),
+    [
+        ({0}, None, "nine explains the recording"),
+        ({0, 1}, 1, "three explains the recording; so do, less well or no better, nine"),
+        ({2}, 1, "twelve explains the recording"),
+        (set(), 1, "No model explains the recording; the best one is three"),
+        (set(), None, "No model explains the recording; the best one is nine"),
+    ],
+)
+def test_the_answer_names_one_model(explained: set[int], named: int | None, sentence: str) -> None:
+    verdicts = [Verdict(k in explained, "" if k in explained else "far off") for k in range(3)]
+    names = ["nine", "three", "twelve"]
+    assert answer_sentence(names, verdicts, 0, Naming(named, ())) == sentence

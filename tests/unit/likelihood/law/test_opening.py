@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from fit_worlds import coarse_study, driven
 
+from driftwalk.core.run_stages import tell_nobody
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.filter_pass import Passes
 from driftwalk.likelihood.fit import _start
@@ -19,7 +20,7 @@ from driftwalk.likelihood.law.found import LawFound
 from driftwalk.likelihood.law.opening import Opening, _parts
 from driftwalk.likelihood.law.search import LawSearch
 from driftwalk.likelihood.law.trial import Trial
-from driftwalk.likelihood.newton import Mode, Prior, silent
+from driftwalk.likelihood.newton import Mode, Prior
 from driftwalk.likelihood.ready import body_of, prepare, spline_of
 from driftwalk.likelihood.start import first_weights
 
@@ -93,7 +94,7 @@ def test_a_law_that_was_found_amid_departures_is_compared_again(settled_by: floa
         spline_of(study, outline_of(study.tank.to_arena())),
     )
     assumptions = assumptions_of(study, ready.angle, recordings=1, flows=1)
-    search = LawSearch(passes, Prior(passes), assumptions, study.fit.iterations, silent)
+    search = LawSearch(passes, Prior(passes), assumptions, study.fit.iterations, tell_nobody)
     start = _start(passes, ready, study)
     weights = first_weights(ready.tracks, passes.spline)
     wrong = search.modes.find_from_afar(
