@@ -392,7 +392,10 @@ PAGES: dict[str, Page] = {
             "assemble run/": f"assemble run/ {FEW_RUNS}",
             "runs=100)": "runs=4)",
         },
-        holds=("sizes.shape == (4,)", "times['proportion'].dims == ('time', 'class')"),
+        holds=(
+            "sizes['size_to'].values[-1] == 16",
+            "times['proportion'].dims == ('time', 'class')",
+        ),
         numbers=Numbers.SAME,
         draws=False,
         slow=True,

@@ -75,7 +75,7 @@ def plot_assembly_sizes(
     ax.set_ylim(bottom=0.0)
     ax.set_xlabel("blocks in the assembly")
     ax.set_ylabel("share of the blocks")
-    _finish(ax, both, labels)
+    _finish(ax, both)
     return ax
 
 
@@ -137,14 +137,14 @@ def plot_growth(
         ax.set_ylim(0.0, 1.02)
     ax.set_xlabel(TIME_LABEL)
     ax.set_ylabel("blocks per assembly, mean" if what == "mean size" else "share of the blocks")
-    _finish(ax, both, labels if len(curves) == 1 else ("yes", ""))
+    _finish(ax, both)
     return ax
 
 
-def _finish(ax: Axes, both: list[xr.Dataset], labels: tuple[str, str]) -> None:
+def _finish(ax: Axes, both: list[xr.Dataset]) -> None:
     """Say of how many runs it is, and name the curves where there are several."""
     ax.spines[["top", "right"]].set_visible(False)
-    bands = f"intervals: {percent(both[0].attrs['confidence'])}"
-    ax.set_title(", ".join(part for part in (runs_text(both[0]), bands) if part), loc="left")
-    if any(labels):
+    intervals = f"intervals: {percent(both[0].attrs['confidence'])}"
+    ax.set_title(", ".join(part for part in (runs_text(both[0]), intervals) if part), loc="left")
+    if ax.get_legend_handles_labels()[1]:
         ax.legend()

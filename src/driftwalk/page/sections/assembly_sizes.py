@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from driftwalk.page.arrays import number
 from driftwalk.page.chart import chart, label, series
 from driftwalk.page.parts import Section, attempt, figure, require, value_of
 from driftwalk.page.words import percent
@@ -86,8 +87,8 @@ def size_numbers(sizes: xr.Dataset) -> list[dict[str, Any]]:
     shown = [
         figure(text, float(end[name]))
         | {
-            "low": _finite(end[f"{name}_low"]),
-            "high": _finite(end[f"{name}_high"]),
+            "low": number(end[f"{name}_low"]),
+            "high": number(end[f"{name}_high"]),
             "confidence": confidence,
         }
         for name, text in words.items()
@@ -119,7 +120,3 @@ def _note(found: dict[str, xr.Dataset]) -> str:
     confidence = value_of(next(iter(found.values())), "confidence")
     each = "" if confidence is None else f", with {percent(confidence)} intervals"
     return f"Means over the runs{each}."
-
-
-def _finite(value: Any) -> float | None:
-    return float(value) if np.isfinite(value) else None
