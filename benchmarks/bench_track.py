@@ -224,15 +224,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--frames", type=int, default=10)
-    parser.add_argument("--quick", action="store_true", help="few markers, to try the script")
+    parser.add_argument("--quick", action="store_true", help="the small images, to try the script")
     arguments = parser.parse_args()
-    cases, blobs = (CASES[:3], BLOBS[:1]) if arguments.quick else (CASES, BLOBS)
+    cases, blobs = (CASES[:1], BLOBS[:1]) if arguments.quick else (CASES, BLOBS)
     cv2.setNumThreads(1)
     how = {"rounds": arguments.rounds, "frames": arguments.frames}
     print(machine())
     seconds = {case: run(*case, **how) for case in cases}
     large = [case for case in cases if case[0] == 1920]
-    for name in ("two colours", "and tracker", "ArUco"):
+    for name in ("two colours", "and tracker", "ArUco") if large else ():
         say_growth(name, [case[2] for case in large], [seconds[case][name] for case in large])
     run_heavy(*cases[0], **how)
     for case in blobs:
