@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -41,22 +42,24 @@ def test_what_a_script_uses_exists(path: Path) -> None:
 
 SMALLEST = {
     "assemble": ["--quick", "--rounds", "1", "--runs", "8"],
-    "assemble_ode": ["--rounds", "1", "--worlds", "2", "--steps", "20"],
+    "assemble_ode": ["--rounds", "1"],
     "calibrate": ["--quick", "--threads", "1"],
     "cluster": ["--quick", "--rounds", "1", "--length", "20"],
     "import": ["--rounds", "1"],
     "ks": ["--rounds", "1", "--sizes", "1000"],
     "laws": ["--rounds", "1", "--steps", "20"],
     "live": ["--seconds", "0.2"],
-    "ode": ["--rounds", "1", "--worlds", "8"],
+    "ode": ["--rounds", "1"],
     "particles": ["--rounds", "1", "--minutes", "0.05"],
     "read": ["--rows", "1000"],
-    "simulate": ["--rounds", "1", "--steps", "50"],
+    "simulate": ["--rounds", "1", "--steps", "100"],
     "track": ["--quick", "--rounds", "1", "--frames", "1"],
 }
 """Options of each benchmark with which it takes the least."""
 LACKING = 77
 """Exit code of a benchmark that lacks a requirement, such as a peer."""
+LATE = re.compile(r"a frame of \d+ blocks takes|costs [\d.]+ times the paper's law")
+"""Ends of a benchmark that a busy machine explains."""
 STUDIES = sorted({path.parent for path in SCRIPTS if "studies" in path.parts})
 # Where a script has a parser it runs up to its --help, else only its definitions run.
 START = """
@@ -89,8 +92,8 @@ def test_every_benchmark_has_its_smallest_size() -> None:
 @pytest.mark.parametrize("name", SMALLEST)
 def test_a_benchmark_runs_at_its_smallest_size(name: str) -> None:
     done = started(ROOT / "benchmarks" / f"bench_{name}.py", *SMALLEST[name])
-    # A time that is missed on a busy machine is no fault of the script; a traceback is.
-    assert done.returncode in (0, LACKING), f"{done.stdout}\n{done.stderr}"
+    said = f"{done.stdout}\n{done.stderr}"
+    assert done.returncode in (0, LACKING) or LATE.search(done.stderr), said
 
 
 @pytest.mark.slow
