@@ -124,27 +124,27 @@ def print_rates(case: Case, sets: list[str], *, steps: int, rounds: int) -> None
         )
 
 
-def print_scaling(*, rounds: int, plot: Path | None) -> None:
+def print_scaling(*, steps: int, rounds: int, plot: Path | None) -> None:
     """Rates over the number of blocks, with latching and without."""
     cases = {blocks: make_case(blocks, worlds=SCALE_BLOCKS // blocks) for blocks in SCALES}
     latchings = ("collision", "none")
     work = {
-        (blocks, latching): int(case.run(steps=SCALE_STEPS, latching=latching)["block_steps"])
+        (blocks, latching): int(case.run(steps=steps, latching=latching)["block_steps"])
         for blocks, case in cases.items()
         for latching in latchings
     }
     times = interleaved(
         {
-            f"{blocks} {latching}": partial(cases[blocks].run, steps=SCALE_STEPS, latching=latching)
+            f"{blocks} {latching}": partial(cases[blocks].run, steps=steps, latching=latching)
             for blocks, latching in work
         },
         rounds=rounds,
     )
     rates = {
-        key: [rate / 1e6 for rate in times[f"{key[0]} {key[1]}"].rates(steps)]
-        for key, steps in work.items()
+        key: [rate / 1e6 for rate in times[f"{key[0]} {key[1]}"].rates(done)]
+        for key, done in work.items()
     }
-    print(f"\n{SCALE_STEPS * STEP_S:g} s, {SCALE_BLOCKS} blocks in all")
+    print(f"\n{steps * STEP_S:g} s, {SCALE_BLOCKS} blocks in all")
     print("Millions of block-steps a second on one core")
     print(f"{'blocks':>6} {'tank [m]':>9} {'latching':>22} {'hard blocks':>22}")
     for blocks, case in cases.items():
@@ -174,7 +174,7 @@ def draw_scaling(file: Path, rates: dict[str, list[list[float]]]) -> None:
     print(f"wrote {file}")
 
 
-def print_reference(realisations: int) -> None:
+def print_reference(realisations: int, runs: int) -> None:
     """Time the reference distribution as a user gets it."""
     study, flow = make_case(BLOCKS, worlds=1).study, dw.tank30_flow()
     wall, processor = time.perf_counter(), time.process_time()
@@ -183,7 +183,7 @@ def print_reference(realisations: int) -> None:
             dw.assembly.assemble(
                 study,
                 flow,
-                runs=REFERENCE_RUNS,
+                runs=runs,
                 trial=trial,
                 drag_coefficient=DRAG_COEFFICIENT,
                 force_std=FORCE_STD_N,
@@ -193,7 +193,7 @@ def print_reference(realisations: int) -> None:
     ]
     wall, processor = time.perf_counter() - wall, time.process_time() - processor
     print(
-        f"\n{realisations} x {REFERENCE_RUNS} runs of {study.assembly.duration_s:g} s on "
+        f"\n{realisations} x {runs} runs of {study.assembly.duration_s:g} s on "
         f"{os.cpu_count()} cores: {wall:.1f} s, {processor:.1f} s of processor time"
     )
     print(f"mean l1 distance of two realisations {dw.assembly.pairwise_l1(found).mean:.3f}")
@@ -206,7 +206,8 @@ def main() -> None:
     parser.add_argument("--plot", type=Path, help="write the figure of the scaling")
     parser.add_argument("--quick", action="store_true", help="short runs, to try the script")
     options = parser.parse_args()
-    steps = RUN_STEPS // 30 if options.quick else RUN_STEPS
+    less = 30 if options.quick else 1
+    steps = RUN_STEPS // less
     sets = list(_core.available_instruction_sets())
     print(machine())
     begin = time.perf_counter()
@@ -214,8 +215,8 @@ def main() -> None:
     print(f"setup (flow table, starts): {time.perf_counter() - begin:.2f} s")
     check_answers(case, sets, steps)
     print_rates(case, sets, steps=steps, rounds=options.rounds)
-    print_scaling(rounds=1 if options.quick else 3, plot=options.plot)
-    print_reference(2 if options.quick else REALISATIONS)
+    print_scaling(steps=SCALE_STEPS // less, rounds=1 if options.quick else 3, plot=options.plot)
+    print_reference(2 if options.quick else REALISATIONS, REFERENCE_RUNS // less)
 
 
 if __name__ == "__main__":

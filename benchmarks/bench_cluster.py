@@ -44,6 +44,7 @@ from driftwalk.sweep.remote import packed
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "helpers"))
 
 SKIPPED = 77
+TELLING_UNITS = 20
 CORES = (1, 100, 10_000)
 BLOCKS, STEP_S, DURATION_S = 4, 0.01, 300.0
 MAP_RUNS = 1000
@@ -139,7 +140,8 @@ def real_units(cluster: Any, runs: int) -> None:
     once = statistics.mean(first[name] - again[name] for name in first)
     print(f"\n{runs} runs of assemble in {units} units, flow and starts of {kept[0]} bytes")
     print(f"  into the workers: {each:.0f} bytes a unit, and {once:.0f} once to each worker")
-    if each > 0.01 * kept[0] + 20_000:
+    # Of few units one worker may do all in the first round: the second then sends it to the other.
+    if units >= TELLING_UNITS and each > 0.01 * kept[0] + 20_000:
         sys.exit("what is large travels with every unit")
 
 

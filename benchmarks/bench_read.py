@@ -84,9 +84,9 @@ def read(path: Path, form: str, rows: int) -> None:
 
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     options = {"metres_per_pixel": 1.0} if form == "animalta" else {}
-    begin = time.perf_counter()
+    begin = time.process_time()
     recording = dw.load(path, **options)
-    seconds = time.perf_counter() - begin
+    seconds = time.process_time() - begin
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     samples = recording["x"].to_numpy()
     found = samples[np.isfinite(samples)] if form == "bodies" else samples[:, 0]

@@ -1,6 +1,6 @@
 """How many frames a second detectors and tracker do, beside ArUco detection and trackpy.
 
-    python benchmarks/bench_track.py [--rounds 7] [--frames 10]
+    python benchmarks/bench_track.py [--rounds 7] [--frames 10] [--quick]
 
 One core, decoding left out, processor time. Every image is a synthetic one with moderate
 noise, but for one case at the heavy level.
@@ -28,7 +28,7 @@ from timing import interleaved, machine, spread
 import driftwalk as dw
 from driftwalk.schema import build_trajectory
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "unit"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "helpers"))
 from drawn_blocks import camera_of, marker_of
 
 SIDE_OF_TAG = 0.8
@@ -224,16 +224,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--frames", type=int, default=10)
+    parser.add_argument("--quick", action="store_true", help="the small images, to try the script")
     arguments = parser.parse_args()
+    cases, blobs = (CASES[:1], BLOBS[:1]) if arguments.quick else (CASES, BLOBS)
     cv2.setNumThreads(1)
     how = {"rounds": arguments.rounds, "frames": arguments.frames}
     print(machine())
-    seconds = {case: run(*case, **how) for case in CASES}
-    large = [case for case in CASES if case[0] == 1920]
-    for name in ("two colours", "and tracker", "ArUco"):
+    seconds = {case: run(*case, **how) for case in cases}
+    large = [case for case in cases if case[0] == 1920]
+    for name in ("two colours", "and tracker", "ArUco") if large else ():
         say_growth(name, [case[2] for case in large], [seconds[case][name] for case in large])
-    run_heavy(*CASES[0], **how)
-    for case in BLOBS:
+    run_heavy(*cases[0], **how)
+    for case in blobs:
         run_blobs(*case, **how)
 
 

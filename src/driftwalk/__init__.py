@@ -39,6 +39,7 @@ _NAMES = {
         "LiveTank",
         "assemble_drawn",
         "assembly_path",
+        "assembly_sizes",
         "class_times",
         "classify",
         "l1_distance",

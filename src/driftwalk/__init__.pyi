@@ -23,6 +23,7 @@ from driftwalk.assembly import (
     LiveTank as LiveTank,
     assemble_drawn as assemble_drawn,
     assembly_path as assembly_path,
+    assembly_sizes as assembly_sizes,
     class_times as class_times,
     classify as classify,
     l1_distance as l1_distance,

@@ -1,8 +1,13 @@
-"""Benchmarks and studies take hours, so no test runs them: what they use has to exist at least."""
+"""Benchmarks and studies start: a benchmark at its smallest size, a study, which takes hours, with
+``--help``, and what they use of driftwalk exists."""
 
 from __future__ import annotations
 
 import ast
+import os
+import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
@@ -33,6 +38,71 @@ def test_what_a_script_uses_exists(path: Path) -> None:
     for module, name in used_names(path):
         if not hasattr(import_module(module), name):
             import_module(f"{module}.{name}")  # a module of a package
+
+
+SMALLEST = {
+    "assemble": ["--quick", "--rounds", "1", "--runs", "8"],
+    "assemble_ode": ["--rounds", "1"],
+    "calibrate": ["--quick", "--threads", "1"],
+    "cluster": ["--quick", "--rounds", "1", "--length", "20"],
+    "import": ["--rounds", "1"],
+    "ks": ["--rounds", "1", "--sizes", "1000"],
+    "laws": ["--rounds", "1", "--steps", "20"],
+    "live": ["--seconds", "0.2"],
+    "ode": ["--rounds", "1"],
+    "particles": ["--rounds", "1", "--minutes", "0.05"],
+    "read": ["--rows", "1000"],
+    "simulate": ["--rounds", "1", "--steps", "100"],
+    "track": ["--quick", "--rounds", "1", "--frames", "1"],
+}
+"""Options of each benchmark with which it takes the least."""
+LACKING = 77
+"""Exit code of a benchmark that lacks a requirement, such as a peer."""
+LATE = re.compile(r"a frame of \d+ blocks takes|costs [\d.]+ times the paper's law")
+"""Ends of a benchmark that a busy machine explains."""
+STUDIES = sorted({path.parent for path in SCRIPTS if "studies" in path.parts})
+# Where a script has a parser it runs up to its --help, else only its definitions run.
+START = """
+import pathlib, runpy, sys
+for name in sys.argv[1:]:
+    asked = "argparse" in pathlib.Path(name).read_text(encoding="utf-8")
+    sys.argv = [name, "--help"]
+    print("starting", name, flush=True)
+    try:
+        runpy.run_path(name, run_name="__main__" if asked else "started")
+    except SystemExit as end:
+        assert asked and not end.code, end
+"""
+
+
+def started(*words: str | Path) -> subprocess.CompletedProcess[str]:
+    """Run Python in the root of the project as a user does, on one thread."""
+    return subprocess.run(
+        [sys.executable, *words], cwd=ROOT, capture_output=True, text=True, check=False,
+        env={**os.environ, "OMP_NUM_THREADS": "1", "MPLBACKEND": "Agg"},
+    )  # fmt: skip
+
+
+def test_every_benchmark_has_its_smallest_size() -> None:
+    files = (ROOT / "benchmarks").glob("bench_*.py")
+    assert {path.stem.removeprefix("bench_") for path in files} == set(SMALLEST)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SMALLEST)
+def test_a_benchmark_runs_at_its_smallest_size(name: str) -> None:
+    done = started(ROOT / "benchmarks" / f"bench_{name}.py", *SMALLEST[name])
+    said = f"{done.stdout}\n{done.stderr}"
+    assert done.returncode in (0, LACKING) or LATE.search(done.stderr), said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("folder", STUDIES, ids=lambda folder: folder.name)
+def test_every_script_of_a_study_starts(folder: Path) -> None:
+    """Its modules are found, its definitions run, and so does its parser."""
+    scripts = sorted(folder.glob("*.py"))
+    done = started("-c", f"import sys; sys.path.insert(0, {str(folder)!r})\n{START}", *scripts)
+    assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
 
 
 SOURCES_OF_STUDIES = (

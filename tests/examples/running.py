@@ -70,7 +70,7 @@ class Reader:
                         assert answer.status == 200, where
                         assert b"driftwalk" in answer.body, where
                     case ["driftwalk", *_]:
-                        self._driftwalk(where, command, self._numbers(written, command))
+                        self._driftwalk(where, command, compared(self.page, written, command))
                     case _:
                         raise AssertionError(f"{where}: only driftwalk is run; see provisions.py")
 
@@ -83,18 +83,10 @@ class Reader:
         self._last = done.out + done.err, numbers
         self._compare(where, command.shown)
 
-    def _numbers(self, written: Command, run: Command) -> Numbers:
-        if run.text != written.text:
-            return Numbers.ANY
-        for pattern, numbers in self.page.numbers_of.items():
-            if _matches(written, [pattern]):
-                return numbers
-        return self.page.numbers
-
     def _compare(self, where: str, shown: list[str]) -> None:
         """Compare the lines that a page shows with what the last command printed."""
         printed, numbers = self._last
-        missing = not_printed(shown, printed, numbers)
+        missing = not_printed(shown, printed, numbers, self.page.by_chance)
         assert not missing, f"{where}\nnot printed: {missing}\n{printed}"
 
     def _python(self, block: Block, text: str) -> None:
@@ -116,6 +108,16 @@ class Reader:
             text = edited(path.read_text(encoding="utf-8"), text)
         path.write_text(text, encoding="utf-8")
         dw.load_study(path)
+
+
+def compared(page: Page, written: Command, run: Command) -> Numbers:
+    """Return how the numbers of a command compare that a page shows and a test runs."""
+    if run.text != written.text:
+        return Numbers.ANY
+    for pattern, numbers in page.numbers_of.items():
+        if _matches(written, [pattern]):
+            return numbers
+    return page.numbers
 
 
 def _matches(command: Command, patterns: Iterable[str]) -> bool:

@@ -11,9 +11,10 @@ import pytest
 from command_line import leave_out_figures
 from ports import held_port
 
-from examples.provisions import ELSEWHERE, PAGES
+from examples.printed import NUMBER, Numbers
+from examples.provisions import ELSEWHERE, NOT_COMPARED, PAGES
 from examples.reading import ROOT, blocks_of, commands_of, pages
-from examples.running import Reader, streaming
+from examples.running import Reader, compared, streaming
 
 
 @pytest.mark.parametrize(
@@ -59,6 +60,33 @@ def test_commands_that_no_test_runs_exist() -> None:
         for word in words:
             if word.startswith((".ci/", "benchmarks/", "studies/")):
                 assert (ROOT / word).exists(), word
+
+
+def test_shown_numbers_are_compared_or_it_is_said_why_not() -> None:
+    """Where a test computes less than the page says, what the page shows can grow old."""
+    shown = []
+    for name, page in PAGES.items():
+        latest = None
+        for block in blocks_of(name):
+            if block.language == "console":
+                text = block.text
+                for old, new in page.instead.items():
+                    text = text.replace(old, new)
+                for written, run in zip(commands_of(block.text), commands_of(text), strict=True):
+                    latest = written, compared(page, written, run)
+                    shown += [(*latest, line) for line in written.shown]
+            elif block.language == "":
+                assert latest is not None, block
+                shown += [(*latest, line) for line in block.text.splitlines()]
+    apart = {
+        command.text
+        for command, numbers, line in shown
+        if numbers is Numbers.ANY and NUMBER.search(line)
+    }
+    excused = {text for text in apart for one in NOT_COMPARED if fnmatch.fnmatch(text, one)}
+    assert apart == excused
+    for one in NOT_COMPARED:
+        assert fnmatch.filter(apart, one), one
 
 
 @pytest.mark.parametrize("name", PAGES)

@@ -57,8 +57,8 @@ PRINTED = "drag   0.39\nforce  0.61 mN\nrecord 12 min 3 s (2 h 1 min to 1 h)\nof
         (["force  0.61 mN  # a remark", "..."], Numbers.SAME, []),
         (["drag 0.40"], Numbers.SAME, ["drag 0.40"]),
         (["force 0.61 mN", "drag 0.39"], Numbers.SAME, ["drag 0.39"]),
-        (["drag 0.40"], Numbers.CLOSE, []),
-        (["drag 0.45"], Numbers.CLOSE, ["drag 0.45"]),
+        (["drag 0.41"], Numbers.CLOSE, []),
+        (["drag 0.42"], Numbers.CLOSE, ["drag 0.42"]),
         (["drags 0.39"], Numbers.CLOSE, ["drags 0.39"]),
         (["drag 0.32"], Numbers.RUNS, []),
         (["drag 0.30"], Numbers.RUNS, ["drag 0.30"]),
@@ -70,6 +70,23 @@ PRINTED = "drag   0.39\nforce  0.61 mN\nrecord 12 min 3 s (2 h 1 min to 1 h)\nof
 )
 def test_shown_lines_are_looked_for(shown: list[str], numbers: Numbers, missing: list[str]) -> None:
     assert not_printed(shown, PRINTED, numbers) == missing
+
+
+def test_close_numbers_agree_to_their_last_digits() -> None:
+    """A distance of 0.020 is no 0.023, and a size of 1e6 no 1.1e6; what scatters is said."""
+    for shown, printed, agree in (
+        ("D 0.023", "D 0.020", False),
+        ("D 0.022", "D 0.020", True),
+        ("n 6.059e-09", "n 6.058e-09", True),
+        ("n 6.059e-09", "n 6.062e-09", False),
+        ("of 20", "of 22", True),
+        ("of 20", "of 23", False),
+    ):
+        assert (not_printed([shown], printed, Numbers.CLOSE) == []) == agree, shown
+    chance = {"KS": 0.005}
+    assert not_printed(["KS 0.023"], "KS 0.020", Numbers.SAME, chance) == []
+    assert not_printed(["KS 0.023"], "KS 0.017", Numbers.SAME, chance) == ["KS 0.023"]
+    assert not_printed(["D 0.023"], "D 0.020", Numbers.SAME, chance) == ["D 0.023"]
 
 
 def test_a_study_is_edited_as_by_hand() -> None:

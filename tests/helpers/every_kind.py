@@ -152,6 +152,7 @@ FORMS: dict[str, Callable[[], xr.Dataset]] = {
     "assembly_path": lambda: dw.assembly_path(small(), FLOW, runs=[0], seed=5),
     "outcome_distribution": lambda: dw.outcome_distribution(every_kind("assembly")),
     "outcome_distribution of realisations": lambda: dw.sensitivity_reference(small(), FLOW),
+    "assembly_sizes": lambda: dw.assembly_sizes(every_kind("assembly")),
     "class_times": lambda: dw.class_times(every_kind("assembly")),
     "classification": lambda: dw.classify(path_seen(), side=0.03),
     "classification with blocks hidden": lambda: dw.observe(path_seen(), side=0.03),

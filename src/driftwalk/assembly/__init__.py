@@ -30,6 +30,7 @@ from driftwalk.assembly.outcomes.l1 import (
     l1_noise_floor,
     pairwise_l1,
 )
+from driftwalk.assembly.outcomes.sizes import assembly_sizes
 from driftwalk.assembly.outcomes.survival import SurvivalCurve, class_times, survival_curve
 from driftwalk.assembly.recordings import classify
 from driftwalk.assembly.runs.parameters import draw_parameters, has_uncertainty
@@ -54,6 +55,7 @@ __all__ = [
     "assemble",
     "assemble_drawn",
     "assembly_path",
+    "assembly_sizes",
     "check_assembly",
     "check_indices",
     "check_sensitivity",

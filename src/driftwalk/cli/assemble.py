@@ -20,6 +20,7 @@ from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, T
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.answer import print_figures, print_warnings
 from driftwalk.cli.terminal.output import print_json, print_table
+from driftwalk.cli.terminal.sizes_answer import print_sizes, sizes_facts
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS
 
@@ -93,7 +94,7 @@ def summary(study: Study, result: AssemblyResult) -> dict[str, Any]:
     """Return what ``--json`` prints: the answer with units in its keys."""
     settings, forces, times = study.assembly, study.forces, result.times.attrs
     return {
-        **_facts(result.distribution),
+        **_facts(result.distribution, result.sizes),
         "confidence": settings.confidence,
         "blocks": settings.blocks,
         "duration_s": times["duration_s"],
@@ -108,12 +109,12 @@ def summary(study: Study, result: AssemblyResult) -> dict[str, Any]:
         "completion_median_s": times["completion_median_s"],
         "drawn": None
         if result.drawn is None
-        else {"parameters": _drawn(result.drawn), **_facts(result.drawn)},
+        else {"parameters": _drawn(result.drawn), **_facts(result.drawn, result.sizes_drawn)},
         **_difference(result),
     }
 
 
-def _facts(distribution: xr.Dataset) -> dict[str, Any]:
+def _facts(distribution: xr.Dataset, sizes: xr.Dataset | None) -> dict[str, Any]:
     facts = distribution.attrs
     names = [str(name) for name in distribution["class"].values]
     low, high = (distribution[f"interval_{end}"].values for end in ("low", "high"))
@@ -124,6 +125,7 @@ def _facts(distribution: xr.Dataset) -> dict[str, Any]:
         "complete_interval": [facts["complete_low"], facts["complete_high"]],
         "runs": facts["runs"],
         "left_out": facts["left_out"],
+        **({} if sizes is None else {"sizes": sizes_facts(sizes)}),
     }
 
 
@@ -161,8 +163,30 @@ def print_answer(study: Study, result: AssemblyResult, folder: Path) -> None:
         f"C_d = {forces.drag_coefficient:.4g}, σ_F = {1e3 * forces.force_std_N:.4g} mN redrawn "
         f"every {1e3 * forces.force_interval_s:g} ms"
     )
+    if result.sizes is None:
+        _print_classes(result, settings.confidence)
+    else:
+        _print_many(result)
+    times = result.times.attrs
+    for event, words in (("first_contact", "first contact"), ("completion", "completion")):
+        median = times[f"{event}_median_s"]
+        reached = f"median {median:.4g} s" if median == median else "not reached in half the runs"
+        print(f"{words}: {reached}")
+    if result.drawn is not None:
+        print(f"drawn for each run: {', '.join(_drawn(result.drawn))}")
+    if result.drawn is not None and result.sizes is None:
+        apart = _difference(result)
+        print(
+            f"l1 distance of the two: {apart['l1_distance']:.4f}; by chance "
+            f"{apart['l1_noise_floor']:.4f} (95 %: {apart['l1_noise_floor_95']:.4f})"
+        )
+    print_figures(folder)
+
+
+def _print_classes(result: AssemblyResult, confidence: float) -> None:
+    """Print how often each class came."""
     columns = [result.distribution, *([] if result.drawn is None else [result.drawn])]
-    interval = f"{settings.confidence:.0%} simultaneous intervals"
+    interval = f"{confidence:.0%} simultaneous intervals"
     heads = ["class", "share", interval]
     if result.drawn is not None:
         heads += ["parameters drawn", interval]
@@ -178,19 +202,21 @@ def print_answer(study: Study, result: AssemblyResult, folder: Path) -> None:
         )
     rows.append(["complete", *(cell for column in columns for cell in _complete_cells(column))])
     print_table(rows, columns=heads)
-    times = result.times.attrs
-    for event, words in (("first_contact", "first contact"), ("completion", "completion")):
-        median = times[f"{event}_median_s"]
-        reached = f"median {median:.4g} s" if median == median else "not reached in half the runs"
-        print(f"{words}: {reached}")
-    if result.drawn is not None:
-        apart = _difference(result)
-        print(f"drawn for each run: {', '.join(_drawn(result.drawn))}")
+
+
+def _print_many(result: AssemblyResult) -> None:
+    """Print the sizes of the assemblies: nearly every run is a class of its own."""
+    from driftwalk.runs import LABELS
+
+    both = zip((result.distribution, result.drawn), (result.sizes, result.sizes_drawn), strict=True)
+    for label, (distribution, sizes) in zip(LABELS, both, strict=True):
+        if distribution is None or sizes is None:
+            continue
+        print_sizes(sizes, label if result.drawn is not None else "")
+        share, interval = _complete_cells(distribution)
         print(
-            f"l1 distance of the two: {apart['l1_distance']:.4f}; by chance "
-            f"{apart['l1_noise_floor']:.4f} (95 %: {apart['l1_noise_floor_95']:.4f})"
+            f"complete: {share} of the runs ({sizes.attrs['confidence']:.0%} interval {interval})"
         )
-    print_figures(folder)
 
 
 def _seen(distributions: list[xr.Dataset]) -> list[str]:

@@ -16,6 +16,7 @@ from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.study_keys import STUDY_KEYS
 from driftwalk.schema.contents import check_contents
 from driftwalk.schema.netcdf import kind_of, open_netcdf
+from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -240,7 +241,10 @@ def _warnings(found: xr.Dataset) -> list[str]:
 
 def _print(summary: dict[str, Any]) -> None:
     known = summary["known_s"]
-    rows = [[name, 100.0 * share, share * known] for name, share in summary["proportions"].items()]
+    rows = [
+        [short_class(name), 100.0 * share, share * known]
+        for name, share in summary["proportions"].items()
+    ]
     print_table(rows, columns=["class", "share of time [%]", "time [s]"])
     print()
     listed = [
@@ -248,7 +252,7 @@ def _print(summary: dict[str, Any]) -> None:
             event["time_s"],
             event["kind"],
             *(f"{body}:{face}" for body, face in zip(event["bodies"], event["faces"], strict=True)),
-            event["outcome"],
+            short_class(event["outcome"]),
         ]
         for event in summary["events"]
     ]
@@ -258,4 +262,4 @@ def _print(summary: dict[str, Any]) -> None:
     else:
         print("no blocks joined")
     print()
-    print_table([["at the end", summary["final"] or "unknown"]])
+    print_table([["at the end", short_class(summary["final"]) or "unknown"]])

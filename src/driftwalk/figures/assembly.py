@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from driftwalk.figures.write import write_each
+from driftwalk.plot.assembly_growth import plot_assembly_sizes, plot_growth
 from driftwalk.plot.class_courses import plot_class_times, plot_survival
 from driftwalk.plot.components import plot_biplot
 from driftwalk.plot.outcome_bars import plot_outcomes
@@ -40,6 +41,8 @@ def write_assembly_figures(
     times: xr.Dataset | None = None,
     path: xr.Dataset | None = None,
     run: int = 0,
+    sizes: xr.Dataset | None = None,
+    sizes_drawn: xr.Dataset | None = None,
     formats: Sequence[str] = ("png", "svg"),
 ) -> list[Path]:
     """Write the figures of one self-assembly experiment: the paper's 9, times, and a film strip.
@@ -65,14 +68,17 @@ def write_assembly_figures(
         An `assembly_path`.
     run : int
         Which run of `path` the strip shows, counted from 0.
+    sizes, sizes_drawn : xarray.Dataset, optional
+        The `assembly_sizes` of both. Where there are many blocks and so too many classes to draw,
+        they take the place of the classes.
     formats : sequence of {"png", "svg", "pdf"}
         File formats.
 
     Returns
     -------
     list of pathlib.Path
-        The files: ``outcomes``, with `times` also ``class_times``, with `path` also
-        ``film_strip``, each in every format.
+        The files: ``outcomes``, with `times` also ``class_times``, or with `sizes`
+        ``assembly_sizes`` in their place; with `path` also ``film_strip``, each in every format.
 
     Raises
     ------
@@ -92,6 +98,12 @@ def write_assembly_figures(
     }
     if times is not None:
         makers["class_times"] = lambda: class_times_figure(times)
+    if sizes is not None:
+        makers = {
+            "assembly_sizes": lambda: assembly_sizes_figure(
+                sizes, beside=sizes_drawn, labels=labels, times=times
+            )
+        }
     if path is not None:
         makers["film_strip"] = lambda: figure_of(plot_film_strip(path, run=run)[0])
     return write_each(makers, folder, formats)
@@ -165,6 +177,27 @@ def class_times_figure(times: xr.Dataset) -> Figure:
     plot_survival(times, row[1])
     titles = [ax.get_title(loc="left") for ax in row]
     letter_panels(row, titles)
+    return figure
+
+
+def assembly_sizes_figure(
+    sizes: xr.Dataset,
+    *,
+    beside: xr.Dataset | None = None,
+    labels: tuple[str, str] = ("", ""),
+    times: xr.Dataset | None = None,
+) -> Figure:
+    """Return the sizes at the end, their mean and shares over time, and the survival curves."""
+    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=130.0)
+    panels = list(figure.subplots(2, 2).ravel())
+    plot_assembly_sizes(sizes, panels[0], beside=beside, labels=labels)
+    plot_growth(sizes, panels[1], beside=beside, labels=labels)
+    plot_growth(sizes, panels[2], beside=beside, labels=labels, what="shares")
+    if times is None:
+        panels.pop().remove()
+    else:
+        plot_survival(times, panels[3])
+    letter_panels(panels, [ax.get_title(loc="left") for ax in panels])
     return figure
 
 

@@ -372,8 +372,8 @@ def _fit(run: Run) -> list[Section]:
 
 
 def _assembly(run: Run) -> list[Section]:
-    names = ("assembly", "distribution", "class_times", "path")
-    drawn = ("assembly_drawn", "distribution_drawn")
+    names = ("assembly", "distribution", "class_times", "path", "sizes")
+    drawn = ("assembly_drawn", "distribution_drawn", "sizes_drawn")
     found = {name: run.dataset(f"{name}.nc") for name in (*names, *drawn)}
     return assembly_sections(**found)
 

@@ -1,5 +1,9 @@
 """Figures of stored datasets: functions that take axes and return them."""
 
+from driftwalk.plot.assembly_growth import (
+    plot_assembly_sizes as assembly_sizes,
+    plot_growth as growth,
+)
 from driftwalk.plot.class_courses import plot_class_times as class_times, plot_survival as survival
 from driftwalk.plot.components import plot_biplot as biplot
 from driftwalk.plot.distances import plot_ks_map as map, plot_refined_map as refined_map
@@ -32,6 +36,7 @@ from driftwalk.plot.uncertainty import (
 )
 
 __all__ = [
+    "assembly_sizes",
     "biplot",
     "blocks",
     "bootstrap",
@@ -42,6 +47,7 @@ __all__ = [
     "distance_profile",
     "film_strip",
     "flow",
+    "growth",
     "innovations",
     "l1_map",
     "map",

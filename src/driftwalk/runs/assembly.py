@@ -68,11 +68,15 @@ class AssemblyResult:
         Kind "class_times", of the same runs.
     drawn : xarray.Dataset or None
         Kind "outcome_distribution", of runs with drawn parameters.
+    sizes, sizes_drawn : xarray.Dataset or None
+        Kind "assembly_sizes", of the same two sets of runs; beyond 8 blocks only.
     """
 
     distribution: xr.Dataset
     times: xr.Dataset
     drawn: xr.Dataset | None
+    sizes: xr.Dataset | None = None
+    sizes_drawn: xr.Dataset | None = None
 
 
 def run_assembly(
@@ -89,8 +93,9 @@ def run_assembly(
     """Simulate self-assembly in a run directory and return the distributions of outcomes.
 
     Writes ``assembly.nc``, ``distribution.nc``, ``class_times.nc``, ``path.nc``, and with drawn
-    parameters ``assembly_drawn.nc``, ``distribution_drawn.nc``; ``figures/`` and, last,
-    ``manifest.json``. Killed at any moment and started again it continues.
+    parameters ``assembly_drawn.nc``, ``distribution_drawn.nc``; beyond 8 blocks ``sizes.nc`` and
+    ``sizes_drawn.nc``; ``figures/`` and, last, ``manifest.json``. Killed at any moment and started
+    again it continues.
 
     Parameters
     ----------
@@ -174,13 +179,17 @@ def _simulate(
         assemble,
         assemble_drawn,
         assembly_path,
+        assembly_sizes,
         class_times,
         outcome_distribution,
     )
+    from driftwalk.assembly.outcomes.classes import MOST_BLOCKS
     from driftwalk.figures import write_assembly_figures
 
-    confidence = work.study.assembly.confidence
-    drawn = None
+    settings = work.study.assembly
+    confidence = settings.confidence
+    many = settings.blocks > MOST_BLOCKS
+    drawn = sizes = sizes_drawn = None
     assembly = assemble(
         work.study,
         work.flow,
@@ -195,6 +204,9 @@ def _simulate(
     run.write("distribution.nc", netcdf_bytes(distribution))
     times = class_times(assembly, confidence=confidence)
     run.write("class_times.nc", netcdf_bytes(times))
+    if many:
+        sizes = assembly_sizes(assembly, confidence=confidence)
+        run.write("sizes.nc", netcdf_bytes(sizes))
     if work.calibration is not None:
         assembly_drawn = assemble_drawn(
             work.study,
@@ -209,7 +221,9 @@ def _simulate(
         run.write("assembly_drawn.nc", netcdf_bytes(assembly_drawn))
         drawn = outcome_distribution(assembly_drawn, confidence=confidence)
         run.write("distribution_drawn.nc", netcdf_bytes(drawn))
-    settings = work.study.assembly
+        if many:
+            sizes_drawn = assembly_sizes(assembly_drawn, confidence=confidence)
+            run.write("sizes_drawn.nc", netcdf_bytes(sizes_drawn))
     path = assembly_path(
         work.study,
         work.flow,
@@ -227,8 +241,10 @@ def _simulate(
         labels=LABELS if drawn is not None else ("", ""),
         times=times,
         path=path,
+        sizes=sizes,
+        sizes_drawn=sizes_drawn,
     )
-    return AssemblyResult(distribution, times, drawn)
+    return AssemblyResult(distribution, times, drawn, sizes, sizes_drawn)
 
 
 def _write_film(run: RunDirectory, film: str) -> None:

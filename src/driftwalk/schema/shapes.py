@@ -27,6 +27,32 @@ NAMED_SHAPES: Final[dict[str, str]] = {
 """As people draw them. The order is that of all lists."""
 
 
+LONGEST_CLASS: Final = 40
+"""Letters of a class that a line of text has room for: every one of up to 8 blocks has fewer."""
+
+
+def short_class(name: str) -> str:
+    """Return the name of an outcome class; of a long one the sizes of its shapes.
+
+    Parameters
+    ----------
+    name : str
+        Shapes joined by ``+``.
+
+    Examples
+    --------
+    >>> short_class("I3+1")
+    'I3+1'
+    >>> short_class("/".join(["xxxxxxxxx"] * 5) + "+2+1+1+1")
+    'sizes 45+2+3×1'
+    """
+    if len(name) <= LONGEST_CLASS:
+        return name
+    sizes = [NAMED_SHAPES.get(shape, shape).count("x") for shape in name.split("+")]
+    times = {size: sizes.count(size) for size in sizes}
+    return "sizes " + "+".join(f"{n}×{size}" if n > 1 else f"{size}" for size, n in times.items())
+
+
 def cells_of_shape(name: str) -> Cells:
     """Return the cells of a shape from its name or its rows; none when it is neither.
 

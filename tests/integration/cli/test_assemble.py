@@ -29,6 +29,7 @@ from command_line import (
 from redrawn import assert_drawn_alike
 from signals_at_units import after_units
 
+from driftwalk.page import report_page
 from driftwalk.schema.calibration_facts import calibration_facts
 from driftwalk.schema.facts import fitted_value
 
@@ -176,6 +177,53 @@ def test_the_answer_for_people_stands_side_by_side(calibrated: Path, tmp_path: P
     assert row.count("to") == 2
     assert any(line.startswith("l1 distance of the two: ") for line in lines)
     assert "drawn for each run: drag_coefficient, force_std, flow" in lines
+
+
+def test_of_many_blocks_sizes_are_printed_and_stored(calibrated: Path, tmp_path: Path) -> None:
+    """Nearly every run is a class of its own, with a name that is longer than a line."""
+    many = ["--blocks", "16", "--runs", "12", "--duration", "20s", "--threads", "1"]
+    done = here("assemble", calibrated, *many, "-o", tmp_path / "run")
+    assert done.code == 0, done.err
+    lines = done.out.partition("figures")[0].splitlines()
+    assert max(map(len, lines)) <= 100
+    assert [line.split()[0] for line in lines].count("blocks") == 2  # found, and drawn
+    assert "l1 distance" not in done.out
+    for words in ("mean size", "in largest", "free", "compactness: 0.", "complete: "):
+        assert words in done.out
+    long = dataset(tmp_path / "run/distribution.nc")["class"].values.tolist()
+    assert max(map(len, long)) > 20
+    assert not any(name in done.out for name in long if len(name) > 20)
+    for end in ("", "_drawn"):
+        end_of = dataset(tmp_path / f"run/assembly{end}.nc")["assembly"].values
+        largest = [np.bincount(run).max() / 16 for run in end_of]
+        sizes = dataset(tmp_path / f"run/sizes{end}.nc")
+        assert sizes.attrs["kind"] == "assembly_sizes"
+        assert float(sizes["largest_share"][-1]) == pytest.approx(np.mean(largest))
+    again = here("assemble", calibrated, *many, "--json", "-o", tmp_path / "json")
+    printed = json.loads(again.out)
+    for part in (printed, printed["drawn"]):
+        found = part["sizes"]
+        assert sum(row["block_share"] for row in found["at_end"]) == pytest.approx(1.0)
+        assert [row["to_blocks"] for row in found["at_end"]] == [*range(1, 9), 16]
+        over = found["over_time"]
+        assert (over["time_s"][-1], over["mean_size_blocks"][0]) == (20.0, 1.0)
+        assert over["free_share_interval"][0] == [1.0, 1.0]
+    page = report_page(tmp_path / "run")
+    kinds = {part["id"]: part["kind"] for part in page["sections"]}
+    assert "empty" not in kinds.values()
+    assert [kinds[id] for id in ("sizes", "mean-size", "size-shares")] == ["lines"] * 3
+    assert not {"classes", "class-times"} & set(kinds)
+
+
+@pytest.mark.slow
+def test_the_figures_of_many_blocks_are_of_sizes(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    many = ["--blocks", "10", "--runs", "4", "--duration", "5s", "--threads", "1"]
+    done = apart("assemble", "--flow", FLOW, *many, "--film", "none", "-o", folder)
+    assert done.code == 0, done.err
+    figures = {path.stem for path in (folder / "figures").iterdir()}
+    assert figures == {"assembly_sizes", "film_strip"}
+    assert_drawn_alike(folder, tmp_path / "again")
 
 
 @pytest.mark.slow

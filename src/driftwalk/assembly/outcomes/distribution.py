@@ -83,7 +83,7 @@ def outcome_distribution(
     """
     import xarray as xr
 
-    _check_confidence(confidence)
+    check_confidence(confidence)
     if isinstance(assembly_or_counts, xr.Dataset):
         require_assembly(assembly_or_counts, "outcome")
         names = class_names(assembly_or_counts)
@@ -180,7 +180,7 @@ def proportion_interval(
     """
     from scipy.special import betaincinv
 
-    _check_confidence(confidence)
+    check_confidence(confidence)
     k, n = np.broadcast_arrays(np.asarray(count, np.float64), np.asarray(runs, np.float64))
     if not ((k >= 0) & (k <= n)).all():
         raise InputError("a proportion needs 0 <= count <= runs")
@@ -271,7 +271,8 @@ def check_times(time: Floats, longest: float) -> None:
         raise InputError(f"time: {wrong[0]:g} s lies outside the runs, which last {longest:g} s")
 
 
-def _check_confidence(confidence: float) -> None:
+def check_confidence(confidence: float) -> None:
+    """Raise `InputError` unless the confidence lies between 0 and 1."""
     if not 0 < confidence < 1:
         raise InputError(f"confidence must lie between 0 and 1, got {confidence}")
 

@@ -108,7 +108,7 @@ def class_times(
         *("outcome", "event_time", "event_class", "end_time"),
         *(f"{event}_time" for event in EVENTS),
     )
-    time = _checked_times(times, duration(assembly))
+    time = checked_times(times, duration(assembly))
     names = class_names(assembly)
     sound = assembly["outcome"].values >= 0
     runs = int(sound.sum())
@@ -293,7 +293,8 @@ def class_counts(
     return count.astype(np.int64)
 
 
-def _checked_times(times: npt.ArrayLike | None, longest: float) -> Floats:
+def checked_times(times: npt.ArrayLike | None, longest: float) -> Floats:
+    """Return the times of a course, 201 where none are given; refuse those outside the runs."""
     if times is None:
         return np.linspace(0.0, longest, TIMES)
     time = np.asarray(times, dtype=np.float64)

@@ -11,6 +11,7 @@ import numpy as np
 from driftwalk.cli.terminal.answer import print_figures
 from driftwalk.cli.terminal.output import print_table
 from driftwalk.core.errors import InputError
+from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -166,7 +167,7 @@ def print_answer(study: Study, result: SensitivityResult, folder: Path) -> None:
 def _print_reference(reference: xr.Dataset) -> None:
     seen = reference.isel({"class": reference["count"].values > 0})
     rows = [
-        [str(name), f"{share:.4f}", f"{spread:.4f}"]
+        [short_class(str(name)), f"{share:.4f}", f"{spread:.4f}"]
         for name, share, spread in zip(
             seen["class"].values,
             seen["proportion"].values,

@@ -159,6 +159,8 @@ def _assembly(run: _Stored, folder: Path, formats: Sequence[str]) -> list[Path]:
         labels=LABELS if drawn is not None else ("", ""),
         times=run.find("class_times.nc"),
         path=run.find("path.nc"),
+        sizes=run.find("sizes.nc"),
+        sizes_drawn=run.find("sizes_drawn.nc"),
         formats=formats,
     )
 

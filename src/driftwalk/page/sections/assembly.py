@@ -18,10 +18,12 @@ from driftwalk.page.parts import (
     section,
     value_of,
 )
+from driftwalk.page.sections.assembly_sizes import size_numbers, size_sections
 from driftwalk.page.sections.classes import class_times_section, classes_section
 from driftwalk.page.sections.replay import replay_section
 from driftwalk.page.words import count, percent, quantity
 from driftwalk.plot.parts.assembly_labels import class_names
+from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,6 +43,8 @@ def assembly_sections(
     assembly: xr.Dataset | None = None,
     assembly_drawn: xr.Dataset | None = None,
     path: xr.Dataset | None = None,
+    sizes: xr.Dataset | None = None,
+    sizes_drawn: xr.Dataset | None = None,
 ) -> list[Section]:
     """Return the sections of a page on self-assembly.
 
@@ -54,6 +58,8 @@ def assembly_sections(
         The `assembly` of every run.
     path : xarray.Dataset, optional
         An `assembly_path` of sample runs.
+    sizes, sizes_drawn : xarray.Dataset, optional
+        The `assembly_sizes` of both. They take the place of the classes.
 
     Returns
     -------
@@ -73,14 +79,21 @@ def assembly_sections(
         if len(found) == 1:
             found = {"runs": distribution}
         made = head_sections(
-            lambda: assembly_summary(distribution, distribution_drawn, class_times, assembly),
+            lambda: assembly_summary(
+                distribution, distribution_drawn, class_times, assembly, sizes
+            ),
             lambda: _left_out(found),
         )
-        made += attempt("classes", "Structures built", lambda: classes_section(found))
+        if sizes is None:
+            made += attempt("classes", "Structures built", lambda: classes_section(found))
+    if sizes is not None:
+        grown = {"runs": sizes} if sizes_drawn is None else {FOUND: sizes, DRAWN: sizes_drawn}
+        made += size_sections(grown)
     if class_times is not None:
-        made += attempt(
-            "class-times", "Outcome classes over time", lambda: class_times_section(class_times)
-        )
+        if sizes is None:
+            made += attempt(
+                "class-times", "Outcome classes over time", lambda: class_times_section(class_times)
+            )
         made += attempt(
             "survival", "Time to contact and completion", lambda: survival_section(class_times)
         )
@@ -96,6 +109,7 @@ def assembly_summary(
     drawn: xr.Dataset | None = None,
     times: xr.Dataset | None = None,
     assembly: xr.Dataset | None = None,
+    sizes: xr.Dataset | None = None,
 ) -> Section:
     """Return the outcomes of self-assembly in words and numbers."""
     require(distribution, "class", "proportion")
@@ -113,11 +127,13 @@ def assembly_summary(
         if name in facts
     ]
     done += f" ({', '.join(rules)})" if rules else ""
-    paragraphs = [f"{done}.", _most_common(distribution)]
+    paragraphs = [f"{done}.", _most_common(distribution, named=sizes is None)]
     shown = [_complete(distribution, "complete: one assembly")]
     if drawn is not None:
-        paragraphs.append(_beside(distribution, drawn))
+        paragraphs.append(_beside(distribution, drawn, classes=sizes is None))
         shown.append(_complete(drawn, "complete, parameters drawn"))
+    if sizes is not None:
+        shown += size_numbers(sizes)
     paragraphs.append("These predictions use latching rules that no recording has settled.")
     if times is not None:
         shown += [_median(times, name) for name in SURVIVAL]
@@ -169,15 +185,20 @@ def _parameters(distribution: xr.Dataset, assembly: xr.Dataset | None) -> str:
     return values + redrawn
 
 
-def _beside(distribution: xr.Dataset, drawn: xr.Dataset) -> str:
+def _beside(distribution: xr.Dataset, drawn: xr.Dataset, *, classes: bool) -> str:
     """Return how far the runs with drawn parameters are from the others."""
     require(drawn, "class", "proportion")
     words = [_drawn_word(name) for name in str(drawn.attrs.get("drawn", "")).split()]
     what = " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+    said = (
+        f"In a second set each run has its own {what or 'parameters'}, drawn from the "
+        "uncertainty of the calibration."
+    )
+    if not classes:
+        return said
     apart, chance = l1_and_chance(distribution, drawn)
     return (
-        f"In a second set each run has its own {what or 'parameters'}, drawn from the "
-        "uncertainty of the calibration. The l1 distance of the two sets is "
+        f"{said} The l1 distance of the two sets is "
         f"{apart:.3g} (0: identical, 2: nothing in common); by chance alone it would "
         f"be {chance:.2g} on average."
     )
@@ -201,8 +222,8 @@ def l1_and_chance(first: xr.Dataset, second: xr.Dataset) -> tuple[float, float]:
     return float(np.abs(one - other).sum()), float(np.sqrt(2.0 / np.pi) * spread.sum())
 
 
-def _most_common(distribution: xr.Dataset) -> str:
-    names = [str(name) for name in distribution["class"].values]
+def _most_common(distribution: xr.Dataset, *, named: bool) -> str:
+    names = [short_class(str(name)) for name in distribution["class"].values]
     share = distribution["proportion"].values
     first = np.argsort(-share, kind="stable")[:3]
     listed = ", ".join(f"{names[i]} in {percent(float(share[i]))}" for i in first if share[i] > 0)
@@ -213,7 +234,8 @@ def _most_common(distribution: xr.Dataset) -> str:
     band = ""
     if ends[0] is not None and ends[1] is not None:
         band = f" ({percent(ends[0])} to {percent(ends[1])})"
-    return f"{percent(complete)}{band} of the runs end as one assembly. Most common: {listed}."
+    done = f"{percent(complete)}{band} of the runs end as one assembly."
+    return f"{done} Most common: {listed}." if named else done
 
 
 def _complete(distribution: xr.Dataset, words: str) -> dict[str, Any]:

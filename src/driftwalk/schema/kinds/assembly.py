@@ -256,6 +256,56 @@ CLASS_TIMES: Final = Kind(
 )
 
 
+_ONE_RUN: Final = "NaN of a single run"
+
+
+def _mean(name: str, dim: str, unit: str, words: str, note: str = "") -> tuple[Variable, ...]:
+    return (
+        Variable(name, dim, unit, f"{words}, mean over runs", note=note),
+        Variable(f"{name}_low", dim, unit, f"lower limit, {words}", note=_ONE_RUN),
+        Variable(f"{name}_high", dim, unit, f"upper limit, {words}", note=_ONE_RUN),
+    )
+
+
+ASSEMBLY_SIZES: Final = Kind(
+    name="assembly_sizes",
+    version=1,
+    dimensions={
+        "size": "sizes: each up to 8 alone, beyond that groups that double",
+        "time": "from the start of the runs",
+    },
+    variables=(
+        *_mean("number", "size", "1", "assemblies of this size per run", note="at the end"),
+        *_mean(
+            "block_share", "size", "1", "share of the blocks in assemblies of this size",
+            note="at the end",
+        ),
+        *_mean("mean_size", "time", "1", "blocks over assemblies"),
+        *_mean("largest_share", "time", "1", "share of the blocks in the largest assembly"),
+        *_mean("free_share", "time", "1", "share of the blocks that are alone"),
+        Variable("size", "size", None, "smallest size of the group, in blocks", "int"),
+        Variable("size_to", "size", None, "largest size of the group, in blocks", "int"),
+        Variable("time", "time", "s", "time from the start of the run"),
+    ),
+    attributes=(
+        Attribute("runs", "number", "runs with an outcome"),
+        Attribute("left_out", "number", "runs without an outcome"),
+        Attribute("confidence", "number", "with which an interval holds, each on its own"),
+        Attribute("method", "text", "of the intervals"),
+        Attribute(
+            "compactness", "number",
+            "least perimeter over that of the assembly, of assemblies of four blocks and more, "
+            "weighted by blocks; mean over runs, NaN where there are none",
+        ),
+        Attribute("compactness_low", "number", "lower end of its interval"),
+        Attribute("compactness_high", "number", "upper end of its interval"),
+        Attribute("compactness_runs", "number", "runs with an assembly of four blocks or more"),
+        Attribute("drawn", "text", "as of the runs", _OF_RUNS),
+        *_SETTINGS_OF_RUNS,
+    ),
+)  # fmt: skip
+
+
 def _joins(name: str, of: str, *, faces: str) -> tuple[Variable, ...]:
     """Return what is known of the joinings, or of what came apart."""
     return (
@@ -335,4 +385,6 @@ CLASSIFICATION: Final = Kind(
     ),
 )  # fmt: skip
 
-KINDS: Final = (ASSEMBLY, ASSEMBLY_PATH, OUTCOME_DISTRIBUTION, CLASS_TIMES, CLASSIFICATION)
+KINDS: Final = (
+    ASSEMBLY, ASSEMBLY_PATH, OUTCOME_DISTRIBUTION, CLASS_TIMES, ASSEMBLY_SIZES, CLASSIFICATION
+)  # fmt: skip

@@ -1,0 +1,232 @@
+"""How large do the assemblies become? Their sizes, means over time, and how compact they are.
+
+Of many blocks nearly every run ends in a class of its own. Sizes are what runs have in common.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.assembly.lattice.polyomino import shape_size
+from driftwalk.assembly.outcomes.classes import MOST_BLOCKS
+from driftwalk.assembly.outcomes.distribution import (
+    NOT_COPIED,
+    Integers,
+    check_confidence,
+    duration,
+    require_assembly,
+)
+from driftwalk.assembly.outcomes.survival import checked_times
+from driftwalk.core.errors import InputError
+from driftwalk.schema.check import build_dataset
+from driftwalk.schema.shapes import cells_of_shape
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Floats = npt.NDArray[np.float64]
+
+METHOD: Final = "Student's t over runs, each interval on its own"
+SMALLEST_SHAPED: Final = 4
+"""Up to three blocks, all shapes are equally compact."""
+
+
+def assembly_sizes(
+    assembly: xr.Dataset,
+    *,
+    times: npt.ArrayLike | None = None,
+    confidence: float = 0.9,
+) -> xr.Dataset:
+    """Return the sizes of the assemblies at the end of the runs, and how they grow.
+
+    Parameters
+    ----------
+    assembly : xarray.Dataset
+        An `assembly` dataset. Runs without an outcome (-1) are left out and counted.
+    times : array_like, shape (time,), optional
+        Times from the start of the runs [s], increasing, within their duration; default: 201 from 0
+        to the duration.
+    confidence : float
+        Probability with which an interval holds, each on its own, in (0, 1).
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind "assembly_sizes". By ``size``, at the end: ``number`` of assemblies per run, and
+        ``block_share``, the share of the blocks that are in them. Each size up to 8 stands alone,
+        beyond that come groups that double, from ``size`` to ``size_to`` blocks. Over ``time``:
+        ``mean_size`` (blocks over assemblies), ``largest_share`` (share of the blocks that are in
+        the largest assembly) and ``free_share`` (that of the blocks that are alone). ``attrs``:
+        those of the assembly, ``runs``, ``left_out``, ``confidence``, ``method``, ``compactness``
+        at the end, and ``compactness_runs``, the runs that have one. All are means over runs, with
+        ``_low`` and ``_high``.
+
+    Raises
+    ------
+    InputError
+        When it is no `assembly` dataset, has no run with an outcome, or an option is out of range.
+
+    Notes
+    -----
+    Runs are independent: an interval is the mean over runs ± Student's t times its standard error,
+    cut at what is possible. It is NaN of a single run, and has no width where all runs agree.
+
+    An assembly of n blocks has the perimeter P: 4 n less 2 for every two of them side by side,
+    holes counted. The least that n squares can have is 2 ceil(2 sqrt(n)) (Harary and Harborth,
+    Extremal animals, J. Combin. Inform. System Sci. 1, 1, 1976). Compactness is their ratio::
+
+        C = 2 ceil(2 sqrt(n)) / P
+
+    It is 1 of the most compact polyominoes; a row has the least, near 2 / sqrt(n). That of a run is
+    the mean over its assemblies of at least four blocks, weighted by their blocks: up to three
+    blocks, all shapes have C = 1. A run without such an assembly has none.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> two_blocks = xr.Dataset(
+    ...     {
+    ...         "event_time": (("run", "event"), [[20.0], [np.nan]]),
+    ...         "event_shape": (("run", "event", "part"), [[[0, 0, 1]], [[-1, -1, -1]]]),
+    ...         "outcome": ("run", [0, 1]),
+    ...     },
+    ...     coords={"class": ["2", "1+1"], "shape": ["1", "2"]},
+    ...     attrs={"kind": "assembly", "blocks": 2, "duration_s": 60.0},
+    ... )
+    >>> found = assembly_sizes(two_blocks, times=[10.0, 60.0])
+    >>> found["number"].values.tolist(), found["mean_size"].values.tolist()
+    ([1.0, 0.5], [1.0, 1.5])
+    """
+    require_assembly(assembly, "outcome", "event_time", "event_shape", "shape")
+    check_confidence(confidence)
+    time = checked_times(times, duration(assembly))
+    sound = assembly["outcome"].values >= 0
+    runs = int(sound.sum())
+    if runs == 0:
+        raise InputError("there is no run with an outcome: sizes need at least one")
+    blocks = int(assembly.attrs["blocks"])
+    shapes = [str(name) for name in assembly["shape"].values]
+    size = np.array([shape_size(name) for name in shapes], dtype=np.int64)
+    event_shape = assembly["event_shape"].values[sound].astype(np.int64)
+    number = _numbers_at_end(event_shape, size, blocks)
+    first, last = _groups(blocks)
+    grouped = np.add.reduceat(number, first - 1, axis=1)
+    share = np.add.reduceat(number * np.arange(1, blocks + 1), first - 1, axis=1) / blocks
+    courses = _courses(assembly["event_time"].values[sound], size[event_shape], time, blocks)
+    data: dict[str, Any] = {}
+    for name, dim, values, possible in (
+        ("number", "size", grouped, (0.0, blocks / first)),
+        ("block_share", "size", share, (0.0, 1.0)),
+        ("mean_size", "time", courses[0], (1.0, blocks)),
+        ("largest_share", "time", courses[1], (1.0 / blocks, 1.0)),
+        ("free_share", "time", courses[2], (0.0, 1.0)),
+    ):
+        mean, low, high = _over_runs(values, confidence, possible)
+        data |= {name: (dim, mean), f"{name}_low": (dim, low), f"{name}_high": (dim, high)}
+    compact = _compactness_of_runs(event_shape, shapes, size)
+    ends = _over_runs(compact[:, np.newaxis], confidence, (0.0, 1.0))
+    names = ("compactness", "compactness_low", "compactness_high")
+    attrs = {name: float(end[0]) for name, end in zip(names, ends, strict=True)}
+    return build_dataset(
+        "assembly_sizes",
+        data,
+        {"size": ("size", first), "size_to": ("size", last), "time": ("time", time)},
+        {
+            **{key: value for key, value in assembly.attrs.items() if key not in NOT_COPIED},
+            **attrs,
+            "compactness_runs": compact.size,
+            "runs": runs,
+            "left_out": int((~sound).sum()),
+            "confidence": confidence,
+            "method": METHOD,
+        },
+    )
+
+
+def compactness(shape: str) -> float:
+    """Return the least perimeter of so many squares over the perimeter of a shape.
+
+    Examples
+    --------
+    >>> compactness("O"), compactness("I")
+    (1.0, 0.8)
+    """
+    cells = set(cells_of_shape(shape))
+    beside = sum((x + 1, y) in cells for x, y in cells) + sum((x, y + 1) in cells for x, y in cells)
+    # ceil(2 sqrt(n)), in whole numbers.
+    least = 2 * (math.isqrt(4 * len(cells) - 1) + 1)
+    return least / (4 * len(cells) - 2 * beside)
+
+
+def _numbers_at_end(event_shape: Integers, size: Integers, blocks: int) -> Integers:
+    """Return how many assemblies of each size a run ends with, shape (run, size - 1)."""
+    number = np.zeros((event_shape.shape[0], blocks), dtype=np.int64)
+    number[:, 0] = blocks
+    run, _ = real = np.nonzero(event_shape[..., 2] >= 0)
+    for part, change in ((0, -1), (1, -1), (2, 1)):
+        np.add.at(number, (run, size[event_shape[real][:, part]] - 1), change)
+    return number
+
+
+def _groups(blocks: int) -> tuple[Integers, Integers]:
+    """Return the first and the last size of each group: 1, 2, ..., 8, 9 to 16, 17 to 32, ..."""
+    first = list(range(1, min(blocks, MOST_BLOCKS) + 1))
+    reached = MOST_BLOCKS
+    while reached < blocks:
+        first.append(reached + 1)
+        reached *= 2
+    return np.array(first), np.array([*(start - 1 for start in first[1:]), blocks])
+
+
+def _courses(
+    event_time: Floats, event_size: Integers, time: Floats, blocks: int
+) -> tuple[Floats, Floats, Floats]:
+    """Return mean size, share of the largest, share of free blocks, each of shape (run, time)."""
+    real = np.isfinite(event_time)
+    joined = real.cumsum(axis=1)
+    freed = ((event_size[..., :2] == 1).sum(axis=2) * real).cumsum(axis=1)
+    largest = np.maximum.accumulate(np.where(real, event_size[..., 2], 1), axis=1)
+    # What stands after so many events, none among them.
+    start = np.zeros((event_time.shape[0], 1), dtype=np.int64)
+    joined, freed, largest = (
+        np.concatenate([before, after], axis=1)
+        for before, after in ((start, joined), (start, freed), (start + 1, largest))
+    )
+    ordered = np.where(real, event_time, np.inf)
+    happened = np.array([np.searchsorted(row, time, side="right") for row in ordered])
+    joined, freed, largest = (
+        np.take_along_axis(one, happened, axis=1) for one in (joined, freed, largest)
+    )
+    return blocks / (blocks - joined), largest / blocks, 1.0 - freed / blocks
+
+
+def _compactness_of_runs(event_shape: Integers, shapes: list[str], size: Integers) -> Floats:
+    """Return the compactness of each run that has one."""
+    shaped = np.where(size >= SMALLEST_SHAPED, size, 0)
+    weighted = shaped * np.array([compactness(name) for name in shapes])
+    real = event_shape[..., 2] >= 0
+    total, blocks = (
+        ((one[event_shape] * (-1, -1, 1)).sum(axis=2) * real).sum(axis=1)
+        for one in (weighted, shaped)
+    )
+    return np.asarray(total[blocks > 0] / blocks[blocks > 0], dtype=np.float64)
+
+
+def _over_runs(
+    values: npt.NDArray[Any], confidence: float, possible: tuple[float, float | Floats]
+) -> tuple[Floats, Floats, Floats]:
+    """Return the mean over runs (the first axis) and its interval, NaN where it has none."""
+    from scipy.special import stdtrit
+
+    runs = values.shape[0]
+    unknown = np.full(values.shape[1:], np.nan)
+    mean = values.mean(axis=0) if runs else unknown
+    if runs < 2:
+        return mean, unknown, unknown
+    reach = stdtrit(runs - 1, (1 + confidence) / 2) * values.std(axis=0, ddof=1) / math.sqrt(runs)
+    least, most = possible
+    return mean, np.maximum(mean - reach, least), np.minimum(mean + reach, most)
