@@ -108,7 +108,7 @@ def _squares(text: str) -> tuple[int, int]:
 
 
 def _read(path: Path) -> Any:
-    from driftwalk.core.opencv import read_image
+    from driftwalk.core.extras import read_image
 
     if not path.is_file():
         raise FormatError("no such image", path=path)

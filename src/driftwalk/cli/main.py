@@ -19,7 +19,7 @@ from typer.core import TyperGroup
 from typer.main import get_command as to_click_command
 
 from driftwalk.cli.terminal.errors import PastTyper, exit_code_of
-from driftwalk.core.unneeded import hide_dask
+from driftwalk.core.extras import hide_dask
 
 
 class Command(NamedTuple):

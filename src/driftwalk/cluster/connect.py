@@ -14,8 +14,8 @@ from driftwalk.cluster.jobs import begin_jobs
 from driftwalk.cluster.probe import SameBits
 from driftwalk.cluster.versions import refuse_other_workers
 from driftwalk.core.errors import ClusterError, InputError, reason_of
+from driftwalk.core.extras import show_dask
 from driftwalk.core.run_stages import tell_nobody
-from driftwalk.core.unneeded import show_dask
 from driftwalk.sweep import WorkerExecutor
 
 ANSWER_S: Final = 10.0

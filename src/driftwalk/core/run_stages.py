@@ -41,7 +41,7 @@ CALIBRATION_STAGES: Final[dict[str, Stage]] = {
 
 
 WHOLE: Final = 1000
-"""The work of a `Course`: it is told in thousandths."""
+"""A `Course` counts in thousandths of the work."""
 USUAL_SHARE: Final = 0.75
 """A search of unknown length goes evenly up to this share of the usual one."""
 MORE: Final = "more-"

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.opencv import require_opencv
+from driftwalk.core.extras import require_opencv
 from driftwalk.core.streams import VideoStream
 from driftwalk.datasets.synthetic_video_bars import Bars, marker_points, place_bars
 from driftwalk.datasets.synthetic_video_camera import image_to_world, local_scale, world_to_image

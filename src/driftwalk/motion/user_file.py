@@ -14,7 +14,7 @@ from types import ModuleType
 
 from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import ConfigurationError, DriftwalkError
-from driftwalk.core.unneeded import show_dask
+from driftwalk.core.extras import show_dask
 
 
 @dataclass(frozen=True)

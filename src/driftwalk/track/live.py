@@ -21,8 +21,8 @@ from types import TracebackType
 from typing import Any, Final, NamedTuple, Self
 
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.extras import require_opencv
 from driftwalk.core.json_text import json_value, parse_json
-from driftwalk.core.opencv import require_opencv
 from driftwalk.track.types import Image
 
 LOOPBACK: Final = "127.0.0.1"

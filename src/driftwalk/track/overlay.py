@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.opencv import require_opencv
+from driftwalk.core.extras import require_opencv
 from driftwalk.track.follow.tracker import TrackState
 from driftwalk.track.types import Image, PixelToWorld
 

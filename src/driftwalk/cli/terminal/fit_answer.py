@@ -154,7 +154,7 @@ def print_found(fit: xr.Dataset, *, wall: bool = False) -> None:
 
 
 def print_verdict(fit: xr.Dataset, check: xr.Dataset | None) -> None:
-    """Print what was found beside the estimates: compared laws, the wall, and the check."""
+    """Print what was found after the estimates: compared laws, the wall, and the check."""
     _print_laws(fit)
     _print_wall(fit_facts(fit))
     _print_verdict(check, fit)

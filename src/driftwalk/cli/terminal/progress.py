@@ -79,7 +79,7 @@ class ProgressReporter:
     def left_s(self) -> float | None:
         """The time left [s], from the work done so far; None while too little is done to say.
 
-        What was done before, by a run that was killed, does not count: it took no time now.
+        Work of an earlier run that was killed does not count: it took no time now.
         """
         return None if self._ends is None else max(self._ends - self._clock(), 0.0)
 
@@ -132,7 +132,7 @@ class ProgressReporter:
         reporter = self
 
         class Left(ProgressColumn):
-            """The time left; it runs down between what is told."""
+            """The time left, which runs down between two calls."""
 
             def render(self, _task: Task) -> Text:
                 return Text(reporter.left)

@@ -130,7 +130,7 @@ def _write_by_opencv(path: Path, frames: Iterator[Frame]) -> None:
 
 
 def _opencv_writer(path: Path, columns: int, rows: int) -> Any:
-    from driftwalk.core.opencv import require_opencv
+    from driftwalk.core.extras import require_opencv
 
     cv2 = require_opencv("an MP4")
     for codec in CODECS:

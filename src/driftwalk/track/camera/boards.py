@@ -8,7 +8,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.opencv import require_opencv
+from driftwalk.core.extras import require_opencv
 from driftwalk.track.detect.tags import dictionary_of
 from driftwalk.track.types import Array, Image
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.opencv import require_opencv
+from driftwalk.core.extras import require_opencv
 from driftwalk.track.camera.boards import Board
 from driftwalk.track.camera.model import Camera, Lens
 from driftwalk.track.types import Array, Image

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.opencv import require_opencv
+from driftwalk.core.extras import require_opencv
 from driftwalk.track.types import Array, Detection, Image, PixelToWorld, Rejected
 
 Polarity = Literal["dark", "bright", "both"]

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from driftwalk.core.opencv import require_opencv
+from driftwalk.core.extras import require_opencv
 from driftwalk.track.types import Detection, Image, PixelToWorld, Rejected
 
 _ACCEPTED: Final = (80, 220, 80)

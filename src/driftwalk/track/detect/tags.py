@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.opencv import require_opencv
+from driftwalk.core.extras import require_opencv
 from driftwalk.track.types import Array, Detection, Image, PixelToWorld, Rejected
 
 _CORNER_STD_PX: Final = 0.15

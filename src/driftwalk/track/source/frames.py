@@ -18,7 +18,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.opencv import read_image, require_opencv
+from driftwalk.core.extras import read_image, require_opencv
 from driftwalk.track.source.gaps import FrameGaps
 from driftwalk.track.types import Frame, Image
 

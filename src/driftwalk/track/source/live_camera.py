@@ -9,7 +9,7 @@ from typing import Any, Final
 from urllib.parse import urlsplit, urlunsplit
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.opencv import require_opencv
+from driftwalk.core.extras import require_opencv
 from driftwalk.track.source.frames import FrameCounts, FrameFilter, open_capture
 from driftwalk.track.types import Frame
 

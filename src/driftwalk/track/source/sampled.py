@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.opencv import require_opencv
+from driftwalk.core.extras import require_opencv
 from driftwalk.track.source.frames import images_in, open_capture
 from driftwalk.track.source.open import open_source
 from driftwalk.track.types import Image

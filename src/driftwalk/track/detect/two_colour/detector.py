@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from driftwalk.core.opencv import require_opencv
+from driftwalk.core.extras import require_opencv
 from driftwalk.track.detect.chroma import ChromaTables
 from driftwalk.track.detect.markers import TwoColourMarker
 from driftwalk.track.detect.two_colour.discs import Disc, find_regions, join_pieces, sort_out

@@ -1,4 +1,4 @@
-"""OpenCV, when something needs it: an extra, so its absence is said in one line."""
+"""Packages of the extras, when something needs them: OpenCV, and Dask, which xarray would load."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from driftwalk.core.errors import FormatError, InputError
 
 _STDERR: Final = 2
+_DASK: Final = "dask"
 
 
 def require_opencv(purpose: str = "tracking") -> Any:
@@ -76,3 +77,21 @@ def _without_stderr() -> Iterator[None]:
         os.dup2(kept, _STDERR)
         os.close(kept)
         os.close(nowhere)
+
+
+def hide_dask() -> None:
+    """Let Dask seem not to be installed, until `show_dask` is called.
+
+    Where it is installed xarray loads its arrays, and with them scipy: half a second. Driftwalk has
+    no such arrays; it needs Dask for workers elsewhere alone. This is for a process that is
+    driftwalk's own, for a notebook may have some. Does nothing where Dask is loaded already.
+    """
+    if _DASK not in sys.modules:
+        # Python takes None for a module that is not there; the types of `sys` do not know it.
+        cast("dict[str, object]", sys.modules)[_DASK] = None
+
+
+def show_dask() -> None:
+    """Let Dask be imported again, by workers or by a user's own code."""
+    if _DASK in sys.modules and cast("dict[str, object]", sys.modules)[_DASK] is None:
+        del sys.modules[_DASK]
