@@ -103,6 +103,32 @@ inline void load_cells(const std::int16_t* table, const Int32* at, IntPack<N>* o
 }
 #endif
 
+// The record of a cell between two frames, node by node in the table's own numbers: integers are
+// rounded to the nearest, halves away from zero.
+template <class T, class Node>
+inline void blend_cell(const Node* before, const Node* after, T weight, Node* out) {
+  constexpr T half = std::is_integral_v<Node> ? T(0.5) : T(0);
+  for (int k = 0; k < 2 * flow_record; ++k) {
+    const T low = static_cast<T>(before[k]);
+    const T blended = low + (static_cast<T>(after[k]) - low) * weight;
+    out[k] = static_cast<Node>(blended + copy_sign(half, blended));
+  }
+}
+
+// The same as load_cells where each lane has its own two frames.
+template <int N>
+inline void load_cells(const LaneTables<float>& lanes, const Int32* at, IntPack<N>* out) {
+  alignas(16) std::int16_t cells[2 * flow_record * N];
+  Int32 number[N];
+  for (int lane = 0; lane < N; ++lane) {
+    const std::int64_t place = flow_record * std::int64_t(at[lane]);
+    blend_cell(lanes.before[lane] + place, lanes.after[lane] + place, lanes.weight[lane],
+               cells + 2 * flow_record * lane);
+    number[lane] = 2 * lane;
+  }
+  load_cells(cells, number, out);
+}
+
 // Keeps the compiler from extracting numbers lane by lane that it has just seen stored: slower.
 template <int Count>
 inline void keep_stored([[maybe_unused]] Int32 (&numbers)[Count]) {
@@ -181,9 +207,11 @@ struct FlowWeights {
     along_x = add_halves(along_x, step_x);
     along_y = add_halves(along_y, step_y);
   }
-  void weigh(const std::int16_t* table, const Int32* at, Real& u, Real& v) const {
+  // `tables` is one for all lanes or a LaneTables.
+  template <class Tables>
+  void weigh(const Tables& tables, const Int32* at, Real& u, Real& v) const {
     Int cell[4];
-    load_cells(table, at, cell);
+    load_cells(tables, at, cell);
     const Int vertical = halve_halves(along_y);
     const Int right = multiply_high_halves(vertical, along_x);
     const Int left = subtract_halves(vertical, right);
@@ -195,8 +223,14 @@ struct FlowWeights {
 inline void look_up(const FlowView<double>& flow, double x, double y, double& u, double& v) {
   const Int32 column = truncate(x), row = truncate(y);
   const double fx = x - column, fy = y - row;
-  const double* record =
-      flow.table + flow_record * ((std::int64_t(row) << flow.stride_bits) + column);
+  const std::int64_t place = flow_record * ((std::int64_t(row) << flow.stride_bits) + column);
+  double cell[2 * flow_record];
+  const double* record = flow.table + place;
+  if (flow.lanes != nullptr) {
+    blend_cell(flow.lanes->before[0] + place, flow.lanes->after[0] + place, flow.lanes->weight[0],
+               cell);
+    record = cell;
+  }
   const double* next = record + flow_record;
   u = (record[0] * (1 - fx) + next[0] * fx) * (1 - fy) + (record[1] * (1 - fx) + next[1] * fx) * fy;
   v = (record[2] * (1 - fx) + next[2] * fx) * (1 - fy) + (record[3] * (1 - fx) + next[3] * fx) * fy;
@@ -219,7 +253,11 @@ public:
     alignas(64) Int32 at[N];
     store_cells(row_.cell(flow_.stride_bits), at);
     keep_stored(at);
-    weights_.weigh(flow_.table, at, u, v);
+    if (flow_.lanes == nullptr) {
+      weights_.weigh(flow_.table, at, u, v);
+    } else {
+      weights_.weigh(*flow_.lanes, at, u, v);
+    }
   }
   void advance() {
     row_.advance();
@@ -246,6 +284,19 @@ private:
   FlowRow<double> row_;
 };
 
+// Reads the cells that have been found along rows.
+template <int N, class Tables>
+inline void weigh_rows(const Tables& tables, const FlowRow<FloatPack<N>>* rows, int row_count,
+                       int count, const Int32* found, FloatPack<N>* u, FloatPack<N>* v) {
+  for (int r = 0; r < row_count; ++r) {
+    FlowWeights<N> weights(rows[r]);
+    for (int k = 0; k < count; ++k, found += N) {
+      weights.weigh(tables, found, *u++, *v++);
+      weights.advance();
+    }
+  }
+}
+
 // The flow along `rows` rows of `count` places, row after row, in units of the table.
 //
 // Each pass does one thing for all places. Together they would need more registers than there are,
@@ -265,14 +316,11 @@ template <int N>
     }
   }
   keep_stored(at);
-  const std::int16_t* const table = flow.table;
-  const Int32* found = at;
-  for (int r = 0; r < row_count; ++r) {
-    FlowWeights<N> weights(rows[r]);
-    for (int k = 0; k < count; ++k, found += N) {
-      weights.weigh(table, found, *u++, *v++);
-      weights.advance();
-    }
+  if (flow.lanes == nullptr) {
+    const std::int16_t* const table = flow.table;
+    weigh_rows<N>(table, rows, row_count, count, at, u, v);
+  } else {
+    weigh_rows<N>(*flow.lanes, rows, row_count, count, at, u, v);
   }
 }
 
