@@ -52,6 +52,7 @@ from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.protocol import ScoresItself
 from driftwalk.motion.score import broken_worlds
 from driftwalk.schema import Track, body_track
+from driftwalk.simulation.series import series_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -187,6 +188,8 @@ def calibrate(
     of_time = None if steadiness is None else steadiness.warning
     of_flow = own_flow_warning(searched, result.quality) if flow is None else None
     result.warnings += [text for text in (of_flow, of_wall, of_time) if text is not None]
+    duration = float(problem.like.sample_time[-1])
+    result.warnings += series_warnings(problem.like.flow, duration=duration)
 
     def finish(halves: Halves | None) -> xr.Dataset:
         return _finish(result, halves, steadiness, recording, problem)

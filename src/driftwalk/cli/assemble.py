@@ -20,6 +20,7 @@ from driftwalk.cli.terminal.answer import print_figures, print_warnings
 from driftwalk.cli.terminal.output import print_json, print_table
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS
+from driftwalk.schema.flow_series import flow_series_words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,7 +76,8 @@ def assemble(
     work = AssemblyWork(source.study, source.flow, source.region, source.inputs, threads)
     with Workers(cluster, cluster_options).reported("assemble") as told:
         result = run_assembly(work, out, film=film, overwrite=overwrite, **told)
-    warnings = [*warnings, *_left_out(result)]
+    series = flow_series_words(result.distribution.attrs, holds="the intervals hold")
+    warnings = [*warnings, *series, *_left_out(result)]
     if json:
         print_json({**summary(work.study, result), "warnings": warnings})
         return

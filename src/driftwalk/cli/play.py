@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -33,7 +34,7 @@ FLOW_SEED = 1
 BLOCKS = 4
 
 
-@with_study_options(ASSEMBLY_KEYS, "tank_diameter", "blocks", "seed")
+@with_study_options(ASSEMBLY_KEYS, "tank_diameter", "blocks", "seed", "flow_repeat")
 def play(
     given: StudyOptions,
     flow: FlowFile = None,
@@ -160,10 +161,16 @@ def _flow(path: Path | None, study: Study, *, bundled: bool) -> xr.Dataset:
     """Return the flow of a file, of the bundled example, or a random one for the tank."""
     from driftwalk.datasets import tank30_flow
     from driftwalk.flow import load_flow, random_tank_flow
+    from driftwalk.schema.flow_series import flow_series_words
+    from driftwalk.simulation.series import continued_flow, series_facts
 
     arena = study.tank.to_arena()
     if path is not None:
-        return load_flow(path, arena=arena, own_flags="keep")
+        field = load_flow(path, arena=arena, own_flags="keep")
+        endless = continued_flow(field, study, duration=math.inf)
+        for text in flow_series_words(series_facts(endless, 0.0, duration=math.inf)):
+            print_note(text)
+        return field
     if bundled:
         return tank30_flow()
     print_note("no flow field was given (--flow): the water moves in a random flow")

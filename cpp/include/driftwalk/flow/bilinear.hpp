@@ -31,15 +31,25 @@ inline void store_cells(IntPack<N> cell, Int32* at) {
   std::memcpy(at, &cell.v, sizeof cell.v);
 }
 
-#if defined(DRIFTWALK_USE_X86)
-inline __m128 load_cell(const std::int16_t* table, Int32 at) {
-  return _mm_loadu_ps(reinterpret_cast<const float*>(table + flow_record * std::int64_t(at)));
+// Where a lane's cell is: in the one table of all lanes, or in its own.
+inline const std::int16_t* cell_of(const std::int16_t* table, int, Int32 at) {
+  return table + flow_record * std::int64_t(at);
+}
+inline const std::int16_t* cell_of(const std::int16_t* const* tables, int lane, Int32 at) {
+  return tables[lane] + flow_record * std::int64_t(at);
 }
 
-inline void load_cells(const std::int16_t* table, const Int32* at, IntPack<4>* out) {
+#if defined(DRIFTWALK_USE_X86)
+template <class Tables>
+inline __m128 load_cell(Tables tables, const Int32* at, int lane) {
+  return _mm_loadu_ps(reinterpret_cast<const float*>(cell_of(tables, lane, at[lane])));
+}
+
+template <class Tables>
+inline void load_cells(Tables tables, const Int32* at, IntPack<4>* out) {
   __m128 r[4];
   for (int k = 0; k < 4; ++k) {
-    r[k] = load_cell(table, at[k]);
+    r[k] = load_cell(tables, at, k);
   }
   _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
   for (int k = 0; k < 4; ++k) {
@@ -48,15 +58,17 @@ inline void load_cells(const std::int16_t* table, const Int32* at, IntPack<4>* o
 }
 
 #if defined(__AVX2__)
-inline __m256 load_two_cells(const std::int16_t* table, Int32 low, Int32 high) {
-  return _mm256_insertf128_ps(_mm256_castps128_ps256(load_cell(table, low)), load_cell(table, high),
-                              1);
+template <class Tables>
+inline __m256 load_two_cells(Tables tables, const Int32* at, int lane) {
+  return _mm256_insertf128_ps(_mm256_castps128_ps256(load_cell(tables, at, lane)),
+                              load_cell(tables, at, lane + 4), 1);
 }
 
-inline void load_cells(const std::int16_t* table, const Int32* at, IntPack<8>* out) {
+template <class Tables>
+inline void load_cells(Tables tables, const Int32* at, IntPack<8>* out) {
   __m256 r[4];
   for (int k = 0; k < 4; ++k) {
-    r[k] = load_two_cells(table, at[k], at[k + 4]);
+    r[k] = load_two_cells(tables, at, k);
   }
   const __m256 t0 = _mm256_unpacklo_ps(r[0], r[1]), t1 = _mm256_unpackhi_ps(r[0], r[1]);
   const __m256 t2 = _mm256_unpacklo_ps(r[2], r[3]), t3 = _mm256_unpackhi_ps(r[2], r[3]);
@@ -69,12 +81,13 @@ inline void load_cells(const std::int16_t* table, const Int32* at, IntPack<8>* o
 #endif
 
 #if defined(__AVX512F__)
-inline void load_cells(const std::int16_t* table, const Int32* at, IntPack<16>* out) {
+template <class Tables>
+inline void load_cells(Tables tables, const Int32* at, IntPack<16>* out) {
   __m512 r[4];
   for (int k = 0; k < 4; ++k) {
     // Halves first: two 16-byte insertions and one of 32 bytes beat three into a 64-byte register.
-    const __m256 low = load_two_cells(table, at[k], at[k + 4]);
-    const __m256 high = load_two_cells(table, at[k + 8], at[k + 12]);
+    const __m256 low = load_two_cells(tables, at, k);
+    const __m256 high = load_two_cells(tables, at, k + 8);
     r[k] = _mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1);
   }
   const __m512 t0 = _mm512_unpacklo_ps(r[0], r[1]), t1 = _mm512_unpackhi_ps(r[0], r[1]);
@@ -87,12 +100,12 @@ inline void load_cells(const std::int16_t* table, const Int32* at, IntPack<16>* 
 }
 #endif
 #else
-template <int N>
-inline void load_cells(const std::int16_t* table, const Int32* at, IntPack<N>* out) {
+template <class Tables, int N>
+inline void load_cells(Tables tables, const Int32* at, IntPack<N>* out) {
   Int32 columns[4][N];
   for (int lane = 0; lane < N; ++lane) {
     Int32 record[4];
-    std::memcpy(record, table + flow_record * std::int64_t(at[lane]), sizeof record);
+    std::memcpy(record, cell_of(tables, lane, at[lane]), sizeof record);
     for (int k = 0; k < 4; ++k) {
       columns[k][lane] = record[k];
     }
@@ -103,30 +116,32 @@ inline void load_cells(const std::int16_t* table, const Int32* at, IntPack<N>* o
 }
 #endif
 
-// The record of a cell between two frames, node by node in the table's own numbers: integers are
-// rounded to the nearest, halves away from zero.
-template <class T, class Node>
-inline void blend_cell(const Node* before, const Node* after, T weight, Node* out) {
-  constexpr T half = std::is_integral_v<Node> ? T(0.5) : T(0);
-  for (int k = 0; k < 2 * flow_record; ++k) {
-    const T low = static_cast<T>(before[k]);
-    const T blended = low + (static_cast<T>(after[k]) - low) * weight;
-    out[k] = static_cast<Node>(blended + copy_sign(half, blended));
-  }
+// What stands in a table between two frames: integers are rounded to the nearest, halves away from
+// zero.
+template <class Real>
+inline Real blend(Real before, Real after, Real weight) {
+  return before + (after - before) * weight;
+}
+template <int N>
+inline IntPack<N> blend(IntPack<N> before, IntPack<N> after, FloatPack<N> weight) {
+  const FloatPack<N> low = to_real(weight, before);
+  const FloatPack<N> blended = low + (to_real(weight, after) - low) * weight;
+  return truncate(blended + copy_sign(FloatPack<N>(0.5f), blended));
 }
 
-// The same as load_cells where each lane has its own two frames.
+// The same as above where each lane has two frames of its own.
 template <int N>
-inline void load_cells(const LaneTables<float>& lanes, const Int32* at, IntPack<N>* out) {
-  alignas(16) std::int16_t cells[2 * flow_record * N];
-  Int32 number[N];
-  for (int lane = 0; lane < N; ++lane) {
-    const std::int64_t place = flow_record * std::int64_t(at[lane]);
-    blend_cell(lanes.before[lane] + place, lanes.after[lane] + place, lanes.weight[lane],
-               cells + 2 * flow_record * lane);
-    number[lane] = 2 * lane;
+inline void load_between(const LaneTables<float>& lanes, const Int32* at, IntPack<N>* out) {
+  IntPack<N> before[4], after[4];
+  load_cells(lanes.before, at, before);
+  load_cells(lanes.after, at, after);
+  FloatPack<N> weight;
+  std::memcpy(&weight.v, lanes.weight, sizeof weight.v);
+  for (int k = 0; k < 4; ++k) {
+    const IntPack<N> low = blend((before[k] << 16) >> 16, (after[k] << 16) >> 16, weight);
+    const IntPack<N> high = blend(before[k] >> 16, after[k] >> 16, weight);
+    out[k] = (high << 16) | (low & IntPack<N>(0xffff));
   }
-  load_cells(cells, number, out);
 }
 
 // Keeps the compiler from extracting numbers lane by lane that it has just seen stored: slower.
@@ -211,7 +226,11 @@ struct FlowWeights {
   template <class Tables>
   void weigh(const Tables& tables, const Int32* at, Real& u, Real& v) const {
     Int cell[4];
-    load_cells(tables, at, cell);
+    if constexpr (std::is_pointer_v<Tables>) {
+      load_cells(tables, at, cell);
+    } else {
+      load_between(tables, at, cell);
+    }
     const Int vertical = halve_halves(along_y);
     const Int right = multiply_high_halves(vertical, along_x);
     const Int left = subtract_halves(vertical, right);
@@ -227,8 +246,10 @@ inline void look_up(const FlowView<double>& flow, double x, double y, double& u,
   double cell[2 * flow_record];
   const double* record = flow.table + place;
   if (flow.lanes != nullptr) {
-    blend_cell(flow.lanes->before[0] + place, flow.lanes->after[0] + place, flow.lanes->weight[0],
-               cell);
+    for (int k = 0; k < 2 * flow_record; ++k) {
+      cell[k] = blend(flow.lanes->before[0][place + k], flow.lanes->after[0][place + k],
+                      flow.lanes->weight[0]);
+    }
     record = cell;
   }
   const double* next = record + flow_record;

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from driftwalk.schema.description import ARENA, SOURCE, STUDY, Attribute, Kind, Variable
+from driftwalk.schema.flow_series import FLOW_SERIES, began_in_flow
 from driftwalk.schema.kinds.motion import WORLD_STATUS
 
 _CONNECTOR: Final = "latching by a connector"
@@ -28,6 +29,7 @@ SETTINGS: Final = (
     Attribute("time_step_s", "number", "step of the integrator"),
     Attribute("backend", "text", "what computed it"),
     STUDY,
+    *FLOW_SERIES,
 )
 _CLASS: Final = Variable(
     "class", "class", None, "outcome class", "text",
@@ -109,6 +111,7 @@ ASSEMBLY: Final = Kind(
             "flow_draw", "run", None, "which drawn flow field the run had", "int",
             when="flow fields were drawn",
         ),
+        began_in_flow("run"),
         Variable(
             "status", "run", None, "problems in a run", "int", note="0 is sound",
             flags=WORLD_STATUS, bits=True,
