@@ -12,6 +12,7 @@ import driftwalk as dw
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.schema.flow_series import flow_series_words
+from driftwalk.simulation import simulate
 from driftwalk.simulation.series import (
     continued_flow,
     flow_starts,
@@ -63,7 +64,8 @@ def test_a_recording_has_its_own_clock() -> None:
 
 def test_a_series_as_long_as_its_frames_last_is_long_enough() -> None:
     # 600 frames of 0.1 s are a minute, the last of which stands at 59.9 s.
-    minute = series(*np.tile(SPEEDS, 150), interval=0.1)
+    minute = series(0.01, 0.02).isel(time=np.arange(600) % 2)
+    minute = minute.assign_coords(time=("time", 0.1 * np.arange(600), {"units": "s"}))
     assert continued_flow(minute, study(), duration=60.0).attrs["repeat"] == "none"
     with pytest.raises(InputError):
         continued_flow(minute, study(), duration=60.1)
@@ -98,7 +100,7 @@ def test_a_moment_depends_on_the_worlds_address_alone() -> None:
     np.testing.assert_array_equal(few, many[:3])
     chosen = dw.Study(**TINY, flow={"repeat": "loop"}, assembly={"blocks": 1, "duration_s": 1.0})
     all_runs = dw.assemble(chosen, series(*SPEEDS), runs=6)
-    path = dw.assembly_path(chosen, series(*SPEEDS), runs=[4])
+    path = dw.assembly_path(chosen, series(*SPEEDS), runs=[4], sample_interval=1.0)
     for axis in ("x", "y"):
         np.testing.assert_allclose(path[axis][0, -1], all_runs[axis][4], rtol=1e-6)
 
@@ -126,11 +128,11 @@ def test_random_moments_spread_what_the_water_carries() -> None:
     flow, time = series(*SPEEDS), np.arange(41) * 0.1
     same = dw.simulate(together, flow, sample_time=time, replicates=64)
     apart = dw.simulate(chosen, flow, sample_time=time, replicates=64)
-    assert float(np.ptp(same["x"][:, -1])) == 0.0
-    assert float(np.ptp(apart["x"][:, -1])) > 0.02
+    assert float(np.ptp(same["x"].values[:, -1])) == 0.0
+    assert float(np.ptp(apart["x"].values[:, -1])) > 0.02
     # Each goes the way that it goes alone from the moment that the result states.
     begin = float(apart["flow_start"][5])
-    alone = dw.simulate(chosen, flow, sample_time=time, flow_start=begin)
+    alone = simulate(chosen, flow, sample_time=time, flow_start=begin)
     np.testing.assert_allclose(alone["x"][0], apart["x"][5], atol=1e-7)
     assert apart.attrs["flow_begins"] == "random"
     assert apart.attrs["flow_period_s"] == 10.0
