@@ -20,7 +20,7 @@ from driftwalk.cli.terminal.answer import print_figures, print_warnings
 from driftwalk.cli.terminal.output import print_json, print_table
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS
-from driftwalk.schema.flow_series import flow_series_words
+from driftwalk.schema.kinds.flow_series import flow_series_words
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -161,20 +160,31 @@ def _flow(path: Path | None, study: Study, *, bundled: bool) -> xr.Dataset:
     """Return the flow of a file, of the bundled example, or a random one for the tank."""
     from driftwalk.datasets import tank30_flow
     from driftwalk.flow import load_flow, random_tank_flow
-    from driftwalk.schema.flow_series import flow_series_words
-    from driftwalk.simulation.series import continued_flow, series_facts
 
     arena = study.tank.to_arena()
     if path is not None:
         field = load_flow(path, arena=arena, own_flags="keep")
-        endless = continued_flow(field, study, duration=math.inf)
-        for text in flow_series_words(series_facts(endless, 0.0, duration=math.inf)):
+        for text in _series_words(field, study):
             print_note(text)
         return field
     if bundled:
         return tank30_flow()
     print_note("no flow field was given (--flow): the water moves in a random flow")
     return random_tank_flow(FLOW_SEED, arena=arena)
+
+
+def _series_words(field: xr.Dataset, study: Study) -> list[str]:
+    """Return how a flow that changes in time goes on after its last frame."""
+    from driftwalk.schema.kinds.flow_series import flow_series_words
+
+    stated = study.flow.repeat
+    repeat = stated if stated != "none" else field.attrs.get("repeat", "none")
+    if field.sizes.get("time", 1) < 2 or repeat == "none":
+        return []
+    span = float(field["time"][-1] - field["time"][0])
+    return flow_series_words(
+        {"flow_span_s": span, "flow_repeat": repeat, "flow_begins": "together"}
+    )
 
 
 def _recording(

@@ -25,7 +25,7 @@ from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.output import print_json
 from driftwalk.cli.terminal.sensitivity_answer import print_answer, summary
 from driftwalk.core.study_keys import SENSITIVITY_KEYS
-from driftwalk.schema.flow_series import flow_series_words
+from driftwalk.schema.kinds.flow_series import flow_series_words
 
 if TYPE_CHECKING:
     from driftwalk.model import Study

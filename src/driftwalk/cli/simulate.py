@@ -24,7 +24,7 @@ from driftwalk.cli.terminal.output import print_json, print_note, require_place
 from driftwalk.core.errors import InputError
 from driftwalk.core.json_text import parse_json
 from driftwalk.core.study_keys import STUDY_KEYS
-from driftwalk.schema.flow_series import flow_series_words
+from driftwalk.schema.kinds.flow_series import flow_series_words
 
 if TYPE_CHECKING:
     import xarray as xr

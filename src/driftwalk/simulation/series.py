@@ -11,7 +11,7 @@ import numpy.typing as npt
 from driftwalk import _core
 from driftwalk.core.errors import InputError
 from driftwalk.core.streams import Purpose
-from driftwalk.schema.flow_series import flow_series_words
+from driftwalk.schema.kinds.flow_series import flow_series_words
 
 if TYPE_CHECKING:
     import xarray as xr

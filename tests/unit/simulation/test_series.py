@@ -11,7 +11,7 @@ import xarray as xr
 import driftwalk as dw
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
-from driftwalk.schema.flow_series import flow_series_words
+from driftwalk.schema.kinds.flow_series import flow_series_words
 from driftwalk.simulation import simulate
 from driftwalk.simulation.series import (
     continued_flow,
@@ -22,7 +22,7 @@ from driftwalk.simulation.series import (
 )
 
 SPEEDS = (0.01, 0.03, -0.02, 0.02)
-TINY = {"tank": {"diameter_m": 0.3}, "forces": {"force_std_N": 0.0}}
+TINY: dict[str, Any] = {"tank": {"diameter_m": 0.3}, "forces": {"force_std_N": 0.0}}
 
 
 def series(*speeds: float, interval: float = 2.5, begin: float = 0.0) -> xr.Dataset:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from driftwalk.schema.description import ARENA, SOURCE, STUDY, Attribute, Kind, Variable
-from driftwalk.schema.flow_series import FLOW_SERIES, began_in_flow
+from driftwalk.schema.kinds.flow_series import FLOW_SERIES, began_in_flow
 from driftwalk.schema.kinds.motion import WORLD_STATUS
 
 _CONNECTOR: Final = "latching by a connector"

@@ -13,7 +13,7 @@ from driftwalk.schema.description import (
     Kind,
     Variable,
 )
-from driftwalk.schema.flow_series import FLOW_SERIES, began_in_flow
+from driftwalk.schema.kinds.flow_series import FLOW_SERIES, began_in_flow
 
 WORLD_STATUS: Final = {"non_finite": 1, "escaped": 2, "no_motion": 4}
 """Bits of a simulated world's status; 0 is sound."""

@@ -1,4 +1,4 @@
-"""What a result says about a flow that changed in time: its attributes, and in words."""
+"""Attributes of a result that was simulated in a flow that changes in time, and their words."""
 
 from __future__ import annotations
 
