@@ -33,7 +33,13 @@ def growing(flow: xr.Dataset) -> xr.Dataset:
     frames = {name: flow[name].values * rise for name in "uv"} | {
         "flag": np.stack([flow["flag"].values] * 2)
     }
-    return build_flow_field(flow["x"].values, flow["y"].values, **frames, time=np.array([0.0, 1.0]))
+    return build_flow_field(
+        flow["x"].values,
+        flow["y"].values,
+        **frames,
+        time=np.array([0.0, 1.0]),
+        attrs={"repeat": "mirror"},
+    )
 
 
 def whole_run(study: dw.Study, flow: xr.Dataset, seed: int, steps: int) -> dict[str, Any]:
