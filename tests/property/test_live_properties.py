@@ -26,7 +26,7 @@ def study(blocks: int, latching: Any, interval: int) -> dw.Study:
 
 
 def growing(flow: xr.Dataset) -> xr.Dataset:
-    """Return a flow that grows from nothing in a second and stays so."""
+    """Return a flow that grows from nothing in a second, and goes again, over and over."""
     from driftwalk.schema import build_flow_field
 
     rise = np.array([0.0, 1.0])[:, None, None]
