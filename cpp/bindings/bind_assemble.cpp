@@ -4,6 +4,7 @@
 #include "driftwalk/assembly/assemble.hpp"
 #include "driftwalk/simulate/threads.hpp"
 
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 
@@ -38,7 +39,7 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
                   const std::string& latching, double connector_distance, double connector_axis,
                   const std::string& hidden_face_drag, double block_restitution,
                   double block_friction, int sample_every, int threads,
-                  const std::string& precision) {
+                  const std::string& precision, std::optional<In<double, 1>> flow_start) {
   const std::size_t worlds = start.shape(0), blocks = start.shape(1);
   require_blocks(blocks);
   if (start.shape(2) != 3 || key.size() != worlds || drag_coefficient.size() != worlds ||
@@ -61,7 +62,8 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
                                         start.data(),
                                         drag_coefficient.data(),
                                         force_std.data(),
-                                        key.data()};
+                                        key.data(),
+                                        starts_of(flow_start, worlds)};
   const std::size_t events = blocks > 1 ? blocks - 1 : 1;
   const std::size_t samples =
       sample_every > 0 ? static_cast<std::size_t>(steps / sample_every + 1) : 0;
@@ -125,5 +127,5 @@ void register_assemble(nb::module_& module) {
   module.def("assemble", &assemble, "model"_a, nb::kw_only(), "start"_a, "key"_a,
              "drag_coefficient"_a, "force_std"_a, "steps"_a, "latching"_a, "connector_distance"_a,
              "connector_axis"_a, "hidden_face_drag"_a, "block_restitution"_a, "block_friction"_a,
-             "sample_every"_a, "threads"_a, "precision"_a);
+             "sample_every"_a, "threads"_a, "precision"_a, "flow_start"_a = nb::none());
 }

@@ -22,7 +22,7 @@ void start_world(LiveWorld* self, const Model& model, In<double, 2> start, std::
                  double drag_coefficient, double force_std, const std::string& latching,
                  double connector_distance, double connector_axis,
                  const std::string& hidden_face_drag, double block_restitution,
-                 double block_friction) {
+                 double block_friction, double flow_start) {
   require_blocks(start.shape(0));
   if (start.shape(1) != 3) {
     throw std::invalid_argument("start must have shape (blocks, 3)");
@@ -34,7 +34,8 @@ void start_world(LiveWorld* self, const Model& model, In<double, 2> start, std::
   rules.hidden_faces_drag = is_first(hidden_face_drag, "full", "none");
   rules.restitution = block_restitution;
   rules.friction = block_friction;
-  new (self) LiveWorld(model.twice(), rules, {drag_coefficient, force_std, 1.0}, start.data(), key);
+  new (self) LiveWorld(model.twice(), rules, {drag_coefficient, force_std, 1.0}, start.data(), key,
+                       flow_start);
 }
 
 nb::dict advance(LiveWorld& world, std::int64_t steps) {
@@ -84,7 +85,8 @@ void register_live(nb::module_& module) {
   nb::class_<LiveWorld>(module, "LiveWorld")
       .def("__init__", &start_world, nb::keep_alive<1, 2>(), "model"_a, nb::kw_only(), "start"_a,
            "key"_a, "drag_coefficient"_a, "force_std"_a, "latching"_a, "connector_distance"_a,
-           "connector_axis"_a, "hidden_face_drag"_a, "block_restitution"_a, "block_friction"_a)
+           "connector_axis"_a, "hidden_face_drag"_a, "block_restitution"_a, "block_friction"_a,
+           "flow_start"_a = 0.0)
       .def("advance", &advance, "steps"_a)
       .def("state", &state)
       .def(

@@ -75,7 +75,8 @@ int columns_of(const driftwalk::ParticleModel& model) {
 // force std, or a particle's numbers; and their random keys.
 class Worlds {
 public:
-  Worlds(const In<double, 2>& table, const In<std::uint64_t, 1>& key, const Particle* particle)
+  Worlds(const In<double, 2>& table, const In<std::uint64_t, 1>& key, const Particle* particle,
+         const std::optional<In<double, 1>>& flow_start)
       : count_(table.shape(0)), columns_(table.size()),
         particle_(particle == nullptr ? driftwalk::ParticleModel() : particle->model) {
     const std::size_t width = 6 + static_cast<std::size_t>(columns_of(particle_));
@@ -89,6 +90,9 @@ public:
       }
     }
     key_.assign(key.data(), key.data() + count_);
+    if (const double* const start = starts_of(flow_start, count_)) {
+      flow_start_.assign(start, start + count_);
+    }
   }
 
   std::size_t count() const { return count_; }
@@ -110,12 +114,13 @@ public:
       view.particle.values = column(6);
     }
     view.key = key_.data();
+    view.flow_start = flow_start_.empty() ? nullptr : flow_start_.data();
     return view;
   }
 
 private:
   std::size_t count_;
-  std::vector<double> columns_;
+  std::vector<double> columns_, flow_start_;
   std::vector<std::uint64_t> key_;
   driftwalk::ParticleModel particle_;
 };
@@ -137,8 +142,9 @@ nb::tuple simulate_as(const driftwalk::PreparedRun<T>& run, const Worlds& worlds
 }
 
 nb::tuple simulate(const Model& model, In<double, 2> table, In<std::uint64_t, 1> key, int threads,
-                   const std::string& precision, const Particle* particle) {
-  const Worlds worlds(table, key, particle);
+                   const std::string& precision, const Particle* particle,
+                   const std::optional<In<double, 1>>& flow_start) {
+  const Worlds worlds(table, key, particle, flow_start);
   if (precision == "double") {
     return simulate_as(model.twice(), worlds, model.samples(), threads);
   }
@@ -149,8 +155,8 @@ nb::dict score(const Model& model, In<double, 2> table, In<std::uint64_t, 1> key
                In<std::int32_t, 1> left, In<double, 1> weight, In<std::int32_t, 1> triple,
                std::optional<In<double, 2>> reference, int bins, double length_limit,
                double angle_limit, std::int64_t excerpt, bool keep_steps, int threads,
-               const Particle* particle) {
-  const Worlds worlds(table, key, particle);
+               const Particle* particle, const std::optional<In<double, 1>>& flow_start) {
+  const Worlds worlds(table, key, particle, flow_start);
   const std::size_t count = worlds.count();
   driftwalk::Scoring scoring;
   scoring.plan = {left.data(), weight.data(), triple.data(), static_cast<std::int64_t>(left.size()),
@@ -275,12 +281,12 @@ void register_simulate(nb::module_& module) {
           "__init__",
           [](Model* self, In<double, 2> edges, In<double, 3> u, In<double, 3> v,
              In<double, 1> frame_time, In<double, 1> sample_time, In<double, 2> view_edges,
-             const nb::kwargs& numbers) {
-            new (self)
-                Model(numbers_of(numbers), {edges, u, v, frame_time, sample_time, view_edges});
+             const std::string& flow_repeat, const nb::kwargs& numbers) {
+            new (self) Model(numbers_of(numbers), {edges, u, v, frame_time, sample_time, view_edges,
+                                                   repeat_of(flow_repeat)});
           },
           nb::kw_only(), "edges"_a, "u"_a, "v"_a, "frame_time"_a, "sample_time"_a, "view_edges"_a,
-          "numbers"_a)
+          "flow_repeat"_a = "hold", "numbers"_a)
       .def_prop_ro("samples", &Model::samples);
   driftwalk::each_model_number([&](const char* name, const char*, driftwalk::Range, auto field) {
     model.def_prop_ro(name, [field](const Model& self) { return self.numbers().*field; });
@@ -296,10 +302,11 @@ void register_simulate(nb::module_& module) {
           "neighbours"_a = nb::none())
       .def_prop_ro("columns", [](const Particle& self) { return columns_of(self.model); });
   module.def("simulate", &simulate, "model"_a, "worlds"_a, "key"_a, nb::kw_only(), "threads"_a,
-             "precision"_a, "particle"_a = nb::none());
+             "precision"_a, "particle"_a = nb::none(), "flow_start"_a = nb::none());
   module.def("score", &score, "model"_a, "worlds"_a, "key"_a, nb::kw_only(), "left"_a, "weight"_a,
              "triple"_a, "reference"_a.none(), "bins"_a, "length_limit"_a, "angle_limit"_a,
-             "excerpt"_a, "keep_steps"_a, "threads"_a, "particle"_a = nb::none());
+             "excerpt"_a, "keep_steps"_a, "threads"_a, "particle"_a = nb::none(),
+             "flow_start"_a = nb::none());
   module.def("ks_matrix", &ks_matrix, "a_length"_a, "a_angle"_a, "a_count"_a, "b_length"_a,
              "b_angle"_a, "b_count"_a, nb::kw_only(), "threads"_a);
   module.def("drag", &drag, "model"_a, nb::kw_only(), "drag_coefficient"_a, "x"_a, "y"_a, "theta"_a,

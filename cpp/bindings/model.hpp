@@ -51,7 +51,32 @@ struct ModelArrays {
   In<double, 3> u, v;
   In<double, 1> frame_time, sample_time;
   In<double, 2> view_edges;
+  driftwalk::FlowRepeat repeat;
 };
+
+inline driftwalk::FlowRepeat repeat_of(const std::string& name) {
+  if (name == "hold") {
+    return driftwalk::FlowRepeat::hold;
+  }
+  if (name == "loop") {
+    return driftwalk::FlowRepeat::loop;
+  }
+  if (name == "mirror") {
+    return driftwalk::FlowRepeat::mirror;
+  }
+  throw std::invalid_argument("flow_repeat is hold, loop or mirror, got " + name);
+}
+
+// Times on the clock of a flow's frames at which worlds begin, null where none are given.
+inline const double* starts_of(const std::optional<In<double, 1>>& start, std::size_t worlds) {
+  if (!start) {
+    return nullptr;
+  }
+  if (start->size() != worlds) {
+    throw std::invalid_argument("flow_start must have one entry per world");
+  }
+  return start->data();
+}
 
 inline void check(const ModelArrays& arrays) {
   const auto& u = arrays.u;
@@ -85,6 +110,7 @@ public:
     model.rows = static_cast<int>(arrays.u.shape(1));
     model.columns = static_cast<int>(arrays.u.shape(2));
     model.frame_time = arrays.frame_time.data();
+    model.repeat = arrays.repeat;
     model.sample_time = arrays.sample_time.data();
     model.samples = static_cast<std::int64_t>(arrays.sample_time.size());
     single_.emplace(model);

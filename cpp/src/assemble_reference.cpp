@@ -8,9 +8,7 @@ std::int64_t assemble_reference(const Prepared<double>& run, const AssemblyRules
                                 const AssemblyWorlds& worlds, const AssemblyOutputs& out,
                                 const WorldQueue& queue, AssemblyScratch& scratch) {
   const auto assembled = [&]<class Law>() {
-    return AssemblyPack<double, double, Law>(run, rules, worlds, out, queue, scratch,
-                                             scratch.blended_flow_twice)
-        .run();
+    return AssemblyPack<double, double, Law>(run, rules, worlds, out, queue, scratch).run();
   };
   return !run.drag.is_quadratic ? assembled.template operator()<MixedDrag<double>>()
                                 : assembled.template operator()<QuadraticDrag>();

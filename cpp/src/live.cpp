@@ -40,12 +40,11 @@ constexpr int most_events = most_blocks - 1;
 
 struct LiveWorld::Inside {
   Inside(const PreparedRun<double>& model, const AssemblyRules& given, const double* start,
-         std::uint64_t own_key)
+         std::uint64_t own_key, double flow_start)
       : run(model.view()), rules(given), key(own_key),
-        memory(most_blocks, PackMemory<double>::bytes(most_blocks), model.blended_flow_size()),
-        out(outputs()), pack(run, rules, start, out, memory.scratch(),
-                             memory.scratch().blended_flow_twice, most_blocks) {
-    pack.begin(0, 0, 0, start, key);
+        memory(most_blocks, PackMemory<double>::bytes(most_blocks)), out(outputs()),
+        pack(run, rules, start, out, memory.scratch(), most_blocks) {
+    pack.begin(0, 0, 0, start, key, flow_start);
   }
 
   AssemblyOutputs outputs() {
@@ -111,8 +110,9 @@ struct LiveWorld::Inside {
 };
 
 LiveWorld::LiveWorld(const PreparedRun<double>& run, const AssemblyRules& rules,
-                     const LiveForces& forces, const double* start, std::uint64_t key)
-    : inside_(std::make_unique<Inside>(run, rules, start, key)) {
+                     const LiveForces& forces, const double* start, std::uint64_t key,
+                     double flow_start)
+    : inside_(std::make_unique<Inside>(run, rules, start, key, flow_start)) {
   set_forces(forces);
 }
 

@@ -168,6 +168,7 @@ void PreparedRun<T>::prepare_flow(const BatchModel& model) {
   flow.high_y = static_cast<T>(high_y);
 
   view_.frames = model.frames;
+  view_.repeat = model.repeat;
   view_.frame_size = std::int64_t(grid.rows) * grid.columns * flow_record;
   // One more record: the last node's load reaches one beyond it.
   table_.resize(static_cast<std::size_t>(view_.frame_size * model.frames + flow_record));
@@ -177,6 +178,7 @@ void PreparedRun<T>::prepare_flow(const BatchModel& model) {
                    table_.data() + frame * view_.frame_size);
   }
   flow.table = table_.data();
+  flow.lanes = nullptr;
   if (model.frames > 1) {
     frame_time_.assign(model.frame_time, model.frame_time + model.frames);
   }

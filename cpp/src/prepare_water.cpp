@@ -101,8 +101,7 @@ void PreparedRun<T>::prepare_water(const BatchModel& model, const TableGrid& gri
   water.nodes.table = water_.data();
   water.nodes.unit = table_unit<T>(step);
   water.count = model.frames > 1 ? most_water_tables : 1;
-  water.table[0] = water.nodes.table;
-  water.part[0] = 1;
+  water.part = 1;
   const double displaced_inertia = model.displaced_mass * model.side * model.side / 6;
   const double added_mass = model.added_mass_share * model.mass;
   const double added_inertia = model.added_mass_share * model.inertia;

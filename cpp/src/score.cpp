@@ -34,13 +34,12 @@ public:
         // A whole number of cache lines plus one, so that lanes do not share cache sets.
         stride_((run.view().samples / 16 + 2) * 16),
         x_(static_cast<std::size_t>(stride_ * calls.most())), y_(x_.size()),
-        blended_(static_cast<std::size_t>(run.blended_flow_size())),
         length_(static_cast<std::size_t>(scoring.plan.pairs)), angle_(length_.size()) {}
 
   void operator()(std::int64_t call) {
     const std::int64_t first = calls_.first(call);
     const int count = calls_.size(call);
-    const SampleSink<float> sink{x_.data(), y_.data(), nullptr, stride_, blended_.data()};
+    const SampleSink<float> sink{x_.data(), y_.data(), nullptr, stride_};
     kernel_.run(run_.view(), worlds_, first, count, sink, out_.status + first);
     for (int lane = 0; lane < count; ++lane) {
       score(first + lane, x_.data() + lane * stride_, y_.data() + lane * stride_);
@@ -94,7 +93,6 @@ private:
   const WorldCalls& calls_;
   std::int64_t stride_;
   std::vector<float> x_, y_;
-  std::vector<std::int16_t> blended_;
   std::vector<double> length_, angle_;
   KsWorkspace workspace_;
 };

@@ -26,13 +26,11 @@ void simulate_batch(const PreparedRun<float>& run, const BatchWorlds& worlds, in
   const std::int64_t samples = run.view().samples;
   const WorldCalls calls(kernel, worlds.count, threads);
   run_tasks(calls.count(), threads, [&] {
-    return [&, blended = std::vector<std::int16_t>(
-                   static_cast<std::size_t>(run.blended_flow_size()))](std::int64_t call) mutable {
+    return [&](std::int64_t call) {
       const std::int64_t first = calls.first(call);
       const std::int64_t at = first * samples;
       const SampleSink<float> sink{out.x + at, out.y + at,
-                                   out.theta == nullptr ? nullptr : out.theta + at, samples,
-                                   blended.data()};
+                                   out.theta == nullptr ? nullptr : out.theta + at, samples};
       kernel.run(run.view(), worlds, first, calls.size(call), sink, out.status + first);
     };
   });
@@ -42,12 +40,10 @@ void simulate_batch(const PreparedRun<double>& run, const BatchWorlds& worlds, i
                     const Trajectories<double>& out) {
   const std::int64_t samples = run.view().samples;
   run_tasks(worlds.count, threads, [&] {
-    return [&, blended = std::vector<double>(static_cast<std::size_t>(run.blended_flow_size()))](
-               std::int64_t world) mutable {
+    return [&](std::int64_t world) {
       const std::int64_t at = world * samples;
       const SampleSink<double> sink{out.x + at, out.y + at,
-                                    out.theta == nullptr ? nullptr : out.theta + at, samples,
-                                    blended.data()};
+                                    out.theta == nullptr ? nullptr : out.theta + at, samples};
       simulate_reference(run.view(), worlds, world, sink, out.status + world);
     };
   });

@@ -53,6 +53,7 @@ class Model:
         frame_time: _Floats,
         sample_time: _Floats,
         view_edges: _Floats,
+        flow_repeat: str = "hold",  # hold, loop or mirror
         **numbers: float,
     ) -> None: ...
     def __getattr__(self, number: str) -> float: ...
@@ -74,7 +75,8 @@ class Particle:
     @property
     def columns(self) -> int: ...
 
-# x, y, theta of shape (worlds, samples), float32 or float64 by precision, and status (worlds,)
+# x, y, theta of shape (worlds, samples), float32 or float64 by precision, and status (worlds,).
+# flow_start (worlds,): time on the clock of the flow's frames at which each begins [s], or 0.
 def simulate(
     model: Model,
     worlds: _Floats,
@@ -83,6 +85,7 @@ def simulate(
     threads: int,
     precision: str,
     particle: Particle | None = None,
+    flow_start: _Floats | None = None,
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[np.uint32]]: ...
 def score(
     model: Model,
@@ -100,6 +103,7 @@ def score(
     keep_steps: bool,
     threads: int,
     particle: Particle | None = None,
+    flow_start: _Floats | None = None,
 ) -> dict[str, npt.NDArray[Any]]: ...
 def ks_matrix(
     a_length: _Floats,
@@ -151,6 +155,7 @@ def assemble(
     sample_every: int,
     threads: int,
     precision: str,
+    flow_start: _Floats | None = None,
 ) -> dict[str, npt.NDArray[Any] | int]: ...
 
 # A world that keeps its state between calls, in double precision. Changes take effect with the next
@@ -170,6 +175,7 @@ class LiveWorld:
         hidden_face_drag: str,
         block_restitution: float,
         block_friction: float,
+        flow_start: float = 0.0,
     ) -> None: ...
     # The joinings: step (n,), block (n, 2), face (n, 2), as in `assemble`.
     def advance(self, steps: int) -> dict[str, npt.NDArray[np.int32]]: ...

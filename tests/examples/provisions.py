@@ -16,6 +16,7 @@ from typing import Any
 
 import h5py
 import numpy as np
+import xarray as xr
 from command_line import FLOW, GRID, RECORDING, here
 from drifting_tracers import seeded_tank
 from finished_run import write_finished_run
@@ -97,6 +98,18 @@ def _tracks(folder: Path) -> Names:
         "particle": table["body"],
     }
     table.assign(**pixels)[list(pixels)].to_csv(folder / "tracks.csv", index=False)
+    return {}
+
+
+def _series(folder: Path) -> Names:
+    """Provide ten seconds of a flow that grows weaker and stronger."""
+    flow = dw.tank30_flow()
+    time = xr.IndexVariable("time", [0.0, 2.5, 5.0, 7.5, 10.0], {"units": "s"})
+    frames = [
+        flow[["u", "v", "flag"]].assign(u=part * flow["u"], v=part * flow["v"])
+        for part in (1.0, 0.8, 0.6, 0.8, 1.0)
+    ]
+    dw.save_flow(xr.concat(frames, dim=time).assign_attrs(flow.attrs), folder / "series.nc")
     return {}
 
 
@@ -385,11 +398,12 @@ PAGES: dict[str, Page] = {
     ),
     "docs/how-to/assemble.md": Page(
         provide=_files(
-            _recording(600.0), _flow("flow_true.csv"), _search("small.toml"), _assembled
+            _recording(600.0), _flow("flow_true.csv"), _search("small.toml"), _assembled, _series
         ),
         instead={
             "calibrate recording.csv": "calibrate recording.csv --study small.toml",
             "assemble run/": f"assemble run/ {FEW_RUNS}",
+            "--flow series.nc": f"--flow series.nc {FEW_RUNS}",
             "runs=100)": "runs=4)",
         },
         holds=(

@@ -46,6 +46,7 @@ def two_flows(duration: float = SWITCH_S) -> xr.Dataset:
         frames[0]["y"],
         time=[duration - 1e-6, duration + 1e-6],
         **{name: np.stack([one[name].values for one in frames]) for name in ("u", "v", "flag")},
+        attrs={"repeat": "hold"},
     )
     clock = 0.1 * np.arange(round(20.0 * duration) + 1)
     study = apply_overrides(coarse_study(), {"simulation.time_step_s": 0.0025})

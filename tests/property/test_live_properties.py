@@ -26,14 +26,20 @@ def study(blocks: int, latching: Any, interval: int) -> dw.Study:
 
 
 def growing(flow: xr.Dataset) -> xr.Dataset:
-    """Return a flow that grows from nothing in a second and stays so."""
+    """Return a flow that grows from nothing in a second, and goes again, over and over."""
     from driftwalk.schema import build_flow_field
 
     rise = np.array([0.0, 1.0])[:, None, None]
     frames = {name: flow[name].values * rise for name in "uv"} | {
         "flag": np.stack([flow["flag"].values] * 2)
     }
-    return build_flow_field(flow["x"].values, flow["y"].values, **frames, time=np.array([0.0, 1.0]))
+    return build_flow_field(
+        flow["x"].values,
+        flow["y"].values,
+        **frames,
+        time=np.array([0.0, 1.0]),
+        attrs={"repeat": "mirror"},
+    )
 
 
 def whole_run(study: dw.Study, flow: xr.Dataset, seed: int, steps: int) -> dict[str, Any]:

@@ -19,9 +19,7 @@ std::int64_t assemble(const Prepared<float>& run, const AssemblyRules& rules,
                       const AssemblyWorlds& worlds, const AssemblyOutputs& out,
                       const WorldQueue& queue, AssemblyScratch& scratch) {
   const auto assembled = [&]<class Law>() {
-    return AssemblyPack<Real, float, Law>(run, rules, worlds, out, queue, scratch,
-                                          scratch.blended_flow)
-        .run();
+    return AssemblyPack<Real, float, Law>(run, rules, worlds, out, queue, scratch).run();
   };
   return !run.drag.is_quadratic ? assembled.template operator()<MixedDrag<Real>>()
                                 : assembled.template operator()<QuadraticDrag>();

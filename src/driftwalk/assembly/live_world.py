@@ -82,8 +82,8 @@ class LiveTank:
     study : Study
         Block, tank, water, forces and assembly, to begin with.
     flow : xarray.Dataset
-        The water's velocity, a `flow_field` that covers the tank. One that changes in time begins
-        with the world, and stays as it is at its end from there on.
+        The water's velocity, a `flow_field` that covers the tank. For one that
+        changes in time, [flow] of the study says how it goes on after its last frame.
     blocks, seed : int, optional
         Over the study's values.
     start : array_like, shape (blocks, 3), optional
@@ -115,13 +115,15 @@ class LiveTank:
         seed: int | None = None,
         start: npt.ArrayLike | None = None,
     ) -> None:
-        plan = make_plan(study, flow, settings={"blocks": blocks, "seed": seed}, index=np.arange(1))
-        self._flow = flow
+        plan = make_plan(
+            study, flow, settings={"blocks": blocks, "seed": seed}, index=np.arange(1), ends=False
+        )
+        self._flow = plan.flow
         self._lock = Lock()
         # Never held while the world advances. Where both are held, this one is taken second.
         self._wishes_lock = Lock()
         self._wishes = _Wishes(plan.study, 1.0)
-        self._model = plan.model(flow)
+        self._model = plan.model(plan.flow)
         self.restart(start=start)
 
     def restart(self, *, seed: int | None = None, start: npt.ArrayLike | None = None) -> None:
@@ -141,7 +143,11 @@ class LiveTank:
         """
         with self._lock, self._wishes_lock:
             plan = make_plan(
-                self._wishes.study, self._flow, settings={"seed": seed}, index=np.arange(1)
+                self._wishes.study,
+                self._flow,
+                settings={"seed": seed},
+                index=np.arange(1),
+                ends=False,
             )
             rules, forces = plan.study.assembly, plan.study.forces
             self._world = _core.LiveWorld(
@@ -156,6 +162,7 @@ class LiveTank:
                 hidden_face_drag=rules.hidden_face_drag,
                 block_restitution=rules.block_restitution,
                 block_friction=rules.block_friction,
+                flow_start=0.0 if plan.flow_start is None else float(plan.flow_start[0]),
             )
             self._wishes = self._active = _Wishes(plan.study, self._wishes.flow_scale)
             self._set_forces()

@@ -58,6 +58,7 @@ from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.protocol import ScoresItself
 from driftwalk.motion.score import broken_worlds
 from driftwalk.schema import Track, body_track
+from driftwalk.simulation.series import series_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -198,6 +199,8 @@ def calibrate(
     result.warnings += jump_warnings(recording, body, track=track)
     said = (unstated, of_flow, of_wall, of_time)
     result.warnings += [text for text in said if text is not None]
+    duration = float(problem.like.sample_time[-1])
+    result.warnings += series_warnings(problem.like.flow, duration=duration)
 
     def finish(halves: Halves | None) -> xr.Dataset:
         return _finish(result, halves, steadiness, recording, problem)

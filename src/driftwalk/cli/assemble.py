@@ -23,6 +23,7 @@ from driftwalk.cli.terminal.output import print_json, print_table
 from driftwalk.cli.terminal.sizes_answer import print_sizes, sizes_facts
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS
+from driftwalk.schema.kinds.flow_series import flow_series_words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -71,8 +72,9 @@ def assemble(
     begun = opening_note(source.study, given, about="simulation", otherwise=str(run))
     with Workers(cluster, cluster_options).reported("assemble") as told:
         result = run_assembly(work, out, film=film, overwrite=overwrite, begun=begun, **told)
+    series = flow_series_words(result.distribution.attrs, holds="the intervals hold")
     drawn = [] if source.not_drawn is None else [source.not_drawn]
-    warnings = [*source.warnings, *drawn, *_left_out(result)]
+    warnings = [*source.warnings, *drawn, *series, *_left_out(result)]
     if json:
         print_json({**summary(work.study, result), "warnings": warnings})
         return

@@ -23,6 +23,7 @@ from driftwalk.core.study_keys import CALIBRATION_KEYS
     *("tank_diameter", "side", "mass", "depth", "force_interval"),
     *("wall_friction", "wall_restitution", "time_step", "step_interval"),
     *("position_noise", "orientation_noise", "replicates", "bootstrap", "seed"),
+    "flow_repeat",
 )
 def calibrate(
     recording: RecordingFile,

@@ -35,7 +35,7 @@ FLOW_SEED = 1
 BLOCKS = 4
 
 
-@with_study_options(ASSEMBLY_KEYS, "tank_diameter", "blocks", "seed")
+@with_study_options(ASSEMBLY_KEYS, "tank_diameter", "blocks", "seed", "flow_repeat")
 def play(
     given: StudyOptions,
     run: Annotated[
@@ -191,11 +191,28 @@ def _flow(path: Path | None, study: Study, *, bundled: bool) -> xr.Dataset:
 
     arena = study.tank.to_arena()
     if path is not None:
-        return load_flow(path, arena=arena, own_flags="keep")
+        field = load_flow(path, arena=arena, own_flags="keep")
+        for text in _series_words(field, study):
+            print_note(text)
+        return field
     if bundled:
         return tank30_flow()
     print_note("no flow field was given (--flow): the water moves in a random flow")
     return random_tank_flow(FLOW_SEED, arena=arena)
+
+
+def _series_words(field: xr.Dataset, study: Study) -> list[str]:
+    """Return how a flow that changes in time goes on after its last frame."""
+    from driftwalk.schema.kinds.flow_series import flow_series_words
+
+    stated = study.flow.repeat
+    repeat = stated if stated != "none" else field.attrs.get("repeat", "none")
+    if field.sizes.get("time", 1) < 2 or repeat == "none":
+        return []
+    span = float(field["time"][-1] - field["time"][0])
+    return flow_series_words(
+        {"flow_span_s": span, "flow_repeat": repeat, "flow_begins": "together"}
+    )
 
 
 def _recording(

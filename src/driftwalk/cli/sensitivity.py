@@ -28,6 +28,7 @@ from driftwalk.cli.terminal.output import print_json
 from driftwalk.cli.terminal.sensitivity_answer import print_answer, summary
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import SENSITIVITY_KEYS
+from driftwalk.schema.kinds.flow_series import flow_series_words
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -134,4 +135,5 @@ def _warnings(source: Source, result: SensitivityResult) -> list[str]:
             "there are no principal components: they need two settings with different outcomes",
         ),
     )
-    return [text for holds, text in said if holds]
+    series = flow_series_words(result.reference.attrs, holds="shares and distances hold")
+    return [*series, *(text for holds, text in said if holds)]

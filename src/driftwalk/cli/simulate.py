@@ -21,10 +21,12 @@ from driftwalk.cli.options.model import (
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.shared import Json, flow_of_run
 from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
+from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.output import print_json, print_note, require_place
 from driftwalk.core.errors import InputError
 from driftwalk.core.json_text import parse_json
 from driftwalk.core.study_keys import STUDY_KEYS
+from driftwalk.schema.kinds.flow_series import flow_series_words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,7 +45,7 @@ OF_THE_BLOCK: Final = (
     STUDY_KEYS,
     *("tank_diameter", "side", "mass", "depth", "drag_coefficient", "force_std", "force_interval"),
     *("wall_friction", "wall_restitution", "time_step", "duration", "sample_rate"),
-    *("position_noise", "orientation_noise", "replicates", "seed"),
+    *("position_noise", "orientation_noise", "replicates", "seed", "flow_repeat", "flow_start"),
 )
 def simulate(
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.nc", help="File to write.")],
@@ -132,6 +134,7 @@ def simulate(
     for name, count in facts["status"].items():
         if count:
             print_note(f"warning: {count} of {facts['replicates']} replicates: {name}")
+    print_warnings(facts["warnings"])
 
 
 def _of_block(
@@ -251,4 +254,5 @@ def summary(result: xr.Dataset) -> dict[str, Any]:
             name: int(((status.values & mask) != 0).sum())
             for name, mask in zip(names, masks, strict=True)
         },
+        "warnings": flow_series_words(result.attrs, holds="what the paths have in common holds"),
     }

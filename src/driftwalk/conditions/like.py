@@ -66,6 +66,7 @@ def simulate_like(
         flow,
         sample_time=sample_times(track, study),
         start=begin,
+        flow_start=0.0,
         replicates=replicates,
         seed=seed,
         threads=threads,

@@ -13,6 +13,7 @@ from driftwalk.conditions.start import recorded_start
 from driftwalk.core.processors import default_threads
 from driftwalk.simulation.backend import Camera
 from driftwalk.simulation.initial import Start
+from driftwalk.simulation.series import continued_flow
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,6 +47,9 @@ class Conditions:
         Threads to use; results do not depend on it.
     neighbours : Neighbours or None
         The other bodies in the tank, for a model that feels them; None where there are none.
+    flow_start : ndarray, shape (worlds,), or None
+        Time on the clock of a flow that changes at which each world begins [s]; None: 0, where that
+        clock is the recording's from its first sample on.
     """
 
     sample_time: Floats
@@ -56,6 +60,7 @@ class Conditions:
     flow: xr.Dataset | None
     threads: int
     neighbours: Neighbours | None = None
+    flow_start: Floats | None = None
 
 
 def recorded_conditions(
@@ -78,7 +83,7 @@ def recorded_conditions(
     camera : Camera
         See `recorded_camera`.
     flow : xarray.Dataset, optional
-        A `flow_field`.
+        A `flow_field`; the time of one that changes counts from the recording's first sample.
     neighbours : Neighbours, optional
         The other bodies on the clock of the recording, see `neighbours_of`.
     threads : int, optional
@@ -87,7 +92,7 @@ def recorded_conditions(
     Raises
     ------
     InputError
-        When the track has no sample.
+        When the track has no sample, or the flow is over before the recording.
 
     Examples
     --------
@@ -99,8 +104,11 @@ def recorded_conditions(
     18001
     """
     start = recorded_start(track, window=study.flow.smoothing_window_s)
+    time = sample_times(track, study)
+    if flow is not None:
+        flow = continued_flow(flow, study, duration=float(time[-1]), begin=0.0)
     return Conditions(
-        sample_time=sample_times(track, study),
+        sample_time=time,
         start=start,
         camera=camera,
         tank=study.tank,

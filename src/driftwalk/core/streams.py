@@ -25,6 +25,7 @@ class Purpose(IntEnum):
     START = 3
     MOTION = 4
     BOUT = 5
+    FLOW = 6
 
 
 WORK: Final[dict[str, int]] = {

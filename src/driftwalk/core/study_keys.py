@@ -27,6 +27,8 @@ STUDY_KEYS: Final[dict[str, str]] = {
     "step_interval": "steps.step_interval_s",
     "position_noise": "observation.position_noise_m",
     "orientation_noise": "observation.orientation_noise_rad",
+    "flow_repeat": "flow.repeat",
+    "flow_start": "flow.start",
 }
 """From an argument's name to the key of the study that it sets; an option has the same name."""
 

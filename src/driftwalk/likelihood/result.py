@@ -376,6 +376,7 @@ def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
         attrs["flow_label"] = intervals.labels[flow]
         attrs["intervals"] = ", ".join(intervals.describe(one) for one in intervals.of_flow(flow))
         return build_flow_field(fit["x"].values, fit["y"].values, attrs=attrs, **fields[flow])
+    attrs["repeat"] = "hold"  # before the first switch and after the last the flow is steady
     by_name = {name: [one[name] for one in fields] for name in fields[0]}
     time, frames = switched_frames(intervals, by_name, first=float(fit["recording_start"]))
     return build_flow_field(fit["x"].values, fit["y"].values, time=time, attrs=attrs, **frames)

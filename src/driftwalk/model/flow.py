@@ -1,4 +1,4 @@
-"""How the flow field is taken from a recording."""
+"""How the flow field is taken from a recording, and how one in frames is met."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from driftwalk.model.section import Quantity, Section
 
 
 class Flow(Section):
-    """Extraction of the flow field from a recording (Eq. 4 of the paper)."""
+    """Extraction of the flow field from a recording (Eq. 4 of the paper), and its course."""
 
     section_name: ClassVar[str] = "flow"
 
@@ -34,4 +34,21 @@ class Flow(Section):
         default="corrected",
         title="Correction for the body's inertia.",
         description='"corrected" adds the inertia term of Eq. 4; "none" leaves it out.',
+    )
+    repeat: Literal["none", "loop", "mirror", "hold"] = Field(
+        default="none",
+        title="How a flow series goes on after its last frame.",
+        description=(
+            'How a flow that changes in time goes on after its last frame: "loop" begins again, '
+            '"mirror" runs backwards and forwards in turns, "hold" stands still; with "none" '
+            "whatever lasts longer is refused."
+        ),
+    )
+    start: Literal["random", "first"] = Field(
+        default="random",
+        title="Where in a flow series a run begins.",
+        description=(
+            'Moment of a flow that changes in time at which a run begins: "random", one for each '
+            'run, or "first", the first frame for all. With a recording its clock is kept.'
+        ),
     )

@@ -72,6 +72,7 @@ class BlockModel:
             keys,
             threads=like.threads,
             precision="single",
+            flow_start=like.flow_start,
         )
         return Worlds(x, y, theta, status)
 

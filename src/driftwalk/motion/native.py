@@ -37,5 +37,6 @@ def scored(
             keep_steps=details == "steps",
             threads=like.threads,
             particle=particle,
+            flow_start=like.flow_start,
         )
     )

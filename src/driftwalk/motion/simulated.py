@@ -22,12 +22,12 @@ from driftwalk.motion.family.particle import time_step_of
 from driftwalk.motion.program import ProgramModel
 from driftwalk.motion.protocol import Keys, MotionModel, Worlds
 from driftwalk.motion.values import known_values
-from driftwalk.motion.water import water_velocity
 from driftwalk.schema import body_track
 from driftwalk.schema.check import build_dataset
 from driftwalk.simulation.backend import STATUS, check_sample_time
 from driftwalk.simulation.initial import Start, random_place, random_start
 from driftwalk.simulation.run import default_times, plain_camera
+from driftwalk.simulation.series import continued_flow, flow_starts, series_facts, velocity_at
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -165,7 +165,11 @@ def _conditions(
     check_sample_time(times)
     if times[0] != 0.0:
         raise InputError(f"`sample_time` begins at {times[0]:g} s: it has to begin at 0 s")
-    begin = model_start(model, study, flow, keys) if start is None else start
+    starts = None
+    if flow is not None:
+        flow = continued_flow(flow, study, duration=float(times[-1]))
+        starts = flow_starts(flow, study, keys, duration=float(times[-1]))
+    begin = model_start(model, study, flow, keys, starts) if start is None else start
     return Conditions(
         sample_time=times,
         start=begin,
@@ -174,10 +178,17 @@ def _conditions(
         view=study.observation.field_of_view,
         flow=flow,
         threads=threads or default_threads(),
+        flow_start=starts,
     )
 
 
-def model_start(model: MotionModel, study: Study, flow: xr.Dataset | None, keys: Keys) -> Start:
+def model_start(
+    model: MotionModel,
+    study: Study,
+    flow: xr.Dataset | None,
+    keys: Keys,
+    flow_start: npt.ArrayLike | None = None,
+) -> Start:
     """Return the start that a study says: a pose or a random one, at rest relative to the water.
 
     Parameters
@@ -190,6 +201,8 @@ def model_start(model: MotionModel, study: Study, flow: xr.Dataset | None, keys:
         The water's velocity.
     keys : ndarray of uint64, shape (worlds,)
         The address of every world's random numbers.
+    flow_start : array_like, shape (worlds,), optional
+        When each world begins in a flow that changes [s]; default: 0.
 
     Returns
     -------
@@ -221,7 +234,7 @@ def model_start(model: MotionModel, study: Study, flow: xr.Dataset | None, keys:
         begin = random_place(study.tank, keys, clearance=clearance)
     if flow is None or isinstance(model, BlockModel):
         return begin
-    vx, vy = water_velocity(flow, begin)
+    vx, vy = velocity_at(flow, begin.x, begin.y, 0.0 if flow_start is None else flow_start)
     return begin._replace(vx=vx, vy=vy)
 
 
@@ -238,6 +251,8 @@ def _dataset(
         name: (dims, np.asarray(getattr(worlds, name))[:, :, None]) for name in ("x", "y", "theta")
     }
     data["status"] = ("replicate", worlds.status.astype(np.int32))
+    if conditions.flow_start is not None:
+        data["flow_start"] = ("replicate", conditions.flow_start)
     stated = {one.key: values[one.name] for one in model.parameters}
     attrs: dict[str, Any] = {"model": model.name, **model.facts(values)}
     if isinstance(model, ParticleModel):
@@ -257,5 +272,10 @@ def _dataset(
             "model_parameters": json.dumps(stated),
             "seed": seed,
             "study": study.to_toml(),
+            **series_facts(
+                conditions.flow,
+                conditions.flow_start,
+                duration=float(conditions.sample_time[-1]),
+            ),
         },
     )

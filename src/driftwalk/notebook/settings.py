@@ -28,6 +28,8 @@ class StudySettings(TypedDict, total=False):
     step_interval: Number
     position_noise: Number
     orientation_noise: Number
+    flow_repeat: str
+    flow_start: str
 
 
 class CalibrationSettings(StudySettings, total=False):

@@ -12,6 +12,7 @@ from driftwalk import _core
 from driftwalk.core.errors import InputError
 from driftwalk.schema import check_flow_field
 from driftwalk.schema.kinds.motion import WORLD_STATUS
+from driftwalk.simulation.series import frames_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -163,10 +164,12 @@ def _water(flow: xr.Dataset, tank: Tank, *, accelerating: bool) -> dict[str, Any
     check_flow_field(flow)
     _require_table(flow, tank, accelerating=accelerating)
     x, y = flow["x"].values, flow["y"].values
+    u, v, frame_time, repeat = frames_of(flow)
     return {
-        "u": _frames(flow, "u"),
-        "v": _frames(flow, "v"),
-        "frame_time": _frame_times(flow),
+        "u": u,
+        "v": v,
+        "frame_time": frame_time,
+        "flow_repeat": repeat,
         "origin_x": float(x[0]),
         "origin_y": float(y[0]),
         "spacing_x": float((x[-1] - x[0]) / (x.size - 1)),
@@ -270,17 +273,3 @@ def world_table(
         )
     )
     return np.ascontiguousarray(np.stack(columns, axis=1))
-
-
-def _frames(flow: xr.Dataset, name: str) -> Floats:
-    values = np.asarray(flow[name].values, dtype=np.float64)
-    return np.ascontiguousarray(values if values.ndim == 3 else values[None])
-
-
-def _frame_times(flow: xr.Dataset) -> Floats:
-    if "time" not in flow["u"].dims:
-        return np.zeros(1)
-    times = np.ascontiguousarray(flow["time"].values, dtype=np.float64)
-    if (np.diff(times) <= 0).any():
-        raise InputError("the times of the flow field do not increase")
-    return times

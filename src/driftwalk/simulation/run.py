@@ -13,8 +13,9 @@ from driftwalk.core.processors import default_threads
 from driftwalk.core.seeds import world_keys
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.trajectory import POSE
-from driftwalk.simulation.backend import Camera, native_model, world_table
+from driftwalk.simulation.backend import Camera, check_sample_time, native_model, world_table
 from driftwalk.simulation.initial import Start, random_start, world_orientations
+from driftwalk.simulation.series import continued_flow, flow_starts, series_facts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,6 +33,7 @@ def simulate(
     start: Start | None = None,
     replicates: int | None = None,
     seed: int | None = None,
+    flow_start: float | None = None,
     backend: Backend = "cpu",
     threads: int | None = None,
 ) -> xr.Dataset:
@@ -47,13 +49,17 @@ def simulate(
         Block, tank, water, forces, simulation and observation. "estimate" and "recording" in the
         observation mean no noise and no rounding here, since there is no recording.
     flow : xarray.Dataset
-        The water's velocity, a `flow_field`.
+        The water's velocity, a `flow_field`. One that changes in time lasts as long as the
+        simulation, or [flow] of the study says how it goes on.
     sample_time : array_like, shape (n,), optional
         Times of the samples [s], increasing, from 0 on; default: the study's rate and duration.
     start : Start, optional
         Pose and motion at time 0; default: what the study says.
     replicates, seed : int, optional
         Over the study's values.
+    flow_start : float, optional
+        Time on the clock of a flow that changes at which all replicates begin [s]; default: what
+        [flow] of the study says, which is a random one for each.
     backend : {"cpu", "reference"}
         The batch kernels in single precision, or the same source in double precision.
     threads : int, optional
@@ -63,12 +69,13 @@ def simulate(
     -------
     xarray.Dataset
         ``x``, ``y`` [m], ``theta`` [rad] with dimensions (replicate, time, body) and ``status``
-        (replicate), bits with CF flag masks.
+        (replicate), bits with CF flag masks; in a flow that changes ``flow_start`` (replicate) [s].
 
     Raises
     ------
     InputError
-        When times do not increase, `flow` is no flow field, or the backend is unknown.
+        When times do not increase, `flow` is no flow field or over too soon, or the backend is
+        unknown.
 
     Examples
     --------
@@ -88,7 +95,12 @@ def simulate(
     times = default_times(study) if sample_time is None else np.asarray(sample_time, np.float64)
     keys = world_keys(chosen, trial=0, replicate=np.arange(count))
     begin = start if start is not None else _study_start(study, keys)
-    model = native_model(study, flow, times, plain_camera(study))
+    check_sample_time(times)
+    water = continued_flow(flow, study, duration=float(times[-1]), begin=flow_start)
+    starts = flow_starts(water, study, keys, duration=float(times[-1]))
+    if starts is not None and flow_start is not None:
+        starts = np.full(count, float(flow_start))
+    model = native_model(study, water, times, plain_camera(study))
     worlds = world_table(
         **{**begin._asdict(), "theta": world_orientations(begin.theta, keys)},
         drag_coefficient=np.full(count, study.forces.drag_coefficient),
@@ -100,8 +112,11 @@ def simulate(
         keys,
         threads=threads or default_threads(),
         precision="double" if backend == "reference" else "single",
+        flow_start=starts,
     )
-    return _dataset(study, times, (x, y, theta), status, {"seed": chosen, "backend": backend})
+    facts = series_facts(water, starts, duration=float(times[-1]))
+    attrs = {"seed": chosen, "backend": backend, **facts}
+    return _dataset(study, times, (x, y, theta), status, starts, attrs)
 
 
 def plain_camera(study: Study) -> Camera:
@@ -128,7 +143,12 @@ def _study_start(study: Study, keys: npt.NDArray[np.uint64]) -> Start:
 
 
 def _dataset(
-    study: Study, times: Any, poses: tuple[Any, Any, Any], status: Any, attrs: dict[str, Any]
+    study: Study,
+    times: Any,
+    poses: tuple[Any, Any, Any],
+    status: Any,
+    starts: Any,
+    attrs: dict[str, Any],
 ) -> xr.Dataset:
     dims = ("replicate", "time", "body")
     forces = study.forces
@@ -136,6 +156,8 @@ def _dataset(
         name: (dims, values[:, :, None]) for name, values in zip(POSE, poses, strict=True)
     }
     data["status"] = ("replicate", status.astype(np.int32))
+    if starts is not None:
+        data["flow_start"] = ("replicate", starts)
     return build_dataset(
         "simulation",
         data,

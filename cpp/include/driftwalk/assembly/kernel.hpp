@@ -19,8 +19,6 @@ struct WorldQueue {
 struct AssemblyScratch {
   void* lanes; // scratch_bytes(blocks), aligned to 64 bytes
   Scene scene;
-  std::int16_t* blended_flow; // one frame of the flow table, when there are several
-  double* blended_flow_twice; // the same for the reference
 };
 
 // Runs worlds from the queue until it is empty; returns the number of block-steps.

@@ -36,9 +36,10 @@ struct LiveEvents {
 // Changes take effect with the next step. Nothing is allocated but in the constructor.
 class LiveWorld {
 public:
-  // `run` has to outlive the world. Blocks [x, y, theta], as many as the rules say, start at rest.
+  // `run` has to outlive the world. Blocks [x, y, theta], as many as the rules say, start at rest,
+  // at the time `flow_start` on the clock of the flow's frames [s].
   LiveWorld(const PreparedRun<double>& run, const AssemblyRules& rules, const LiveForces& forces,
-            const double* start, std::uint64_t key);
+            const double* start, std::uint64_t key, double flow_start = 0);
   ~LiveWorld();
   LiveWorld(const LiveWorld&) = delete;
   LiveWorld& operator=(const LiveWorld&) = delete;

@@ -14,16 +14,13 @@ namespace driftwalk {
 // Room for `blocks` blocks a world; `lane_bytes` is what the kernel asks for.
 class AssemblyMemory {
 public:
-  AssemblyMemory(int blocks, std::size_t lane_bytes, std::int64_t flow_size)
+  AssemblyMemory(int blocks, std::size_t lane_bytes)
       : blocks_(static_cast<std::size_t>(blocks)), before_(blocks_.size()),
         assemblies_(blocks_.size()), next_(blocks_.size()),
         heads_(most_cells_per_side * most_cells_per_side),
         pairs_(static_cast<std::size_t>(pair_capacity(blocks))),
-        flow_(static_cast<std::size_t>(flow_size)), flow_twice_(flow_.size()),
         lanes_(static_cast<char*>(::operator new(lane_bytes, lane_alignment))) {
     scratch_.lanes = lanes_.get();
-    scratch_.blended_flow = flow_.data();
-    scratch_.blended_flow_twice = flow_twice_.data();
     Scene& scene = scratch_.scene;
     scene = {};
     scene.block = blocks_.data();
@@ -46,8 +43,6 @@ private:
   std::vector<SceneAssembly> assemblies_;
   std::vector<std::int32_t> next_, heads_;
   std::vector<BlockPair> pairs_;
-  std::vector<std::int16_t> flow_;
-  std::vector<double> flow_twice_;
   std::unique_ptr<char, DeleteLanes> lanes_;
   AssemblyScratch scratch_;
 };

@@ -16,15 +16,13 @@ public:
   static constexpr int lanes = Numbers<Real>::lanes;
   using Bool = typename Numbers<Real>::Bool;
   using UInt = typename Numbers<Real>::UInt;
-  using Node = typename FlowNumber<T>::type;
 
   // All lanes get the blocks at `start`; those that never begin move them along for nothing. The
   // memory holds worlds of up to `capacity` blocks. Events go to `out`.
   WorldPack(const Prepared<T>& run, const AssemblyRules& rules, const double* start,
-            const AssemblyOutputs& out, AssemblyScratch& scratch, Node* blended_flow, int capacity)
-      : run_(run), rules_(rules), out_(out), scratch_(scratch), blended_flow_(blended_flow),
-        memory_(scratch.lanes, capacity), near_(rules), blocks_(rules.blocks),
-        listed_(rules.blocks > most_blocks_all_pairs),
+            const AssemblyOutputs& out, AssemblyScratch& scratch, int capacity)
+      : run_(run), rules_(rules), out_(out), scratch_(scratch), memory_(scratch.lanes, capacity),
+        near_(rules), blocks_(rules.blocks), listed_(rules.blocks > most_blocks_all_pairs),
         physics_{
             Law::of(Real(T(0)), run.drag),       run.block, run.flow, run.water, run.wall, run.step,
             {Real(T(0)), Real(T(0)), Real(T(0))}} {
@@ -36,6 +34,9 @@ public:
       put(stream_.key1, lane, 0);
       put(draw_, lane, 0);
       begin_force(lane);
+    }
+    if (run_.frames > 1) {
+      clocks_.show(physics_.flow, physics_.water);
     }
     for (int b = 0; b < blocks_; ++b) {
       memory_.listed_x[b] = memory_.listed_y[b] = Real(T(0));
@@ -51,7 +52,7 @@ public:
 
   // Puts a world into a lane, before the pack's step `step`, a whole number of periods.
   void begin(int lane, std::int64_t world, std::int64_t step, const double* start,
-             std::uint64_t key) {
+             std::uint64_t key, double flow_start) {
     LaneBook& book = books_[lane];
     book.world = world;
     book.first_step = step;
@@ -64,6 +65,7 @@ public:
     put(stream_.key1, lane, static_cast<UInt32>(key >> 32));
     put(draw_, lane, 0);
     begin_force(lane);
+    clocks_.begin(lane, flow_start);
     if (listed_) {
       list_pairs(lane);
     }
@@ -82,7 +84,7 @@ public:
   void scale_flow(T factor) {
     physics_.flow.unit = run_.flow.unit * factor;
     physics_.water.strength = factor;
-    physics_.water.part[0] = factor * factor;
+    physics_.water.part = factor * factor;
   }
 
   // To be called when the rules, or the blocks of a lane, have been changed from outside.
@@ -115,7 +117,7 @@ public:
       draw_ = draw_ + UInt(static_cast<UInt32>(1));
     }
     if (run_.frames > 1) {
-      blend_flow(step);
+      look_at_flow(step);
     }
     advance(physics_, phase < run_.steps_per_interval ? 0 : 1, memory_.members, memory_.sums,
             blocks_);
@@ -145,15 +147,12 @@ private:
     }
   }
 
-  void blend_flow(std::int64_t step) {
-    std::int64_t first = 0;
-    for (const LaneBook& book : books_) {
-      first = book.running ? book.first_step : first;
+  void look_at_flow(std::int64_t step) {
+    for (int lane = 0; lane < lanes; ++lane) {
+      const std::int64_t own = books_[lane].running ? step - books_[lane].first_step : 0;
+      const double middle = (static_cast<double>(own) + 0.5) * static_cast<double>(run_.step.dt);
+      clocks_.look(run_, lane, middle, physics_.water.strength);
     }
-    const double middle =
-        (static_cast<double>(step - first) + 0.5) * static_cast<double>(run_.step.dt);
-    physics_.flow.table = flow_table_at(run_, middle, blended_flow_);
-    look_at_water(run_, middle, physics_.water);
   }
 
   bool settle_lanes(std::int64_t step) {
@@ -253,7 +252,6 @@ private:
   const AssemblyRules& rules_;
   const AssemblyOutputs& out_;
   AssemblyScratch& scratch_;
-  Node* blended_flow_;
   PackMemory<Real> memory_;
   NearRules<T> near_;
   int blocks_;
@@ -263,6 +261,7 @@ private:
   UInt draw_;
   Real kept_, fresh_; // parts of the last force and of the new numbers in the next force
   LaneBook books_[lanes];
+  FlowClocks<T> clocks_;
 };
 
 DRIFTWALK_LANES_END

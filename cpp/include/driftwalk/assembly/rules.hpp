@@ -37,6 +37,7 @@ struct AssemblyWorlds {
   const double* drag_coefficient = nullptr;
   const double* force_std = nullptr;  // [N]
   const std::uint64_t* key = nullptr; // hash of (seed, trial, replicate)
+  const double* flow_start = nullptr; // as in BatchWorlds
 };
 
 // Outputs, one row per world; events beyond event_count stay as they are.

@@ -10,13 +10,11 @@ template <class Real, class T, class Law>
 class AssemblyPack {
 public:
   static constexpr int lanes = Numbers<Real>::lanes;
-  using Node = typename FlowNumber<T>::type;
 
   AssemblyPack(const Prepared<T>& run, const AssemblyRules& rules, const AssemblyWorlds& worlds,
-               const AssemblyOutputs& out, const WorldQueue& queue, AssemblyScratch& scratch,
-               Node* blended_flow)
+               const AssemblyOutputs& out, const WorldQueue& queue, AssemblyScratch& scratch)
       : run_(run), rules_(rules), worlds_(worlds), out_(out), queue_(queue),
-        pack_(run, rules, worlds.start, out, scratch, blended_flow, rules.blocks) {}
+        pack_(run, rules, worlds.start, out, scratch, rules.blocks) {}
 
   // Returns the number of block-steps of the worlds that were run.
   std::int64_t run() {
@@ -40,9 +38,7 @@ private:
     for (int lane = 0; lane < lanes; ++lane) {
       some = some || pack_.book(lane).running;
     }
-    // Worlds in a flow that changes share its clock: they begin together.
-    const bool may_begin = run_.frames == 1 || !some;
-    for (int lane = 0; lane < lanes && may_begin; ++lane) {
+    for (int lane = 0; lane < lanes; ++lane) {
       if (!pack_.book(lane).running && !empty_) {
         const std::int64_t world = queue_.take(queue_.self);
         empty_ = world >= worlds_.count;
@@ -56,7 +52,8 @@ private:
   }
 
   void begin(std::int64_t world, int lane, std::int64_t step) {
-    pack_.begin(lane, world, step, worlds_.start + 3 * rules_.blocks * world, worlds_.key[world]);
+    pack_.begin(lane, world, step, worlds_.start + 3 * rules_.blocks * world, worlds_.key[world],
+                worlds_.flow_start == nullptr ? 0.0 : worlds_.flow_start[world]);
     pack_.set_forces(lane, worlds_.drag_coefficient[world], worlds_.force_std[world]);
     if (out_.sample_every > 0) {
       write_moment<Real, T>(rules_, out_, pack_.memory(), lane, world, 0);

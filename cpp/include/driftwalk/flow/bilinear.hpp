@@ -31,15 +31,25 @@ inline void store_cells(IntPack<N> cell, Int32* at) {
   std::memcpy(at, &cell.v, sizeof cell.v);
 }
 
-#if defined(DRIFTWALK_USE_X86)
-inline __m128 load_cell(const std::int16_t* table, Int32 at) {
-  return _mm_loadu_ps(reinterpret_cast<const float*>(table + flow_record * std::int64_t(at)));
+// Where a lane's cell is: in the one table of all lanes, or in its own.
+inline const std::int16_t* cell_of(const std::int16_t* table, int, Int32 at) {
+  return table + flow_record * std::int64_t(at);
+}
+inline const std::int16_t* cell_of(const std::int16_t* const* tables, int lane, Int32 at) {
+  return tables[lane] + flow_record * std::int64_t(at);
 }
 
-inline void load_cells(const std::int16_t* table, const Int32* at, IntPack<4>* out) {
+#if defined(DRIFTWALK_USE_X86)
+template <class Tables>
+inline __m128 load_cell(Tables tables, const Int32* at, int lane) {
+  return _mm_loadu_ps(reinterpret_cast<const float*>(cell_of(tables, lane, at[lane])));
+}
+
+template <class Tables>
+inline void load_cells(Tables tables, const Int32* at, IntPack<4>* out) {
   __m128 r[4];
   for (int k = 0; k < 4; ++k) {
-    r[k] = load_cell(table, at[k]);
+    r[k] = load_cell(tables, at, k);
   }
   _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
   for (int k = 0; k < 4; ++k) {
@@ -48,15 +58,17 @@ inline void load_cells(const std::int16_t* table, const Int32* at, IntPack<4>* o
 }
 
 #if defined(__AVX2__)
-inline __m256 load_two_cells(const std::int16_t* table, Int32 low, Int32 high) {
-  return _mm256_insertf128_ps(_mm256_castps128_ps256(load_cell(table, low)), load_cell(table, high),
-                              1);
+template <class Tables>
+inline __m256 load_two_cells(Tables tables, const Int32* at, int lane) {
+  return _mm256_insertf128_ps(_mm256_castps128_ps256(load_cell(tables, at, lane)),
+                              load_cell(tables, at, lane + 4), 1);
 }
 
-inline void load_cells(const std::int16_t* table, const Int32* at, IntPack<8>* out) {
+template <class Tables>
+inline void load_cells(Tables tables, const Int32* at, IntPack<8>* out) {
   __m256 r[4];
   for (int k = 0; k < 4; ++k) {
-    r[k] = load_two_cells(table, at[k], at[k + 4]);
+    r[k] = load_two_cells(tables, at, k);
   }
   const __m256 t0 = _mm256_unpacklo_ps(r[0], r[1]), t1 = _mm256_unpackhi_ps(r[0], r[1]);
   const __m256 t2 = _mm256_unpacklo_ps(r[2], r[3]), t3 = _mm256_unpackhi_ps(r[2], r[3]);
@@ -69,12 +81,13 @@ inline void load_cells(const std::int16_t* table, const Int32* at, IntPack<8>* o
 #endif
 
 #if defined(__AVX512F__)
-inline void load_cells(const std::int16_t* table, const Int32* at, IntPack<16>* out) {
+template <class Tables>
+inline void load_cells(Tables tables, const Int32* at, IntPack<16>* out) {
   __m512 r[4];
   for (int k = 0; k < 4; ++k) {
     // Halves first: two 16-byte insertions and one of 32 bytes beat three into a 64-byte register.
-    const __m256 low = load_two_cells(table, at[k], at[k + 4]);
-    const __m256 high = load_two_cells(table, at[k + 8], at[k + 12]);
+    const __m256 low = load_two_cells(tables, at, k);
+    const __m256 high = load_two_cells(tables, at, k + 8);
     r[k] = _mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1);
   }
   const __m512 t0 = _mm512_unpacklo_ps(r[0], r[1]), t1 = _mm512_unpackhi_ps(r[0], r[1]);
@@ -87,12 +100,12 @@ inline void load_cells(const std::int16_t* table, const Int32* at, IntPack<16>* 
 }
 #endif
 #else
-template <int N>
-inline void load_cells(const std::int16_t* table, const Int32* at, IntPack<N>* out) {
+template <class Tables, int N>
+inline void load_cells(Tables tables, const Int32* at, IntPack<N>* out) {
   Int32 columns[4][N];
   for (int lane = 0; lane < N; ++lane) {
     Int32 record[4];
-    std::memcpy(record, table + flow_record * std::int64_t(at[lane]), sizeof record);
+    std::memcpy(record, cell_of(tables, lane, at[lane]), sizeof record);
     for (int k = 0; k < 4; ++k) {
       columns[k][lane] = record[k];
     }
@@ -102,6 +115,34 @@ inline void load_cells(const std::int16_t* table, const Int32* at, IntPack<N>* o
   }
 }
 #endif
+
+// What stands in a table between two frames: integers are rounded to the nearest, halves away from
+// zero.
+template <class Real>
+inline Real blend(Real before, Real after, Real weight) {
+  return before + (after - before) * weight;
+}
+template <int N>
+inline IntPack<N> blend(IntPack<N> before, IntPack<N> after, FloatPack<N> weight) {
+  const FloatPack<N> low = to_real(weight, before);
+  const FloatPack<N> blended = low + (to_real(weight, after) - low) * weight;
+  return truncate(blended + copy_sign(FloatPack<N>(0.5f), blended));
+}
+
+// The same as above where each lane has two frames of its own.
+template <int N>
+inline void load_between(const LaneTables<float>& lanes, const Int32* at, IntPack<N>* out) {
+  IntPack<N> before[4], after[4];
+  load_cells(lanes.before, at, before);
+  load_cells(lanes.after, at, after);
+  FloatPack<N> weight;
+  std::memcpy(&weight.v, lanes.weight, sizeof weight.v);
+  for (int k = 0; k < 4; ++k) {
+    const IntPack<N> low = blend((before[k] << 16) >> 16, (after[k] << 16) >> 16, weight);
+    const IntPack<N> high = blend(before[k] >> 16, after[k] >> 16, weight);
+    out[k] = (high << 16) | (low & IntPack<N>(0xffff));
+  }
+}
 
 // Keeps the compiler from extracting numbers lane by lane that it has just seen stored: slower.
 template <int Count>
@@ -181,9 +222,15 @@ struct FlowWeights {
     along_x = add_halves(along_x, step_x);
     along_y = add_halves(along_y, step_y);
   }
-  void weigh(const std::int16_t* table, const Int32* at, Real& u, Real& v) const {
+  // `tables` is one for all lanes or a LaneTables.
+  template <class Tables>
+  void weigh(const Tables& tables, const Int32* at, Real& u, Real& v) const {
     Int cell[4];
-    load_cells(table, at, cell);
+    if constexpr (std::is_pointer_v<Tables>) {
+      load_cells(tables, at, cell);
+    } else {
+      load_between(tables, at, cell);
+    }
     const Int vertical = halve_halves(along_y);
     const Int right = multiply_high_halves(vertical, along_x);
     const Int left = subtract_halves(vertical, right);
@@ -195,8 +242,16 @@ struct FlowWeights {
 inline void look_up(const FlowView<double>& flow, double x, double y, double& u, double& v) {
   const Int32 column = truncate(x), row = truncate(y);
   const double fx = x - column, fy = y - row;
-  const double* record =
-      flow.table + flow_record * ((std::int64_t(row) << flow.stride_bits) + column);
+  const std::int64_t place = flow_record * ((std::int64_t(row) << flow.stride_bits) + column);
+  double cell[2 * flow_record];
+  const double* record = flow.table + place;
+  if (flow.lanes != nullptr) {
+    for (int k = 0; k < 2 * flow_record; ++k) {
+      cell[k] = blend(flow.lanes->before[0][place + k], flow.lanes->after[0][place + k],
+                      flow.lanes->weight[0]);
+    }
+    record = cell;
+  }
   const double* next = record + flow_record;
   u = (record[0] * (1 - fx) + next[0] * fx) * (1 - fy) + (record[1] * (1 - fx) + next[1] * fx) * fy;
   v = (record[2] * (1 - fx) + next[2] * fx) * (1 - fy) + (record[3] * (1 - fx) + next[3] * fx) * fy;
@@ -219,7 +274,11 @@ public:
     alignas(64) Int32 at[N];
     store_cells(row_.cell(flow_.stride_bits), at);
     keep_stored(at);
-    weights_.weigh(flow_.table, at, u, v);
+    if (flow_.lanes == nullptr) {
+      weights_.weigh(flow_.table, at, u, v);
+    } else {
+      weights_.weigh(*flow_.lanes, at, u, v);
+    }
   }
   void advance() {
     row_.advance();
@@ -246,6 +305,19 @@ private:
   FlowRow<double> row_;
 };
 
+// Reads the cells that have been found along rows.
+template <int N, class Tables>
+inline void weigh_rows(const Tables& tables, const FlowRow<FloatPack<N>>* rows, int row_count,
+                       int count, const Int32* found, FloatPack<N>* u, FloatPack<N>* v) {
+  for (int r = 0; r < row_count; ++r) {
+    FlowWeights<N> weights(rows[r]);
+    for (int k = 0; k < count; ++k, found += N) {
+      weights.weigh(tables, found, *u++, *v++);
+      weights.advance();
+    }
+  }
+}
+
 // The flow along `rows` rows of `count` places, row after row, in units of the table.
 //
 // Each pass does one thing for all places. Together they would need more registers than there are,
@@ -265,14 +337,11 @@ template <int N>
     }
   }
   keep_stored(at);
-  const std::int16_t* const table = flow.table;
-  const Int32* found = at;
-  for (int r = 0; r < row_count; ++r) {
-    FlowWeights<N> weights(rows[r]);
-    for (int k = 0; k < count; ++k, found += N) {
-      weights.weigh(table, found, *u++, *v++);
-      weights.advance();
-    }
+  if (flow.lanes == nullptr) {
+    const std::int16_t* const table = flow.table;
+    weigh_rows<N>(table, rows, row_count, count, at, u, v);
+  } else {
+    weigh_rows<N>(*flow.lanes, rows, row_count, count, at, u, v);
   }
 }
 

@@ -27,12 +27,18 @@ void run_particles(const Prepared<T>& run, const BatchWorlds& worlds, std::int64
   const ColumnReader<Real> columns(worlds, first, count);
   Particle particle(columns, worlds, static_cast<double>(run.step.dt));
   FlowView<T> flow = run.flow;
+  FlowClocks<T> clocks;
+  const bool changes = run.frames > 1 && worlds.particle.carried;
+  if (changes) {
+    clocks.begin(worlds, first, count, Numbers<Real>::lanes);
+    clocks.show(flow);
+  }
   Motionless<Real> rest(run);
   std::int64_t sample = 0;
   for (std::int64_t index = 0; sample < run.samples; ++index) {
-    if (run.frames > 1 && worlds.particle.carried) {
-      const double middle = (static_cast<double>(index) + 0.5) * static_cast<double>(run.step.dt);
-      flow.table = flow_table_at(run, middle, sink.blended_flow);
+    const double middle = (static_cast<double>(index) + 0.5) * static_cast<double>(run.step.dt);
+    for (int lane = 0; lane < Numbers<Real>::lanes && changes; ++lane) {
+      clocks.look(run, lane, middle, T(1));
     }
     const Real x = particle.x(), y = particle.y();
     particle.step(run.wall, flow, index);

@@ -30,8 +30,11 @@ inline Motion<Real> water_acceleration(const WaterView<T>& water, const BlockSha
   const Real zero{T(0)};
   Motion<Real> sums{zero, zero, zero};
   for (int k = 0; k < water.count; ++k) {
-    nodes.table = water.table[k];
-    const T part = water.part[k];
+    Real part{water.part};
+    if (water.lanes != nullptr) {
+      nodes.lanes = &water.lanes->table[k];
+      load_lanes(water.lanes->part[k], part);
+    }
     for (int above = 0; above < 2; ++above) {
       FlowCursor<Real> cursor(nodes, column, above == 0 ? row : row + up, across, zero);
       Real left_x, left_y, right_x, right_y;

@@ -16,6 +16,11 @@ enum Status : std::uint32_t {
   status_no_motion = 1u << 2,  // mean speed below 1 um/s in the second half of the run
 };
 
+// How a flow in frames goes on before its first frame and after its last: it stands, it begins
+// again with the first frame (where the last one has to lead), or it runs backwards and forwards in
+// turns.
+enum class FlowRepeat : int { hold, loop, mirror };
+
 // The same for every world of a batch. Lengths in m, times in s, SI throughout.
 struct BatchModel : ModelNumbers {
   // wall: a circle about the origin, or the edges of a convex polygon (nx, ny, distance) x count
@@ -26,6 +31,7 @@ struct BatchModel : ModelNumbers {
   const double* flow_v = nullptr;
   int frames = 1, rows = 0, columns = 0;
   const double* frame_time = nullptr;
+  FlowRepeat repeat = FlowRepeat::hold;
   // sampling: times from the start [s], increasing, from 0
   const double* sample_time = nullptr;
   std::int64_t samples = 0;
@@ -42,6 +48,8 @@ struct BatchWorlds {
   const double* drag_coefficient = nullptr;
   const double* force_std = nullptr;  // [N]
   const std::uint64_t* key = nullptr; // hash of (seed, trial, replicate)
+  // Time on the clock of the flow's frames at which a world begins [s]; null: 0 for all.
+  const double* flow_start = nullptr;
   const double* x = nullptr;
   const double* y = nullptr;
   const double* theta = nullptr;

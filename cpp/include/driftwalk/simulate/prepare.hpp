@@ -36,8 +36,6 @@ public:
   PreparedRun& operator=(const PreparedRun&) = delete;
 
   const Prepared<T>& view() const { return view_; }
-  // Numbers of scratch that SampleSink::blended_flow needs.
-  std::int64_t blended_flow_size() const { return view_.frames > 1 ? view_.frame_size : 0; }
 
 private:
   void prepare_wall(const BatchModel& model);

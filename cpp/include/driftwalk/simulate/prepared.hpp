@@ -52,9 +52,21 @@ struct FlowNumber<float> {
   using type = std::int16_t;
 };
 
+// Lanes of a pack, at most.
+inline constexpr int most_lanes = 16;
+
+// Two tables for each lane of a pack, and what the second one counts: the frames around its time.
+template <class T>
+struct LaneTables {
+  const typename FlowNumber<T>::type* before[most_lanes];
+  const typename FlowNumber<T>::type* after[most_lanes];
+  T weight[most_lanes]; // of `after`, 0 to 1
+};
+
 template <class T>
 struct FlowView {
   const typename FlowNumber<T>::type* table; // [rows][1 << stride_bits][flow_record]
+  const LaneTables<T>* lanes;                // in place of `table` in a flow in frames, else null
   int stride_bits;
   T unit;     // velocity of a looked-up number of 1 [m/s]
   T origin_x; // position of node (0, 0) [m]
@@ -68,18 +80,26 @@ struct FlowView {
 // Up to so many tables make the water's acceleration at a time.
 inline constexpr int most_water_tables = 4;
 
+// Of a flow in frames, the tables of the water's acceleration that each lane needs, and their
+// parts.
+template <class T>
+struct LaneWater {
+  LaneTables<T> table[most_water_tables];
+  double part[most_water_tables][most_lanes];
+};
+
 // The water's acceleration Du/Dt on the nodes of the flow, and how it pushes a block: the sum of
 // `count` tables, each times its part. A steady flow has one; cpp/src/prepare_water.cpp says which
 // a flow in frames has.
 template <class T>
 struct WaterView {
-  int count;         // 0: the water's acceleration does not push
-  FlowView<T> nodes; // of the first table; its unit is in m/s^2
-  const typename FlowNumber<T>::type* table[most_water_tables];
-  T part[most_water_tables];
-  T strength; // of the flow, a factor on its velocity
-  T push;     // (m_w + m_a)/(m + m_a), m_w the displaced mass
-  T spin;     // the same of the moments of inertia
+  int count;                 // 0: the water's acceleration does not push
+  FlowView<T> nodes;         // of the first table; its unit is in m/s^2
+  const LaneWater<T>* lanes; // of a flow in frames, else null
+  T part;                    // of the one table of a steady flow
+  T strength;                // of the flow, a factor on its velocity
+  T push;                    // (m_w + m_a)/(m + m_a), m_w the displaced mass
+  T spin;                    // the same of the moments of inertia
 };
 
 // Everything a kernel reads, in its own number type. Plain pointers: the kernels are compiled once
@@ -98,6 +118,7 @@ struct Prepared {
   std::int64_t frame_size;
   int frames;
   const double* frame_time;
+  FlowRepeat repeat;
   WaterView<T> water;
   // force: what is kept of the last one, 0 where it has no memory, and the spread of the first
   T force_kept, force_first;
@@ -120,8 +141,6 @@ struct SampleSink {
   T* y;
   T* theta;
   std::int64_t lane_stride;
-  // Scratch for one frame of the flow table, used when there are several.
-  typename FlowNumber<T>::type* blended_flow;
 };
 
 // Packs of worlds that one call of a kernel takes together.

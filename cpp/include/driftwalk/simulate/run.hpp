@@ -13,7 +13,7 @@ template <class T>
 inline SampleSink<T> samples_from(const SampleSink<T>& sink, std::int64_t lane) {
   const std::int64_t offset = lane * sink.lane_stride;
   return {sink.x + offset, sink.y + offset, sink.theta == nullptr ? nullptr : sink.theta + offset,
-          sink.lane_stride, sink.blended_flow};
+          sink.lane_stride};
 }
 
 template <class Real>
@@ -144,63 +144,93 @@ inline void write_sample(const Prepared<T>& run, const SampleSink<T>& sink, std:
   }
 }
 
-// Where a time is among the frames of a flow: between `frame` and the next, at a share of the span
-// that is below 0 before the first frame and above 1 after the last.
-struct AmongFrames {
-  int frame;
-  double share;
+// The clocks of a pack's flow in frames: where each lane is among them, and what it reads there.
+// Lanes that are not begun stand at time 0.
+template <class T>
+class FlowClocks {
+public:
+  FlowClocks() = default;
+  FlowClocks(const FlowClocks&) = delete;
+  FlowClocks& operator=(const FlowClocks&) = delete;
+
+  // The world of a lane begins at this time on the clock of the frames [s].
+  void begin(int lane, double start) { start_[lane] = start; }
+  // The same for the worlds of a pack; lanes beyond the last world repeat it.
+  void begin(const BatchWorlds& worlds, std::int64_t first, int count, int lanes) {
+    for (int lane = 0; lane < lanes && worlds.flow_start != nullptr; ++lane) {
+      begin(lane, worlds.flow_start[first + (lane < count ? lane : count - 1)]);
+    }
+  }
+
+  // Lets the views of a pack read at a time since the start of a lane's world; `strength` is a
+  // factor on the flow.
+  void look(const Prepared<T>& run, int lane, double elapsed, T strength) {
+    const SeriesTime now = series_time(run, start_[lane] + elapsed);
+    const double* const time = run.frame_time;
+    // From where the lane was: the frame found does not depend on where the search begins.
+    int frame = frame_[lane];
+    while (frame + 2 < run.frames && time[frame + 1] <= now.time) {
+      ++frame;
+    }
+    while (frame > 0 && time[frame] > now.time) {
+      --frame;
+    }
+    frame_[lane] = frame;
+    const double share = (now.time - time[frame]) / (time[frame + 1] - time[frame]);
+    const T weight = static_cast<T>(share < 0 ? 0 : (share > 1 ? 1 : share));
+    flow_.before[lane] = run.flow.table + frame * run.frame_size;
+    flow_.after[lane] = flow_.before[lane] + run.frame_size;
+    flow_.weight[lane] = weight;
+    if (run.water.count > 0) {
+      // Before the first frame and after the last the flow stands.
+      const T rate = share < 0 || share > 1 ? T(0) : now.backwards ? -strength : strength;
+      look_at_water(run, lane, frame, weight, strength * strength, rate);
+    }
+  }
+
+  void show(FlowView<T>& flow, WaterView<T>& water) const {
+    flow.lanes = &flow_;
+    water.lanes = &water_;
+  }
+  void show(FlowView<T>& flow) const { flow.lanes = &flow_; }
+
+private:
+  struct SeriesTime {
+    double time;
+    bool backwards;
+  };
+
+  static SeriesTime series_time(const Prepared<T>& run, double time) {
+    if (run.repeat == FlowRepeat::hold) {
+      return {time, false};
+    }
+    const double first = run.frame_time[0], span = run.frame_time[run.frames - 1] - first;
+    const double turn = __builtin_floor((time - first) / span);
+    const double within = (time - first) - turn * span;
+    const bool backwards =
+        run.repeat == FlowRepeat::mirror && turn != 2 * __builtin_floor(turn / 2);
+    return {first + (backwards ? span - within : within), backwards};
+  }
+
+  // The tables of the water's acceleration (prepare_water.cpp).
+  void look_at_water(const Prepared<T>& run, int lane, int frame, T weight, T twice, T rate) {
+    const T before = T(1) - weight;
+    const T part[most_water_tables] = {before * before * twice, T(2) * weight * before * twice,
+                                       rate, weight * weight * twice};
+    for (int k = 0; k < most_water_tables; ++k) {
+      LaneTables<T>& table = water_.table[k];
+      table.before[lane] = table.after[lane] =
+          run.water.nodes.table + (3 * frame + k) * run.frame_size;
+      table.weight[lane] = T(0);
+      water_.part[k][lane] = static_cast<double>(part[k]);
+    }
+  }
+
+  double start_[most_lanes] = {};
+  int frame_[most_lanes] = {};
+  LaneTables<T> flow_;
+  LaneWater<T> water_;
 };
-
-template <class T>
-inline AmongFrames among_frames(const Prepared<T>& run, double time) {
-  int frame = 0;
-  while (frame + 2 < run.frames && run.frame_time[frame + 1] <= time) {
-    ++frame;
-  }
-  const double span = run.frame_time[frame + 1] - run.frame_time[frame];
-  return {frame, (time - run.frame_time[frame]) / span};
-}
-
-template <class T>
-inline T weight_of(const AmongFrames& at) {
-  return static_cast<T>(at.share < 0 ? 0 : (at.share > 1 ? 1 : at.share));
-}
-
-// The flow table at a time, blended linearly between the two frames around it.
-template <class T, class Node>
-inline const Node* flow_table_at(const Prepared<T>& run, double time, Node* scratch) {
-  const AmongFrames at = among_frames(run, time);
-  const T weight = weight_of<T>(at);
-  const Node* before = run.flow.table + at.frame * run.frame_size;
-  const Node* after = before + run.frame_size;
-  for (std::int64_t k = 0; k < run.frame_size; ++k) {
-    const T low = static_cast<T>(before[k]);
-    const T blended = low + (static_cast<T>(after[k]) - low) * weight;
-    // Integer nodes are rounded to the nearest, halves away from zero.
-    constexpr T half = std::is_integral_v<Node> ? T(0.5) : T(0);
-    scratch[k] = static_cast<Node>(blended + copy_sign(half, blended));
-  }
-  return scratch;
-}
-
-// Of a flow in frames, the tables of the water's acceleration at a time (prepare_water.cpp).
-template <class T>
-inline void look_at_water(const Prepared<T>& run, double time, WaterView<T>& water) {
-  if (water.count == 0) {
-    return;
-  }
-  const AmongFrames at = among_frames(run, time);
-  const T weight = weight_of<T>(at), before = T(1) - weight;
-  const T twice = water.strength * water.strength;
-  const T part[most_water_tables] = {before * before * twice, T(2) * weight * before * twice,
-                                     // Before the first frame and after the last the flow stands.
-                                     at.share >= 0 && at.share <= 1 ? water.strength : T(0),
-                                     weight * weight * twice};
-  for (int k = 0; k < most_water_tables; ++k) {
-    water.table[k] = run.water.nodes.table + (3 * at.frame + k) * run.frame_size;
-    water.part[k] = part[k];
-  }
-}
 
 // Path length of a world in the second half of its samples, before camera noise. It reveals a
 // world at rest, whatever the noise does to its recorded steps.
@@ -293,6 +323,7 @@ private:
     Philox<UInt> stream;
     Real normals[4], last[2];
     Motionless<Real> rest;
+    FlowClocks<T> clocks;
   };
 
   void load(int p, const BatchWorlds& worlds, std::int64_t first, int count) {
@@ -311,6 +342,10 @@ private:
                     run_.wall,
                     run_.step,
                     world_constants(law, run_, drag_coefficient, force_std)};
+    if (run_.frames > 1) {
+      record.clocks.begin(worlds, first, count, lanes);
+      record.clocks.show(pack.physics.flow, pack.physics.water);
+    }
     meet_wall(run_.wall, run_.block.half_side, Real(run_.step.per_inertia), pack.body.pose,
               pack.body.motion);
   }
@@ -334,7 +369,7 @@ private:
 
   void step() {
     if (run_.frames > 1) {
-      blend_flow();
+      look_at_flow();
     }
     step_packs(pack_, packs_);
     for (; sample_ < run_.samples && run_.sample_step[sample_] == step_index_; ++sample_) {
@@ -345,13 +380,13 @@ private:
     ++step_index_;
   }
 
-  void blend_flow() {
+  void look_at_flow() {
     const double middle =
         (static_cast<double>(step_index_) + 0.5) * static_cast<double>(run_.step.dt);
-    const auto* const table = flow_table_at(run_, middle, sink_.blended_flow);
     for (int p = 0; p < packs_; ++p) {
-      pack_[p].physics.flow.table = table;
-      look_at_water(run_, middle, pack_[p].physics.water);
+      for (int lane = 0; lane < lanes; ++lane) {
+        record_[p].clocks.look(run_, lane, middle, T(1));
+      }
     }
   }
 

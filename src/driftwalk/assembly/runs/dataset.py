@@ -17,6 +17,7 @@ from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.trajectory import POSE
 from driftwalk.simulation.backend import BROKEN
+from driftwalk.simulation.series import series_facts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -140,6 +141,7 @@ def assembly_attrs(plan: Plan) -> dict[str, Any]:
         "trial": plan.trial,
         "backend": plan.backend,
         "study": study.to_toml(),
+        **series_facts(plan.flow, plan.flow_start, duration=plan.steps * study.time_step_s),
     }
 
 
@@ -209,4 +211,6 @@ def _parameters(plan: Plan) -> dict[str, Any]:
     }
     if plan.flow_draw is not None:
         known["flow_draw"] = ("run", plan.flow_draw.astype(np.int32))
+    if plan.flow_start is not None:
+        known["flow_start"] = ("run", plan.flow_start)
     return known | {LAW_NAMES[key]: ("run", values) for key, values in plan.law.items()}

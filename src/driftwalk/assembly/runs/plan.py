@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
@@ -16,6 +17,7 @@ from driftwalk.assembly.runs.start import given_start, place_blocks, require_roo
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import default_threads
 from driftwalk.simulation.backend import Camera, native_model
+from driftwalk.simulation.series import continued_flow, flow_starts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,6 +44,8 @@ class Plan:
     keys: npt.NDArray[np.uint64]
     drag_coefficient: Floats
     force_std: Floats
+    flow_start: Floats | None
+    """When each run begins in a flow that changes [s]; None: the flow is steady."""
     flow_draw: Indices | None
     """Which drawn flow a run has; None: the flow as it is."""
     flow_correlated_over: float | None
@@ -67,6 +71,7 @@ def make_plan(
     trial: int = 0,
     threads: int | None = None,
     backend: Backend = "cpu",
+    ends: bool = True,
 ) -> Plan:
     """Put options over the study, and check everything but the start.
 
@@ -78,12 +83,14 @@ def make_plan(
         Values by the keys of [assembly]; None leaves the study's.
     index : ndarray of int, optional
         The runs, by index; default: all of the study's.
+    ends : bool
+        Whether the runs end after the study's duration.
 
     Raises
     ------
     InputError
-        When an option is out of range, the blocks have no room, or the flow does not cover the
-        tank.
+        When an option is out of range, the blocks have no room, the flow does not cover the
+        tank, or is over before the runs.
     """
     from driftwalk.model import apply_overrides
 
@@ -99,18 +106,22 @@ def make_plan(
     require_room(chosen)
     require_cover(flow, chosen.tank)
     runs = np.arange(chosen.assembly.runs) if index is None else index
-    forces = chosen.forces
+    forces, steps = chosen.forces, whole_steps(chosen)
+    keys = stream_keys("run", seed=chosen.assembly.seed, trial=trial, index=runs)
+    lasts = steps * chosen.time_step_s if ends else math.inf
+    flow = continued_flow(flow, chosen, duration=lasts)
     return Plan(
         study=chosen,
         flow=flow,
-        steps=whole_steps(chosen),
+        steps=steps,
         trial=trial,
         index=runs,
-        keys=stream_keys("run", seed=chosen.assembly.seed, trial=trial, index=runs),
+        keys=keys,
         drag_coefficient=_of_each(
             "drag_coefficient", drag_coefficient, forces.drag_coefficient, runs.size
         ),
         force_std=_of_each("force_std", force_std, forces.force_std_N, runs.size),
+        flow_start=flow_starts(flow, chosen, keys, duration=lasts),
         flow_draw=None,
         flow_correlated_over=None,
         law={},
@@ -170,5 +181,6 @@ def simulate_rows(
         sample_every=sample_every,
         threads=plan.threads,
         precision="double" if plan.backend == "reference" else "single",
+        flow_start=None if plan.flow_start is None else np.ascontiguousarray(plan.flow_start[rows]),
     )
     return {name: values for name, values in found.items() if isinstance(values, np.ndarray)}

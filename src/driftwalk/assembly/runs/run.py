@@ -287,7 +287,9 @@ def assembly_path(
     if not sample_interval > 0:
         raise InputError(f"sample_interval must be above 0 s, got {sample_interval}")
     every = min(max(round(sample_interval / plan.study.time_step_s), 1), plan.steps)
-    found = simulate_rows(plan, start_poses(plan, start), slice(None), flow, sample_every=every)
+    found = simulate_rows(
+        plan, start_poses(plan, start), slice(None), plan.flow, sample_every=every
+    )
     return build_path(plan, found, every=every)
 
 

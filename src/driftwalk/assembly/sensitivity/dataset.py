@@ -18,6 +18,7 @@ from driftwalk.assembly.sensitivity.times import map_courses, reference_courses
 from driftwalk.core.errors import InputError
 from driftwalk.core.json_text import parse_json
 from driftwalk.schema.check import build_dataset, described
+from driftwalk.schema.kinds.flow_series import FLOW_SERIES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,7 +30,7 @@ Integers = npt.NDArray[np.int64]
 
 NOT_COMMON: Final[dict[str, tuple[str, ...]]] = {
     "tank_diameter": ("arena",),
-    "flow": (),
+    "flow": tuple(one.name for one in FLOW_SERIES),
     "latching": (
         "latching",
         "connector_distance_m",

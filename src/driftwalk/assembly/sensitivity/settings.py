@@ -26,6 +26,7 @@ from driftwalk.assembly.sensitivity.times import Courses, added, courses_of, cou
 from driftwalk.core.errors import DriftwalkError
 from driftwalk.core.shards import Unit, UnitT
 from driftwalk.simulation.backend import BROKEN
+from driftwalk.simulation.series import flow_starts
 from driftwalk.sweep import (
     MemoryStore,
     Store,
@@ -248,9 +249,12 @@ def _simulate(
     start = [place_blocks(plan.study, model, own, threads=plan.threads) for own in keys]
     length = [len(piece.runs) for piece in pieces]
     chosen = [piece.setting for piece in pieces]
+    together = np.concatenate(keys)
+    duration = plan.steps * plan.study.time_step_s
     filled = replace(
         plan,
-        keys=np.concatenate(keys),
+        keys=together,
+        flow_start=flow_starts(plan.flow, plan.study, together, duration=duration),
         drag_coefficient=np.repeat(settings.drag_coefficient[chosen], length),
         force_std=np.repeat(settings.force_std[chosen], length),
     )

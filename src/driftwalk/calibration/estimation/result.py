@@ -15,7 +15,7 @@ from driftwalk.calibration.models.checks import CHECKS, UNITS
 from driftwalk.calibration.models.contestants import Contestant
 from driftwalk.calibration.models.judge import JUDGED, without_error
 from driftwalk.calibration.models.recorded import RecordedMotion
-from driftwalk.calibration.models.result import steadiness_warnings
+from driftwalk.calibration.models.result import motion_warnings
 from driftwalk.calibration.models.verdict import verdict_of
 from driftwalk.motion import ParticleModel
 from driftwalk.schema.check import build_dataset
@@ -74,7 +74,7 @@ def build_model_calibration(
         "verdict": ((), np.array(verdict.text)),
         **_stages(found, entry),
     }  # fmt: skip
-    said = [*warnings, *_said(found, entry, verdict.explained), *steadiness_warnings(motion)]
+    said = [*warnings, *_said(found, entry, verdict.explained), *motion_warnings(motion)]
     coords: dict[str, Any] = {
         "parameter": ("parameter", texts([one.name for one in ranges])),
         "bound": ("bound", texts(BOUNDS)),

@@ -19,6 +19,7 @@ from driftwalk.comparison import KsReference
 from driftwalk.comparison.aspects import points_distance
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.facts import texts
+from driftwalk.simulation.series import series_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,7 +76,7 @@ def build_comparison(
     ]
     units, values = _estimates(entries, judged)
     steady = _steadiness(motion)
-    said = [*warnings, *_edge_warnings(entries, judged), *steadiness_warnings(motion)]
+    said = [*warnings, *_edge_warnings(entries, judged), *motion_warnings(motion)]
     why = _findings(names, entries, verdicts, closest, tied)
     if asked:
         why.insert(0 if answer.named is not None else 1, tie_sentence(names, asked, answer))
@@ -192,12 +193,17 @@ def _steadiness(motion: RecordedMotion) -> Steadiness | None:
     return steadiness_of_steps(steps, lambda one, other: points_distance(KsReference(one), other))
 
 
-def steadiness_warnings(motion: RecordedMotion) -> list[str]:
-    """Return a sentence where the halves of a recording differ, and when its speed changed."""
+def motion_warnings(motion: RecordedMotion) -> list[str]:
+    """Return sentences on a recording and its flow.
+
+    Where its halves differ, with the moment at which its speed changed, and where the flow is a
+    series that goes on beyond its frames.
+    """
+    said = series_warnings(motion.like.flow, duration=motion.duration)
     steady = _steadiness(motion)
     if steady is None or steady.warning is None:
-        return []
-    return [steady.warning + _change(motion)]
+        return said
+    return [steady.warning + _change(motion), *said]
 
 
 def _change(motion: RecordedMotion) -> str:

@@ -30,7 +30,7 @@ RUN_NAMES: Final = (
     *("drag_coefficient", "force_std", "force_interval"),
     *("wall_friction", "wall_restitution", "time_step"),
     *("latching", "connector_distance", "connector_axis", "hidden_face_drag", "chirality"),
-    *("block_restitution", "block_friction", "confidence", "seed"),
+    *("block_restitution", "block_friction", "confidence", "seed", "flow_repeat", "flow_start"),
 )
 """Options for keys of a study that every command on self-assembly takes."""
 MODEL_KEYS: Final = ("block", "tank", "water", "forces", "simulation.time_step_s")
@@ -121,7 +121,7 @@ def source_from_run(folder: Path, flow_file: Path | None, given: StudyOptions) -
         Another flow field.
     given : StudyOptions
         The options, and a study file whose sections [assembly] and [sensitivity] take the place of
-        the run's; the model is the run's.
+        the run's, and which may say how a flow series is met; the model is the run's.
 
     Raises
     ------
@@ -170,4 +170,12 @@ def _with_sections(study: Study, path: Path, folder: Path) -> Study:
                     f"made with {getattr(ours, key)}; leave it out of the file, or take the run's "
                     f"flow field alone: --flow {folder}"
                 )
-    return study.model_copy(update={"assembly": given.assembly, "sensitivity": given.sensitivity})
+    series = ("repeat", "start")
+    flow = {key: getattr(given.flow, key) for key in series if key in given.flow.model_fields_set}
+    return study.model_copy(
+        update={
+            "assembly": given.assembly,
+            "sensitivity": given.sensitivity,
+            "flow": study.flow.model_copy(update=flow),
+        }
+    )

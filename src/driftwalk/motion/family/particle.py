@@ -24,10 +24,10 @@ from driftwalk.motion.family.members import Member
 from driftwalk.motion.family.parts import Part
 from driftwalk.motion.native import scored
 from driftwalk.motion.protocol import Details, Floats, Keys, Scores, Values, Worlds
-from driftwalk.motion.water import water_velocity
 from driftwalk.schema import Parameter
 from driftwalk.simulation.backend import native_scene
 from driftwalk.simulation.initial import world_orientations
+from driftwalk.simulation.series import velocity_at
 
 NEIGHBOURS: Final = "neighbours"
 """The part that needs the other bodies of a recording."""
@@ -109,6 +109,7 @@ class ParticleModel:
             threads=like.threads,
             precision="single",
             particle=self.particle(table, like),
+            flow_start=like.flow_start,
         )
         return Worlds(x, y, theta, status)
 
@@ -242,9 +243,9 @@ class ParticleModel:
         A body sets out in the direction that it moves in, relative to the water that carries it;
         where it does not move, in that of its recorded orientation, or a random one.
         """
-        start = like.start
+        start, moment = like.start, 0.0 if like.flow_start is None else like.flow_start
         u, v = (
-            water_velocity(like.flow, start)
+            velocity_at(like.flow, start.x, start.y, moment)
             if self.needs_flow and like.flow is not None
             else (0, 0)
         )

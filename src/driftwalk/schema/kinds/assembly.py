@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from driftwalk.schema.description import ARENA, SOURCE, STUDY, Attribute, Kind, Variable
+from driftwalk.schema.kinds.flow_series import FLOW_SERIES, began_in_flow
 from driftwalk.schema.kinds.motion import WORLD_STATUS
 
 _LAW: Final = "drawn from a fit whose force law has it"
@@ -29,6 +30,7 @@ SETTINGS: Final = (
     Attribute("time_step_s", "number", "step of the integrator"),
     Attribute("backend", "text", "what computed it"),
     STUDY,
+    *FLOW_SERIES,
 )
 _CLASS: Final = Variable(
     "class", "class", None, "outcome class", "text",
@@ -113,6 +115,7 @@ ASSEMBLY: Final = Kind(
             "flow_draw", "run", None, "which drawn flow field the run had", "int",
             when="flow fields were drawn",
         ),
+        began_in_flow("run"),
         Variable(
             "status", "run", None, "problems in a run", "int", note="0 is sound",
             flags=WORLD_STATUS, bits=True,

@@ -67,6 +67,10 @@ FLOW_FIELD: Final = Kind(
         Attribute("measured_share", "number", "share of the tank's cells", _RECORDED),
         Attribute("filled_share", "number", "share of the tank's cells", _RECORDED),
         Attribute("warning", "text", "what to know about it", "there is something"),
+        Attribute(
+            "repeat", "text", "how it goes on beyond its frames: loop, mirror or hold",
+            "it changes, and says so",
+        ),
     ),
     read="u v x y",
 )  # fmt: skip

@@ -13,6 +13,7 @@ from driftwalk.schema.description import (
     Kind,
     Variable,
 )
+from driftwalk.schema.kinds.flow_series import FLOW_SERIES, began_in_flow
 
 WORLD_STATUS: Final = {"non_finite": 1, "escaped": 2, "no_motion": 4}
 """Bits of a simulated world's status; 0 is sound."""
@@ -95,6 +96,7 @@ SIMULATION: Final = Kind(
         Variable("time", "time", "s", "time"),
         Variable("body", "body", None, "body", "text"),
         Variable("replicate", "replicate", None, "replicate", "int"),
+        began_in_flow("replicate"),
     ),
     attributes=(
         ARENA,
@@ -117,6 +119,7 @@ SIMULATION: Final = Kind(
         ),
         Attribute("seed", "number", "seed of the random numbers"),
         STUDY,
+        *FLOW_SERIES,
     ),
     read="x y theta time body",
 )  # fmt: skip

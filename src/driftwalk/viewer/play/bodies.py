@@ -13,9 +13,9 @@ from driftwalk.conditions import Conditions
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.motion import MotionModel, ParticleModel, Worlds, model_start
-from driftwalk.motion.water import water_velocity
 from driftwalk.simulation.backend import STATUS, Camera
 from driftwalk.simulation.initial import Start
+from driftwalk.simulation.series import continued_flow, flow_starts, velocity_at
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -67,7 +67,8 @@ class MovingBodies:
         interval: float,
         seed: int,
     ) -> None:
-        self.model, self.study, self.flow = model, study, flow
+        self.model, self.study = model, study
+        self.flow = None if flow is None else continued_flow(flow, study, duration=math.inf)
         self.values = dict(values)
         self.every = max(math.ceil(interval / FINEST_S - 1e-9), 1)
         """Samples in the interval of a step."""
@@ -81,7 +82,9 @@ class MovingBodies:
         """Begin again at the start of the study, with random numbers of another seed."""
         self._seed, self._stretch, self.sample = seed, 0, 0
         keys = world_keys(seed, trial=0, replicate=np.arange(bodies))
-        self._run(model_start(self.model, self.study, self.flow, keys), bodies)
+        self._begun = flow_starts(self.flow, self.study, keys, duration=math.inf)
+        begin = model_start(self.model, self.study, self.flow, keys, self._begun)
+        self._run(begin, bodies)
 
     def change(self, name: str, value: float) -> None:
         """Change a parameter; the bodies go on with it from where they are.
@@ -142,9 +145,13 @@ class MovingBodies:
         )
         start = Start(x, y, theta, vx, vy)
         if isinstance(self.model, ParticleModel) and self.model.member.kind == "switching":
-            start = _along_heading(start, self.flow)
+            start = _along_heading(start, self.flow, self._moment(self.count))
         self._stretch += 1
         self._run(start, self.count)
+
+    def _moment(self, bodies: int) -> Floats | None:
+        """Return the time on the clock of a flow that changes, of each body [s]."""
+        return None if self._begun is None else self._begun[:bodies] + self.time
 
     def _run(self, start: Start, bodies: int) -> None:
         like = Conditions(
@@ -155,6 +162,7 @@ class MovingBodies:
             view=None,
             flow=self.flow,
             threads=1,
+            flow_start=self._moment(bodies),
         )
         keys = world_keys(self._seed, trial=self._stretch, replicate=np.arange(bodies))
         columns = {name: np.full(bodies, value) for name, value in self.values.items()}
@@ -166,12 +174,15 @@ class MovingBodies:
         self._worlds, self._at = worlds, 0
 
 
-def _along_heading(start: Start, flow: xr.Dataset | None) -> Start:
+def _along_heading(start: Start, flow: xr.Dataset | None, moment: Floats | None) -> Start:
     """Return a start in which bodies swim along their heading, which a difference only comes near.
 
     In the water's frame: the flow carries them besides.
     """
-    u, v = (0.0, 0.0) if flow is None else water_velocity(flow, start)
+    u: Floats | float = 0.0
+    v: Floats | float = 0.0
+    if flow is not None:
+        u, v = velocity_at(flow, start.x, start.y, 0.0 if moment is None else moment)
     speed = np.hypot(np.asarray(start.vx) - u, np.asarray(start.vy) - v)
     theta = np.asarray(start.theta)
     return start._replace(vx=u + speed * np.cos(theta), vy=v + speed * np.sin(theta))
