@@ -6,6 +6,7 @@ files are simulated. An example that would take minutes runs with the options or
 
 from __future__ import annotations
 
+import json
 import shlex
 import shutil
 import sys
@@ -327,6 +328,37 @@ def _markers(folder: Path) -> Names:
     return {}
 
 
+def _tracks(folder: Path) -> Names:
+    """Provide ``tracks.csv``: a simulated block of 4 cm, in pixels of 0.5 mm at 25 Hz."""
+    study = dw.apply_overrides(
+        dw.Study(),
+        {
+            "tank.diameter_m": 0.4,
+            "block.side_m": 0.04,
+            "block.mass_kg": 0.024,
+            "simulation.duration_s": 120.0,
+            "simulation.sample_rate_Hz": 25.0,
+            "observation.position_noise_m": 3e-4,
+            "observation.orientation_noise_rad": 0.01,
+        },
+    )
+    flow, wider = dw.tank30_flow(), 0.4 / 0.3
+    arena = {"shape": "circle", "diameter_m": 0.4, "center_m": [0.0, 0.0]}
+    flow = flow.assign_coords(x=wider * flow["x"], y=wider * flow["y"])
+    flow = flow.assign_attrs(arena=json.dumps(arena), cell_size_m=wider * flow.attrs["cell_size_m"])
+    path = dw.simulate(study, flow).isel(replicate=0, body=0)
+    columns = [
+        np.arange(path.sizes["time"]),
+        1e3 + path["x"].values / 5e-4,
+        1e3 - path["y"].values / 5e-4,
+        np.degrees(-path["theta"].values),
+    ]
+    heads = "frame,x_px,y_px,theta_deg"
+    table = np.stack(columns, axis=1)
+    np.savetxt(folder / "tracks.csv", table, "%.4f", ",", header=heads, comments="")
+    return {}
+
+
 MODEL_FILE = """\
 import numpy as np
 
@@ -353,8 +385,9 @@ FEW_SETTINGS = "--runs 10 --realisations 2 --duration 1min"
 
 PAGES: dict[str, Page] = {
     "README.md": Page(
-        provide=_files(_recording(), _film(1, 4.0)),
-        not_run={"make *": INSTALLS, "pip install *": INSTALLS, "driftwalk demo": DEMO},
+        provide=_files(_recording(), _tracks, _film(1, 4.0)),
+        not_run={"make *": INSTALLS},
+        makes=("mine/fit.nc",),
         numbers=Numbers.SAME,
         # Thousand runs in a fitted flow; the size of a compressed file.
         numbers_of={

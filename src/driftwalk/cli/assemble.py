@@ -18,7 +18,7 @@ from driftwalk.cli.inputs.study_recording import opening_note
 from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
 from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.answer import print_figures, print_warnings
+from driftwalk.cli.terminal.answer import print_figures, print_report_next, print_warnings
 from driftwalk.cli.terminal.output import print_json, print_table
 from driftwalk.cli.terminal.sizes_answer import print_sizes, sizes_facts
 from driftwalk.core.errors import InputError
@@ -80,6 +80,7 @@ def assemble(
         return
     print_answer(work.study, result, out)
     print_warnings(warnings)
+    print_report_next(*([] if run is None else [run]), out)
 
 
 def _check_film(film: str) -> None:

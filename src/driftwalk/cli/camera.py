@@ -10,7 +10,7 @@ import typer
 
 from driftwalk.cli.main import paragraphs
 from driftwalk.cli.options.shared import Json, quantity_option
-from driftwalk.cli.terminal.output import print_json, print_note, print_table
+from driftwalk.cli.terminal.output import print_json, print_next, print_note, print_table
 from driftwalk.core.errors import FormatError, InputError
 
 if TYPE_CHECKING:
@@ -75,6 +75,7 @@ def calibrate(
         return
     print_table([[key.replace("_", " "), value] for key, value in found.items()])
     print_note(f"wrote {out}")
+    print_next("markers teach", "VIDEO", "--camera", out, "-o", "markers.toml")
 
 
 def _calibrated(

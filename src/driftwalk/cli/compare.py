@@ -16,6 +16,7 @@ from driftwalk.cli.options.shared import Json
 from driftwalk.cli.options.study import study_option
 from driftwalk.cli.terminal.output import (
     print_json,
+    print_next,
     print_note,
     print_table,
     require_place,
@@ -118,6 +119,7 @@ def compare(
     _print(summary)
     for warning in summary["warnings"]:
         print_note(f"warning: {warning}")
+    print_next("report", b, "-o", "report.html")
 
 
 def summarise(result: xr.Dataset) -> dict[str, Any]:

@@ -111,11 +111,11 @@ def export(
         for note in notes:
             print_note(f"note: {note}")
         print_row("folder", f"{out}: {target.gives}")
-        print_row("begin with", out / "README.md")
         for line in () if outcome is None else outcome.lines:
             print_row(
                 "verified" if outcome is not None and outcome.passed else "NOT VERIFIED", line
             )
+        print_row("next", f"read {out / 'README.md'}")
     return 0 if outcome is None or outcome.passed else 1
 
 

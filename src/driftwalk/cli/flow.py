@@ -12,8 +12,9 @@ from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json
 from driftwalk.cli.options.study import StudyOptions, with_study_options
+from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.argument_names import to_options
-from driftwalk.cli.terminal.output import print_json, print_note
+from driftwalk.cli.terminal.output import beside, print_json, print_next, print_note
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import FLOW_KEYS
 
@@ -64,7 +65,7 @@ def flow(
     to metres, with its masked nodes filled; --arena circle:D@X,Y says where its tank is.
     """
     from driftwalk.cli.inputs.flow_file import read_flow_file
-    from driftwalk.conditions import load_with_study, require_motion
+    from driftwalk.conditions import load_with_study, require_motion, study_for, unstated_warning
     from driftwalk.flow import save_flow
 
     existing = "replace" if overwrite else "error"
@@ -81,6 +82,8 @@ def flow(
             raise InputError(f"{recording} is a flow field already: --tracers is for tracks")
         save_flow(measured, out, existing=existing)
         _report_file(measured, out, json=json)
+        if not json:
+            print_next("simulate", "--flow", out, "-o", "motion.nc")
         return
     _check_given(given, tracers=tracers)
     resolved = given.study()
@@ -98,6 +101,15 @@ def flow(
         field = _extract(trajectory, resolved, body=how.body)
     save_flow(field, out, existing=existing)
     _report(field, out, json=json)
+    if json:
+        return
+    if tracers:
+        print_next("simulate", "--flow", out, "-o", "motion.nc")
+        return
+    warning = unstated_warning(study_for([trajectory], resolved), about="block")
+    print_warnings([] if warning is None else [warning])
+    run = beside(out.with_suffix(""), "run")
+    print_next("calibrate", recording, *how.words(), "--flow", out, "-o", run)
 
 
 def _check_given(given: StudyOptions, *, tracers: bool) -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json
 from driftwalk.cli.options.study import Side, TankDiameter
 from driftwalk.cli.terminal.argument_names import to_options
-from driftwalk.cli.terminal.output import command_text, print_json, print_note, print_table
+from driftwalk.cli.terminal.output import print_json, print_next, print_note, print_table
 
 SIDE_BY_SIDE = 5
 """Bodies shown as columns; more are shown as rows, with fewer numbers."""
@@ -123,12 +122,12 @@ def info(
         print_note(f"warning: {warning}")
     tank = [] if tank_diameter is None else ["--tank-diameter", f"{tank_diameter:.12g}"]
     block = [] if side is None else ["--side", f"{side:.12g}"]
-    print()
-    print(f"next: {_next_command(recording, described, [*how.words(), *tank, *block])}")
+    words = _fit_words(described, [*how.words(), *tank, *block])
+    print_next("fit", recording, *words, "-o", f"{recording.stem}-fit")
 
 
-def _next_command(recording: Path, described: dict[str, Any], given: list[str]) -> str:
-    """Return the command that most users type next: a fit of this recording, read in this way."""
+def _fit_words(described: dict[str, Any], given: list[str]) -> list[str]:
+    """Return the options of a fit of this recording, read in the same way."""
     name, body = next(iter(described["bodies"].items()))
     words = list(given)
     if len(described["bodies"]) > 1:
@@ -136,7 +135,7 @@ def _next_command(recording: Path, described: dict[str, Any], given: list[str]) 
     circle = body["circle_of_centers"]
     if described["arena"] is None and circle and circle["sectors_visited_share"] >= FIT_TANK:
         words += ["--arena", "fit"]
-    return command_text("fit", recording, *words, "-o", f"{recording.stem}-fit")
+    return words
 
 
 def _print_field(described: dict[str, Any], *, json: bool) -> None:

@@ -10,7 +10,7 @@ import typer
 from driftwalk.cli.main import paragraphs
 from driftwalk.cli.options import tracking as given
 from driftwalk.cli.options.tracking import TrackingOptions
-from driftwalk.cli.terminal.output import print_note, print_table
+from driftwalk.cli.terminal.output import print_next, print_note, print_table
 from driftwalk.core.errors import DriftwalkError, InputError
 
 _REMEDY = (
@@ -76,6 +76,10 @@ def teach(
             f"{1e3 * side:.3g} mm: unless they lie along its diagonal the scale is wrong; check "
             "--tank-diameter, --px-per-m or --camera"
         )
+    stated = (("camera", camera), ("tank-diameter", tank_diameter), ("px-per-m", px_per_m))
+    scale = [f"--{name}={value}" for name, value in stated if value is not None]
+    recording = out.with_suffix(".nc")
+    print_next("track", Path(source), "--markers", out, *scale, "-o", recording)
 
 
 markers_app.command("teach", help=paragraphs(teach.__doc__ or ""))(teach)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from driftwalk.cli.options.shared import Json
-from driftwalk.cli.terminal.output import print_json, print_table
+from driftwalk.cli.terminal.output import print_json, print_next, print_table
 
 if TYPE_CHECKING:
     from driftwalk.motion import Member, MotionModel, Part, ParticleModel
@@ -45,6 +45,7 @@ def models(
         for title, some in (("models", MEMBERS), ("parts", PARTS)):
             rows = [(one.name, len(one.parameters), one.sentence) for one in some.values()]
             print_table(rows, columns=("name", "parameters", "what"), title=title)
+        print_next("compare-models", "RECORDING", "--models", "all", "-o", "models")
 
 
 def _show(model: MotionModel, *, json: bool) -> None:

@@ -23,7 +23,7 @@ from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
 from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.options.vary import VARY_KEYS, Vary, vary_overrides
-from driftwalk.cli.terminal.answer import print_warnings
+from driftwalk.cli.terminal.answer import print_report_next, print_warnings
 from driftwalk.cli.terminal.output import print_json
 from driftwalk.cli.terminal.sensitivity_answer import print_answer, summary
 from driftwalk.core.errors import InputError
@@ -101,6 +101,7 @@ def sensitivity(
         return
     print_answer(work.study, result, out)
     print_warnings(warnings)
+    print_report_next(*([] if run is None else [run]), out)
 
 
 def _flow_paths(study: Study, folder: Path) -> dict[str, Path]:

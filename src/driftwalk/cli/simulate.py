@@ -21,8 +21,8 @@ from driftwalk.cli.options.model import (
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.shared import Json, flow_of_run
 from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
-from driftwalk.cli.terminal.answer import print_warnings
-from driftwalk.cli.terminal.output import print_json, print_note, require_place
+from driftwalk.cli.terminal.answer import print_report_next, print_warnings
+from driftwalk.cli.terminal.output import print_json, print_next, print_note, require_place
 from driftwalk.core.errors import InputError
 from driftwalk.core.json_text import parse_json
 from driftwalk.core.study_keys import STUDY_KEYS
@@ -135,6 +135,10 @@ def simulate(
         if count:
             print_note(f"warning: {count} of {facts['replicates']} replicates: {name}")
     print_warnings(facts["warnings"])
+    if like is None:
+        print_report_next(out)
+    else:
+        print_next("compare", like, out)
 
 
 def _of_block(

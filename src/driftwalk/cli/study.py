@@ -10,7 +10,7 @@ import typer
 from driftwalk.cli.main import paragraphs
 from driftwalk.cli.options.shared import Json
 from driftwalk.cli.study_recover import recover
-from driftwalk.cli.terminal.output import print_json, print_note, require_place
+from driftwalk.cli.terminal.output import print_json, print_next, print_note, require_place
 
 ALL_PARAMETERS = "\n# All parameters, with their units and meanings: driftwalk study new --full\n"
 
@@ -48,6 +48,7 @@ def new(
     require_place(path, existing="replace" if overwrite else "error")
     write_atomic(path, text.encode())
     print_note(f"wrote {path}")
+    print_next("fit", "RECORDING", "--study", path, "-o", "fit")
 
 
 @study_app.command()

@@ -24,7 +24,7 @@ def pixels(tmp_path: Path) -> Path:
 
 def following(done: Done) -> list[str]:
     assert done.code == 0, done.err
-    *_, last = done.out.splitlines()
+    *_, last = done.err.splitlines()
     assert last.startswith("next: driftwalk ")
     return shlex.split(last)[2:]
 

@@ -49,8 +49,8 @@ def test_values_of_all_rows_begin_in_one_column(capsys: pytest.CaptureFixture[st
     print_estimates(answer(), "drag_coefficient", "force_std")
     print_figures(Path("run"))
     lines = capsys.readouterr().out.splitlines()
-    assert [line[:22].rstrip() == line[:23].rstrip() for line in lines] == [True] * 4
-    assert [line[23] for line in lines] == ["0", "0", "r", "d"]
+    assert [line[:22].rstrip() == line[:23].rstrip() for line in lines] == [True] * 3
+    assert [line[23] for line in lines] == ["0", "0", "r"]
 
 
 @pytest.mark.parametrize(("simulated", "lines"), [("yes", 1), ("no", 0)])

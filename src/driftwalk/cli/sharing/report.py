@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -57,6 +58,7 @@ def report(
         print_note(page["state"]["words"])
     megabytes = out.stat().st_size / 1e6
     print(f"report  {out}, {megabytes:.2g} MB")
+    print(f"next: open {out} in a browser", file=sys.stderr)
 
 
 def _page(path: Path, how: RecordingOptions, tank_diameter: float | None) -> dict[str, Any]:

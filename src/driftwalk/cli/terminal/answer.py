@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
-from driftwalk.cli.terminal.output import print_note, report_command
+from driftwalk.cli.terminal.output import print_next, print_note
 from driftwalk.schema.answer import SYMBOLS, Estimate, estimate_of
 
 if TYPE_CHECKING:
@@ -106,11 +106,10 @@ def print_warnings(texts: Iterable[str]) -> None:
 
 
 def print_figures(folder: Path) -> None:
-    """Print where the figures of a run are, and how to see all of it on one page."""
+    """Print where the figures of a run are."""
     print_row("figures", folder / "figures")
-    print_page(folder)
 
 
-def print_page(folder: Path) -> None:
-    """Print the command that makes one page of a run."""
-    print_row("all in one page", report_command(folder))
+def print_report_next(*runs: Path) -> None:
+    """Print the command that makes one page of some runs, which comes next."""
+    print_next("report", *runs, "-o", "report.html")

@@ -13,6 +13,7 @@ from driftwalk.cli.terminal.answer import (
     print_row,
     print_warnings,
 )
+from driftwalk.cli.terminal.output import beside, command_text, print_next
 from driftwalk.schema.calibration import is_block, stored_parameters
 from driftwalk.schema.calibration_facts import calibration_facts
 
@@ -93,3 +94,14 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
         )
     print_warnings(facts["warnings"])
     print_figures(folder)
+    print_row("all in one page", command_text("report", folder, "-o", "report.html"))
+    if is_block(found):
+        print_next("assemble", folder, "-o", beside(folder, "assembly"))
+    else:
+        print_next("simulate", folder, *model_words(found), "-o", beside(folder, "motion.nc"))
+
+
+def model_words(found: xr.Dataset) -> list[str]:
+    """Return how the user names a model that is none of driftwalk's own."""
+    model = str(found.attrs["model"])
+    return ["--model", model] if "model_source_sha256" in found.attrs else []

@@ -13,11 +13,11 @@ from driftwalk.cli.terminal.answer import (
     print_estimates,
     print_intensity,
     print_origin,
-    print_page,
     print_row,
     print_warnings,
 )
 from driftwalk.cli.terminal.argument_names import to_options
+from driftwalk.cli.terminal.output import beside, command_text, print_next
 from driftwalk.schema.compared_laws import compared_laws
 from driftwalk.schema.facts import fit_facts, sentences
 from driftwalk.schema.law_words import (
@@ -165,7 +165,8 @@ def print_places(fit: xr.Dataset, folder: Path) -> None:
     """Print the warnings, and where everything is."""
     print_warnings(fit_facts(fit)["warnings"])
     print_row("flow", folder / "flow.nc")
-    print_page(folder)
+    print_row("all in one page", command_text("report", folder, "-o", "report.html"))
+    print_next("assemble", folder, "-o", beside(folder, "assembly"))
 
 
 def _print_wall(facts: Mapping[str, Any]) -> None:

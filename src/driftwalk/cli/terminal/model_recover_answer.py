@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.cli.terminal.answer import print_page, print_row, print_warnings
+from driftwalk.cli.terminal.answer import print_report_next, print_row, print_warnings
 from driftwalk.cli.terminal.output import print_table
 from driftwalk.cli.terminal.recover_answer import length_text
 from driftwalk.schema.parameters import unit_suffix
@@ -68,7 +68,7 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
     )  # fmt: skip
     print_warnings(warnings(found))
     print_row("every recording", folder / "model_recovery.nc")
-    print_page(folder)
+    print_report_next(folder)
 
 
 def _row(one: xr.Dataset) -> list[str]:

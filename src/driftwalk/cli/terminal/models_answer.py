@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.cli.terminal.answer import print_row, print_warnings
+from driftwalk.cli.terminal.answer import print_report_next, print_row, print_warnings
 from driftwalk.cli.terminal.output import print_table
 from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.schema.model_words import ASPECT_WORDS
@@ -138,6 +138,7 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
     print_warnings(str(text) for text in found["warning"].values)
     print_row("comparison", folder / "comparison.nc")
     print_row("figures", folder / "figures")
+    print_report_next(folder)
 
 
 def _behind(one: xr.Dataset, index: int) -> str:

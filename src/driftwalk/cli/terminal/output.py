@@ -92,31 +92,36 @@ def print_note(text: str) -> None:
     print(f"driftwalk: {' '.join(to_options(text).split())}", file=sys.stderr)
 
 
-def command_text(name: str, path: Path, *words: str) -> str:
-    """Return a command about a file or folder with its options, for a person to copy.
+def command_text(name: str, *words: str | Path) -> str:
+    """Return a command with its files and options, for a person to copy.
 
     Examples
     --------
     >>> command_text("fit", Path("my tracks.csv"), "--frame-rate", "30")
     "driftwalk fit 'my tracks.csv' --frame-rate 30"
+    >>> command_text("report", Path("-run"))
+    'driftwalk report ./-run'
     """
-    place = str(path)
-    # A name that begins with a dash would be taken for an option.
-    place = f"./{place}" if place.startswith("-") else place
-    return shlex.join(["driftwalk", name, place, *words])
+    # A file whose name begins with a dash would be taken for an option.
+    shown = [f"./{one}" if isinstance(one, Path) and str(one)[0] == "-" else one for one in words]
+    return shlex.join(["driftwalk", *name.split(), *map(str, shown)])
 
 
-def report_command(folder: Path) -> str:
-    """Return the command that makes the report of a run, for a person to copy.
+def print_next(name: str, *words: str | Path) -> None:
+    """Print on stderr, as the last line of a command, the one that most users run next."""
+    sys.stdout.flush()
+    print(f"next: {command_text(name, *words)}", file=sys.stderr)
+
+
+def beside(place: Path, name: str) -> Path:
+    """Return a name for results that stand on a run or a file, in the same folder.
 
     Examples
     --------
-    >>> report_command(Path("my run"))
-    "driftwalk report 'my run' -o report.html"
-    >>> report_command(Path("-run"))
-    'driftwalk report ./-run -o report.html'
+    >>> beside(Path("runs/fit"), "assembly").as_posix()
+    'runs/fit-assembly'
     """
-    return command_text("report", folder, "-o", "report.html")
+    return place.with_name(f"{place.name or 'run'}-{name}")
 
 
 def require_place(path: Path, *, existing: str) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.cli.terminal.answer import print_page, print_row, print_warnings
+from driftwalk.cli.terminal.answer import print_report_next, print_row, print_warnings
 from driftwalk.cli.terminal.output import print_table
 from driftwalk.cli.terminal.progress import duration_text
 from driftwalk.schema.answer import symbol_of
@@ -163,7 +163,7 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
         print(_needed_sentence(found.sel(angle=angle)))
     print_warnings(warnings(found))
     print_row("every recording", folder / "recovery.nc")
-    print_page(folder)
+    print_report_next(folder)
 
 
 def _parts(found: xr.Dataset) -> list[xr.Dataset]:

@@ -1,0 +1,79 @@
+"""Every command ends with the command that most users run next, ready to paste.
+
+The recording is the first minute of the bundled one, which another engine simulated.
+"""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import pytest
+from command_line import FLOW, RECORDING, Done, here
+from typer.main import get_command
+
+from driftwalk.cli.main import app
+
+FIT = ("--tank-diameter", "30cm", "--spline-spacing", "4cm", "--no-check", "--angle", "none")
+FEW = ("--runs", "4", "--duration", "5s", "--film", "none", "--threads", "1")
+
+pytestmark = pytest.mark.usefixtures("undrawn")
+
+
+@pytest.fixture
+def tracks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return a recording in the present folder, which has a space in its name."""
+    monkeypatch.chdir(tmp_path)
+    path = Path("my tracks.nc")
+    assert here("convert", RECORDING, "--to", "60s", *FIT[:2], path).code == 0
+    return path
+
+
+def next_of(done: Done) -> list[str]:
+    """Return the words of the last line, after checking that they are a command that there is."""
+    assert done.code == 0, done.err
+    program, *words = shlex.split(done.err.splitlines()[-1].removeprefix("next: "))
+    assert done.err.splitlines()[-1].startswith("next: ")
+    assert program == "driftwalk"
+    assert words[0] in get_command(app).commands  # type: ignore[attr-defined]
+    return words
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("info", "my tracks.nc"), ["fit", "my tracks.nc"]),
+        (("convert", "my tracks.nc", "b.nc"), ["fit", "b.nc", "-o", "b-fit"]),
+        (
+            ("flow", "my tracks.nc", "-o", "f.nc"),
+            ["calibrate", "my tracks.nc", "--flow", "f.nc", "-o", "f-run"],
+        ),
+        (("flow", FLOW, "--tank-diameter", "30cm", "-o", "f.nc"), ["simulate", "--flow", "f.nc"]),
+        (
+            ("simulate", "--flow", FLOW, "--duration", "2s", "-o", "s.nc"),
+            ["report", "s.nc", "-o", "report.html"],
+        ),
+        (
+            ("simulate", "--flow", FLOW, "--like", "my tracks.nc", "-o", "s.nc"),
+            ["compare", "my tracks.nc", "s.nc"],
+        ),
+        (("compare", "my tracks.nc", "my tracks.nc", "--permutations", "0"), ["report"]),
+        (("study", "new", "study.toml"), ["fit", "RECORDING", "--study", "study.toml"]),
+        (("models",), ["compare-models", "RECORDING", "--models", "all"]),
+    ],
+)
+def test_the_last_line_is_the_next_command(
+    tracks: Path, words: tuple[str, ...], expected: list[str]
+) -> None:
+    assert next_of(here(*words))[: len(expected)] == expected
+
+
+def test_the_lines_lead_from_a_recording_to_a_page(tracks: Path) -> None:
+    words = next_of(here("info", tracks))
+    words = next_of(here(*words, *FIT))
+    assert words == ["assemble", "my tracks-fit", "-o", "my tracks-fit-assembly"]
+    words = next_of(here(*words, *FEW))
+    done = here(*words)
+    assert done.code == 0, done.err
+    assert done.err.splitlines()[-1] == "next: open report.html in a browser"
+    assert Path("report.html").is_file()
