@@ -24,7 +24,7 @@ from driftwalk.calibration.quality import (
     validate_on_halves,
 )
 from driftwalk.calibration.refine import Refined, beating_cell, first_window, locate, refine
-from driftwalk.calibration.refuse import MOST_PARAMETERS, require_searchable
+from driftwalk.calibration.refuse import MOST_PARAMETERS, require_samples, require_searchable
 from driftwalk.calibration.region import (
     Bootstrap,
     Region,
@@ -44,7 +44,7 @@ from driftwalk.calibration.steadiness import Steadiness, steadiness_of
 from driftwalk.calibration.surface import Optimum, at_settings
 from driftwalk.calibration.wall import wall_warning
 from driftwalk.comparison import Statistic, StepDistance
-from driftwalk.conditions import neighbours_of, recorded_camera, study_in_arena
+from driftwalk.conditions import neighbours_of, recorded_camera, require_travel, study_in_arena
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.run_stages import share_of_map, share_of_windows, tell_nobody
 from driftwalk.motion import BlockModel, Details, MotionModel
@@ -165,6 +165,9 @@ def calibrate(
         return many
     require_searchable(searched)
     track = body_track(recording, body)
+    require_samples(track)
+    of_block = isinstance(searched, BlockModel)
+    require_travel(track, chosen, of_block=of_block)
     quantum = float(recording.attrs.get("position_quantum_m", 0.0))
     flow_of = _flow_source(chosen, searched, flow)
     camera = recorded_camera(track, chosen, position_quantum=quantum)

@@ -15,7 +15,12 @@ from driftwalk.conditions.reading import (
     read_recordings,
 )
 from driftwalk.conditions.recorded import Conditions, recorded_conditions
-from driftwalk.conditions.refuse import require_motion, require_positions
+from driftwalk.conditions.refuse import (
+    require_motion,
+    require_positions,
+    require_travel,
+    typical_speed,
+)
 from driftwalk.conditions.start import recorded_start
 from driftwalk.conditions.study import estimated_study, study_for
 from driftwalk.conditions.tank import require_inside, study_in_arena
@@ -37,7 +42,9 @@ __all__ = [
     "require_inside",
     "require_motion",
     "require_positions",
+    "require_travel",
     "simulate_like",
     "study_for",
     "study_in_arena",
+    "typical_speed",
 ]

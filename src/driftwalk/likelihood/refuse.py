@@ -1,15 +1,11 @@
-"""Recordings that cannot be fitted, and the remedies: too short, at rest, or at the wall."""
+"""Recordings that cannot be fitted, and the remedies: too short, or at the wall."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
-from driftwalk.conditions import recorded_camera
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.length import length_advice
-from driftwalk.likelihood.start import typical_speed
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -17,12 +13,6 @@ if TYPE_CHECKING:
 
 FEWEST_SAMPLES: Final = 100
 """Positions, or intervals between them, that a flow needs at least."""
-LEAST_MOTION: Final = 0.1
-"""A body that stays within this part of its side is at rest: it has seen one place of the flow."""
-LEAST_MOTION_IN_NOISES: Final = 3.0
-"""Standard deviation of the positions of a moving body, in tracking noises."""
-KEPT: Final = 0.99
-"""Share of the positions that tells how far a body goes: single jumps of the tracker do not."""
 MOST_AT_OWN_WALL: Final = 0.9
 """Share of the intervals at the wall of a tank that was fitted to the positions themselves."""
 MOST_COEFFICIENTS: Final = 4400
@@ -41,43 +31,6 @@ def require_length(track: Track, study: Study, *, where: str) -> None:
         raise InputError(
             f"{where}the recording has {track.time.size} positions of this body; the fit needs "
             f"{FEWEST_SAMPLES} at least. {length_advice(study.fit.drag_coefficient_precision)}"
-        )
-
-
-def require_motion(track: Track, study: Study, *, where: str) -> None:
-    """Refuse a body that does not move, or no further than its tracker is noisy.
-
-    Raises
-    ------
-    InputError
-        With how far it goes and where it is.
-    """
-    from driftwalk.model import apply_overrides
-
-    tail = 0.5 * (1.0 - KEPT)
-    width = max(float(np.ptp(np.quantile(axis, (tail, 1.0 - tail)))) for axis in (track.x, track.y))
-    scatter = max(float(track.x.std()), float(track.y.std()))
-    # The study may say what the tracker's noise should be; this is what it is.
-    measured = apply_overrides(study, {"observation.position_noise_m": "estimate"})
-    noise = recorded_camera(track, measured, position_quantum=0.0).position_noise
-    at_rest = width < LEAST_MOTION * study.block.side_m
-    if at_rest or scatter < LEAST_MOTION_IN_NOISES * noise:
-        place = f"({np.median(track.x):.3f}, {np.median(track.y):.3f}) m"
-        why = (
-            f"less than a tenth of its side of {1e3 * study.block.side_m:g} mm"
-            if at_rest
-            else f"no more than the tracking noise of {1e3 * noise:.2g} mm would show"
-        )
-        raise InputError(
-            f"{where}the body never moves: it stays within {1e3 * width:.2g} mm around {place}, "
-            f"{why}, and there is nothing to fit; check the units, the body (`body`) and the time "
-            "that is kept (`start`, `stop` of `load`)"
-        )
-    if typical_speed([track]) == 0.0:
-        raise InputError(
-            f"{where}the body rests in 99 % of the recording, at the same position to the last "
-            "digit, and there is no motion to fit; check the body (`body`) and the time that is "
-            "kept (`start`, `stop` of `load`)"
         )
 
 
