@@ -69,6 +69,7 @@ def one_blas_thread() -> Iterator[None]:
     global _callers, _limits
     with _lock:
         if _callers == 0:
+            _let_any_thread_limit()
             _limits = threadpool_limits(limits=1, user_api="blas")
         _callers += 1
     try:
@@ -77,4 +78,20 @@ def one_blas_thread() -> Iterator[None]:
         with _lock:
             _callers -= 1
             if _callers == 0:
+                _let_any_thread_limit()
                 _limits.restore_original_limits()
+                _let_any_thread_limit()
+
+
+def _let_any_thread_limit() -> None:
+    """Let the next thread that limits OpenBLAS do so, whichever did before.
+
+    From version 3.7 on threadpoolctl obeys the first thread that sets a limit, for as long as that
+    thread lives, and passes over the calls of all others without a word.
+    """
+    import threadpoolctl
+
+    openblas = getattr(threadpoolctl, "OpenBLASController", None)
+    clear = getattr(openblas, "clear_controlling_thread", None)
+    if clear is not None:
+        clear(force=True)
