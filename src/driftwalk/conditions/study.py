@@ -132,7 +132,7 @@ def estimated_study(
         if f"forces.{key}" not in stated and estimate_of(found, name).open:
             raise InputError(
                 f"the {found.attrs['kind']} does not determine {name}: its recording tells too "
-                f"little of it; state it (`{name}`)"
+                f"little of it; state it (`forces.{key}`)"
             )
     return apply_overrides(
         parse_study(found.attrs["study"], source=source),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,6 +15,12 @@ from driftwalk.core.nesting import refuse_deep
 MOST_BYTES: Final = MIB
 """Largest such file, including comments: its reader takes time that grows with the square of
 some of what it holds."""
+MOST_PARTS: Final = 100
+"""Parts of a key, as of a.b.c; its reader takes memory that grows with the square of their number:
+50,000 took 4 GB. Keys of these files have two."""
+_LONG_KEY: Final = re.compile(
+    r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){""" + f"{MOST_PARTS}}}"
+)
 _LARGE: Final = "an integer has more than 64 bits"
 
 
@@ -43,7 +50,8 @@ def parse_toml(text: str | bytes, *, path: str | Path | None = None) -> dict[str
     Raises
     ------
     FormatError
-        When it is no TOML, values are nested too deeply, or an integer has more than 64 bits.
+        When it is no TOML, values are nested too deeply, a key has more than 100 parts, or an
+        integer has more than 64 bits.
 
     Examples
     --------
@@ -51,9 +59,16 @@ def parse_toml(text: str | bytes, *, path: str | Path | None = None) -> dict[str
     {'side_m': 0.03}
     """
     try:
-        values = tomllib.loads(text if isinstance(text, str) else text.decode("utf-8-sig"))
+        found = text if isinstance(text, str) else text.decode("utf-8-sig")
+        if _LONG_KEY.search(found):
+            raise FormatError(
+                f"not a file that driftwalk reads: a key of more than {MOST_PARTS} parts", path=path
+            )
+        values = tomllib.loads(found)
     except UnicodeDecodeError as error:
         raise FormatError(f"not a text file in UTF-8 ({error.reason})", path=path) from error
+    except FormatError:
+        raise
     except RecursionError:
         raise FormatError("not a TOML file: values nested too deeply", path=path) from None
     except ValueError as error:

@@ -24,6 +24,8 @@ FOUND_BY_CALIBRATION: Final = (
 )
 SEARCHED: Final = FOUND_BY_CALIBRATION[:2]
 """Parameters that a calibration finds: a study file may hold any value for them."""
+CONNECTOR: Final = ("assembly.connector_distance_m", "assembly.connector_axis_rad")
+"""Parameters of the latching rule "connector" alone."""
 RUN_NAMES: Final = (
     *("blocks", "duration", "tank_diameter", "side", "mass", "depth"),
     *("drag_coefficient", "force_std", "force_interval"),
@@ -83,7 +85,21 @@ def source_from_flow(given: StudyOptions, flow_file: Path | None) -> Source:
         )
     chosen = given.study()
     inputs = {"flow": flow_file, **({} if given.file is None else {"study": given.file})}
-    return Source(chosen, load_flow_for(flow_file, chosen), None, inputs, [])
+    said = _without_effect(given, chosen)
+    return Source(chosen, load_flow_for(flow_file, chosen), None, inputs, said)
+
+
+def _without_effect(given: StudyOptions, study: Study) -> list[str]:
+    """Return a warning where a connector is described that no block has."""
+    idle = [option_name(key, keys=given.keys) for key in CONNECTOR if key in given.overrides]
+    latching = study.assembly.latching
+    if not idle or latching == "connector":
+        return []
+    verb = "has" if len(idle) == 1 else "have"
+    return [
+        f"{' and '.join(idle)} {verb} no effect with --latching {latching}: blocks have connectors "
+        "with --latching connector"
+    ]
 
 
 def refuse_found(folder: Path, overrides: Mapping[str, Any], *, also: Sequence[str] = ()) -> None:
@@ -130,6 +146,7 @@ def source_from_calibration(folder: Path, flow_file: Path | None, given: StudyOp
         inputs["study"] = given.file
     chosen = given.over(study, base=base)
     warnings = [f"of the calibration: {warning}" for warning in found.warnings]
+    warnings += _without_effect(given, chosen)
     field = found.flow
     if flow_file is not None:
         field, inputs["flow"] = load_flow_for(flow_file, chosen), flow_file
