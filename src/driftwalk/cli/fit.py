@@ -11,7 +11,8 @@ from driftwalk.cli.inputs.study_recording import read_for_run, tank_note
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json, Overwrite
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.output import print_json
+from driftwalk.cli.terminal.argument_names import to_options
+from driftwalk.cli.terminal.output import print_json, print_note
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.study_keys import FIT_KEYS
 
@@ -65,6 +66,7 @@ def fit(
     model (check.nc), figures and manifest.json.
     """
     from driftwalk.cli.terminal.fit_answer import answer, print_answer
+    from driftwalk.likelihood import fit_work
     from driftwalk.runs import FitWork, run_fit
 
     read = read_for_run(recordings, given, how)
@@ -73,8 +75,17 @@ def fit(
     work = FitWork(
         read.trajectories, read.study, how.body, inputs, not no_check, compare_laws, wall
     )
+    effort = fit_work(sum(one.sizes["time"] for one in read.trajectories))
+    said = tank_note(read)
+
+    def begun() -> None:
+        if said is not None:
+            said()
+        if effort.notable:
+            print_note(to_options(f"{effort.describe()}; to take less, {effort.advice()}"))
+
     with reported("fit") as told:
-        found = run_fit(work, out, overwrite=overwrite, begun=tank_note(read), **told)
+        found = run_fit(work, out, overwrite=overwrite, begun=begun, **told)
     if json:
         print_json(answer(found.fit, found.check))
     else:

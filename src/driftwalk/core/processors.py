@@ -1,4 +1,4 @@
-"""How many processors there are to use."""
+"""How many processors and how much memory there are to use."""
 
 from __future__ import annotations
 
@@ -20,6 +20,14 @@ _limits: Any = None
 def default_threads() -> int:
     """Return how many threads to use: the processors that this process may run on."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def machine_memory() -> int | None:
+    """Return the memory of this machine [bytes]; None where the system does not say."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):
+        return None
 
 
 def map_in_threads(

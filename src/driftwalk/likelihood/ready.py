@@ -26,6 +26,7 @@ from driftwalk.likelihood.mistakes.smoothed import require_raw
 from driftwalk.likelihood.refuse import (
     FEWEST_SAMPLES,
     require_length,
+    require_memory,
     require_own_arena,
     require_size,
     require_usable,
@@ -92,6 +93,7 @@ def prepare(
     many: Sequence[xr.Dataset], study: Study, angle: AngleUse | None, body: str | None
 ) -> Ready:
     """Return recordings ready for the filter; refuse what cannot be fitted."""
+    require_memory(sum(one.sizes["time"] for one in many))
     intervals = intervals_of(study)
     outline = outline_of(study.tank.to_arena())
     require_size(len(intervals.labels), 2 * spline_of(study, outline).size)

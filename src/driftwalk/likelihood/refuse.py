@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+import math
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.length import length_advice
+from driftwalk.core.processors import machine_memory
+from driftwalk.likelihood.length import in_words, length_advice
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -17,6 +19,87 @@ MOST_AT_OWN_WALL: Final = 0.9
 """Share of the intervals at the wall of a tank that was fitted to the positions themselves."""
 MOST_COEFFICIENTS: Final = 4400
 """Limit for all flows together: about six flows in the paper's tank."""
+
+SAMPLE_BYTES: Final = 5200.0
+"""Memory of a fit for each sample: 0.27 GB at 18,000 samples, 0.49 GB at 60,000, with the angle in
+the state; a million took 4 GB."""
+SAMPLE_S: Final = 1.2e-3
+"""Time of one processor for each sample, with the check: 0.8 ms for the fit at 18,000 and at 60,000
+samples in the paper's tank, and half as much for the check."""
+NOTABLE_BYTES: Final = 2e9
+NOTABLE_S: Final = 600.0
+"""A fit that takes more is announced."""
+
+
+class Work(NamedTuple):
+    """Memory and time that a fit takes."""
+
+    samples: int
+    memory: float
+    """[bytes]"""
+    seconds: float
+
+    @property
+    def notable(self) -> bool:
+        """Whether it is so much that it should be said before."""
+        return self.memory > NOTABLE_BYTES or self.seconds > NOTABLE_S
+
+    def describe(self) -> str:
+        """Return "a fit of 1000000 samples takes about 5.2 GB of memory and 20 min".
+
+        Examples
+        --------
+        >>> fit_work(1_000_000).describe()
+        'a fit of 1000000 samples takes about 5.2 GB of memory and 20 min'
+        """
+        return (
+            f"a fit of {self.samples} samples takes about {self.memory / 1e9:.2g} GB of memory and "
+            f"{in_words(self.seconds)}"
+        )
+
+    def advice(self) -> str:
+        """Return how to take fewer samples."""
+        every = max(math.ceil(self.memory / NOTABLE_BYTES), math.ceil(self.seconds / NOTABLE_S), 2)
+        return (
+            "fit a part of the time (`start`, `stop` of `load`), or fewer samples a second, such "
+            f"as one row in {every} of the file"
+        )
+
+
+def fit_work(samples: int) -> Work:
+    """Return the memory and the time of a fit, as measured.
+
+    Parameters
+    ----------
+    samples : int
+        Samples of all recordings together.
+
+    Returns
+    -------
+    Work
+        Memory [bytes] and time of one processor [s].
+
+    Examples
+    --------
+    >>> round(fit_work(100_000).seconds)
+    120
+    """
+    return Work(samples, SAMPLE_BYTES * samples, SAMPLE_S * samples)
+
+
+def require_memory(samples: int) -> None:
+    """Refuse more samples than this machine has memory for.
+
+    Raises
+    ------
+    InputError
+        With the memory and the time that they would take.
+    """
+    work, there = fit_work(samples), machine_memory()
+    if there is not None and work.memory > there:
+        raise InputError(
+            f"{work.describe()}, and this machine has {there / 1e9:.2g} GB: {work.advice()}"
+        )
 
 
 def require_length(track: Track, study: Study, *, where: str) -> None:

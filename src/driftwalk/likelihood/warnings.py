@@ -12,6 +12,7 @@ from driftwalk.likelihood.length import USUAL_PRECISION, in_words, needed_durati
 from driftwalk.likelihood.mistakes.mirrored import MIRRORED
 from driftwalk.likelihood.newton import NOTABLE_LEVER
 from driftwalk.likelihood.result import Whiteness
+from driftwalk.schema.facts import is_open
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -145,7 +146,7 @@ def _on_the_search(facts: Mapping[str, Any]) -> list[str]:
         found.append(
             f"the search has not converged in {facts['iterations']} steps ([fit] iterations)"
         )
-    elif not math.isfinite(facts["drag_coefficient_interval"][1]):
+    elif is_open(facts, "drag_coefficient"):
         found.append(
             "the recording says less of C_d than the fit assumes of it beforehand (0.5, within a "
             "factor of two): it does not determine C_d"

@@ -19,8 +19,8 @@ from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.units import parse_quantity
 
 SMALLEST: Final = 1e-25
-"""Least size of a number other than 0, in SI: below every length, mass, time and force of a
-laboratory, and its third and fourth powers are still numbers. Of 1e-320 the square is 0."""
+"""Least value, in SI, of a number that must be more than 0: below every length, mass, time and force
+of a laboratory, and its third and fourth powers are still numbers. Of 1e-320 the square is 0."""
 
 
 @dataclass(frozen=True)
@@ -72,10 +72,9 @@ class Quantity:
             number: float = self._whole(value)
         else:
             number = parse_quantity(value, self.unit)
-            if 0.0 < abs(number) < SMALLEST:
-                zero = "" if self.gt == 0 else "0, or "
+            if self.gt == 0 and 0.0 < number < SMALLEST:
                 raise ConfigurationError(
-                    f"must be {zero}at least {SMALLEST:g}{self._its_unit()}, got {value}"
+                    f"must be at least {SMALLEST:g}{self._its_unit()}, got {value}"
                 )
         for bound, holds, text in (
             (self.ge, number >= (self.ge or 0.0), "at least"),

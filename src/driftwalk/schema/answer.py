@@ -21,7 +21,7 @@ SMALL_UNITS: Final = MappingProxyType({"N": (1e3, "mN"), "m": (1e3, "mm")})
 """Units in which a person reads the numbers of a 3-cm block, and their number in the SI unit."""
 
 NOT_DETERMINED: Final = "not determined by this recording"
-"""What stands in the place of a number with an open interval."""
+"""Said in the place of a number with an open interval."""
 
 
 class Estimate(NamedTuple):
