@@ -20,7 +20,8 @@ from driftwalk.core.units import parse_quantity
 
 SMALLEST: Final = 1e-25
 """Least value, in SI, of a number that must be more than 0: below every length, mass, time and
-force of a laboratory, and its third and fourth powers are still numbers. Of 1e-320 the square is 0."""
+force of a laboratory, and its third and fourth powers are still numbers. The square of 1e-320 is
+0."""
 
 
 @dataclass(frozen=True)
