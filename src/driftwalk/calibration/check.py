@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from driftwalk.calibration.models.recorded import body_motion
 from driftwalk.calibration.problem import prepare_problem
-from driftwalk.calibration.refuse import MOST_PARAMETERS, require_searchable
-from driftwalk.conditions import neighbours_of, recorded_camera
+from driftwalk.calibration.refuse import MOST_PARAMETERS, require_samples, require_searchable
+from driftwalk.conditions import neighbours_of, recorded_camera, require_travel
 from driftwalk.motion import BlockModel, MotionModel, ParticleModel
 from driftwalk.schema import body_track
 
@@ -60,6 +60,9 @@ def check_recording(
     if model is not None:
         require_searchable(model)
     track = body_track(recording, body)
+    require_samples(track)
+    of_block = model is None or isinstance(model, BlockModel)
+    require_travel(track, study, of_block=of_block)
     camera = recorded_camera(track, study, position_quantum=0.0)
     others = neighbours_of(recording, body, study.tank)
     problem = prepare_problem(track, study, flow, camera=camera, model=model, neighbours=others)

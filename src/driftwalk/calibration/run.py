@@ -24,7 +24,7 @@ from driftwalk.calibration.quality import (
     validate_on_halves,
 )
 from driftwalk.calibration.refine import Refined, beating_cell, first_window, locate, refine
-from driftwalk.calibration.refuse import MOST_PARAMETERS, require_searchable
+from driftwalk.calibration.refuse import MOST_PARAMETERS, require_samples, require_searchable
 from driftwalk.calibration.region import (
     Bootstrap,
     Region,
@@ -48,6 +48,7 @@ from driftwalk.conditions import (
     jump_warnings,
     neighbours_of,
     recorded_camera,
+    require_travel,
     study_in_arena,
     unstated_warning,
 )
@@ -172,6 +173,9 @@ def calibrate(
         return many
     require_searchable(searched)
     track = body_track(recording, body)
+    require_samples(track)
+    of_block = isinstance(searched, BlockModel)
+    require_travel(track, chosen, of_block=of_block)
     quantum = float(recording.attrs.get("position_quantum_m", 0.0))
     flow_of = _flow_source(chosen, searched, flow)
     camera = recorded_camera(track, chosen, position_quantum=quantum)

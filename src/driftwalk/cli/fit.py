@@ -12,7 +12,8 @@ from driftwalk.cli.inputs.study_recording import opening_note, read_for_run
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json, Overwrite
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.output import print_json
+from driftwalk.cli.terminal.argument_names import to_options
+from driftwalk.cli.terminal.output import print_json, print_note
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.study_keys import FIT_KEYS
 
@@ -66,6 +67,7 @@ def fit(
     model (check.nc), figures and manifest.json.
     """
     from driftwalk.cli.terminal.fit_answer import answer, print_found, print_places, print_verdict
+    from driftwalk.likelihood import fit_work
     from driftwalk.runs import FitWork, run_fit
 
     read = read_for_run(recordings, given, how)
@@ -74,7 +76,14 @@ def fit(
     work = FitWork(
         read.trajectories, read.study, how.body, inputs, not no_check, compare_laws, wall
     )
-    begun = opening_note(read.study, given, about="block")
+    effort = fit_work(sum(one.sizes["time"] for one in read.trajectories))
+    opening = opening_note(read.study, given, about="block")
+
+    def begun() -> None:
+        opening()
+        if effort.notable:
+            print_note(to_options(f"{effort.describe()}; to take less, {effort.advice()}"))
+
     # Each part of the answer is printed as soon as it is there; JSON at the end, in one piece.
     said: dict[str, Any] = {"fitted": partial(print_found, wall=wall), "checked": print_verdict}
     if json:

@@ -16,7 +16,12 @@ from driftwalk.conditions.reading import (
     read_recordings,
 )
 from driftwalk.conditions.recorded import Conditions, recorded_conditions
-from driftwalk.conditions.refuse import require_motion, require_positions
+from driftwalk.conditions.refuse import (
+    require_motion,
+    require_positions,
+    require_travel,
+    typical_speed,
+)
 from driftwalk.conditions.start import recorded_start
 from driftwalk.conditions.study import (
     About,
@@ -47,9 +52,11 @@ __all__ = [
     "require_inside",
     "require_motion",
     "require_positions",
+    "require_travel",
     "simulate_like",
     "study_as_seen",
     "study_for",
     "study_in_arena",
+    "typical_speed",
     "unstated_warning",
 ]

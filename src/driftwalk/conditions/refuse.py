@@ -1,20 +1,33 @@
-"""Recordings in which there is nothing to see: without a position, too short, or at rest."""
+"""Recordings in which there is nothing to see: without a position, too short, or at rest.
+
+A recording that is unfit for one estimator is unfit for all: each of them asks here.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from driftwalk.conditions.camera import recorded_camera
 from driftwalk.core.errors import InputError
 from driftwalk.schema import Track, body_names, body_track
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from driftwalk.model import Study
+
 FEWEST_POSITIONS: Final = 3
 """Two steps, the least that has a turning angle."""
+LEAST_MOTION: Final = 0.1
+"""A block that stays within this part of its side is at rest: it has seen one place of the flow."""
+LEAST_MOTION_IN_NOISES: Final = 3.0
+"""Standard deviation of the positions of a moving body, in tracking noises."""
+KEPT: Final = 0.99
+"""Share of the positions that tells how far a body goes: single jumps of the tracker do not."""
 
 
 def require_positions(recording: xr.Dataset, *, where: str | PathLike[str] = "") -> None:
@@ -87,6 +100,93 @@ def require_motion(
             f"{_begin(recording, where)}the body never moves ({which}): all {most} positions are "
             f"({tracks[0].x[0]:g}, {tracks[0].y[0]:g}) m"
         )
+
+
+def require_travel(
+    track: Track, study: Study, *, of_block: bool = True, where: str | PathLike[str] = ""
+) -> None:
+    """Refuse a body that does not move, or no further than its tracker is noisy.
+
+    Parameters
+    ----------
+    track : Track
+        The present samples of one body.
+    study : Study
+        The block and the camera.
+    of_block : bool
+        Whether the body is the block of the study, which has to leave its place; the size of
+        another body is not known.
+    where : path-like
+        The recording, to begin the message with.
+
+    Raises
+    ------
+    InputError
+        With how far it goes and where it is.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> from driftwalk.schema import body_track
+    >>> require_travel(body_track(dw.tank30_recording(), None), dw.Study())
+    """
+    from driftwalk.model import apply_overrides
+
+    begin = f"{where}: " if str(where) else ""
+    tail = 0.5 * (1.0 - KEPT)
+    width = max(float(np.ptp(np.quantile(axis, (tail, 1.0 - tail)))) for axis in (track.x, track.y))
+    scatter = max(float(track.x.std()), float(track.y.std()))
+    # The study may say what the tracker's noise should be; this is what it is.
+    measured = apply_overrides(study, {"observation.position_noise_m": "estimate"})
+    noise = recorded_camera(track, measured, position_quantum=0.0).position_noise
+    at_rest = of_block and width < LEAST_MOTION * study.block.side_m
+    if at_rest or scatter < LEAST_MOTION_IN_NOISES * noise:
+        place = f"({np.median(track.x):.3f}, {np.median(track.y):.3f}) m"
+        why = (
+            f"less than a tenth of its side of {1e3 * study.block.side_m:g} mm"
+            if at_rest
+            else f"no more than the tracking noise of {1e3 * noise:.2g} mm would show"
+        )
+        raise InputError(
+            f"{begin}the body never moves: it stays within {1e3 * width:.2g} mm around {place}, "
+            f"{why}, and there is nothing to fit; check the units, the body (`body`) and the time "
+            "that is kept (`start`, `stop` of `load`)"
+        )
+    if typical_speed([track]) == 0.0:
+        raise InputError(
+            f"{begin}the body rests in 99 % of the recording, at the same position to the last "
+            "digit, and there is no motion to fit; check the body (`body`) and the time that is "
+            "kept (`start`, `stop` of `load`)"
+        )
+
+
+def typical_speed(tracks: Sequence[Track]) -> float:
+    """Return the root mean square speed over some ten samples, robust to outliers.
+
+    Parameters
+    ----------
+    tracks : sequence of Track
+        The present samples of one body, by recording.
+
+    Returns
+    -------
+    float
+        Speed [m/s]; 0 where the body rests in 99 % of the recordings.
+
+    Examples
+    --------
+    >>> time = np.arange(100.0)
+    >>> track = Track(time, 0.02 * time, 0.0 * time, 0.0 * time)
+    >>> round(typical_speed([track]), 6)
+    0.02
+    """
+    speeds = []
+    for track in tracks:
+        stride = max(1, min(10, track.time.size // 10))
+        way = np.hypot(*(axis[stride:] - axis[:-stride] for axis in (track.x, track.y)))
+        speeds.append(way / (track.time[stride:] - track.time[:-stride]))
+    speed = np.concatenate(speeds)
+    return float(np.sqrt(np.mean(np.minimum(speed, np.quantile(speed, 0.99)) ** 2)))
 
 
 def _begin(recording: xr.Dataset, where: str | PathLike[str]) -> str:

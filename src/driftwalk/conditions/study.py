@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from driftwalk.conditions.tank import OUTLINE, require_inside, study_in_arena
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import read_arena
+from driftwalk.schema.answer import estimate_of
 from driftwalk.schema.facts import fitted_value
 
 if TYPE_CHECKING:
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 About = Literal["tank", "block", "simulation"]
 """What decides the numbers of some work: the tank, the block in it too, or its forces as well."""
+FORCE_KEYS: Final = {"drag_coefficient": "drag_coefficient", "force_std_N": "force_std"}
+"""Keys of [forces] that every estimate has, and its parameters that they hold."""
 LAW_KEYS: Final = {
     "added_mass_share": "added_mass_share",
     "linear_drag_kg_s": "linear_drag",
@@ -120,7 +123,7 @@ def estimated_study(
     Raises
     ------
     InputError
-        When the two were not estimated.
+        When the two were not estimated, or the recording does not determine one of them.
 
     Examples
     --------
@@ -131,14 +134,20 @@ def estimated_study(
     """
     from driftwalk.model import apply_overrides, parse_study
 
+    stated = overrides or {}
+    for key, name in FORCE_KEYS.items():
+        if f"forces.{key}" not in stated and estimate_of(found, name).open:
+            raise InputError(
+                f"the {found.attrs['kind']} does not determine {name}: its recording tells too "
+                f"little of it; state it (`forces.{key}`)"
+            )
     return apply_overrides(
         parse_study(found.attrs["study"], source=source),
         {
-            "forces.drag_coefficient": fitted_value(found, "drag_coefficient"),
-            "forces.force_std_N": fitted_value(found, "force_std"),
+            **{f"forces.{key}": fitted_value(found, name) for key, name in FORCE_KEYS.items()},
             **fitted_law(found),
             **_fitted_wall(found),
-            **(overrides or {}),
+            **stated,
         },
     )
 

@@ -1,4 +1,4 @@
-"""How many processors there are to use."""
+"""How many processors and how much memory there are to use."""
 
 from __future__ import annotations
 
@@ -20,6 +20,14 @@ _limits: Any = None
 def default_threads() -> int:
     """Return how many threads to use: the processors that this process may run on."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def machine_memory() -> int | None:
+    """Return the memory of this machine [bytes]; None where the system does not say."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):
+        return None
 
 
 def map_in_threads(
@@ -69,6 +77,7 @@ def one_blas_thread() -> Iterator[None]:
     global _callers, _limits
     with _lock:
         if _callers == 0:
+            _let_any_thread_limit()
             _limits = threadpool_limits(limits=1, user_api="blas")
         _callers += 1
     try:
@@ -77,4 +86,20 @@ def one_blas_thread() -> Iterator[None]:
         with _lock:
             _callers -= 1
             if _callers == 0:
+                _let_any_thread_limit()
                 _limits.restore_original_limits()
+                _let_any_thread_limit()
+
+
+def _let_any_thread_limit() -> None:
+    """Let the next thread that limits OpenBLAS do so, whichever did before.
+
+    From version 3.7 on threadpoolctl obeys the first thread that sets a limit, for as long as that
+    thread lives, and passes over the calls of all others without a word.
+    """
+    import threadpoolctl
+
+    openblas = getattr(threadpoolctl, "OpenBLASController", None)
+    clear = getattr(openblas, "clear_controlling_thread", None)
+    if clear is not None:
+        clear(force=True)

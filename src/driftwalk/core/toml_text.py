@@ -19,6 +19,12 @@ _TWICE: Final = re.compile(
     r"(?:Cannot declare (?P<table>\(.*?\)) twice|Cannot overwrite a value) \(at line (?P<line>\d+)"
 )
 """Message of the reader about a table, or a key, that stands twice."""
+MOST_PARTS: Final = 100
+"""Parts of a key, as of a.b.c; its reader takes memory that grows with the square of their number:
+50,000 took 4 GB. Keys of these files have two."""
+_LONG_KEY: Final = re.compile(
+    r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){""" + f"{MOST_PARTS}}}"
+)
 _LARGE: Final = "an integer has more than 64 bits"
 
 
@@ -48,7 +54,8 @@ def parse_toml(text: str | bytes, *, path: str | Path | None = None) -> dict[str
     Raises
     ------
     FormatError
-        When it is no TOML, values are nested too deeply, or an integer has more than 64 bits.
+        When it is no TOML, values are nested too deeply, a key has more than 100 parts, or an
+        integer has more than 64 bits.
 
     Examples
     --------
@@ -57,9 +64,15 @@ def parse_toml(text: str | bytes, *, path: str | Path | None = None) -> dict[str
     """
     try:
         plain = text if isinstance(text, str) else text.decode("utf-8-sig")
+        if _LONG_KEY.search(plain):
+            raise FormatError(
+                f"not a file that driftwalk reads: a key of more than {MOST_PARTS} parts", path=path
+            )
         values = tomllib.loads(plain)
     except UnicodeDecodeError as error:
         raise FormatError(f"not a text file in UTF-8 ({error.reason})", path=path) from error
+    except FormatError:
+        raise
     except RecursionError:
         raise FormatError("not a TOML file: values nested too deeply", path=path) from None
     except ValueError as error:

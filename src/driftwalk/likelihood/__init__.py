@@ -8,6 +8,7 @@ from driftwalk.likelihood.law.held_out import compare_laws
 from driftwalk.likelihood.recover.check import check_recovery
 from driftwalk.likelihood.recover.run import recovery_study
 from driftwalk.likelihood.recover.score import score_fit
+from driftwalk.likelihood.refuse import fit_work
 from driftwalk.likelihood.result import fitted_flow
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "compare_laws",
     "estimate_wall",
     "fit_motion",
+    "fit_work",
     "fitted_flow",
     "judge_fit",
     "recovery_study",

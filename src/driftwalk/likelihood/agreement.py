@@ -61,14 +61,17 @@ def angle_given_facts(
             held=FROM_NEAR,
         )
         again = restricted_drag(passes, other, prior, intensity=False)
+        covariance = parameter_covariance(other, again)
+        own = parameter_covariance(mode, restricted)
+        apart = abs(again.point.log_drag - found.log_drag)
+        facts = parameter_facts(again.point, covariance, study)
+        disagreement = apart / math.sqrt(covariance[0, 0] + own[0, 0])
     except BREAKDOWN:
         return {"angle_disagreement_std": math.nan}
-    covariance = parameter_covariance(other, again)
-    own = parameter_covariance(mode, restricted)
-    apart = abs(again.point.log_drag - found.log_drag)
-    facts = parameter_facts(again.point, covariance, study)
+    if other.lost or not math.isfinite(disagreement):
+        return {"angle_disagreement_std": math.nan}
     return {
         "drag_coefficient_angle_given": facts["drag_coefficient"],
         "drag_coefficient_angle_given_interval": facts["drag_coefficient_interval"],
-        "angle_disagreement_std": apart / math.sqrt(covariance[0, 0] + own[0, 0]),
+        "angle_disagreement_std": disagreement,
     }

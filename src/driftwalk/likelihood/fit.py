@@ -35,6 +35,7 @@ from driftwalk.likelihood.ready import (
 from driftwalk.likelihood.reml import Restricted, restricted_drag
 from driftwalk.likelihood.result import (
     build_fit,
+    open_where_undetermined,
     parameter_covariance,
     parameter_facts,
     visited_shares,
@@ -154,16 +155,18 @@ def fit_motion(
         )
     duration = sum(float(one.time[-1] - one.time[0]) for one in series)
     mended = ready.dropped_frames / max(ready.samples, 1)
-    covariance = with_mended_frames(parameter_covariance(mode, restricted), mended)
+    with solved():
+        covariance = with_mended_frames(parameter_covariance(mode, restricted), mended)
+    stated = open_where_undetermined(covariance, mode, restricted)
     facts: dict[str, Any] = {
         **parameter_facts(
             restricted.point,
-            covariance,
+            stated,
             chosen,
             by_side=side_slopes(passes, law, restricted, chosen),
         ),
         "maximum_likelihood_drag_coefficient": stated_drag(mode.point, chosen),
-        **precision_facts(math.sqrt(covariance[0, 0]), duration, chosen),
+        **precision_facts(math.inf if mode.lost else math.sqrt(covariance[0, 0]), duration, chosen),
         **law_facts(law, assumptions),
         **_turning(start, passes),
         "wetted_depth_m": chosen.wetted_depth_m,
@@ -183,6 +186,7 @@ def fit_motion(
         **whiteness._asdict(),
         "iterations": mode.iterations,
         "converged": "yes" if mode.converged else "no",
+        "search_left": mode.left if mode.lost else 0.0,
         "roughness_weight": mode.weights.roughness,
         "size_weight": mode.weights.size,
         "source": ", ".join(str(one.attrs.get("source", "")) for one in many),

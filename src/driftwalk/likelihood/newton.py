@@ -55,6 +55,9 @@ CLOSE = 0.25
 below this part of their standard deviations: what is left is a tenth of such a step."""
 CLOSE_ENOUGH = 0.5
 """The same where a search of many more samples begins: what is saved here costs more there."""
+MOST_LEFT: Final = 2.0
+"""Standard deviations: an interval around a place further from the maximum does not hold it. A body
+that is driven on a circle without any force was given up 5 to 80 away."""
 CLOSE_NATS: Final = 1.0
 """Converged when a whole step would also raise the log likelihood by less than this. Hundreds of
 coefficients may each move by a small part of their standard deviations and gain 100 nats together:
@@ -142,6 +145,14 @@ class Mode:
     converged: bool
     deviance: float
     """Negative log likelihood with the priors, at the last step."""
+    left: float = 0.0
+    """How far Newton's whole step would have moved C_d, a noise or an opened number at the last
+    step, in standard deviations: how far the maximum seems to be."""
+
+    @property
+    def lost(self) -> bool:
+        """Whether the search was given up so far from a maximum that its numbers mean nothing."""
+        return not self.converged and not self.left <= MOST_LEFT
 
     def value_of(self, name: str) -> tuple[float, float]:
         """Return a noise or an opened number, and its standard deviation by theory."""
@@ -212,7 +223,7 @@ def find_mode(
     """
     point, used, converged = start, 0, False
     covariance = np.zeros((0, 0))
-    deviance = math.inf
+    deviance = ahead = math.inf
     last = np.zeros(start.coefficients.size + 1 + len(start.extras))
     for index in range(iterations):
         drag = point.coefficients.size
@@ -224,20 +235,23 @@ def find_mode(
         passed(work_of_pass(passes))
         used, deviance = sums.used, sums.deviance
         covariance = inverse(sums.information)
-        step = limited(newton_step(sums, covariance, held=left), drag, list(point.opened))
+        whole = newton_step(sums, covariance, held=left)
+        step = limited(whole, drag, list(point.opened))
         step = last = damped(step, last, sums.information)
         point = point.moved(step)
         weights = prior.updated(weights, point, covariance)
-        moves = np.abs(step) / np.sqrt(np.diag(covariance))
+        stds = np.sqrt(np.diag(covariance))
+        moves, ways = np.abs(step) / stds, np.abs(whole) / stds
         # A lever that is known from its prior alone may go to and fro without moving anything else.
         if point.log_lever is not None:
-            moves[drag + LEVER] = 0.0
+            moves[drag + LEVER] = ways[drag + LEVER] = 0.0
+        ahead = float(ways[drag:].max())
         near = max(float(moves[drag:].max()), float(np.sqrt((moves[:drag] ** 2).mean())))
         gain = 0.5 * float(sums.score @ covariance @ sums.score)
         if len(left) == 0 and near < close and gain < close_nats:
             converged = True
             break
-    return Mode(point, weights, covariance, used, index + 1, converged, deviance)
+    return Mode(point, weights, covariance, used, index + 1, converged, deviance, ahead)
 
 
 def _of_all(sums: Sums, count: int) -> Sums:

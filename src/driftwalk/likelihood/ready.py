@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
+from driftwalk.conditions import require_travel
 from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import InputError
 from driftwalk.core.json_text import parse_json
@@ -25,7 +26,7 @@ from driftwalk.likelihood.mistakes.smoothed import require_raw
 from driftwalk.likelihood.refuse import (
     FEWEST_SAMPLES,
     require_length,
-    require_motion,
+    require_memory,
     require_own_arena,
     require_size,
     require_usable,
@@ -92,6 +93,7 @@ def prepare(
     many: Sequence[xr.Dataset], study: Study, angle: AngleUse | None, body: str | None
 ) -> Ready:
     """Return recordings ready for the filter; refuse what cannot be fitted."""
+    require_memory(sum(one.sizes["time"] for one in many))
     intervals = intervals_of(study)
     outline = outline_of(study.tank.to_arena())
     require_size(len(intervals.labels), 2 * spline_of(study, outline).size)
@@ -100,17 +102,18 @@ def prepare(
     mistakes, dropped = 0, list[DroppedFrames]()
     for index, recording in enumerate(many):
         seen, where = body_track(recording, body), _name_of(recording)
+        name = str(recording.attrs.get("source", ""))
         track = without_mistakes(seen)
         mistakes += seen.time.size - track.time.size
         require_length(track, study, where=where)
-        require_motion(track, study, where=where)
+        require_travel(track, study, where=name)
         raws.append(track)
         dropped.append(find_dropped_frames(track, recording["time"].values))
         track = with_gaps(track, dropped[-1])
         cut = cut_track(track, intervals, fewest=FEWEST_SAMPLES, where=where)
         for number, part in enumerate(cut):
             if len(cut) > 1:
-                require_motion(part, study, where=f"{where}{intervals.describe(number)}: ")
+                require_travel(part, study, where=f"{where}{intervals.describe(number)}")
         tracks.append(track)
         parts += cut
         places += [(flow, index) for flow in intervals.flows]

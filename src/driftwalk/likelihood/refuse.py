@@ -1,15 +1,13 @@
-"""Recordings that cannot be fitted, and the remedies: too short, at rest, or at the wall."""
+"""Recordings that cannot be fitted, and the remedies: too short, or at the wall."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+import math
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-import numpy as np
-
-from driftwalk.conditions import recorded_camera
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.length import length_advice
-from driftwalk.likelihood.start import typical_speed
+from driftwalk.core.processors import machine_memory
+from driftwalk.likelihood.length import in_words, length_advice
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -17,16 +15,91 @@ if TYPE_CHECKING:
 
 FEWEST_SAMPLES: Final = 100
 """Positions, or intervals between them, that a flow needs at least."""
-LEAST_MOTION: Final = 0.1
-"""A body that stays within this part of its side is at rest: it has seen one place of the flow."""
-LEAST_MOTION_IN_NOISES: Final = 3.0
-"""Standard deviation of the positions of a moving body, in tracking noises."""
-KEPT: Final = 0.99
-"""Share of the positions that tells how far a body goes: single jumps of the tracker do not."""
 MOST_AT_OWN_WALL: Final = 0.9
 """Share of the intervals at the wall of a tank that was fitted to the positions themselves."""
 MOST_COEFFICIENTS: Final = 4400
 """Limit for all flows together: about six flows in the paper's tank."""
+
+SAMPLE_BYTES: Final = 5200.0
+"""Memory of a fit for each sample: 0.27 GB at 18,000 samples, 0.49 GB at 60,000, with the angle in
+the state; a million took 4 GB."""
+SAMPLE_S: Final = 1.2e-3
+"""Time of one processor for each sample, with the check: 0.8 ms for the fit at 18,000 and at 60,000
+samples in the paper's tank, and half as much for the check."""
+NOTABLE_BYTES: Final = 2e9
+NOTABLE_S: Final = 600.0
+"""A fit that takes more is announced."""
+
+
+class Work(NamedTuple):
+    """Memory and time that a fit takes."""
+
+    samples: int
+    memory: float
+    """[bytes]"""
+    seconds: float
+
+    @property
+    def notable(self) -> bool:
+        """Whether it is so much that it should be said before."""
+        return self.memory > NOTABLE_BYTES or self.seconds > NOTABLE_S
+
+    def describe(self) -> str:
+        """Return "a fit of 1000000 samples takes about 5.2 GB of memory and 20 min".
+
+        Examples
+        --------
+        >>> fit_work(1_000_000).describe()
+        'a fit of 1000000 samples takes about 5.2 GB of memory and 20 min'
+        """
+        return (
+            f"a fit of {self.samples} samples takes about {self.memory / 1e9:.2g} GB of memory and "
+            f"{in_words(self.seconds)}"
+        )
+
+    def advice(self) -> str:
+        """Return how to take fewer samples."""
+        every = max(math.ceil(self.memory / NOTABLE_BYTES), math.ceil(self.seconds / NOTABLE_S), 2)
+        return (
+            "fit a part of the time (`start`, `stop` of `load`), or fewer samples a second, such "
+            f"as one row in {every} of the file"
+        )
+
+
+def fit_work(samples: int) -> Work:
+    """Return the memory and the time of a fit, as measured.
+
+    Parameters
+    ----------
+    samples : int
+        Samples of all recordings together.
+
+    Returns
+    -------
+    Work
+        Memory [bytes] and time of one processor [s].
+
+    Examples
+    --------
+    >>> round(fit_work(100_000).seconds)
+    120
+    """
+    return Work(samples, SAMPLE_BYTES * samples, SAMPLE_S * samples)
+
+
+def require_memory(samples: int) -> None:
+    """Refuse more samples than this machine has memory for.
+
+    Raises
+    ------
+    InputError
+        With the memory and the time that they would take.
+    """
+    work, there = fit_work(samples), machine_memory()
+    if there is not None and work.memory > there:
+        raise InputError(
+            f"{work.describe()}, and this machine has {there / 1e9:.2g} GB: {work.advice()}"
+        )
 
 
 def require_length(track: Track, study: Study, *, where: str) -> None:
@@ -41,43 +114,6 @@ def require_length(track: Track, study: Study, *, where: str) -> None:
         raise InputError(
             f"{where}the recording has {track.time.size} positions of this body; the fit needs "
             f"{FEWEST_SAMPLES} at least. {length_advice(study.fit.drag_coefficient_precision)}"
-        )
-
-
-def require_motion(track: Track, study: Study, *, where: str) -> None:
-    """Refuse a body that does not move, or no further than its tracker is noisy.
-
-    Raises
-    ------
-    InputError
-        With how far it goes and where it is.
-    """
-    from driftwalk.model import apply_overrides
-
-    tail = 0.5 * (1.0 - KEPT)
-    width = max(float(np.ptp(np.quantile(axis, (tail, 1.0 - tail)))) for axis in (track.x, track.y))
-    scatter = max(float(track.x.std()), float(track.y.std()))
-    # The study may say what the tracker's noise should be; this is what it is.
-    measured = apply_overrides(study, {"observation.position_noise_m": "estimate"})
-    noise = recorded_camera(track, measured, position_quantum=0.0).position_noise
-    at_rest = width < LEAST_MOTION * study.block.side_m
-    if at_rest or scatter < LEAST_MOTION_IN_NOISES * noise:
-        place = f"({np.median(track.x):.3f}, {np.median(track.y):.3f}) m"
-        why = (
-            f"less than a tenth of its side of {1e3 * study.block.side_m:g} mm"
-            if at_rest
-            else f"no more than the tracking noise of {1e3 * noise:.2g} mm would show"
-        )
-        raise InputError(
-            f"{where}the body never moves: it stays within {1e3 * width:.2g} mm around {place}, "
-            f"{why}, and there is nothing to fit; check the units, the body (`body`) and the time "
-            "that is kept (`start`, `stop` of `load`)"
-        )
-    if typical_speed([track]) == 0.0:
-        raise InputError(
-            f"{where}the body rests in 99 % of the recording, at the same position to the last "
-            "digit, and there is no motion to fit; check the body (`body`) and the time that is "
-            "kept (`start`, `stop` of `load`)"
         )
 
 

@@ -30,7 +30,7 @@ from driftwalk.likelihood.law.facts import (
     number_variables,
 )
 from driftwalk.likelihood.law.found import LawFound
-from driftwalk.likelihood.newton import Mode, known_numbers_variance
+from driftwalk.likelihood.newton import PRIOR_LOG_DRAG_STD, Mode, known_numbers_variance
 from driftwalk.likelihood.reml import Restricted
 from driftwalk.likelihood.spline import Floats, Spline
 from driftwalk.likelihood.widening import widened
@@ -48,6 +48,8 @@ LEAST_QUADRATIC = 1e-6
 """Share of the quadratic drag below which nothing is known of its C_d."""
 MOST_LOG_WIDTH: Final = 300.0
 """Beyond this an interval has no upper end: exp would not fit a double for long."""
+PRIOR_ALONE: Final = math.sqrt(0.5)
+"""Share of the prior's standard deviation of ln C_d above which the data tell less than it does."""
 LEAST_COUNT: Final = 3
 """Samples with the block over a node that make the node a measured one."""
 PARAMETERS: Final = (
@@ -116,6 +118,25 @@ def parameter_covariance(mode: Mode, restricted: Restricted) -> Floats:
     return widened(covariance * np.outer(scale, scale), mode.point)
 
 
+def open_where_undetermined(covariance: Floats, mode: Mode, restricted: Restricted) -> Floats:
+    """Return the covariance, infinite for parameters of which the recording tells nothing.
+
+    Parameters
+    ----------
+    covariance : ndarray
+        As of `parameter_covariance`.
+    mode, restricted : Mode, Restricted
+        Where the search has come to, and C_d: where the data say less of it than its weak prior,
+        the estimate is the prior's.
+    """
+    if mode.lost:
+        return np.asarray(np.diag(np.full(len(covariance), math.inf)))
+    found = covariance.copy()
+    if restricted.log_drag_std > PRIOR_ALONE * PRIOR_LOG_DRAG_STD:
+        found[0, 0] = math.inf
+    return found
+
+
 def parameter_facts(
     point: Point, covariance: Floats, study: Study, *, by_side: tuple[float, float] = (0.0, 0.0)
 ) -> dict[str, Any]:
@@ -161,6 +182,8 @@ def parameter_facts(
 
 def _log_drag_std(point: Point, covariance: Floats) -> float:
     """Return the standard deviation of ln C_d of the quadratic part of the drag."""
+    if math.isinf(covariance[0, 0]):
+        return math.inf
     slopes = np.zeros(len(covariance))
     slopes[0] = 1.0
     if "linear_share" in point.opened:
@@ -212,6 +235,8 @@ def build_fit(
     least = min(one.deviance for one in profiles)
     flat = profiles[0].half_log_determinant
     uncertainty = parameter_covariance(mode, restricted)
+    if mode.lost:
+        uncertainty = open_where_undetermined(uncertainty, mode, restricted)
     noises = 1 + len(mode.point.noises)
     names = np.array([*PARAMETERS[:noises], *mode.point.opened], dtype=object)
     data: dict[str, Any] = {

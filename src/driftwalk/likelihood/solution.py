@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from driftwalk.likelihood.spline import Floats
     from driftwalk.schema import Track
 
-BREAKDOWN = (np.linalg.LinAlgError, ArithmeticError)
+BREAKDOWN = (np.linalg.LinAlgError, ArithmeticError, ValueError)
 """Errors of a search that diverges: a matrix that is not positive definite, a parameter that
-is no longer a number."""
+is no longer a number, the root of a negative variance, a value that the filter refuses."""
 
 
 @contextmanager
@@ -29,7 +29,10 @@ def solved() -> Iterator[None]:
         When the search within it breaks down.
     """
     try:
-        yield
+        with np.errstate(all="ignore"):
+            yield
+    except InputError:
+        raise
     except BREAKDOWN as error:
         raise InputError(
             "the fit has no solution for this recording: the motion does not follow the model at "

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from driftwalk.conditions import recorded_camera
+from driftwalk.conditions import recorded_camera, typical_speed
 from driftwalk.conditions.own_flow import flow_from_track
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.filter_pass import Point
@@ -84,17 +84,6 @@ def first_weights(tracks: Sequence[Track], spline: Spline) -> Weights:
     """Return weights for a flow of the body's speed that changes over one or two knots."""
     power = typical_speed(tracks) ** 2 * spline.spacing**2
     return Weights(roughness=10.0 * spline.spacing**4 / power, size=0.02 / power)
-
-
-def typical_speed(tracks: Sequence[Track]) -> float:
-    """Return the root mean square speed over some ten samples [m/s], robust to outliers."""
-    speeds = []
-    for track in tracks:
-        stride = max(1, min(10, track.time.size // 10))
-        way = np.hypot(*(axis[stride:] - axis[:-stride] for axis in (track.x, track.y)))
-        speeds.append(way / (track.time[stride:] - track.time[:-stride]))
-    speed = np.concatenate(speeds)
-    return float(np.sqrt(np.mean(np.minimum(speed, np.quantile(speed, 0.99)) ** 2)))
 
 
 def _flow_coefficients(track: Track, study: Study, spline: Spline) -> Floats:

@@ -12,6 +12,7 @@ from driftwalk.likelihood.length import USUAL_PRECISION, in_words, needed_durati
 from driftwalk.likelihood.mistakes.mirrored import MIRRORED
 from driftwalk.likelihood.newton import NOTABLE_LEVER
 from driftwalk.likelihood.result import Whiteness
+from driftwalk.schema.facts import is_open
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -112,7 +113,7 @@ def _on_the_data(
         )
     std = facts["drag_coefficient_relative_std"]
     wanted = facts.get("drag_coefficient_precision")
-    if std > (wanted or USUAL_PRECISION):
+    if std > (wanted or USUAL_PRECISION) and not facts.get("search_left", 0.0):
         # Infinite where the criterion is flat.
         needed = facts["needed_duration_s"]
         length = f"about {in_words(needed)}" if math.isfinite(needed) else "another recording"
@@ -133,9 +134,22 @@ def _on_the_data(
 
 def _on_the_search(facts: Mapping[str, Any]) -> list[str]:
     found = []
-    if facts["converged"] == "no":
+    left = facts.get("search_left", 0.0)
+    if left:
+        found.append(
+            f"the search was given up after {facts['iterations']} steps ([fit] iterations), "
+            f"{left:.2g} standard deviations from a maximum of the likelihood: this recording does "
+            "not determine the parameters of the model; a motion without random force, as that of "
+            "a driven body, tells nothing of them"
+        )
+    elif facts["converged"] == "no":
         found.append(
             f"the search has not converged in {facts['iterations']} steps ([fit] iterations)"
+        )
+    elif is_open(facts, "drag_coefficient"):
+        found.append(
+            "the recording says less of C_d than the fit assumes of it beforehand (0.5, within a "
+            "factor of two): it does not determine C_d"
         )
     if facts["restricted"] == "no":
         found.append(
@@ -173,6 +187,11 @@ def _on_the_turning(facts: Mapping[str, Any], side_m: float) -> list[str]:
             "clockwise; C_d is then meaningless; negate the angle, or turn y upwards"
         )
     apart = facts.get("angle_disagreement_std", 0.0)
+    if math.isnan(apart):
+        found.append(
+            "the fit with the angle as an input has no solution and was left out: whether the "
+            "turning of the block and its motion follow one drag law is not known"
+        )
     if apart > NOTABLE_DISAGREEMENT:
         found.append(
             f"with the angle as an input C_d is {facts['drag_coefficient_angle_given']:.3g}, "

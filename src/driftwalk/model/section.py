@@ -9,7 +9,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar, get_args
+from typing import Any, ClassVar, Final, get_args
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
 from pydantic_core import CoreSchema, ErrorDetails, core_schema
@@ -17,6 +17,11 @@ from pydantic_core import CoreSchema, ErrorDetails, core_schema
 from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.units import parse_quantity
+
+SMALLEST: Final = 1e-25
+"""Least value, in SI, of a number that must be more than 0: below every length, mass, time and
+force of a laboratory, and its third and fourth powers are still numbers. The square of 1e-320 is
+0."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +73,10 @@ class Quantity:
             number: float = self._whole(value)
         else:
             number = parse_quantity(value, self.unit)
+            if self.gt == 0 and 0.0 < number < SMALLEST:
+                raise ConfigurationError(
+                    f"must be at least {SMALLEST:g}{self._its_unit()}, got {value}"
+                )
         for bound, holds, text in (
             (self.ge, number >= (self.ge or 0.0), "at least"),
             (self.gt, number > (self.gt or 0.0), "more than"),
@@ -75,8 +84,7 @@ class Quantity:
             (self.lt, number < (self.lt or 0.0), "less than"),
         ):
             if bound is not None and not holds:
-                unit = f" {self.unit}" if self.unit != "1" else ""
-                raise ConfigurationError(f"must be {text} {bound:g}{unit}, got {value}")
+                raise ConfigurationError(f"must be {text} {bound:g}{self._its_unit()}, got {value}")
         return number
 
     def range_text(self) -> str:
@@ -88,6 +96,9 @@ class Quantity:
             if bound is not None and bound < 1e18
         ]
         return ", ".join(parts)
+
+    def _its_unit(self) -> str:
+        return f" {self.unit}" if self.unit != "1" else ""
 
     def _in_unit(self) -> str:
         return f" in {self.unit}" if self.unit != "1" else ""

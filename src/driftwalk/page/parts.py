@@ -14,8 +14,9 @@ from driftwalk.core.json_text import json_value
 from driftwalk.page.arrays import number
 from driftwalk.plot.parts.arena import arena_of
 from driftwalk.plot.parts.labels import interval_of
+from driftwalk.schema.answer import NOT_DETERMINED
 from driftwalk.schema.calibration_facts import facts_of
-from driftwalk.schema.facts import sentences
+from driftwalk.schema.facts import is_open, sentences
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -145,15 +146,16 @@ def estimate(
 ) -> dict[str, Any]:
     """Return an estimate of the facts with its interval, for a summary."""
     ends = interval_of(dataset, f"{name}_interval")
+    unknown = is_open(facts_of(dataset), name)
     return {
         "label": label,
         "symbol": symbol,
-        "value": number(required(dataset, name)),
+        "value": None if unknown else number(required(dataset, name)),
         "unit": unit,
         "low": None if ends is None else ends[0],
         "high": None if ends is None else ends[1],
         "confidence": None if ends is None else value_of(dataset, "confidence"),
-        "note": note,
+        "note": NOT_DETERMINED if unknown else note,
     }
 
 

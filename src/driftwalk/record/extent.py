@@ -24,6 +24,8 @@ PLACES_PER_SAMPLE: Final = 50
 
 FARTHEST_M: Final = 1e12
 """Beyond the planets. The noise and the speed take powers of positions, which float64 must hold."""
+NEAREST_M: Final = 1e-25
+"""Positions that all are nearer to the origin are no positions: their powers are 0 in float64."""
 LARGEST_ANGLE: Final = 1e12
 """In the file's unit; of larger ones float64 no longer knows the fraction of a turn."""
 
@@ -72,6 +74,8 @@ def refuse_sparse(time: Array, bodies: list[RawBody]) -> None:
 def refuse_far(bodies: Sequence[RawBody], scale: float) -> None:
     """Refuse numbers that are no position and no angle: a damaged file, or a mark of what is lost.
 
+    Neither are positions that all are as good as zero.
+
     Parameters
     ----------
     bodies : sequence of RawBody
@@ -87,8 +91,22 @@ def refuse_far(bodies: Sequence[RawBody], scale: float) -> None:
     for body in bodies:
         for name, values in (("x", body.x), ("y", body.y)):
             _refuse_beyond(body, name, values, FARTHEST_M / scale)
+        _refuse_within(body, NEAREST_M / scale)
         if body.theta is not None:
             _refuse_beyond(body, "angle", body.theta, LARGEST_ANGLE)
+
+
+def _refuse_within(body: RawBody, least: float) -> None:
+    farthest = max(
+        float(np.abs(values).max(where=np.isfinite(values), initial=0.0))
+        for values in (body.x, body.y)
+    )
+    if 0.0 < farthest < least:
+        raise InputError(
+            f"body '{body.name}' has no position that is further than {farthest:.3g} from the "
+            "origin, in the file's unit: no camera sees that; are these the right columns, and is "
+            "the unit right (`length_unit`)?"
+        )
 
 
 def _refuse_beyond(body: RawBody, name: str, values: Array, most: float) -> None:

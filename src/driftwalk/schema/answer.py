@@ -20,6 +20,9 @@ SYMBOLS: Final = MappingProxyType(
 SMALL_UNITS: Final = MappingProxyType({"N": (1e3, "mN"), "m": (1e3, "mm")})
 """Units in which a person reads the numbers of a 3-cm block, and their number in the SI unit."""
 
+NOT_DETERMINED: Final = "not determined by this recording"
+"""Said in the place of a number with an open interval."""
+
 
 class Estimate(NamedTuple):
     """An estimate in the unit of a reader."""
@@ -29,6 +32,11 @@ class Estimate(NamedTuple):
     """Such as "mN"; empty for a number without a unit."""
     ends: tuple[float, float] | None
     """Its interval, where it has one."""
+
+    @property
+    def open(self) -> bool:
+        """Whether the interval has no upper end: the recording does not determine the number."""
+        return self.ends is not None and math.isinf(self.ends[1])
 
 
 def symbol_of(parameter: str) -> str:
@@ -119,7 +127,7 @@ def answer_lines(found: xr.Dataset) -> list[str]:
 def _open(found: xr.Dataset, name: str) -> str:
     """Return a remark on a parameter that the recording does not determine."""
     known = "determined" not in found or bool(found["determined"].sel(parameter=name))
-    return "" if known else "  not determined"
+    return "" if known or estimate_of(found, name).open else "  not determined"
 
 
 def _ranking(found: xr.Dataset) -> list[str]:
@@ -148,6 +156,8 @@ def _remarks(found: xr.Dataset) -> list[str]:
 
 
 def _text(found: Estimate) -> str:
+    if found.open:
+        return NOT_DETERMINED
     text = f"{found.value:.4g} {found.unit}".rstrip()
     return text if found.ends is None else f"{text}  [{found.ends[0]:.4g}, {found.ends[1]:.4g}]"
 

@@ -171,6 +171,18 @@ def fit_facts(fit: xr.Dataset) -> dict[str, Any]:
     return facts
 
 
+def is_open(facts: Mapping[str, Any], key: str) -> bool:
+    """Return whether an interval has no upper end: the recording does not determine the number.
+
+    Examples
+    --------
+    >>> facts = {"drag_coefficient": 0.4, "drag_coefficient_interval": [0.0, np.inf]}
+    >>> is_open(facts, "drag_coefficient"), is_open(facts, "force_std_N")
+    (True, False)
+    """
+    return bool(np.isposinf(facts.get(f"{key}_interval", (0.0, 0.0))[1]))
+
+
 def sentences(dataset: xr.Dataset, name: str) -> list[str]:
     """Return the sentences that a variable holds; none where it is absent."""
     return [str(text) for text in dataset[name].values] if name in dataset.variables else []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 Backend = Literal["cpu", "reference"]
+BYTES_PER_SAMPLE: Final = 12
+"""Three numbers of 4 bytes; those of the reference are twice as large."""
 
 
 def simulate(
@@ -106,14 +108,22 @@ def simulate(
         drag_coefficient=np.full(count, study.forces.drag_coefficient),
         force_std=study.forces.force_std_N,
     )
-    x, y, theta, status = _core.simulate(
-        model,
-        worlds,
-        keys,
-        threads=threads or default_threads(),
-        precision="double" if backend == "reference" else "single",
-        flow_start=starts,
-    )
+    try:
+        x, y, theta, status = _core.simulate(
+            model,
+            worlds,
+            keys,
+            threads=threads or default_threads(),
+            precision="double" if backend == "reference" else "single",
+            flow_start=starts,
+        )
+    except MemoryError as error:
+        size = count * times.size * BYTES_PER_SAMPLE / 1e9
+        raise MemoryError(
+            f"{count} replicates of {times.size} samples take {size:.3g} GB; take fewer "
+            "(`simulation.replicates`, `simulation.sample_rate_Hz`) or a shorter time "
+            "(`simulation.duration_s`)"
+        ) from error
     facts = series_facts(water, starts, duration=float(times[-1]))
     attrs = {"seed": chosen, "backend": backend, **facts}
     return _dataset(study, times, (x, y, theta), status, starts, attrs)

@@ -16,7 +16,7 @@ from driftwalk.assembly.runs.cover import require_cover
 from driftwalk.assembly.runs.start import given_start, place_blocks, require_room
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import default_threads
-from driftwalk.simulation.backend import Camera, native_model
+from driftwalk.simulation.backend import Camera, native_model, require_steps
 from driftwalk.simulation.series import continued_flow, flow_starts
 
 if TYPE_CHECKING:
@@ -132,14 +132,9 @@ def make_plan(
 
 def whole_steps(study: Study) -> int:
     """Return the whole time steps of a run: those that end within its duration, at least one."""
-    steps = max(int(np.floor(study.assembly.duration_s / study.time_step_s + 1e-9)), 1)
-    if steps > MOST_STEPS:
-        raise InputError(
-            f"a run of {study.assembly.duration_s:g} s has {steps} time steps of "
-            f"{study.time_step_s:g} s, at most {MOST_STEPS} are possible: shorten it "
-            "(`assembly.duration_s`)"
-        )
-    return steps
+    duration, step = study.assembly.duration_s, study.time_step_s
+    require_steps(max(duration, study.forces.force_interval_s), step)
+    return max(int(np.floor(duration / step + 1e-9)), 1)
 
 
 def _of_each(name: str, given: npt.ArrayLike | None, default: float, runs: int) -> Floats:

@@ -33,6 +33,7 @@ from driftwalk.conditions import (
     possible_noises,
     recorded_camera,
     recorded_conditions,
+    require_travel,
 )
 from driftwalk.core.errors import InputError
 from driftwalk.schema import Track, body_track
@@ -169,6 +170,7 @@ def body_motion(
     """
     track = body_track(recording, body)
     require_samples(track)
+    require_travel(track, study, of_block=False)
     quantum = float(recording.attrs.get("position_quantum_m", 0.0))
     return recorded_motion(
         track,

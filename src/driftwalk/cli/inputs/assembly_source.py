@@ -25,6 +25,8 @@ FOUND_BY_A_RUN: Final = (
 SEARCHED: Final = FOUND_BY_A_RUN[:2]
 """Parameters that a run finds: a study file may hold any value for them."""
 RUN_HELP: Final = "Run directory of a finished fit, calibration or comparison of models."
+CONNECTOR: Final = ("assembly.connector_distance_m", "assembly.connector_axis_rad")
+"""Parameters of the latching rule "connector" alone."""
 RUN_NAMES: Final = (
     *("blocks", "duration", "tank_diameter", "side", "mass", "depth"),
     *("drag_coefficient", "force_std", "force_interval"),
@@ -91,7 +93,21 @@ def source_from_flow(given: StudyOptions, flow_file: Path | None) -> Source:
     inputs = {"flow": flow_file, **({} if given.file is None else {"study": given.file})}
     warning = unstated_warning(chosen, about="simulation")
     field = load_flow_for(flow_file, chosen)
-    return Source(chosen, field, None, inputs, [] if warning is None else [warning])
+    said = [*([] if warning is None else [warning]), *_without_effect(given, chosen)]
+    return Source(chosen, field, None, inputs, said)
+
+
+def _without_effect(given: StudyOptions, study: Study) -> list[str]:
+    """Return a warning where a connector is described that no block has."""
+    idle = [option_name(key, keys=given.keys) for key in CONNECTOR if key in given.overrides]
+    latching = study.assembly.latching
+    if not idle or latching == "connector":
+        return []
+    verb = "has" if len(idle) == 1 else "have"
+    return [
+        f"{' and '.join(idle)} {verb} no effect with --latching {latching}: blocks have connectors "
+        "with --latching connector"
+    ]
 
 
 def refuse_found(folder: Path, overrides: Mapping[str, Any], *, also: Sequence[str] = ()) -> None:
@@ -141,7 +157,8 @@ def source_from_run(folder: Path, flow_file: Path | None, given: StudyOptions) -
         field = found.flow(study)
     else:
         field, inputs["flow"] = load_flow_for(flow_file, chosen), flow_file
-    return Source(chosen, field, found.uncertainty, inputs, found.warnings, found.not_drawn)
+    warnings = [*found.warnings, *_without_effect(given, chosen)]
+    return Source(chosen, field, found.uncertainty, inputs, warnings, found.not_drawn)
 
 
 def load_flow_for(path: Path, study: Study) -> xr.Dataset:

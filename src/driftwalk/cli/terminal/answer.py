@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from driftwalk.cli.terminal.output import print_next, print_note
-from driftwalk.schema.answer import SYMBOLS, Estimate, estimate_of
+from driftwalk.schema.answer import NOT_DETERMINED, SYMBOLS, Estimate, estimate_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,6 +83,9 @@ def print_estimates(found: xr.Dataset, *parameters: str) -> None:
     """
     for name in parameters:
         one = estimate_of(found, name)
+        if one.open:
+            print_row(label_of(name), NOT_DETERMINED)
+            continue
         text = f"{number_text(one.value)} {one.unit}".rstrip()
         if name == "force_std":
             text += f", redrawn every {1e3 * float(found['force_interval']):g} ms"

@@ -72,7 +72,9 @@ def one_line(error: BaseException) -> str | None:
     if hasattr(error, "format_message"):  # what typer raises for a mistake in the options
         return _usage_message(error)
     if isinstance(error, MemoryError):
-        return _joined(f"there is not enough memory for this: {error}".rstrip(": "))
+        # What C++ says of itself names neither size nor remedy.
+        said = "" if str(error) == "std::bad_alloc" else str(error)
+        return _joined(f"there is not enough memory for this: {to_options(said)}".rstrip(": "))
     if isinstance(error, OSError):
         return _joined(_operating_system_message(error))
     return None

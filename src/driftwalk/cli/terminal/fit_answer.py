@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Mapping
 from math import isfinite
@@ -19,7 +20,7 @@ from driftwalk.cli.terminal.answer import (
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import beside, command_text, print_next
 from driftwalk.schema.compared_laws import compared_laws
-from driftwalk.schema.facts import fit_facts, sentences
+from driftwalk.schema.facts import ESTIMATES, fit_facts, is_open, sentences
 from driftwalk.schema.law_words import (
     LAW_KEYS,
     LINEAR_DRAG_ALONE,
@@ -78,8 +79,13 @@ _KEYS: Final = (
 
 
 def summary(found: xr.Dataset) -> dict[str, Any]:
-    """Return the fit with units in its keys."""
+    """Return the fit with units in its keys; None for what the recording does not determine."""
     facts = fit_facts(found)
+    for key in ESTIMATES:
+        if is_open(facts, key):
+            facts[key] = None
+    if facts.get("drag_coefficient", math.nan) is None:
+        facts["maximum_likelihood_drag_coefficient"] = None
     if "compared_law" in found.dims:
         facts["compared_laws"] = _laws_of(found)
     return {
@@ -138,7 +144,8 @@ def print_found(fit: xr.Dataset, *, wall: bool = False) -> None:
     else:
         print_estimates(fit, "drag_coefficient")
     print_estimates(fit, "force_std", "tracking_noise")
-    print_intensity(facts["force_noise_intensity_N2_s"])
+    if not is_open(facts, "force_noise_intensity_N2_s"):
+        print_intensity(facts["force_noise_intensity_N2_s"])
     print_law(facts)
     left_out = f"{facts['wall_share']:.1%}, left out"
     asked = wall or "wall_contacts" in facts or "wall_left_out" in facts

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import InputError, reason_of
 from driftwalk.likelihood.check.run import check_model
+from driftwalk.likelihood.solution import BREAKDOWN
 from driftwalk.schema.verdict import with_verdict
 
 if TYPE_CHECKING:
@@ -55,4 +56,7 @@ def judge_fit(
         check = check_model(fit, recordings, body=body)
     except InputError as error:
         return Judged(fit.assign_attrs(check_left_out=str(error)), None)
+    except BREAKDOWN as error:
+        why = f"the model cannot be checked: the check broke down ({reason_of(error)})"
+        return Judged(fit.assign_attrs(check_left_out=why), None)
     return Judged(with_verdict(fit, check), check)

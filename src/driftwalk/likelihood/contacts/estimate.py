@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from driftwalk.conditions import estimated_study
 from driftwalk.core.run_stages import tell_nobody
-from driftwalk.likelihood.check.errors import estimate_of
+from driftwalk.likelihood.check.errors import Estimate, estimate_of
 from driftwalk.likelihood.contacts.lattice import tried_walls
 from driftwalk.likelihood.contacts.parabola import answer, says_nothing
 from driftwalk.likelihood.contacts.particles import Part, Trial
-from driftwalk.likelihood.contacts.passages import passages_of, thinned
+from driftwalk.likelihood.contacts.passages import Passages, passages_of, thinned
 from driftwalk.likelihood.intervals import fitted_intervals
 from driftwalk.likelihood.newton import Tell
 from driftwalk.likelihood.result import fitted_flow
+from driftwalk.likelihood.solution import BREAKDOWN
 from driftwalk.schema.check import described
 from driftwalk.schema.law_words import WALL_KEYS
 
@@ -84,6 +85,20 @@ def estimate_wall(
     fit = described(fit.assign(wall_contacts=((), np.int64(count))))
     if count < LEAST_CONTACTS:
         return fit.assign_attrs(wall_left_out=_too_few(count))
+    try:
+        data = _answer(fit, estimate, found, seed=seed, tell=tell or tell_nobody)
+    except BREAKDOWN as error:
+        return fit.assign_attrs(wall_left_out=f"the estimate of the wall failed: {error}")
+    if says_nothing(data):
+        return fit.assign_attrs(wall_left_out=_all_alike(count))
+    return described(fit.assign(data))
+
+
+def _answer(
+    fit: xr.Dataset, estimate: Estimate, found: Sequence[Passages], *, seed: int, tell: Tell
+) -> dict[str, Any]:
+    """Return restitution and friction, from the passages of each series."""
+    count = sum(len(one.x) for one in found)
     intervals = fitted_intervals(fit)
     parts = [
         Part(
@@ -95,11 +110,8 @@ def estimate_wall(
         if len(passages.x)
     ]
     trial = Trial(estimated_study(fit), estimate.point, parts, seed)
-    walls = tried_walls(trial.log_likelihood, tell or tell_nobody)
-    data = answer(walls, float(fit["confidence"]))
-    if says_nothing(data):
-        return fit.assign_attrs(wall_left_out=_all_alike(count))
-    return described(fit.assign(data))
+    walls = tried_walls(trial.log_likelihood, tell)
+    return answer(walls, float(fit["confidence"]))
 
 
 def _no_orientation(angle: str) -> str:

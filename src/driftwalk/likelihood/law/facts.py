@@ -11,6 +11,7 @@ import numpy as np
 from driftwalk.likelihood.filter_pass import Passes, Point
 from driftwalk.likelihood.law.assumptions import USUAL_ADDED_MASS, added_mass_of, is_stated
 from driftwalk.likelihood.law.departures import DRAG_SHAPES, STRENGTHS
+from driftwalk.likelihood.solution import BREAKDOWN
 from driftwalk.schema.facts import fitted_value
 
 if TYPE_CHECKING:
@@ -226,7 +227,7 @@ def side_slopes(
     """Return the derivatives of ln C_d and ln σ_F by the logarithm of the block's side.
 
     They come from the one step that the search makes after a change of the side. (0, 0) where the
-    side is stated without an uncertainty.
+    side is stated without an uncertainty; infinite where that step breaks down.
     """
     if study.fit.side_std_m == 0.0:
         return 0.0, 0.0
@@ -238,9 +239,12 @@ def side_slopes(
     prior = Prior(passes)
     changed = replace(passes, body=body_of(larger, passes.body.orientation))
     steps = []
-    for one in (passes, changed):
-        sums = prior.add(one.sums(restricted.point), restricted.point, law.mode.weights)
-        steps.append(inverse(sums.information) @ sums.score)
+    try:
+        for one in (passes, changed):
+            sums = prior.add(one.sums(restricted.point), restricted.point, law.mode.weights)
+            steps.append(inverse(sums.information) @ sums.score)
+    except BREAKDOWN:
+        return math.inf, math.inf
     drag = restricted.point.coefficients.size
     slope = (steps[1] - steps[0])[drag : drag + 2] / math.log1p(SIDE_STEP)
     return float(slope[0]), 0.5 * float(slope[1])

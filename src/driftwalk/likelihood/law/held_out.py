@@ -141,8 +141,10 @@ def _under(estimate: Estimate, floating: bool, drag: str, *, passed: Passed) -> 
                 passed=passed,
             )
             scores = _scores(passes, mode.point)
+            if not np.isfinite(scores).any():
+                return None
             return _Compared(evidence_of(mode, prior), scores, math.exp(mode.point.log_drag))
-    except (*BREAKDOWN, ValueError):
+    except BREAKDOWN:
         return None
 
 

@@ -103,5 +103,5 @@ def unless_broken(search: Callable[[], Mode]) -> Mode | None:
     try:
         with np.errstate(all="ignore"):
             return search()
-    except (*BREAKDOWN, ValueError):
+    except BREAKDOWN:
         return None

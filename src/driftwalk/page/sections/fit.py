@@ -26,7 +26,9 @@ from driftwalk.page.sections.law import law_sections
 from driftwalk.page.sections.recording import Noise, recording_sections
 from driftwalk.page.words import count, percent, quantity, with_interval
 from driftwalk.plot.parts.labels import interval_of
-from driftwalk.schema.facts import sentences
+from driftwalk.schema.answer import NOT_DETERMINED
+from driftwalk.schema.calibration_facts import facts_of
+from driftwalk.schema.facts import is_open, sentences
 from driftwalk.schema.law_words import LINEAR_DRAG_ALONE
 
 if TYPE_CHECKING:
@@ -151,22 +153,26 @@ def _what_was_done(fit: xr.Dataset) -> str:
 
 
 def _what_was_found(fit: xr.Dataset) -> str:
-    confidence = value_of(fit, "confidence")
-    drag, force, noise = (
-        with_interval(required(fit, name), interval_of(fit, f"{name}_interval"), unit, confidence)
-        for name, unit in (
-            ("drag_coefficient", "1"),
-            ("force_std_N", "N"),
-            ("tracking_noise_m", "m"),
-        )
-    )
     every = quantity(required(fit, "force_interval_s"), "s")
+    drag = _value_words(fit, "drag_coefficient", "1", before="C_d = ")
+    force = _value_words(fit, "force_std_N", "N", before="σ_F = ", after=f", redrawn every {every}")
+    noise = _value_words(fit, "tracking_noise_m", "m")
     linear = fit.attrs.get("drag_law") == "linear"
-    of_drag = f": {LINEAR_DRAG_ALONE}" if linear else f" is C_d = {drag}"
+    of_drag = f": {LINEAR_DRAG_ALONE}" if linear else f" is {drag}"
     return (
-        f"The drag coefficient{of_drag}. The stochastic force is σ_F = {force}, redrawn every "
-        f"{every}, the tracking noise {noise}. The intervals hold if the force law is right."
+        f"The drag coefficient{of_drag}. The stochastic force is {force}, the tracking noise "
+        f"{noise}. The intervals hold if the force law is right."
     )
+
+
+def _value_words(
+    fit: xr.Dataset, name: str, unit: str, *, before: str = "", after: str = ""
+) -> str:
+    """Return an estimate with its interval, or that the recording does not determine it."""
+    if is_open(facts_of(fit), name):
+        return NOT_DETERMINED
+    ends, confidence = interval_of(fit, f"{name}_interval"), value_of(fit, "confidence")
+    return f"{before}{with_interval(required(fit, name), ends, unit, confidence)}{after}"
 
 
 def _verdict(check: xr.Dataset) -> str:
@@ -201,7 +207,7 @@ def _warnings(fit: xr.Dataset, check: xr.Dataset | None) -> list[str]:
 
 def _noise(fit: xr.Dataset) -> Noise | None:
     value = value_of(fit, "tracking_noise_m")
-    if value is None:
+    if value is None or is_open(facts_of(fit), "tracking_noise_m"):
         return None
     low, high = interval_of(fit, "tracking_noise_m_interval") or (None, None)
     return Noise(value, low, high, "estimated by the fit")

@@ -1,0 +1,122 @@
+"""Numbers that a recording does not determine, and fits beside the main one that break down."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import here, leave_out_figures
+from fit_worlds import coarse_study, fitted, recording
+
+import driftwalk as dw
+from driftwalk.cli.terminal.fit_answer import summary
+from driftwalk.conditions import estimated_study
+from driftwalk.core.errors import InputError
+from driftwalk.likelihood import agreement, estimate_wall, judge_fit
+from driftwalk.likelihood.check import judged
+from driftwalk.likelihood.contacts import estimate as wall
+from driftwalk.likelihood.newton import Mode
+from driftwalk.page.sections.fit import fit_summary
+from driftwalk.schema import build_trajectory
+from driftwalk.schema.answer import answer_lines
+from driftwalk.schema.facts import fit_facts
+
+UNKNOWN = "not determined by this recording"
+
+
+def driven_on_a_circle(seed: int = 1, samples: int = 400) -> xr.Dataset:
+    """Return a body on a circle, with 1 mm of noise and an exact angle: no force drives it."""
+    time, angle = 0.1 * np.arange(samples), 0.05 * np.arange(samples)
+    noise = np.random.default_rng(seed).normal(0.0, 1e-3, (2, samples))
+    x, y = 0.08 * np.cos(angle) + noise[0], 0.08 * np.sin(angle) + noise[1]
+    return build_trajectory(time, x, y, angle)
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("circle") / "circle.csv"
+    one = driven_on_a_circle().isel(body=0)
+    rows = np.column_stack([one["time"], one["x"], one["y"], one["theta"]])
+    np.savetxt(path, rows, delimiter=",", header="t,x,y,theta", comments="")
+    return path
+
+
+@pytest.mark.slow
+def test_a_motion_without_random_force_has_no_numbers(
+    table: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    leave_out_figures(monkeypatch)
+    study = ("--tank-diameter", "30cm", "--spline-spacing", "5cm", "--no-check")
+    done = here("fit", table, *study, "-o", tmp_path / "run")
+    assert done.code == 0, done.err
+    for label in ("drag coefficient C_d", "stochastic force σ_F", "tracking noise"):
+        (row,) = [line for line in done.out.splitlines() if line.startswith(label)]
+        assert row.split(maxsplit=label.count(" ") + 1)[-1] == UNKNOWN
+    assert "standard deviations from a maximum of the likelihood" in done.err
+    found = xr.load_dataset(tmp_path / "run" / "fit.nc", engine="h5netcdf")
+    assert np.isinf(found["interval"].sel(bound="upper")).all()
+    assert answer_lines(found)[0].endswith(UNKNOWN)
+    (drag, *_), words = (fit_summary(found)[key] for key in ("numbers", "paragraphs"))
+    assert (drag["value"], drag["note"]) == (None, UNKNOWN)
+    assert f"The drag coefficient is {UNKNOWN}." in " ".join(words)
+    with pytest.raises(InputError, match="does not determine drag_coefficient"):
+        estimated_study(found)
+    stated = {"forces.drag_coefficient": 0.4, "forces.force_std_N": 1e-3}
+    assert estimated_study(found, stated).forces.drag_coefficient == 0.4
+    answer = summary(found)
+    assert answer["drag_coefficient"] is answer["tracking_noise_m"] is None
+
+
+def test_the_fit_with_the_angle_given_may_break_down_alone(monkeypatch: Any) -> None:
+    study, track = coarse_study(), recording(60.0)
+    found = agreement.find_mode
+
+    def diverged(*given: Any, **options: Any) -> Mode:
+        mode = found(*given, **options)
+        # Beyond 709 the exponential of ln q is no longer a double.
+        return replace(mode, point=replace(mode.point, log_intensity=2000.0))
+
+    alone = dw.fit_motion(track, study)
+    with monkeypatch.context() as patch:
+        patch.setattr(agreement, "find_mode", diverged)
+        patch.setattr(agreement, "restricted_drag", lambda _, mode, *rest, **more: _at(mode))
+        left_out = dw.fit_motion(track, study)
+    facts = fit_facts(left_out)
+    assert math.isnan(facts["angle_disagreement_std"])
+    assert any("with the angle as an input has no solution" in one for one in facts["warnings"])
+    np.testing.assert_array_equal(left_out["estimate"], alone["estimate"])
+    np.testing.assert_array_equal(left_out["interval"], alone["interval"])
+
+
+def _at(mode: Mode) -> Any:
+    from driftwalk.likelihood.reml import Restricted
+
+    return Restricted(mode.point, 0.1, [], has_minimum=False)
+
+
+@pytest.mark.parametrize("error", [OverflowError("math range error"), np.linalg.LinAlgError("no")])
+def test_a_check_or_a_wall_that_breaks_down_leaves_the_fit(error: Any, monkeypatch: Any) -> None:
+    def breaks(*given: Any, **options: Any) -> None:
+        raise error
+
+    track, fit = recording(60.0), fitted(60.0)
+    monkeypatch.setattr(judged, "check_model", breaks)
+    found = judge_fit(fit, [track])
+    assert found.check is None
+    assert str(error) in found.fit.attrs["check_left_out"]
+    monkeypatch.setattr(wall, "LEAST_CONTACTS", 0)
+    monkeypatch.setattr(wall, "tried_walls", breaks)
+    assert str(error) in estimate_wall(fit, [track]).attrs["wall_left_out"]
+
+
+def test_what_the_prior_alone_says_is_no_number() -> None:
+    """Ten seconds of motion say less of C_d than that it is about 0.5."""
+    facts = fit_facts(dw.fit_motion(recording(10.5), coarse_study(), angle="given"))
+    assert facts["drag_coefficient_interval"] == [0.0, math.inf]
+    assert np.isfinite(facts["tracking_noise_m_interval"]).all()
+    assert any("does not determine C_d" in one for one in facts["warnings"])
