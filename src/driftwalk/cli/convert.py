@@ -11,7 +11,7 @@ import typer
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json
 from driftwalk.cli.options.study import Side, TankDiameter
-from driftwalk.cli.terminal.output import beside, print_json, print_next, print_note
+from driftwalk.cli.terminal.output import print_json, print_next, print_note, sibling
 
 
 @with_recording_options
@@ -57,4 +57,4 @@ def convert(
         f"wrote {out}: {counts['samples']} samples of {bodies} bod{'y' if bodies == 1 else 'ies'}; "
         f"format {trajectory.attrs['format']}; y {trajectory.attrs['y_axis']}"
     )
-    print_next("fit", out, "-o", beside(out.with_suffix(""), "fit"))
+    print_next("fit", out, "-o", sibling(out.with_suffix(""), "fit"))

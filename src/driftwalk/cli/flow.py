@@ -14,7 +14,7 @@ from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.argument_names import to_options
-from driftwalk.cli.terminal.output import beside, print_json, print_next, print_note
+from driftwalk.cli.terminal.output import print_json, print_next, print_note, sibling
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import FLOW_KEYS
 
@@ -108,7 +108,7 @@ def flow(
         return
     warning = unstated_warning(study_for([trajectory], resolved), about="block")
     print_warnings([] if warning is None else [warning])
-    run = beside(out.with_suffix(""), "run")
+    run = sibling(out.with_suffix(""), "run")
     print_next("calibrate", recording, *how.words(), "--flow", out, "-o", run)
 
 

@@ -10,7 +10,7 @@ import typer
 from driftwalk.cli.options import tracking as given
 from driftwalk.cli.options.shared import Json
 from driftwalk.cli.options.tracking import TrackingOptions
-from driftwalk.cli.terminal.output import beside, print_json, print_next, print_note, print_table
+from driftwalk.cli.terminal.output import print_json, print_next, print_note, print_table, sibling
 from driftwalk.core.errors import InputError
 
 _SHOWN = {"duplicates": "doubled"}
@@ -106,7 +106,7 @@ def track(
     print_note(f"wrote {out}")
     _print(found)
     if bodies == 1:
-        print_next("fit", out, "-o", beside(out.with_suffix(""), "fit"))
+        print_next("fit", out, "-o", sibling(out.with_suffix(""), "fit"))
     else:
         print_next("classify", out)
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 About = Literal["tank", "block", "simulation"]
-"""What decides the numbers of some work: the tank, the block in it too, or its forces as well."""
+"""Work whose numbers the tank decides, the block in it too, or its forces as well."""
 FORCE_KEYS: Final = {"drag_coefficient": "drag_coefficient", "force_std_N": "force_std"}
 """Keys of [forces] that every estimate has, and its parameters that they hold."""
 LAW_KEYS: Final = {
@@ -239,6 +239,13 @@ def unstated_warning(study: Study, *, about: About) -> str | None:
 
 def is_stated(study: Study, key: str) -> bool:
     """Return whether somebody stated a key of a study; of a tank, its outline.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    key : str
+        The key, as ``"section.key"``.
 
     Examples
     --------

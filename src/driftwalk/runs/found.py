@@ -121,7 +121,7 @@ class FoundRun:
 
     @property
     def faults(self) -> list[str]:
-        """What the manifest of the run says against its files, a sentence each."""
+        """Sentences on files that are not those of the manifest of the run."""
         if self.folder is None:
             return []
         names = [path.name for path in self.inputs.values()]

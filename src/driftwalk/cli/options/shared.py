@@ -9,7 +9,6 @@ from typing import Annotated, Any, Final
 import typer
 
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.core.run_layout import run_file
 from driftwalk.core.uncertain import Uncertain, split_uncertain
 from driftwalk.core.units import parse_quantity
 
@@ -61,6 +60,8 @@ def flow_of_run(path: Path | None) -> Path | None:
     """Return the flow field in a run directory; any other path as it is."""
     if path is None or not path.is_dir():
         return path
+    from driftwalk.core.run_layout import run_file
+
     stored = run_file(path, "flow.nc")
     if stored is None:
         raise InputError(

@@ -13,7 +13,7 @@ from driftwalk.cli.terminal.answer import (
     print_row,
     print_warnings,
 )
-from driftwalk.cli.terminal.output import beside, command_text, print_next
+from driftwalk.cli.terminal.output import command_text, print_next, sibling
 from driftwalk.schema.calibration import is_block, stored_parameters
 from driftwalk.schema.calibration_facts import calibration_facts
 
@@ -96,9 +96,9 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
     print_figures(folder)
     print_row("all in one page", command_text("report", folder, "-o", "report.html"))
     if is_block(found):
-        print_next("assemble", folder, "-o", beside(folder, "assembly"))
+        print_next("assemble", folder, "-o", sibling(folder, "assembly"))
     else:
-        print_next("simulate", folder, *model_words(found), "-o", beside(folder, "motion.nc"))
+        print_next("simulate", folder, *model_words(found), "-o", sibling(folder, "motion.nc"))
 
 
 def model_words(found: xr.Dataset) -> list[str]:

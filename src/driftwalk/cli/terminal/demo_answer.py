@@ -22,7 +22,7 @@ TRUTH: Final = {
     "drag_coefficient": "acting_drag_coefficient",
     **{name: name for name in ("force_std_N", "force_interval_s", "tracking_noise_m")},
 }
-"""What an estimate is compared with, by its key in the truth: the drag as it acts in the engine."""
+"""Keys of the truth that estimates are compared with: of the drag, the one that acts."""
 
 
 @dataclass(frozen=True)

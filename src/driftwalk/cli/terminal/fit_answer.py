@@ -18,7 +18,7 @@ from driftwalk.cli.terminal.answer import (
     print_warnings,
 )
 from driftwalk.cli.terminal.argument_names import to_options
-from driftwalk.cli.terminal.output import beside, command_text, print_next
+from driftwalk.cli.terminal.output import command_text, print_next, sibling
 from driftwalk.schema.compared_laws import compared_laws
 from driftwalk.schema.facts import ESTIMATES, fit_facts, is_open, sentences
 from driftwalk.schema.law_words import (
@@ -173,7 +173,7 @@ def print_places(fit: xr.Dataset, folder: Path) -> None:
     print_warnings(fit_facts(fit)["warnings"])
     print_row("flow", folder / "flow.nc")
     print_row("all in one page", command_text("report", folder, "-o", "report.html"))
-    print_next("assemble", folder, "-o", beside(folder, "assembly"))
+    print_next("assemble", folder, "-o", sibling(folder, "assembly"))
 
 
 def _print_wall(facts: Mapping[str, Any]) -> None:

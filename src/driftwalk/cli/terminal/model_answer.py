@@ -17,7 +17,7 @@ from driftwalk.cli.terminal.answer import (
     print_warnings,
 )
 from driftwalk.cli.terminal.calibration_answer import model_words
-from driftwalk.cli.terminal.output import beside, command_text, print_next
+from driftwalk.cli.terminal.output import command_text, print_next, sibling
 from driftwalk.schema.answer import estimate_of
 from driftwalk.schema.compared_models import own_score
 from driftwalk.schema.parameters import unit_suffix
@@ -77,7 +77,7 @@ def print_answer(found: xr.Dataset, folder: Path) -> None:
     print_warnings(str(text) for text in found["warning"].values)
     print_figures(folder)
     print_row("all in one page", command_text("report", folder, "-o", "report.html"))
-    print_next("simulate", folder, *model_words(found), "-o", beside(folder, "motion.nc"))
+    print_next("simulate", folder, *model_words(found), "-o", sibling(folder, "motion.nc"))
 
 
 def _value_text(found: xr.Dataset, one: xr.Dataset, name: str) -> str:

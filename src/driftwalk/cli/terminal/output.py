@@ -113,12 +113,12 @@ def print_next(name: str, *words: str | Path) -> None:
     print(f"next: {command_text(name, *words)}", file=sys.stderr)
 
 
-def beside(place: Path, name: str) -> Path:
+def sibling(place: Path, name: str) -> Path:
     """Return a name for results that stand on a run or a file, in the same folder.
 
     Examples
     --------
-    >>> beside(Path("runs/fit"), "assembly").as_posix()
+    >>> sibling(Path("runs/fit"), "assembly").as_posix()
     'runs/fit-assembly'
     """
     return place.with_name(f"{place.name or 'run'}-{name}")
