@@ -157,14 +157,11 @@ def fit_motion(
     mended = ready.dropped_frames / max(ready.samples, 1)
     with solved():
         covariance = with_mended_frames(parameter_covariance(mode, restricted), mended)
-    stated = open_where_undetermined(covariance, mode, restricted)
+        stated = open_where_undetermined(covariance, mode, restricted)
+        slopes = side_slopes(passes, law, restricted, chosen)
+        parameters = parameter_facts(restricted.point, stated, chosen, by_side=slopes)
     facts: dict[str, Any] = {
-        **parameter_facts(
-            restricted.point,
-            stated,
-            chosen,
-            by_side=side_slopes(passes, law, restricted, chosen),
-        ),
+        **parameters,
         "maximum_likelihood_drag_coefficient": stated_drag(mode.point, chosen),
         **precision_facts(math.inf if mode.lost else math.sqrt(covariance[0, 0]), duration, chosen),
         **law_facts(law, assumptions),

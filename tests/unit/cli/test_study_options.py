@@ -20,6 +20,7 @@ from driftwalk.core import study_keys
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.study_keys import FIT_KEYS, RECOVER_KEYS, STUDY_KEYS
 from driftwalk.model import Study, declared
+from driftwalk.model.section import SMALLEST
 
 TABLES = {name: getattr(study_keys, name) for name in dir(study_keys) if name.endswith("_KEYS")}
 Run = Callable[..., StudyOptions]
@@ -95,7 +96,8 @@ def values_of(key: str) -> st.SearchStrategy[tuple[str, Any]]:
     quantity = of_key.quantity
     if quantity is None:
         return st.one_of(words)
-    low, high = (quantity.ge or quantity.gt or 0.0), (quantity.le or quantity.lt or 1e9)
+    least = SMALLEST if quantity.gt == 0 else 0.0
+    low, high = (quantity.ge or quantity.gt or least), (quantity.le or quantity.lt or 1e9)
     if quantity.whole:
         whole = st.integers(int(low), int(high))
         return whole.map(lambda number: (str(number), number))
