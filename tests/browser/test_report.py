@@ -192,6 +192,78 @@ def test_on_a_phone_nothing_is_cut_off(
     picture(page, "report-phone")
 
 
+def test_a_tap_reads_what_a_pointer_reads(
+    visit: Callable[..., Visit], report: Path, picture: Callable[..., Path]
+) -> None:
+    """A finger that taps does not move, and has left the chart before the click comes."""
+    one = visit(report.as_uri(), viewport=PHONE, has_touch=True, is_mobile=True)
+    page = one.open(report.as_uri())
+    for kind in ("flow", "map", "lines"):
+        section = page.locator(f"section[data-kind={kind}]").first
+        cover = section.locator("svg .cover").first
+        cover.scroll_into_view_if_needed()
+        area = cover.bounding_box()
+        assert section.locator(".readout .hint").count() == 1
+        page.touchscreen.tap(area["x"] + 0.5 * area["width"], area["y"] + 0.2 * area["height"])
+        section.locator(".readout .pair").first.wait_for()
+    picture(page, "report-tapped")
+
+
+def test_the_legend_and_the_table_are_those_of_the_part_shown(
+    visit: Callable[..., Visit], tmp_path: Path
+) -> None:
+    """Near the optimum no best cell of the whole box is drawn, and the values are others."""
+    found = synthetic_calibration()
+    path = tmp_path / "report.html"
+    dw.write_report(page_of([map_section(found)]), path)
+    page = visit(path.as_uri()).open(path.as_uri())
+    plot = page.locator(".map-plot")
+    page.get_by_text("Values as a table").click()
+    rows = plot.locator("tbody tr")
+    for view, best, name in (
+        ("near the optimum", 0, "refined_force_std"),
+        ("whole box", 1, "force_std"),
+    ):
+        page.get_by_text(view, exact=True).first.click()
+        page.wait_for_function(
+            "count => document.querySelectorAll('.map-plot tbody tr').length === count",
+            arg=found.sizes[name],
+        )
+        assert rows.count() == found.sizes[name]
+        assert plot.locator(".legend").get_by_text("best cell").count() == best
+        assert plot.locator("svg.plot .best").count() == best
+
+
+def test_the_label_of_a_colour_bar_stays_in_its_picture(
+    visit: Callable[..., Visit], tmp_path: Path
+) -> None:
+    """A long one has two lines: on a phone the bar is shorter than the words."""
+    long = {"label": "distance from zero (standard deviations)", "unit": "1"}
+    sections = [one | long for one in every_kind() if one["kind"] == "image_grid"]
+    path = tmp_path / "report.html"
+    dw.write_report(page_of(sections), path)
+    page = visit(path.as_uri(), viewport=PHONE).open(path.as_uri())
+    picture = page.locator("svg.plot").bounding_box()
+    lines = page.locator(".colour-bar .label")
+    assert lines.all_text_contents() == ["distance from zero", "(standard deviations)"]
+    for line in lines.all():
+        box = line.bounding_box()
+        assert box["y"] >= picture["y"]
+        assert box["y"] + box["height"] <= picture["y"] + picture["height"]
+        assert box["x"] + box["width"] <= PHONE["width"]
+
+
+def test_names_in_a_warning_are_set_as_code(visit: Callable[..., Visit], tmp_path: Path) -> None:
+    page_data = page_of([one for one in every_kind() if one["kind"] == "warnings"])
+    page_data["sections"][0]["items"] = ["state `block.mass_kg` and `tank.diameter_m`", "a ` alone"]
+    path = tmp_path / "report.html"
+    dw.write_report(page_data, path)
+    page = visit(path.as_uri()).open(path.as_uri())
+    assert page.locator(".warnings code").all_inner_texts() == ["block.mass_kg", "tank.diameter_m"]
+    said = page.locator(".warnings li").all_inner_texts()
+    assert said == ["state block.mass_kg and tank.diameter_m", "a ` alone"]
+
+
 def test_in_the_dark(
     visit: Callable[..., Visit], report: Path, picture: Callable[..., Path]
 ) -> None:

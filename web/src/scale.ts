@@ -59,7 +59,11 @@ export function multiples(low: number, high: number, step: number): number[] {
 export function logTicks(low: number, high: number, count: number): number[] {
   if (!(low > 0) || !(high > low)) return [];
   const decades = Math.log10(high / low);
-  if (decades < 1) return linearTicks(low, high, count).filter((tick) => tick > 0);
+  if (decades < 1) {
+    const even = linearTicks(low, high, count).filter((tick) => tick > 0);
+    // Even steps crowd at the upper end of the axis: two of them leave the lower half without any.
+    if (even.length > 2) return even;
+  }
   const factors = decades * 3 <= count + 2 ? [1, 2, 5] : [1];
   const every = Math.max(1, Math.ceil(decades / count));
   const ticks: number[] = [];

@@ -3,7 +3,7 @@ import test from "node:test";
 import { SECTIONS, checkPage, checkState } from "../src/page";
 import { isAnother } from "../src/views/connection";
 import { checkFrame, checkHello } from "../src/views/live_message";
-import { besides, insertAfter, sameIds } from "../src/views/order";
+import { besides, insertAfter, isSmall, sameIds } from "../src/views/order";
 import { nextPause, parsed } from "../src/views/socket";
 import { sliderScale } from "../src/views/controls";
 
@@ -96,7 +96,9 @@ test("new sections stand where they say, else at the end", () => {
 });
 
 test("small sections stand in pairs, what is left over stands alone", () => {
-  assert.deepEqual(besides(["map", "lines", "lines", "table", "flow", "lines"]), [
+  const beside = (kinds: readonly string[]): boolean[] =>
+    besides(kinds.map((kind) => isSmall({ kind, content: {} })));
+  assert.deepEqual(beside(["map", "lines", "lines", "table", "flow", "lines"]), [
     false,
     true,
     true,
@@ -104,8 +106,14 @@ test("small sections stand in pairs, what is left over stands alone", () => {
     false,
     false,
   ]);
-  assert.deepEqual(besides(["lines", "table", "biplot", "image_grid"]), [true, true, true, true]);
-  assert.deepEqual(besides([]), []);
+  assert.deepEqual(beside(["lines", "table", "biplot", "image_grid"]), [true, true, true, true]);
+  assert.deepEqual(beside([]), []);
+});
+
+test("a table of many columns takes the whole width of the page", () => {
+  const columns = (count: number): unknown => ({ columns: Array.from({ length: count }, () => "one") });
+  assert.ok(isSmall({ kind: "table", content: columns(5) }));
+  assert.ok(!isSmall({ kind: "table", content: columns(6) }));
 });
 
 test("only objects with a type are messages, and pauses grow to a limit", () => {

@@ -59,6 +59,11 @@ test("ticks of a logarithmic axis are powers of ten, with 2 and 5 when there is 
   assert.deepEqual(logTicks(-1, 100, 8), []);
 });
 
+test("an axis of less than a decade has ticks in its lower half, too", () => {
+  assert.deepEqual(logTicks(0.045, 0.26, 3), [0.05, 0.1, 0.2]);
+  assert.deepEqual(logTicks(0.2, 0.9, 4), [0.2, 0.4, 0.6, 0.8]);
+});
+
 test("a nice domain holds its values", () => {
   const [low, high] = niceDomain(0.13, 0.97);
   assert.ok(low <= 0.13 && high >= 0.97);

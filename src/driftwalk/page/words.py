@@ -26,8 +26,8 @@ def quantity(value: float, unit: str = "1", *, digits: int = 4) -> str:
     --------
     >>> quantity(0.000665, "N"), quantity(0.3825), quantity(1800.0, "s"), quantity(0.3, "m")
     ('0.665 mN', '0.3825', '30 min', '30 cm')
-    >>> quantity(7.076e-9, "N² s")
-    '7.076×10⁻⁹ N² s'
+    >>> quantity(7.076e-9, "N² s"), quantity(0.0042, "m2"), quantity(0.3, "rad2/s")
+    ('7.076×10⁻⁹ N² s', '0.0042 m²', '0.3 rad²/s')
     """
     if not math.isfinite(value):
         return "unknown"
@@ -42,7 +42,7 @@ def quantity(value: float, unit: str = "1", *, digits: int = 4) -> str:
     if unit == "N" and 1e-5 <= abs(value) < 1.0:
         return f"{_digits(1e3 * value, digits)} mN"
     if unit not in _PREFIXED or value == 0.0:
-        return f"{_digits(value, digits)} {unit}"
+        return f"{_digits(value, digits)} {unit.translate(_RAISED)}"
     power = 3 * math.floor(math.log10(abs(value)) / 3.0 + 1e-12)
     power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
     return f"{_digits(value / 10.0**power, digits)} {_PREFIXES[power]}{unit}"

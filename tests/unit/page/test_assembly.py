@@ -21,6 +21,7 @@ from synthetic_assembly import (
 
 from driftwalk.page import assembly_sections, sensitivity_sections
 from driftwalk.page.sections.assembly import l1_and_chance
+from driftwalk.page.sections.assembly_sizes import sizes_section
 from driftwalk.page.sections.classes import cells_of
 from driftwalk.page.sections.replay import MOST_POSES
 
@@ -312,3 +313,24 @@ def test_sobol_indices_are_those_of_the_dataset() -> None:
     assert rows[3][:2] == ["I", "stochastic force"]
     assert rows[3][2:] == pytest.approx([0.3, 1.3, 2.3, 3.3])
     assert len(rows) == 6
+
+
+@pytest.mark.parametrize(
+    ("ends", "said"),
+    [
+        ([(7, 7), (8, 8), (9, 12)], "Sizes that share a point, at their geometric mean: 9 to 12."),
+        ([(8, 8), (9, 16), (17, 20)], "geometric mean: 9 to 16, 17 to 20."),
+        ([(1, 1), (2, 2)], "At the end of the runs. Means"),
+    ],
+)
+def test_the_sizes_name_the_groups_that_are_there(ends: list[tuple[int, int]], said: str) -> None:
+    """The last group ends at the number of blocks, not at a power of two that no run can reach."""
+    low, high = zip(*ends, strict=True)
+    share = ("size", np.full(len(ends), 0.2))
+    names = ("block_share", "block_share_low", "block_share_high")
+    sizes = xr.Dataset(
+        dict.fromkeys(names, share) | {"size_to": ("size", list(high))},
+        coords={"size": list(low)},
+        attrs={"confidence": 0.9},
+    )
+    assert said in sizes_section({"parameters found": sizes})["note"]

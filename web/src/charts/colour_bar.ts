@@ -5,7 +5,7 @@ import { freshId, svg } from "../dom";
 import { richSvg } from "../symbols";
 import type { Display } from "../units";
 import type { Frame } from "./frame";
-import { LETTER, ticksOf } from "./frame";
+import { LETTER, LINE, ticksOf, twoLines } from "./frame";
 
 /** Room that a colour bar needs at the right of a frame [px]. */
 export const BAR_ROOM = 84;
@@ -53,12 +53,12 @@ export function drawColourBar(frame: Frame, options: BarOptions): void {
   }
   const middle = frame.top + frame.height / 2;
   const right = left + WIDTH + 7 + widest * LETTER + 17;
-  group.append(
-    svg(
-      "text",
-      { class: "label", transform: `translate(${right} ${middle}) rotate(-90)`, "text-anchor": "middle" },
-      ...richSvg(options.label),
-    ),
-  );
+  // The label is centred on the bar: it may reach as far down as there is room above.
+  twoLines(options.label, frame.height + 2 * frame.top).forEach((line, index) => {
+    const turned = `translate(${right + index * LINE} ${middle}) rotate(-90)`;
+    group.append(
+      svg("text", { class: "label", transform: turned, "text-anchor": "middle" }, ...richSvg(line)),
+    );
+  });
   frame.svg.append(group);
 }

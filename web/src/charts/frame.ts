@@ -51,7 +51,8 @@ export interface Tick {
 const TICK = 4;
 /** Width of a letter of a tick [px]. */
 export const LETTER = 6.6;
-const LINE = 15;
+/** Height of a line of a label [px]. */
+export const LINE = 15;
 
 export function makeFrame(options: FrameOptions): Frame {
   const top = options.top ?? 8;

@@ -8,7 +8,7 @@ export interface Place {
   readonly y: number;
 }
 
-/** Calls back with the place of the pointer, null when it has left; `pressed` on a click. */
+/** Calls back with the place of the pointer or of a tap, null when it has left; `pressed` on a click. */
 export function onPointer(
   frame: Frame,
   moved: (place: Place | null) => void,
@@ -31,6 +31,10 @@ export function onPointer(
   };
   cover.addEventListener("pointermove", (event) => moved(placeOf(event)));
   cover.addEventListener("pointerleave", () => moved(null));
-  if (pressed !== undefined) cover.addEventListener("click", (event) => pressed(placeOf(event)));
+  // A finger that taps does not move, and has left before the click comes: what it shows then stays.
+  cover.addEventListener("click", (event) => {
+    moved(placeOf(event));
+    pressed?.(placeOf(event));
+  });
   frame.svg.append(cover);
 }

@@ -84,6 +84,7 @@ export async function drawMap(section: MapSection, body: HTMLElement, context: C
         cursor = null;
         plot.redraw();
         line.show(null);
+        fillBelow();
         void show(selected());
       }),
     );
@@ -112,11 +113,15 @@ export async function drawMap(section: MapSection, body: HTMLElement, context: C
     moved,
     select,
   });
-  shown.append(
-    line.element,
-    mapLegend(map),
-    details("Values as a table", () => valueTable(map)),
-  );
+  const below = el("div");
+  const fillBelow = (): void => {
+    const open = below.querySelector("details")?.open ?? false;
+    const values = details("Values as a table", () => valueTable(now()));
+    values.open = open;
+    below.replaceChildren(mapLegend(now()), values);
+  };
+  fillBelow();
+  shown.append(line.element, below);
 
   if (selected() === null) {
     panel.append(el("p", { class: "nothing" }, "No setting has been computed yet."));

@@ -18,20 +18,30 @@ export function insertAfter(sections: readonly RawSection[], section: RawSection
 /** Kinds of sections that need only half of a wide page. */
 const SMALL: ReadonlySet<string> = new Set(["lines", "image_grid", "biplot", "table"]);
 
+/** A wider table does not fit into half of a page: its last columns, often a verdict, would be hidden. */
+const MOST_COLUMNS = 5;
+
+/** Returns whether a section needs only half of a wide page. */
+export function isSmall({ kind, content }: Pick<RawSection, "kind" | "content">): boolean {
+  if (!SMALL.has(kind)) return false;
+  const columns =
+    typeof content === "object" && content !== null && "columns" in content ? content.columns : [];
+  return !Array.isArray(columns) || columns.length <= MOST_COLUMNS;
+}
+
 /** Returns which sections stand beside another: small ones, in pairs. */
-export function besides(kinds: readonly string[]): boolean[] {
-  const beside = kinds.map(() => false);
-  for (let index = 0; index + 1 < kinds.length; index += 1) {
-    if (!SMALL.has(kinds[index] ?? "") || !SMALL.has(kinds[index + 1] ?? "")) continue;
+export function besides(small: readonly boolean[]): boolean[] {
+  const beside = small.map(() => false);
+  for (let index = 0; index + 1 < small.length; index += 1) {
+    if (small[index] !== true || small[index + 1] !== true) continue;
     beside[index] = beside[index + 1] = true;
     index += 1;
   }
   return beside;
 }
 
-/** Puts small sections side by side. */
-export function arrange(main: HTMLElement): void {
-  const frames = [...main.children];
-  const beside = besides(frames.map((frame) => frame.getAttribute("data-kind") ?? ""));
-  frames.forEach((frame, index) => frame.classList.toggle("beside", beside[index] ?? false));
+/** Puts small sections side by side; the frames in `main` are those of the sections. */
+export function arrange(main: HTMLElement, sections: readonly RawSection[]): void {
+  const beside = besides(sections.map(isSmall));
+  [...main.children].forEach((frame, index) => frame.classList.toggle("beside", beside[index] ?? false));
 }

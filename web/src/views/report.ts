@@ -17,7 +17,7 @@ export async function drawSections(shell: Shell, page: Page, context: Context): 
   shell.showContents(page.sections);
   const frames = page.sections.map(sectionFrame);
   shell.main.replaceChildren(...frames);
-  arrange(shell.main);
+  arrange(shell.main, page.sections);
   for (const [index, section] of page.sections.entries()) {
     const frame = frames[index];
     if (frame !== undefined) await fillSection(frame, section, context);

@@ -148,6 +148,6 @@ async function addSection(
   const frame = sectionFrame(section);
   shell.main.insertBefore(frame, shell.main.children[all.indexOf(section)] ?? null);
   shell.showContents(all);
-  arrange(shell.main);
+  arrange(shell.main, all);
   await fillSection(frame, section, context);
 }

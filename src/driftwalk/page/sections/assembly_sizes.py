@@ -64,13 +64,17 @@ def sizes_section(found: dict[str, xr.Dataset]) -> Section:
         When one of them has no sizes.
     """
     drawn = []
+    groups: dict[str, None] = {}
     for name, one in found.items():
         require(one, "size", "size_to", "block_share")
+        ends = zip(one["size"].values, one["size_to"].values, strict=True)
+        groups |= dict.fromkeys(f"{low} to {high}" for low, high in ends if high > low)
         middle = np.sqrt(one["size"].values * one["size_to"].values)
         drawn.append(_series(name, middle, one, "block_share", style="points"))
-    note = "Beyond 8 blocks a point is a group of sizes: 9 to 16, 17 to 32, and so on."
+    grouped = "Sizes that share a point, at their geometric mean"
+    note = f"{grouped}: {', '.join(groups)}. " if groups else ""
     return chart(
-        "sizes", "Sizes of the assemblies", f"At the end of the runs. {note} {_note(found)}",
+        "sizes", "Sizes of the assemblies", f"At the end of the runs. {note}{_note(found)}",
         x=label("blocks in the assembly", log=True), y=label("share of the blocks"), series=drawn,
     )  # fmt: skip
 
