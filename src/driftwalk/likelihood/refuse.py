@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 FEWEST_SAMPLES: Final = 100
 """Positions, or intervals between them, that a flow needs at least."""
+MOST_WALL_SHARE: Final = 0.3
+"""Share of intervals at the wall above which C_d means little."""
 MOST_AT_OWN_WALL: Final = 0.9
 """Share of the intervals at the wall of a tank that was fitted to the positions themselves."""
 MOST_COEFFICIENTS: Final = 4400
