@@ -142,6 +142,15 @@ def test_a_fitted_arena_that_excludes_its_own_positions_is_an_error() -> None:
         InputError, match=r"`tank=\"fit\"` found a tank 8 mm across, in which a block"
     ):
         dw.fit_motion(track, study)
+    # A beetle in a dish, taken for the block of the paper.
+    seconds = track["time"].values
+    walk = trajectory(seconds, 0.006 * np.cos(0.3 * seconds), 0.006 * np.sin(0.3 * seconds))
+    dish = walk.assign_attrs(
+        arena_found=json.dumps(found), arena=json.dumps({"shape": "circle", "diameter_m": 0.05})
+    )
+    assumed = apply_overrides(Study(), {"tank.diameter_m": 0.05})
+    with pytest.raises(InputError, match=r"30 mm is .* nobody stated the side.*`block.side_m`"):
+        dw.fit_motion(dish, assumed)
     # The same tank, stated: what it leaves is the subject then.
     with pytest.raises(InputError, match="all 599 intervals are at the wall of the tank"):
         dw.fit_motion(track.drop_attrs(), study)
