@@ -109,7 +109,8 @@ def flow(
     warning = unstated_warning(study_for([trajectory], resolved), about="block")
     print_warnings([] if warning is None else [warning])
     run = beside(out.with_suffix(""), "run")
-    print_next("calibrate", recording, *how.words(), "--flow", out, "-o", run)
+    words = [*how.words(), *given.words("tank_diameter", "side", "mass", "depth")]
+    print_next("calibrate", recording, *words, "--flow", out, "-o", run)
 
 
 def _check_given(given: StudyOptions, *, tracers: bool) -> None:

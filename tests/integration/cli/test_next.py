@@ -68,6 +68,18 @@ def test_the_last_line_is_the_next_command(
     assert next_of(here(*words))[: len(expected)] == expected
 
 
+def test_what_was_said_of_tank_and_body_is_said_again(tmp_path: Path) -> None:
+    study, out = tmp_path / "my.toml", tmp_path / "f.nc"
+    study.write_text('[block]\ndepth = "archimedes"\n', encoding="utf-8")
+    said = ("--study", study, "--tank-diameter", "31cm", "--side", "2.9cm", "--mass", "12g")
+    words = next_of(here("flow", RECORDING, "--to", "60", *said, "--cells", "30", "-o", out))
+    said_again = ["--study", str(study), "--tank-diameter", "0.31", "--side", "0.029"]
+    assert words[:-2] == [
+        *("calibrate", str(RECORDING), "--to", "60", *said_again, "--mass", "0.012"),
+        *("--flow", str(out)),
+    ]
+
+
 def test_the_lines_lead_from_a_recording_to_a_page(tracks: Path) -> None:
     words = next_of(here("info", tracks))
     words = next_of(here(*words, *FIT))
