@@ -80,6 +80,11 @@ def test_what_was_said_of_tank_and_body_is_said_again(tmp_path: Path) -> None:
     ]
 
 
+def test_the_side_that_a_fitted_tank_took_is_asked_for(tmp_path: Path) -> None:
+    done = here("flow", RECORDING, "--to", "300", "--arena", "fit", "-o", tmp_path / "f.nc")
+    assert "nobody stated the mass and side" in done.err
+
+
 def test_the_lines_lead_from_a_recording_to_a_page(tracks: Path) -> None:
     words = next_of(here("info", tracks))
     words = next_of(here(*words, *FIT))
