@@ -80,6 +80,20 @@ def test_what_was_said_of_tank_and_body_is_said_again(tmp_path: Path) -> None:
     ]
 
 
+def test_a_name_that_is_taken_is_not_proposed(tracks: Path) -> None:
+    simulate = ("simulate", "--flow", FLOW, "--duration", "2s", "--overwrite", "-o", "s.nc")
+    proposed = []
+    for _ in range(3):
+        proposed.append(next_of(here(*simulate))[-1])
+        Path(proposed[-1]).touch()
+    assert proposed == ["report.html", "report-2.html", "report-3.html"]
+    for finished, name in ((False, "my tracks-fit"), (True, "my tracks-fit-2")):
+        Path("my tracks-fit").mkdir(exist_ok=True)
+        if finished:
+            Path("my tracks-fit", "manifest.json").touch()
+        assert next_of(here("info", tracks))[-1] == name
+
+
 def test_the_side_that_a_fitted_tank_took_is_asked_for(tmp_path: Path) -> None:
     done = here("flow", RECORDING, "--to", "300", "--arena", "fit", "-o", tmp_path / "f.nc")
     assert "nobody stated the mass and side" in done.err
