@@ -126,9 +126,9 @@ def words_to_fit(trajectory: xr.Dataset, described: Mapping[str, Any]) -> list[s
     Returns
     -------
     list of str
-        A body where there are several. Where nothing states the tank, and the default one does not
-        hold the positions, ``--arena fit`` if they show it, otherwise ``--tank-diameter DIAMETER``,
-        which only the user can fill in.
+        A body where there are several. Where nothing states the tank, ``--arena fit`` if the
+        positions show it; otherwise, if the default one does not hold them, ``--tank-diameter
+        DIAMETER``, which only the user can fill in.
     """
     from driftwalk.conditions import require_inside
     from driftwalk.core.errors import InputError
