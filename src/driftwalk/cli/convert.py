@@ -31,7 +31,8 @@ def convert(
     Positions are in metres with y up, times in seconds, angles in radians. NetCDF also keeps the
     arena and all other information; CSV has the columns t_s, x_m, y_m, theta_rad and body.
     """
-    from driftwalk.record import save_trajectory
+    from driftwalk.cli.inputs.study_recording import words_to_fit
+    from driftwalk.record import describe, save_trajectory
 
     trajectory = how.load(recording, tank_diameter=tank_diameter, side=side)
     save_trajectory(trajectory, out, existing="replace" if overwrite else "error")
@@ -57,4 +58,5 @@ def convert(
         f"wrote {out}: {counts['samples']} samples of {bodies} bod{'y' if bodies == 1 else 'ies'}; "
         f"format {trajectory.attrs['format']}; y {trajectory.attrs['y_axis']}"
     )
-    print_next("fit", out, "-o", sibling(out.with_suffix(""), "fit"))
+    words = words_to_fit(trajectory, describe(trajectory))
+    print_next("fit", out, *words, "-o", sibling(out.with_suffix(""), "fit"))

@@ -65,7 +65,13 @@ def flow(
     to metres, with its masked nodes filled; --arena circle:D@X,Y says where its tank is.
     """
     from driftwalk.cli.inputs.flow_file import read_flow_file
-    from driftwalk.conditions import load_with_study, require_motion, study_for, unstated_warning
+    from driftwalk.conditions import (
+        is_stated,
+        load_with_study,
+        require_motion,
+        study_for,
+        unstated_warning,
+    )
     from driftwalk.flow import save_flow
 
     existing = "replace" if overwrite else "error"
@@ -90,6 +96,9 @@ def flow(
     if given.file is None:
         # Without a study nobody has said how large the tank is: the default one is no answer.
         trajectory = how.load(recording, tank_diameter=diameter, side=resolved.block.side_m)
+        if how.arena == "fit" and not is_stated(resolved, "block.side_m"):
+            # The circle was widened by the default side, which the recording does not say.
+            del trajectory.attrs["block_side_m"]
     else:
         with explained():
             trajectory = load_with_study(recording, resolved, how.arguments())
@@ -109,7 +118,8 @@ def flow(
     warning = unstated_warning(study_for([trajectory], resolved), about="block")
     print_warnings([] if warning is None else [warning])
     run = sibling(out.with_suffix(""), "run")
-    print_next("calibrate", recording, *how.words(), "--flow", out, "-o", run)
+    words = [*how.words(), *given.words("tank_diameter", "side", "mass", "depth")]
+    print_next("calibrate", recording, *words, "--flow", out, "-o", run)
 
 
 def _check_given(given: StudyOptions, *, tracers: bool) -> None:

@@ -12,8 +12,6 @@ from driftwalk.cli.terminal.output import print_json, print_next, print_note, pr
 
 SIDE_BY_SIDE = 5
 """Bodies shown as columns; more are shown as rows, with fewer numbers."""
-FIT_TANK = 0.5
-"""Share of the rim that was visited from which on the tank can be taken from the positions."""
 
 _ROWS: list[tuple[str, str, float]] = [
     ("samples", "samples", 1),
@@ -94,6 +92,7 @@ def info(
     and the tracking noise estimated from the recording itself.
     """
     from driftwalk.cli.inputs.flow_file import describe_field, read_flow_file
+    from driftwalk.cli.inputs.study_recording import words_to_fit
     from driftwalk.record import describe
 
     field = read_flow_file(
@@ -106,7 +105,8 @@ def info(
     if field is not None:
         _print_field(describe_field(field), json=json)
         return
-    described = describe(how.load(recording, tank_diameter=tank_diameter, side=side))
+    trajectory = how.load(recording, tank_diameter=tank_diameter, side=side)
+    described = describe(trajectory)
     if json:
         print_json(described)
         return
@@ -122,20 +122,8 @@ def info(
         print_note(f"warning: {warning}")
     tank = [] if tank_diameter is None else ["--tank-diameter", f"{tank_diameter:.12g}"]
     block = [] if side is None else ["--side", f"{side:.12g}"]
-    words = _fit_words(described, [*how.words(), *tank, *block])
+    words = [*how.words(), *tank, *block, *words_to_fit(trajectory, described)]
     print_next("fit", recording, *words, "-o", f"{recording.stem}-fit")
-
-
-def _fit_words(described: dict[str, Any], given: list[str]) -> list[str]:
-    """Return the options of a fit of this recording, read in the same way."""
-    name, body = next(iter(described["bodies"].items()))
-    words = list(given)
-    if len(described["bodies"]) > 1:
-        words += ["--body", name]
-    circle = body["circle_of_centers"]
-    if described["arena"] is None and circle and circle["sectors_visited_share"] >= FIT_TANK:
-        words += ["--arena", "fit"]
-    return words
 
 
 def _print_field(described: dict[str, Any], *, json: bool) -> None:

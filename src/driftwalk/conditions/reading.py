@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from driftwalk.conditions.refuse import require_motion, require_positions
-from driftwalk.conditions.study import study_for
+from driftwalk.conditions.study import is_stated, study_for
 from driftwalk.conditions.tank import OUTLINE, study_in_arena
 from driftwalk.core.json_text import parse_json
 from driftwalk.record import load
@@ -189,6 +189,9 @@ def load_with_study(path: Path, study: Study, given: Mapping[str, Any] | None = 
     values["block"] = study.block.side_m if values.get("tank") == "fit" else None
     trajectory = load(path, **values)
     require_positions(trajectory, where=path)
+    if values["block"] is not None and not is_stated(study, "block.side_m"):
+        # The circle was widened by the default side, which the recording does not say.
+        del trajectory.attrs["block_side_m"]
     if study.tank.shape == "polygon" and "tank" not in values and study.recording.arena == "tank":
         return trajectory.assign_attrs(arena=study.tank.to_arena_json())
     return trajectory

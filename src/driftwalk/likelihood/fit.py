@@ -138,7 +138,7 @@ def fit_motion(
     course = Course(tell or tell_nobody, _usual_parts(passes, used_angle))
     law, restricted = _search(passes, start, ready, assumptions, chosen, course)
     mode = law.mode
-    with solved():
+    with solved(ready.wall_share):
         innovations = passes.innovations(restricted.point)
     whiteness = whiteness_of(
         [
@@ -155,7 +155,7 @@ def fit_motion(
         )
     duration = sum(float(one.time[-1] - one.time[0]) for one in series)
     mended = ready.dropped_frames / max(ready.samples, 1)
-    with solved():
+    with solved(ready.wall_share):
         covariance = with_mended_frames(parameter_covariance(mode, restricted), mended)
         stated = open_where_undetermined(covariance, mode, restricted)
         slopes = side_slopes(passes, law, restricted, chosen)
@@ -317,7 +317,7 @@ def _search(
     """Return the law with the maximum of its likelihood, and that of the restricted one."""
     prior = Prior(passes)
     weights = first_weights(ready.tracks, passes.spline)
-    with solved():
+    with solved(ready.wall_share):
         passed = _counted(course, _usual_search(passes))
         law = LawSearch(passes, prior, assumptions, study.fit.iterations, passed).find(
             start, weights
@@ -330,5 +330,5 @@ def _search(
             law = replace(law, mode=law.base)
             restricted = restricted_drag(passes, law.mode, prior)
         noise = math.exp(restricted.point.log_noise)
-    require_noise_below_motion(noise, ready.tracks)
+    require_noise_below_motion(noise, ready.tracks, ready.wall_share)
     return law, restricted

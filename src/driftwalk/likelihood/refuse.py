@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from driftwalk.conditions import is_stated
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import machine_memory
 from driftwalk.likelihood.length import in_words, length_advice
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
 
 FEWEST_SAMPLES: Final = 100
 """Positions, or intervals between them, that a flow needs at least."""
+MOST_WALL_SHARE: Final = 0.3
+"""Share of intervals at the wall above which C_d means little."""
 MOST_AT_OWN_WALL: Final = 0.9
 """Share of the intervals at the wall of a tank that was fitted to the positions themselves."""
 MOST_COEFFICIENTS: Final = 4400
@@ -136,11 +139,17 @@ def require_own_arena(study: Study, *, intervals: int, near_wall: int, where: st
     """
     if near_wall <= MOST_AT_OWN_WALL * intervals:
         return
+    reason = (
+        "the body stays in a region too small to find the tank from. State the tank with "
+        '`tank="circle:D"`, and check the scale and the side of the block'
+        if is_stated(study, "block.side_m")
+        else "nobody stated the side, and this is the default. State that of your body with "
+        "`block.side_m`, and check the scale"
+    )
     raise InputError(
         f'{where}`tank="fit"` found a tank {1e3 * max(study.tank.extent_m):.3g} mm across, in '
         f"which a block of {1e3 * study.block.side_m:.3g} mm is at the wall in {near_wall} of "
-        f"{intervals} intervals: the body stays in a region too small to find the tank from. State "
-        'the tank with `tank="circle:D"`, and check the scale and the side of the block'
+        f"{intervals} intervals: {reason}"
     )
 
 

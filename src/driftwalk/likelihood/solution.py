@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.core.errors import InputError
+from driftwalk.likelihood.refuse import MOST_WALL_SHARE
 
 if TYPE_CHECKING:
     from driftwalk.likelihood.spline import Floats
@@ -20,8 +21,13 @@ is no longer a number, the root of a negative variance, a value that the filter 
 
 
 @contextmanager
-def solved() -> Iterator[None]:
+def solved(wall_share: float = 0.0) -> Iterator[None]:
     """Turn every way in which a search breaks down into one error for people.
+
+    Parameters
+    ----------
+    wall_share : float
+        Share of the intervals that were left out because the body is at the wall.
 
     Raises
     ------
@@ -35,9 +41,21 @@ def solved() -> Iterator[None]:
         raise
     except BREAKDOWN as error:
         raise InputError(
-            "the fit has no solution for this recording: the motion does not follow the model at "
-            "all, or the tank, the block or the units are wrong"
+            f"the fit has no solution for this recording: {_reason(wall_share)}"
         ) from error
+
+
+def _reason(wall_share: float) -> str:
+    """Return why a search may break down, and what to do."""
+    if wall_share > MOST_WALL_SHARE:
+        return (
+            f"{wall_share:.0%} of the intervals are at the wall and were left out, and the motion "
+            "in the others does not follow the model; record where the body stays away from the "
+            "wall, or check the tank, the side of the block and the units"
+        )
+    return (
+        "the motion does not follow the model at all, or the tank, the block or the units are wrong"
+    )
 
 
 def cholesky(information: Floats) -> Any:
@@ -55,7 +73,9 @@ def cholesky(information: Floats) -> Any:
     return cho_factor(information, check_finite=False)
 
 
-def require_noise_below_motion(noise: float, tracks: Sequence[Track]) -> None:
+def require_noise_below_motion(
+    noise: float, tracks: Sequence[Track], wall_share: float = 0.0
+) -> None:
     """Refuse a solution that takes the whole motion for tracking noise.
 
     Parameters
@@ -64,6 +84,8 @@ def require_noise_below_motion(noise: float, tracks: Sequence[Track]) -> None:
         Fitted tracking noise [m].
     tracks : sequence of Track
         The recordings.
+    wall_share : float
+        As of `solved`.
 
     Raises
     ------
@@ -75,6 +97,5 @@ def require_noise_below_motion(noise: float, tracks: Sequence[Track]) -> None:
         raise InputError(
             "the fit has no solution for this recording: it attributes the whole "
             f"motion to tracking noise ({1e3 * noise:.3g} mm, while the positions "
-            f"scatter by {1e3 * scatter:.3g} mm); "
-            "the motion does not follow the model, or the tank, the block or the units are wrong"
+            f"scatter by {1e3 * scatter:.3g} mm); {_reason(wall_share)}"
         )

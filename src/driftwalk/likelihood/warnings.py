@@ -11,14 +11,13 @@ from driftwalk.likelihood.intervals import Intervals
 from driftwalk.likelihood.length import USUAL_PRECISION, in_words, needed_duration
 from driftwalk.likelihood.mistakes.mirrored import MIRRORED
 from driftwalk.likelihood.newton import NOTABLE_LEVER
+from driftwalk.likelihood.refuse import MOST_WALL_SHARE
 from driftwalk.likelihood.result import Whiteness
 from driftwalk.schema.facts import is_open
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
 
-MOST_WALL_SHARE: Final = 0.3
-"""Share of intervals at the wall above which C_d means little."""
 LEAST_USED: Final = 0.9
 """Share of the usable intervals below which what the filter takes is not the whole motion."""
 LEAST_VISITED: Final = 0.3

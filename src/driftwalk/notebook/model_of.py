@@ -53,7 +53,8 @@ def model_of(
     if not hasattr(source, "attrs"):
         raise InputError(
             f"a study, a fit or a calibration is needed, got {source!r}; `motion_model` makes a "
-            "motion model of a name"
+            "motion model of a name, and xarray.open_dataset opens what a run directory holds, "
+            "such as fit.nc"
         )
     kind = source.attrs.get("kind")
     if kind not in RUN_KINDS:

@@ -24,6 +24,8 @@ OUTER = 0.9
 """Share of the directions in which the fitted circle encloses the samples."""
 RIM = 0.85
 """A sector counts as visited when a sample lies beyond this share of the radius."""
+OUTSIDE = 0.05
+"""Percentage of the samples beyond each side of a rectangle: tracking errors."""
 ENOUGH_VISITED = 0.5
 """Share of the sectors of a circle from which on it says something about the tank."""
 
@@ -163,7 +165,7 @@ def _quantile_fit(design: Array, values: Array, share: float) -> tuple[float, fl
 
 
 def implied_scale(bodies: Sequence[RawBody], tank: str | None) -> str:
-    """Return what scale the circle of the positions implies, for a file that does not say it.
+    """Return what scale the extent of the positions implies, for a file that does not say it.
 
     Parameters
     ----------
@@ -179,14 +181,17 @@ def implied_scale(bodies: Sequence[RawBody], tank: str | None) -> str:
     >>> implied_scale([body], "circle:30cm").partition(", ")[2]
     'in a tank of 0.3 m: a unit is 0.00075 m at most'
     """
+    x, y = (np.concatenate([getattr(one, axis) for one in bodies]) for axis in "xy")
+    kind, _, size = (tank or "").partition("@")[0].partition(":")
+    if kind in ("rect", "rectangle"):
+        return _scale_of_rectangle(x, y, size)
     try:
-        fit = fit_circle(*(np.concatenate([getattr(one, axis) for one in bodies]) for axis in "xy"))
+        fit = fit_circle(x, y)
     except (InputError, ValueError):
         return ""
     if fit.coverage < ENOUGH_VISITED:
         return ""
     across = f"the positions fill a circle of {2.0 * fit.radius:.4g} units across"
-    kind, _, size = (tank or "").partition("@")[0].partition(":")
     try:
         diameter = parse_quantity(size, "m") if kind == "circle" else 0.0
     except ConfigurationError:
@@ -197,3 +202,26 @@ def implied_scale(bodies: Sequence[RawBody], tank: str | None) -> str:
         )
     bound = 0.5 * diameter / fit.radius  # the body's centre does not reach the rim
     return f"{across}, in a tank of {diameter:g} m: a unit is {bound:.3g} m at most"
+
+
+def _scale_of_rectangle(x: Array, y: Array, size: str) -> str:
+    """Return what scale the span of the positions implies in a tank of WxH, empty where none."""
+    known = np.isfinite(x) & np.isfinite(y)
+    try:
+        sides = [parse_quantity(part, "m") for part in size.split("x")]
+    except ConfigurationError:
+        return ""
+    if len(sides) != 2 or min(sides) <= 0.0 or not known.any():
+        return ""
+    # A few tracking errors lie outside the tank.
+    spans = [
+        float(np.subtract(*np.percentile(axis[known], [100.0 - OUTSIDE, OUTSIDE])))
+        for axis in (x, y)
+    ]
+    if min(spans) <= 0.0:
+        return ""
+    bound = min(side / span for side, span in zip(sides, spans, strict=True))
+    return (
+        f"the positions span {spans[0]:.4g} by {spans[1]:.4g} units, in a tank of {sides[0]:g} m "
+        f"by {sides[1]:g} m: a unit is {bound:.3g} m at most"
+    )

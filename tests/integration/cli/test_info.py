@@ -45,6 +45,9 @@ def test_a_known_tank_and_the_circle_of_positions_imply_the_scale(pixels: Path) 
     assert "in a tank of 0.3 m: a unit is 0.00075" in said
     said = refusal(here("info", pixels, "--arena", "circle:60cm"))
     assert "in a tank of 0.6 m: a unit is 0.0015 m at most" in said
+    said = refusal(here("info", pixels, "--arena", "rect:40cmx60cm"))
+    assert "in a tank of 0.4 m by 0.6 m: a unit is 0.001" in said
+    assert "state the tank" not in said
 
 
 def test_it_ends_with_the_command_that_follows(pixels: Path) -> None:
@@ -60,6 +63,19 @@ def test_it_ends_with_the_command_that_follows(pixels: Path) -> None:
     assert "--arena" not in stated
     assert stated[stated.index("--tank-diameter") + 1] == "0.4"
     assert stated[stated.index("--side") + 1] == "0.03"
+
+
+@pytest.mark.parametrize("command", ["info", "convert"])
+def test_a_tank_that_nobody_knows_is_asked_for(command: str, tmp_path: Path) -> None:
+    """An animal in the open: the command without a tank would end in an error."""
+    path, out = tmp_path / "walk.csv", [tmp_path / "walk.nc"] if command == "convert" else []
+    for offset, asked in ((1.0, True), (0.0, False)):
+        rows = "".join(f"{0.1 * k},{offset + 1e-3 * k},0\n" for k in range(100))
+        path.write_text("t,x,y\n" + rows, encoding="utf-8")
+        again = ["--overwrite"] if command == "convert" else []
+        words = following(here(command, path, *out, *again))
+        assert (words[2:4] == ["--tank-diameter", "DIAMETER"]) == asked
+        assert ("--tank-diameter" in words) == asked
 
 
 @pytest.mark.slow

@@ -68,6 +68,37 @@ def test_the_last_line_is_the_next_command(
     assert next_of(here(*words))[: len(expected)] == expected
 
 
+def test_what_was_said_of_tank_and_body_is_said_again(tmp_path: Path) -> None:
+    study, out = tmp_path / "my.toml", tmp_path / "f.nc"
+    study.write_text('[block]\ndepth = "archimedes"\n', encoding="utf-8")
+    said = ("--study", study, "--tank-diameter", "31cm", "--side", "2.9cm", "--mass", "12g")
+    words = next_of(here("flow", RECORDING, "--to", "60", *said, "--cells", "30", "-o", out))
+    said_again = ["--study", str(study), "--tank-diameter", "0.31", "--side", "0.029"]
+    assert words[:-2] == [
+        *("calibrate", str(RECORDING), "--to", "60", *said_again, "--mass", "0.012"),
+        *("--flow", str(out)),
+    ]
+
+
+def test_a_name_that_is_taken_is_not_proposed(tracks: Path) -> None:
+    simulate = ("simulate", "--flow", FLOW, "--duration", "2s", "--overwrite", "-o", "s.nc")
+    proposed = []
+    for _ in range(3):
+        proposed.append(next_of(here(*simulate))[-1])
+        Path(proposed[-1]).touch()
+    assert proposed == ["report.html", "report-2.html", "report-3.html"]
+    for finished, name in ((False, "my tracks-fit"), (True, "my tracks-fit-2")):
+        Path("my tracks-fit").mkdir(exist_ok=True)
+        if finished:
+            Path("my tracks-fit", "manifest.json").touch()
+        assert next_of(here("info", tracks))[-1] == name
+
+
+def test_the_side_that_a_fitted_tank_took_is_asked_for(tmp_path: Path) -> None:
+    done = here("flow", RECORDING, "--to", "300", "--arena", "fit", "-o", tmp_path / "f.nc")
+    assert "nobody stated the mass and side" in done.err
+
+
 def test_the_lines_lead_from_a_recording_to_a_page(tracks: Path) -> None:
     words = next_of(here("info", tracks))
     words = next_of(here(*words, *FIT))

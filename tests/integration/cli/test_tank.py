@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import RECORDING
 
 import driftwalk as dw
 from driftwalk.cli.inputs.study_recording import opening_note
@@ -113,6 +114,21 @@ def test_a_run_says_who_stated_its_block_and_its_tank(
         f"mass 24 g ({file}); wetted depth 1.5 cm ({file}); force redrawn every 10 ms (default)\n"
     )
     assert unstated_warning(study, about="block") is None
+
+
+def test_the_default_side_that_a_fitted_tank_took_is_nobodys_word(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for stated in ({}, {"block.side_m": 0.03}):
+        given = StudyOptions(None, {"block.mass_kg": 0.0116, **stated}, FIT_KEYS)
+        read = read_recordings([RECORDING], given.study(), {"tank": "fit"})
+        opening_note(read.study, given, about="block")()
+        said = "--side" if stated else "default"
+        assert f"block of side 3 cm ({said})" in capsys.readouterr().err
+        warning = unstated_warning(read.study, about="block")
+        assert (warning is None) == bool(stated)
+        assert stated or "nobody stated the side" in str(warning)
+        assert read.study.tank.diameter_m == pytest.approx(0.3, rel=0.05)
 
 
 @pytest.mark.parametrize(

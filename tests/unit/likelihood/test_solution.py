@@ -88,6 +88,28 @@ def test_a_search_that_runs_away_is_an_error_for_people() -> None:
         cholesky(np.array([[np.nan, 0.0], [0.0, 1.0]]))
 
 
+def test_a_body_at_the_wall_is_named_as_the_reason() -> None:
+    for share, said in ((0.97, "97% of the intervals are at the wall"), (0.3, "at all, or the")):
+        with pytest.raises(InputError, match=said), solved(share):
+            raise np.linalg.LinAlgError
+    track = Track(0.1 * np.arange(9), np.linspace(0.0, 1e-3, 9), np.zeros(9), np.full(9, np.nan))
+    with pytest.raises(InputError, match=r"mm\); 80% of the intervals are at the wall"):
+        require_noise_below_motion(0.1, [track], 0.8)
+
+
+def test_a_fit_that_breaks_down_at_the_wall_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    def breaks(*_: object) -> None:
+        raise np.linalg.LinAlgError
+
+    monkeypatch.setattr("driftwalk.likelihood.fit.LawSearch.find", breaks)
+    track = recording(60.0)
+    # In this tank a block of 3 cm touches the wall from most of the places of the recording.
+    reach = float(np.hypot(track["x"], track["y"]).max())
+    narrow = apply_overrides(coarse_study(), {"tank.diameter_m": 2.0 * reach + 0.002})
+    with pytest.raises(InputError, match=r"\d% of the intervals are at the wall and were left out"):
+        dw.fit_motion(track, narrow)
+
+
 def test_motion_that_is_all_noise_is_no_solution() -> None:
     time = 0.1 * np.arange(200)
     track = Track(time, 0.02 * np.sin(time), 0.0 * time, np.full(200, np.nan))
@@ -120,6 +142,15 @@ def test_a_fitted_arena_that_excludes_its_own_positions_is_an_error() -> None:
         InputError, match=r"`tank=\"fit\"` found a tank 8 mm across, in which a block"
     ):
         dw.fit_motion(track, study)
+    # A beetle in a dish, taken for the block of the paper.
+    seconds = track["time"].values
+    walk = trajectory(seconds, 0.006 * np.cos(0.3 * seconds), 0.006 * np.sin(0.3 * seconds))
+    dish = walk.assign_attrs(
+        arena_found=json.dumps(found), arena=json.dumps({"shape": "circle", "diameter_m": 0.05})
+    )
+    assumed = apply_overrides(Study(), {"tank.diameter_m": 0.05})
+    with pytest.raises(InputError, match=r"30 mm is .* nobody stated the side.*`block.side_m`"):
+        dw.fit_motion(dish, assumed)
     # The same tank, stated: what it leaves is the subject then.
     with pytest.raises(InputError, match="all 599 intervals are at the wall of the tank"):
         dw.fit_motion(track.drop_attrs(), study)

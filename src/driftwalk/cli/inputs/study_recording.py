@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from driftwalk.cli.inputs.assembly_source import load_flow_for
 from driftwalk.cli.inputs.other_files import explained
@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from driftwalk.conditions import About, ReadRecordings
     from driftwalk.conditions.reading import Bodies
     from driftwalk.model import Study
+
+
+FIT_TANK: Final = 0.5
+"""Share of the rim that was visited from which on the tank can be taken from the positions."""
 
 
 def read_for_run(
@@ -107,6 +111,41 @@ def read_with_flow(
     return ReadForModel(
         read, field, {role: path for role, path in inputs.items() if path is not None}
     )
+
+
+def words_to_fit(trajectory: xr.Dataset, described: Mapping[str, Any]) -> list[str]:
+    """Return the options that a fit needs besides those with which a recording was read.
+
+    Parameters
+    ----------
+    trajectory : xarray.Dataset
+        The recording.
+    described : mapping
+        What `driftwalk.describe` says of it.
+
+    Returns
+    -------
+    list of str
+        A body where there are several. Where nothing states the tank, ``--arena fit`` if the
+        positions show it; otherwise, if the default one does not hold them, ``--tank-diameter
+        DIAMETER``, which only the user can fill in.
+    """
+    from driftwalk.conditions import require_inside
+    from driftwalk.core.errors import InputError
+    from driftwalk.model import Study
+
+    name, found = next(iter(described["bodies"].items()))
+    words = ["--body", name] if len(described["bodies"]) > 1 else []
+    if described["arena"] is not None:
+        return words
+    circle = found["circle_of_centers"]
+    if circle and circle["sectors_visited_share"] >= FIT_TANK:
+        return [*words, "--arena", "fit"]
+    try:
+        require_inside(Study(), trajectory, name)
+    except InputError:
+        return [*words, "--tank-diameter", "DIAMETER"]
+    return words
 
 
 def opening_note(

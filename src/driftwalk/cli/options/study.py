@@ -57,6 +57,21 @@ class StudyOptions:
         """Whether a study file or an option says the tank."""
         return self.file is not None or TANK in self.overrides
 
+    def words(self, *names: str) -> list[str]:
+        """Return ``--study`` and those of the named options that are given, as a user types them.
+
+        Examples
+        --------
+        >>> StudyOptions(None, {"tank.diameter_m": 0.3}, STUDY_KEYS).words("tank_diameter", "side")
+        ['--tank-diameter', '0.3']
+        """
+        words = [] if self.file is None else ["--study", str(self.file)]
+        for key in (self.keys[name] for name in names):
+            if (value := self.overrides.get(key)) is not None:
+                text = f"{value:.12g}" if isinstance(value, float) else str(value)
+                words += [option_name(key, keys=self.keys), text]
+        return words
+
     def study(self) -> Study:
         """Return the study of the file, or the default one, with the options over it.
 

@@ -110,7 +110,21 @@ def command_text(name: str, *words: str | Path) -> str:
 def print_next(name: str, *words: str | Path) -> None:
     """Print on stderr, as the last line of a command, the one that most users run next."""
     sys.stdout.flush()
-    print(f"next: {command_text(name, *words)}", file=sys.stderr)
+    places = [*words]
+    if "-o" in words[:-1]:
+        at = words.index("-o") + 1
+        places[at] = _free(words[at])
+    print(f"next: {command_text(name, *places)}", file=sys.stderr)
+
+
+def _free(word: str | Path) -> str | Path:
+    """Return a name for a result; numbered where a file or a finished run has it already."""
+    place, number = Path(word), 1
+    suffix = place.suffix if place.is_file() else ""  # a folder's name may hold a point
+    while place.is_file() or (place / "manifest.json").is_file():
+        number += 1
+        place = Path(f"{str(word).removesuffix(suffix)}-{number}{suffix}")
+    return word if number == 1 else place
 
 
 def sibling(place: Path, name: str) -> Path:

@@ -23,7 +23,7 @@ from driftwalk.likelihood.recover.one import (
 )
 from driftwalk.likelihood.recover.score import SCORED
 from driftwalk.likelihood.recover.summary import COVERAGE_CONFIDENCE, NEEDED_CONFIDENCE, add_summary
-from driftwalk.likelihood.warnings import MOST_WALL_SHARE
+from driftwalk.likelihood.refuse import MOST_WALL_SHARE
 from driftwalk.model.recover import RANDOM
 from driftwalk.schema.check import described
 from driftwalk.schema.kinds import KINDS
