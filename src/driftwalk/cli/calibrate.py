@@ -55,6 +55,7 @@ def calibrate(
     Reports how well the parameters are known and whether the model explains the motion. After a
     kill, the same command continues.
     """
+    from driftwalk.conditions import About, jump_warnings
     from driftwalk.motion import feels_others
     from driftwalk.runs import CalibrationWork, run_calibration
 
@@ -67,7 +68,9 @@ def calibrate(
     work = CalibrationWork(
         read.trajectories[0], read.study, field, body, inputs, threads, chosen, posterior
     )
-    begun = opening_note(read.study, given, about="block" if model is None else "tank")
+    about: About = "block" if model is None else "tank"
+    jumps = jump_warnings(read.trajectories[0], read.body)
+    begun = opening_note(read.study, given, about=about, warnings=jumps)
     with Workers(cluster, cluster_options).reported("calibrate") as told:
         found = run_calibration(work, out, overwrite=overwrite, begun=begun, **told)
     many = found.attrs["kind"] == "model_calibration"

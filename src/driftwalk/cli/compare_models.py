@@ -57,6 +57,7 @@ def compare_models(
     recording. After a kill, the same command continues.
     """
     from driftwalk.calibration import ALL_MODELS, DEFAULT_MODELS
+    from driftwalk.conditions import About, jump_warnings
     from driftwalk.motion import feels_others, models_knowing
     from driftwalk.runs import ModelComparisonWork, run_model_comparison
 
@@ -75,7 +76,9 @@ def compare_models(
     work = ModelComparisonWork(
         read.trajectories[0], chosen, read.study, field, body, inputs, threads
     )
-    begun = opening_note(read.study, given, about="block" if "block" in chosen else "tank")
+    about: About = "block" if "block" in chosen else "tank"
+    jumps = jump_warnings(read.trajectories[0], read.body)
+    begun = opening_note(read.study, given, about=about, warnings=jumps)
     with Workers(cluster, cluster_options).reported("compare models") as told:
         said: dict[str, Any] = {} if json else {"finished": Ranking(told["progress"])}
         found = run_model_comparison(work, out, overwrite=overwrite, begun=begun, **said, **told)

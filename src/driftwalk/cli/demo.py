@@ -163,13 +163,13 @@ def _require_own(out: Path) -> None:
     from driftwalk.core.shards import make_folder
 
     make_folder(out)
-    refuse_leading_out(out)
     foreign = [entry for entry in visible(out) if entry.name not in (FIT, CALIBRATION, PAGE)]
     if foreign:
         raise RunDirectoryError(
             f"{out} holds files but no run of this demo ({foreign[0].name}, ...); choose an empty "
             "or a new directory"
         )
+    refuse_leading_out(out)
 
 
 def _finished(folder: Path, overwrite: bool) -> bool:

@@ -20,6 +20,7 @@ from driftwalk.cli.options.model import (
 )
 from driftwalk.cli.options.shared import FlowFile
 from driftwalk.cli.options.study import StudyOptions, with_study_options
+from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.output import print_note
 from driftwalk.cli.view import Host, Open, Port, show
 from driftwalk.core.errors import InputError
@@ -95,6 +96,7 @@ def play(
     if found is not None:
         chosen, field = found.block(flow)
         beside, body = _of_run(found, recording, chosen, body)
+        print_warnings(found.found.warnings)
     else:
         chosen = given.over(_bundled(), base="the bundled example") if bundled else given.study()
         field = _flow(flow, chosen, bundled=bundled)

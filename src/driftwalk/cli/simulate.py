@@ -170,6 +170,7 @@ def _of_block(
     else:
         result = simulate_like(chosen, field, recording)
     # What was refused needs no such words.
+    print_warnings([] if source is None else source.found.warnings)
     _say_what(chosen, given, source, about="simulation")
     return result
 

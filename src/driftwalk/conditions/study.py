@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from driftwalk.conditions.tank import OUTLINE, require_inside, study_in_arena
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import read_arena
-from driftwalk.schema.answer import estimate_of
+from driftwalk.schema.answer import undetermined
 from driftwalk.schema.facts import fitted_value
 
 if TYPE_CHECKING:
@@ -135,11 +135,12 @@ def estimated_study(
     from driftwalk.model import apply_overrides, parse_study
 
     stated = overrides or {}
+    unknown = undetermined(found)
     for key, name in FORCE_KEYS.items():
-        if f"forces.{key}" not in stated and estimate_of(found, name).open:
+        if f"forces.{key}" not in stated and name in unknown:
             raise InputError(
                 f"the {found.attrs['kind']} does not determine {name}: its recording tells too "
-                f"little of it; state it (`forces.{key}`)"
+                f"little of it; take its flow field alone (`flow`), and state `forces.{key}`"
             )
     return apply_overrides(
         parse_study(found.attrs["study"], source=source),

@@ -124,10 +124,11 @@ class RunDirectory:
 
     def __enter__(self) -> Self:
         make_folder(self.path)
-        # Before anything is opened: the lock is a file of the directory too.
-        refuse_leading_out(self.path)
+        # First, as what links lead to in a folder of someone else's is none of a run's business.
         if not (self.path / LOCK_FILE).exists():
             refuse_foreign(self.path)
+        # Before anything is opened: the lock is a file of the directory too.
+        refuse_leading_out(self.path)
         self._lock = lock_folder(self.path)
         try:
             # Again: only under the lock does nobody change what is looked at.

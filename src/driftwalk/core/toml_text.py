@@ -78,10 +78,7 @@ def parse_toml(text: str | bytes, *, path: str | Path | None = None) -> dict[str
     except ValueError as error:
         # The syntax; a date that no calendar has; an integer of more digits than Python converts.
         reason = _LARGE if "Exceeds the limit" in str(error) else str(error)
-        lines = (
-            text.splitlines() if isinstance(text, str) else text.decode("utf-8-sig").splitlines()
-        )
-        reason = _twice(str(error), lines) or reason
+        reason = _twice(str(error), plain.splitlines()) or reason
         raise FormatError(f"not a TOML file: {reason}", path=path) from error
     refuse_deep(values, path=path)
     if any(isinstance(value, int) and not -(2**63) <= value < 2**63 for value in _leaves(values)):

@@ -79,6 +79,21 @@ def estimate_of(found: xr.Dataset, parameter: str) -> Estimate:
     return Estimate(scale * float(one["estimate"]), unit, ends)
 
 
+def undetermined(found: xr.Dataset) -> list[str]:
+    """Return which of C_d and σ_F a recording does not determine: both are needed to simulate.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        A `fit` or a `calibration` of the block.
+    """
+    unknown = [name for name in ("drag_coefficient", "force_std") if estimate_of(found, name).open]
+    # Where the drag is linear but for a trace, nothing depends on C_d.
+    if "linear_drag" in found["parameter"].values and not estimate_of(found, "linear_drag").open:
+        unknown = [name for name in unknown if name != "drag_coefficient"]
+    return unknown
+
+
 def answer_lines(found: xr.Dataset) -> list[str]:
     """Return what a fit, a calibration or a comparison of models says, a line each.
 

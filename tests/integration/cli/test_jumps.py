@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import GRID, RECORDING, Done, here, leave_out_figures
+from command_line import GRID, RECORDING, Done, here, leave_out_figures, refusal
 from few_simulations import compare_after_little
 
 from driftwalk.record import load
@@ -54,6 +54,11 @@ def test_info(jumping: Path) -> None:
     assert "impossible steps left" in shown.out
     assert "warning: body '0' jumps once" in shown.err
     assert "--max-speed" in shown.err
+
+
+def test_what_is_refused_is_one_line(jumping: Path, tmp_path: Path) -> None:
+    words = ("--flow", tmp_path / "no.nc", "-o", tmp_path / "run")
+    assert "no.nc" in refusal(here("calibrate", jumping, *TANK, *words))
 
 
 @pytest.mark.slow

@@ -248,6 +248,27 @@ def test_nothing_is_written_where_something_leads_out(
     assert sorted((path, path.lstat().st_mtime_ns) for path in tmp_path.rglob("*")) == before
 
 
+@pytest.mark.parametrize("command", ["demo", "assemble"])
+def test_links_in_a_folder_of_the_user_are_none_of_its_business(
+    tmp_path: Path, command: str
+) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "link").symlink_to(tmp_path)
+    words = () if command == "demo" else FLOW_ALONE
+    assert "holds files but no run" in refusal(here(command, *words, "-o", tmp_path / "mine"))
+
+
+def test_control_characters_of_a_manifest_do_not_reach_the_terminal(received: Path) -> None:
+    path = received / "manifest.json"
+    manifest = json.loads(path.read_text(encoding="utf-8"))
+    manifest["inputs"] = {"\x1b[31mrole": {"path": "a\x1b]0;b\x07.csv", "sha256": "\u202e"}}
+    path.write_text(json.dumps(manifest), encoding="utf-8")
+    done = here("cite", received)
+    assert done.code == 0, done.err
+    assert "\\x1b[31mrole a\\x1b]0;b\\x07.csv" in done.out
+    assert not any(one in done.out + done.err for one in "\x1b\x07\u202e")
+
+
 def test_a_demo_in_a_folder_that_leads_out_is_refused(tmp_path: Path) -> None:
     (tmp_path / "home").mkdir()
     (tmp_path / "demo").mkdir()

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import here, leave_out_figures
+from command_line import here, leave_out_figures, refusal
 from fit_worlds import coarse_study, fitted, recording
 
 import driftwalk as dw
 from driftwalk.cli.terminal.fit_answer import summary
 from driftwalk.conditions import estimated_study
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood import agreement, estimate_wall, judge_fit
+from driftwalk.likelihood import agreement, compare_laws, estimate_wall, judge_fit
 from driftwalk.likelihood.check import judged
 from driftwalk.likelihood.contacts import estimate as wall
 from driftwalk.likelihood.newton import Mode
@@ -58,6 +58,9 @@ def test_a_motion_without_random_force_has_no_numbers(
         (row,) = [line for line in done.out.splitlines() if line.startswith(label)]
         assert row.split(maxsplit=label.count(" ") + 1)[-1] == UNKNOWN
     assert "standard deviations from a maximum of the likelihood" in done.err
+    assert done.err.splitlines()[-1].startswith("next: driftwalk report")
+    said = refusal(here("assemble", tmp_path / "run", "-o", tmp_path / "four"))
+    assert "does not determine drag_coefficient" in said
     found = xr.load_dataset(tmp_path / "run" / "fit.nc", engine="h5netcdf")
     assert np.isinf(found["interval"].sel(bound="upper")).all()
     assert answer_lines(found)[0].endswith(UNKNOWN)
@@ -112,6 +115,16 @@ def test_a_check_or_a_wall_that_breaks_down_leaves_the_fit(error: Any, monkeypat
     monkeypatch.setattr(wall, "LEAST_CONTACTS", 0)
     monkeypatch.setattr(wall, "tried_walls", breaks)
     assert str(error) in estimate_wall(fit, [track]).attrs["wall_left_out"]
+
+
+def test_nothing_stands_on_numbers_that_are_not_determined() -> None:
+    track, fit = recording(60.0), fitted(60.0).copy(deep=True)
+    fit["interval"].loc[{"bound": "upper"}] = math.inf
+    fit["estimate"].loc[{"parameter": "force_std"}] = 0.0
+    left_out = estimate_wall(fit, [track]).attrs["wall_left_out"]
+    assert "needs drag_coefficient and force_std, which this recording does not" in left_out
+    assert np.isnan(compare_laws(fit, [track])["compared_log_score"]).all()
+    assert "does not determine" in judge_fit(fit, [track]).fit.attrs["check_left_out"]
 
 
 def test_what_the_prior_alone_says_is_no_number() -> None:

@@ -237,7 +237,7 @@ def answer_sentence(
         return f"No model explains the recording; the best one is {names[first]}"
     best = first if first in explained else explained[0]
     others = [names[k] for k in explained if k != best]
-    also = f"; so do, less well or no better, {', '.join(others)}" if others else ""
+    also = f"; so do others, but no better: {', '.join(others)}" if others else ""
     return f"{names[best]} explains the recording{also}"
 
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from driftwalk.cli.inputs.assembly_source import load_flow_for, refuse_found
 from driftwalk.cli.options.study import StudyOptions
-from driftwalk.cli.terminal.output import print_note
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -51,8 +50,6 @@ class FoundSource:
 
     def block(self, flow: Path | None) -> tuple[Study, xr.Dataset]:
         """Return study and flow of the block; a given flow field goes over that of the run."""
-        for warning in self.found.warnings:
-            print_note(f"warning: {warning}")
         chosen = self.study()
         if flow is not None:
             return chosen, load_flow_for(flow, chosen)

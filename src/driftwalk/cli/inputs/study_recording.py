@@ -10,6 +10,7 @@ from driftwalk.cli.inputs.assembly_source import load_flow_for
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.study import StudyOptions, option_name
+from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.output import print_note
 
 if TYPE_CHECKING:
@@ -101,11 +102,7 @@ def read_with_flow(
     InputError
         As `read_for_run`, and when the flow field cannot be read.
     """
-    from driftwalk.conditions import jump_warnings
-
     read = read_for_run([recording], given, how, bodies=bodies)
-    for warning in jump_warnings(read.trajectories[0], read.body):
-        print_note(f"warning: {warning}")  # before the work, which may take hours
     inputs = {"recording": recording, "flow": flow, "study": given.file}
     field = None if flow is None else load_flow_for(flow, read.study)
     return ReadForModel(
@@ -149,7 +146,12 @@ def words_to_fit(trajectory: xr.Dataset, described: Mapping[str, Any]) -> list[s
 
 
 def opening_note(
-    study: Study, given: StudyOptions, *, about: About, otherwise: str = "recording"
+    study: Study,
+    given: StudyOptions,
+    *,
+    about: About,
+    otherwise: str = "recording",
+    warnings: Sequence[str] = (),
 ) -> Callable[[], None]:
     """Return what says, when a run begins, which body and tank it takes, and who stated them.
 
@@ -163,6 +165,8 @@ def opening_note(
         As in `driftwalk.conditions.unstated_warning`.
     otherwise : str
         Who stated what neither an option nor the study file does.
+    warnings : sequence of str
+        What to know before the work, which may take hours.
     """
     from driftwalk.conditions import is_stated
     from driftwalk.model import Study, load_study
@@ -196,4 +200,9 @@ def opening_note(
         every = f"{1e3 * forces.force_interval_s:g} ms"
         texts["forces.force_interval_s"] = f"force redrawn every {every}"
     line = "; ".join(stated(key, text) for key, text in texts.items())
-    return lambda: print_note(line)
+
+    def say() -> None:
+        print_note(line)
+        print_warnings(warnings)
+
+    return say

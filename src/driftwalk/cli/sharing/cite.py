@@ -10,7 +10,7 @@ import typer
 
 from driftwalk.cli.options.shared import Json
 from driftwalk.cli.terminal.answer import print_warnings
-from driftwalk.cli.terminal.output import print_json
+from driftwalk.cli.terminal.output import print_json, printable
 from driftwalk.core.errors import InputError
 from driftwalk.core.provenance import read_manifest, refuse_other_version
 from driftwalk.core.run_layout import MANIFEST_FILE, faults_of, state_of
@@ -37,10 +37,10 @@ def cite(
     if json:
         print_json({**found, "bibtex": bibtex(found["version"])})
     elif bibtex_entries:
-        print(bibtex(found["version"]), end="")
+        print(printable(bibtex(found["version"])), end="")
     else:
-        print(f"cite      {citation(found['version'])}")
-        print(f"computed  {found['computed']}")
+        print(printable(f"cite      {citation(found['version'])}"))
+        print(printable(f"computed  {found['computed']}"))
         for method in found["methods"]:
             print(f"method    {method['what']}: {method['work']}.")
 

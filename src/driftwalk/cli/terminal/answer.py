@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
-from driftwalk.cli.terminal.output import print_next, print_note
+from driftwalk.cli.terminal.output import print_next, print_note, printable
 from driftwalk.schema.answer import NOT_DETERMINED, SYMBOLS, Estimate, estimate_of
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def print_row(label: str, text: object) -> None:
     >>> print_row("flow", "fit/flow.nc")
     flow                   fit/flow.nc
     """
-    print(f"{label:{LABEL_WIDTH}} {text}")
+    print(f"{printable(label):{LABEL_WIDTH}} {printable(str(text))}")
 
 
 def print_origin(found: xr.Dataset) -> None:

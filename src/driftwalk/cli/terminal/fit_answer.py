@@ -14,11 +14,13 @@ from driftwalk.cli.terminal.answer import (
     print_estimates,
     print_intensity,
     print_origin,
+    print_report_next,
     print_row,
     print_warnings,
 )
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import command_text, print_next, sibling
+from driftwalk.schema.answer import undetermined
 from driftwalk.schema.compared_laws import compared_laws
 from driftwalk.schema.facts import ESTIMATES, fit_facts, is_open, sentences
 from driftwalk.schema.law_words import (
@@ -172,6 +174,10 @@ def print_places(fit: xr.Dataset, folder: Path) -> None:
     """Print the warnings, and where everything is."""
     print_warnings(fit_facts(fit)["warnings"])
     print_row("flow", folder / "flow.nc")
+    if undetermined(fit):
+        # Nothing can be simulated with what is not known.
+        print_report_next(folder)
+        return
     print_row("all in one page", command_text("report", folder, "-o", "report.html"))
     print_next("assemble", folder, "-o", sibling(folder, "assembly"))
 

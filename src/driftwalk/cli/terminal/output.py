@@ -6,6 +6,7 @@ import json
 import os
 import shlex
 import sys
+import unicodedata
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,10 @@ from driftwalk.core.json_text import json_value
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+_UNSEEN = ("Cc", "Cf")
+"""Categories of Unicode that a terminal obeys instead of showing: escape, right to left."""
 
 
 def print_json(values: Mapping[str, Any]) -> None:
@@ -76,12 +81,12 @@ def print_table(
     lines = [list(columns)] if columns is not None else []
     lines += [[_cell(value) for value in row] for row in rows]
     if title is not None:
-        print(title)
+        print(printable(title))
     count = max((len(line) for line in lines), default=0)
     widths = [max(len(line[i]) for line in lines if i < len(line)) for i in range(count)]
     for line in lines:
         cells = [cell.ljust(width) for cell, width in zip(line, widths, strict=False)]
-        print("  ".join(cells).rstrip())
+        print(printable("  ".join(cells).rstrip()))
 
 
 def print_note(text: str) -> None:
@@ -89,7 +94,21 @@ def print_note(text: str) -> None:
 
     It may be one of the library: options take the place of arguments, see `to_options`.
     """
-    print(f"driftwalk: {' '.join(to_options(text).split())}", file=sys.stderr)
+    print(f"driftwalk: {' '.join(printable(to_options(text)).split())}", file=sys.stderr)
+
+
+def printable(text: str) -> str:
+    r"""Return a text whose control characters are spelled out: one of a file may be for a terminal.
+
+    Examples
+    --------
+    >>> printable("a" + chr(27) + "[2J, σ_F")
+    'a\\x1b[2J, σ_F'
+    """
+    return "".join(
+        ascii(one)[1:-1] if unicodedata.category(one) in _UNSEEN and one not in "\n\t" else one
+        for one in text
+    )
 
 
 def command_text(name: str, *words: str | Path) -> str:
@@ -114,7 +133,7 @@ def print_next(name: str, *words: str | Path) -> None:
     if "-o" in words[:-1]:
         at = words.index("-o") + 1
         places[at] = _free(words[at])
-    print(f"next: {command_text(name, *places)}", file=sys.stderr)
+    print(f"next: {printable(command_text(name, *places))}", file=sys.stderr)
 
 
 def _free(word: str | Path) -> str | Path:

@@ -84,10 +84,10 @@ def print_sizes(sizes: xr.Dataset, what: str = "") -> None:
     heads = [cell for name in ("mean size", "in largest", "free") for cell in (name, interval)]
     print_table(rows, columns=["time [s]", *heads])
     if facts["compactness_runs"]:
-        low, high = facts["compactness_low"], facts["compactness_high"]
+        ends = _range(facts["compactness_low"], facts["compactness_high"])
         print(
-            f"compactness: {facts['compactness']:.3g} ({interval}{_range(low, high, ' ')}), least "
-            "perimeter over perimeter, 1 at most"
+            f"compactness: {facts['compactness']:.3g}{f' ({interval} {ends})' if ends else ''}, "
+            "least perimeter over perimeter, 1 at most"
         )
 
 
@@ -102,6 +102,6 @@ def _cells(found: xr.Dataset, name: str) -> tuple[str, str]:
     return f"{value:.3g}", _range(low, high)
 
 
-def _range(low: float, high: float, before: str = "") -> str:
+def _range(low: float, high: float) -> str:
     """Return an interval, nothing of a single run."""
-    return f"{before}{low:.3g} to {high:.3g}" if low == low else ""
+    return f"{low:.3g} to {high:.3g}" if low == low else ""

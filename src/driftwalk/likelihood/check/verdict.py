@@ -168,7 +168,7 @@ def place_criterion(local: Local, where: Where) -> Criterion:
         p_value,
         f"the mean error of prediction is {off:.1f} sd from zero at {where.place(worst)} "
         f"({local.samples[worst]:.0f} samples), expected below {limit:.1f} in all "
-        f"{cells.size} cells of 95 % of recordings: the fitted flow is wrong there",
+        f"{cells.size} cells in 95 % of recordings: the fitted flow is wrong there",
     )
 
 

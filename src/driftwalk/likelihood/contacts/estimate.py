@@ -18,6 +18,7 @@ from driftwalk.likelihood.intervals import fitted_intervals
 from driftwalk.likelihood.newton import Tell
 from driftwalk.likelihood.result import fitted_flow
 from driftwalk.likelihood.solution import BREAKDOWN
+from driftwalk.schema.answer import undetermined
 from driftwalk.schema.check import described
 from driftwalk.schema.law_words import WALL_KEYS
 
@@ -74,10 +75,13 @@ def estimate_wall(
     >>> int(found["wall_contacts"])  # doctest: +SKIP
     0
     """
-    estimate = estimate_of(fit, recordings, body=body)
+    unknown = undetermined(fit)
+    estimate = None if unknown else estimate_of(fit, recordings, body=body)
     # An earlier estimate may have left some.
     fit = fit.drop_vars(WALL_KEYS, errors="ignore")
     fit.attrs.pop("wall_left_out", None)
+    if estimate is None:
+        return fit.assign_attrs(wall_left_out=_stands_on(unknown))
     if fit.attrs["angle"] != "state":
         return fit.assign_attrs(wall_left_out=_no_orientation(fit.attrs["angle"]))
     found = [passages_of(estimate, one) for one in estimate.passes.series]
@@ -112,6 +116,14 @@ def _answer(
     trial = Trial(estimated_study(fit), estimate.point, parts, seed)
     walls = tried_walls(trial.log_likelihood, tell)
     return answer(walls, float(fit["confidence"]))
+
+
+def _stands_on(unknown: Sequence[str]) -> str:
+    """Return why a fit without its numbers says nothing of the wall."""
+    return (
+        f"the estimate of the wall needs {' and '.join(unknown)}, which this recording does not "
+        "determine"
+    )
 
 
 def _no_orientation(angle: str) -> str:

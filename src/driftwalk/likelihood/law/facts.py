@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.core.errors import InputError
 from driftwalk.likelihood.filter_pass import Passes, Point
 from driftwalk.likelihood.law.assumptions import USUAL_ADDED_MASS, added_mass_of, is_stated
 from driftwalk.likelihood.law.departures import DRAG_SHAPES, STRENGTHS
@@ -198,6 +199,8 @@ def effective_logs(fit: xr.Dataset, study: Study) -> tuple[float, float]:
         if "filter_drag_coefficient" in fit
         else fitted_value(fit, "drag_coefficient")
     )
+    if not (drag > 0.0 and intensity > 0.0):
+        raise InputError("the fit does not determine C_d and σ_F: nothing can stand on it")
     return math.log(drag), math.log(intensity)
 
 

@@ -18,6 +18,7 @@ from driftwalk.likelihood.law.departures import DRAG_SHAPES, DRAGS
 from driftwalk.likelihood.law.search import evidence_of
 from driftwalk.likelihood.newton import Passed, Prior, Tell, find_mode
 from driftwalk.likelihood.solution import BREAKDOWN
+from driftwalk.schema.answer import undetermined
 from driftwalk.schema.check import described
 
 if TYPE_CHECKING:
@@ -95,12 +96,20 @@ def compare_laws(
     >>> found["compared_law"].values[found["compared_log_score"].argmax()]  # doctest: +SKIP
     'paper'
     """
+    found: dict[str, _Compared | None] = dict.fromkeys(LAWS)
+    if undetermined(fit):
+        # There is nothing to begin a search from.
+        return _with_laws(fit, found)
     estimate = estimate_of(fit, recordings, body=body)
     course = Course(tell or tell_nobody, _usual_parts(estimate.point))
-    found: dict[str, _Compared | None] = {}
     for name, law in LAWS.items():
         course.begin(name)
         found[name] = _under(estimate, *law, passed=_counted(course, name, estimate))
+    return _with_laws(fit, found)
+
+
+def _with_laws(fit: xr.Dataset, found: dict[str, _Compared | None]) -> xr.Dataset:
+    """Return a fit with what was found of each law."""
     names = np.array(list(found), dtype=np.str_)
     return described(
         fit.assign(_variables(found)).assign_coords(compared_law=("compared_law", names))

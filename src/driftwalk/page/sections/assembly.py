@@ -192,7 +192,7 @@ def _beside(distribution: xr.Dataset, drawn: xr.Dataset, *, classes: bool) -> st
     what = " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
     said = (
         f"In a second set each run has its own {what or 'parameters'}, drawn from the "
-        "uncertainty of the calibration."
+        "uncertainty of the run that found them."
     )
     if not classes:
         return said

@@ -119,8 +119,8 @@ def _tested(fit: xr.Dataset) -> Section | None:
         "The last score tests of the search: estimates of numbers that are not in the fit, in "
         f"their standard deviations; 0 is the model. A number is fitted from {OPENED_SIGMAS:g} on "
         f"(the memory of the force from {MEMORY_SIGMAS:g} on) if it is large enough to matter, and "
-        "stays if the fit finds it too. Small errors of the fitted flow look like less: whether "
-        "something is missing in the model, its check says."
+        "stays if the fit finds it too. Small errors of the fitted flow can look like a weaker "
+        "one: the check of the model says whether anything is missing from it."
     )
     columns = ["what was tested", "standard deviations from the model", "why it is not in the fit"]
     return section(

@@ -125,7 +125,7 @@ def test_a_model_that_does_not_give_them_is_told_by_how_much() -> None:
     ("explained", "named", "sentence"),
     [
         ({0}, None, "nine explains the recording"),
-        ({0, 1}, 1, "three explains the recording; so do, less well or no better, nine"),
+        ({0, 1}, 1, "three explains the recording; so do others, but no better: nine"),
         ({2}, 1, "twelve explains the recording"),
         (set(), 1, "No model explains the recording; the best one is three"),
         (set(), None, "No model explains the recording; the best one is nine"),
