@@ -328,7 +328,7 @@ def _markers(folder: Path) -> Names:
     return {}
 
 
-def _tracks(folder: Path) -> Names:
+def _pixels(folder: Path) -> Names:
     """Provide ``tracks.csv``: a simulated block of 4 cm, in pixels of 0.5 mm at 25 Hz."""
     study = dw.apply_overrides(
         dw.Study(),
@@ -385,7 +385,7 @@ FEW_SETTINGS = "--runs 10 --realisations 2 --duration 1min"
 
 PAGES: dict[str, Page] = {
     "README.md": Page(
-        provide=_files(_recording(), _tracks, _film(1, 4.0)),
+        provide=_files(_recording(), _pixels, _film(1, 4.0)),
         not_run={"make *": INSTALLS},
         makes=("mine/fit.nc",),
         numbers=Numbers.SAME,
@@ -434,7 +434,6 @@ PAGES: dict[str, Page] = {
             _recording(600.0), _flow("flow_true.csv"), _search("small.toml"), _assembled, _series
         ),
         instead={
-            "calibrate recording.csv": "calibrate recording.csv --study small.toml",
             "assemble run/": f"assemble run/ {FEW_RUNS}",
             "--flow series.nc": f"--flow series.nc {FEW_RUNS}",
             "runs=100)": "runs=4)",
@@ -505,7 +504,6 @@ PAGES: dict[str, Page] = {
             _minutes(first=1, second=1.5),
         ),
         instead={
-            "calibrate recording.csv": "calibrate first.csv --study small.toml",
             "assemble ": f"assemble {FEW_RUNS} ",
             "fit first.csv": "fit --no-check first.csv",
             "fit recording.csv --mass": "fit --no-check first.csv --mass",

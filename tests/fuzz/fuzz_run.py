@@ -58,7 +58,7 @@ class Outcome:
         if self.code is None or any(line.startswith("Traceback") for line in lines):
             where = next((line for line in traced[::-1] if "driftwalk/" in line), "?")
             return f"{lines[-1][:80]} | {where.rpartition('driftwalk/')[2][:80]}"
-        foreign = [line for line in lines if not line.startswith("driftwalk: ")]
+        foreign = [line for line in lines if not line.startswith(("driftwalk: ", "next: "))]
         if foreign:
             return f"foreign line: {foreign[0][:100]}"
         errors = [line for line in lines if line.startswith("driftwalk: error: ")]

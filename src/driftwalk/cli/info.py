@@ -123,7 +123,9 @@ def info(
     tank = [] if tank_diameter is None else ["--tank-diameter", f"{tank_diameter:.12g}"]
     block = [] if side is None else ["--side", f"{side:.12g}"]
     words = [*how.words(), *tank, *block, *words_to_fit(trajectory, described)]
-    print_next("fit", recording, *words, "-o", f"{recording.stem}-fit")
+    # A body that never moves cannot be fitted.
+    if any(body["speed_max_m_s"] for body in described["bodies"].values()):
+        print_next("fit", recording, *words, "-o", f"{recording.stem}-fit")
 
 
 def _print_field(described: dict[str, Any], *, json: bool) -> None:

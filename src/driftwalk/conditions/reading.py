@@ -191,7 +191,7 @@ def load_with_study(path: Path, study: Study, given: Mapping[str, Any] | None = 
     require_positions(trajectory, where=path)
     if values["block"] is not None and not is_stated(study, "block.side_m"):
         # The circle was widened by the default side, which the recording does not say.
-        del trajectory.attrs["block_side_m"]
+        trajectory.attrs.pop("block_side_m", None)
     if study.tank.shape == "polygon" and "tank" not in values and study.recording.arena == "tank":
         return trajectory.assign_attrs(arena=study.tank.to_arena_json())
     return trajectory

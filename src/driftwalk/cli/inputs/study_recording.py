@@ -10,7 +10,6 @@ from driftwalk.cli.inputs.assembly_source import load_flow_for
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.study import StudyOptions, option_name
-from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.output import print_note
 
 if TYPE_CHECKING:
@@ -203,6 +202,7 @@ def opening_note(
 
     def say() -> None:
         print_note(line)
-        print_warnings(warnings)
+        for warning in warnings:
+            print_note(f"warning: {warning}")
 
     return say
