@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import fnmatch
+import os
 import re
-from contextlib import nullcontext
+import shutil
+import subprocess
+from contextlib import closing, nullcontext
 from pathlib import Path
 
 import pytest
 from command_line import leave_out_figures
 from ports import held_port
 
+from driftwalk.cli.terminal.demo_answer import demo_truth
 from examples.printed import NUMBER, Numbers
 from examples.provisions import ELSEWHERE, NOT_COMPARED, PAGES
-from examples.reading import ROOT, blocks_of, commands_of, pages
+from examples.reading import ROOT, blocks_of, commands_of, pages, read_blocks
 from examples.running import Reader, compared, streaming
+
+TUTORIAL, FIT_PAGE = "docs/tutorials/first-calibration.md", "docs/how-to/fit.md"
 
 
 @pytest.mark.parametrize(
@@ -60,6 +66,74 @@ def test_commands_that_no_test_runs_exist() -> None:
         for word in words:
             if word.startswith((".ci/", "benchmarks/", "studies/")):
                 assert (ROOT / word).exists(), word
+
+
+def section(page: str, heading: str) -> str:
+    """Return the text of a page below one of its headings."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    return text.split(f"\n## {heading}\n")[1].split("\n## ")[0]
+
+
+def console(page: str, text: str) -> list[list[str]]:
+    """Return the words of the commands in a part of a page."""
+    blocks = read_blocks(page, text)
+    return [c.words for b in blocks if b.language == "console" for c in commands_of(b.text)]
+
+
+def test_two_commands_of_the_front_page_do_all_the_set_up() -> None:
+    """No package is on an index, so pip works from the sources alone, by `make`."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert console("README.md", section("README.md", "Try it")) == [
+        ["make", "demo"],
+        ["make", "test"],
+    ]
+    assert not [words for words in console("README.md", text) if words[0] == "pip"]
+
+
+def test_a_fit_on_the_front_page_states_what_no_recording_tells() -> None:
+    own = console("README.md", section("README.md", "With your own recording"))
+    fits = [words for words in own if words[:2] == ["driftwalk", "fit"]]
+    assert fits
+    for words in fits:
+        assert {"--tank-diameter", "--side", "--mass"} <= set(words)
+
+
+def test_the_tutorial_begins_with_the_demo() -> None:
+    """And not with the tests, which take far longer than its ten minutes."""
+    first, *rest = console(TUTORIAL, (ROOT / TUTORIAL).read_text(encoding="utf-8"))
+    assert first == ["make", "demo"]
+    assert ["make", "test"] not in rest
+
+
+@pytest.mark.parametrize("page", ["README.md", TUTORIAL, FIT_PAGE])
+def test_the_interval_that_a_page_prints_holds_the_truth_that_it_states(page: str) -> None:
+    text = (ROOT / page).read_text(encoding="utf-8")
+    printed = re.search(r"^drag coefficient C_d .*interval ([\d.]+) to ([\d.]+)$", text, re.M)
+    assert printed is not None
+    low, high = map(float, printed.groups())
+    assert low < demo_truth()["drag_coefficient"] < high
+    stated = [float(one) for one in re.findall(r"0\.3[89]\d*(?=[\s,:.])", text)]
+    assert any(abs(one - demo_truth()["drag_coefficient"]) < 5e-4 for one in stated)
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
+@pytest.mark.skipif(os.name == "nt", reason="there are no pseudo-terminals there")
+@pytest.mark.parametrize("terminal", [False, True])
+def test_make_says_what_it_installs(terminal: bool, tmp_path: Path) -> None:
+    """A word before every pip, and pip's own bar where someone looks."""
+    ours, theirs = os.openpty()
+    with closing(os.fdopen(ours, "rb")), closing(os.fdopen(theirs, "wb")) as screen:
+        done = subprocess.run(
+            ["make", "--dry-run", "lint", f"VENV={tmp_path / 'none'}"],
+            cwd=ROOT, stdout=subprocess.PIPE, stderr=screen if terminal else subprocess.PIPE,
+            text=True, check=True,
+        )  # fmt: skip
+    lines = done.stdout.splitlines()
+    places = [place for place, line in enumerate(lines) if " -m pip install " in line]
+    assert len(places) == 3  # the package, what the tests need, and what the developers do
+    for place in places:
+        assert lines[place - 1].startswith('echo "Installing ')
+        assert ("--quiet" in lines[place]) != terminal
 
 
 def test_shown_numbers_are_compared_or_it_is_said_why_not() -> None:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from command_line import Done, apart, contents, here, refusal, start
 from page_reading import page_in
+
+from driftwalk.cli.terminal.demo_answer import print_next
 
 TRUTH = {
     "drag_coefficient": 0.3948,
@@ -129,3 +132,10 @@ def test_a_folder_with_other_files_is_refused_before_any_work(tmp_path: Path) ->
     line = refusal(here("demo", "--out", tmp_path))
     assert "thesis.txt" in line
     assert set(contents(tmp_path)) == {"thesis.txt"}
+
+
+def test_how_long_the_map_takes_stands_at_its_bar_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    print_next(Path("report.html"))
+    said = capsys.readouterr().out
+    assert "Next, the paper's method" in said
+    assert not re.search(r"\d", said)
