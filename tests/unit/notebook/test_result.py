@@ -38,7 +38,7 @@ def test_the_answer_comes_first() -> None:
     assert repr(found).splitlines()[:5] == [
         "C_d             0.393  [0.388, 0.398]",
         "σ_F             0.55 mN  [0.54, 0.56]",
-        "tracking noise  0.1 mm  [0.09, inf]",
+        "tracking noise  not determined by this recording",
         "intervals of 90 %; force redrawn every 16 ms",
         "explains the recording: yes",
     ]
