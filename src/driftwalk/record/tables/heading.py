@@ -44,6 +44,9 @@ def heading_of(rows: Sequence[list[str]], options: ReadOptions) -> Heading | Non
     >>> heading_of(rows, ReadOptions())
     Heading(names=['t [ms]', 'x [cm]', 'y [cm]'], rows=2)
     """
+    if rows and rows[0][:1] == ["coords"]:
+        # The lowest level of DeepLabCut's header: those above it name the body parts.
+        return None
     if len(rows) > 1 and _holds_positions(rows[0], rows[1], options):
         return Heading(rows[0], 1)
     if len(rows) > 2 and (units := _units(rows[1])):
