@@ -317,9 +317,9 @@ ELSEWHERE = {"demo", "view", "play"}
 
 
 def own_words(err: str) -> None:
-    """Check that all lines of stderr are driftwalk's notes, or its progress."""
+    """Check that all lines of stderr are driftwalk's notes, its progress, or the next command."""
     for line in err.replace("\r", "\n").splitlines():
-        assert re.match(r"driftwalk: |[a-z ]+: \d+ of \d+ |$", line), err
+        assert re.match(r"(driftwalk|next): |[a-z ]+: \d+ (of \d+ |%)|$", line), err
 
 
 @pytest.mark.parametrize("command", QUICK)
