@@ -164,10 +164,12 @@ def test_the_page_and_the_terminal_name_what_is_not_shown(
     assert done.code == 0, done
     told: list[str] = []
     page = RunSource(received, tell=told.append).greeting()[0]["page"]
-    warnings = next(part for part in page["sections"] if part["kind"] == "warnings")
-    assert warnings["items"][: len(told)] == told
+    shown = next(part for part in page["sections"] if part["kind"] == "warnings")
+    assert shown["items"][: len(told)] == told
     assert [text for text in told if text.startswith(f"{name} ")] == told
-    assert done.err == "".join(f"driftwalk: warning: {text}\n" for text in told)
+    *warnings, last = done.err.splitlines()
+    assert warnings == [f"driftwalk: warning: {text}" for text in told]
+    assert last.startswith("next: ")
     assert len(told) == 1
 
 
