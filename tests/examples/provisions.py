@@ -328,7 +328,7 @@ def _markers(folder: Path) -> Names:
     return {}
 
 
-def _pixels(folder: Path) -> Names:
+def _wide_tracks(folder: Path) -> Names:
     """Provide ``tracks.csv``: a simulated block of 4 cm, in pixels of 0.5 mm at 25 Hz."""
     study = dw.apply_overrides(
         dw.Study(),
@@ -385,7 +385,7 @@ FEW_SETTINGS = "--runs 10 --realisations 2 --duration 1min"
 
 PAGES: dict[str, Page] = {
     "README.md": Page(
-        provide=_files(_recording(), _pixels, _film(1, 4.0)),
+        provide=_files(_recording(), _wide_tracks, _film(1, 4.0)),
         not_run={"make *": INSTALLS},
         makes=("mine/fit.nc",),
         numbers=Numbers.SAME,
@@ -430,11 +430,10 @@ PAGES: dict[str, Page] = {
         ),
     ),
     "docs/how-to/assemble.md": Page(
-        provide=_files(
-            _recording(600.0), _flow("flow_true.csv"), _search("small.toml"), _assembled, _series
-        ),
+        provide=_files(_recording(300.0), _flow("flow_true.csv"), _assembled, _series),
         instead={
-            "assemble run/": f"assemble run/ {FEW_RUNS}",
+            "fit recording.csv": "fit --no-check recording.csv",
+            "assemble fit/": f"assemble fit/ {FEW_RUNS}",
             "--flow series.nc": f"--flow series.nc {FEW_RUNS}",
             "runs=100)": "runs=4)",
         },
