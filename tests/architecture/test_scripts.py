@@ -88,6 +88,12 @@ def test_every_benchmark_has_its_smallest_size() -> None:
     assert {path.stem.removeprefix("bench_") for path in files} == set(SMALLEST)
 
 
+@pytest.mark.parametrize("name", SMALLEST)
+def test_the_page_of_performance_names_every_benchmark(name: str) -> None:
+    page = (ROOT / "docs" / "explanation" / "performance.md").read_text(encoding="utf-8")
+    assert f"bench_{name}.py" in page
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SMALLEST)
 def test_a_benchmark_runs_at_its_smallest_size(name: str) -> None:
