@@ -54,7 +54,7 @@ from driftwalk.conditions import (
 )
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.run_stages import share_of_map, share_of_windows, tell_nobody
-from driftwalk.motion import BlockModel, Details, MotionModel, is_family_name
+from driftwalk.motion import BlockModel, Details, MotionModel, ParticleModel
 from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.protocol import ScoresItself
 from driftwalk.motion.score import broken_worlds
@@ -194,7 +194,7 @@ def calibrate(
     say = tell if tell is not None else tell_nobody
     result = _Calibration(problem, keep, say, executor).run()
     is_block = isinstance(searched, BlockModel)
-    in_tank = is_block or is_family_name(searched.name)
+    in_tank = is_block or isinstance(searched, ParticleModel)
     unstated = unstated_warning(chosen, about="block" if is_block else "tank") if in_tank else None
     of_wall = wall_warning(track, chosen) if is_block else None
     steadiness = steadiness_of(problem)

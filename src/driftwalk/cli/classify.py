@@ -11,8 +11,15 @@ from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json, quantity_option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.output import print_json, print_note, print_table, save_dataset
+from driftwalk.cli.terminal.output import (
+    print_json,
+    print_next,
+    print_note,
+    print_table,
+    save_dataset,
+)
 from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.run_layout import MANIFEST_FILE
 from driftwalk.core.study_keys import STUDY_KEYS
 from driftwalk.schema.contents import check_contents
 from driftwalk.schema.netcdf import kind_of, open_netcdf
@@ -129,6 +136,9 @@ def classify(
     _print(summary)
     for warning in summary["warnings"]:
         print_note(f"warning: {warning}")
+    # A file of a run is shown with its run.
+    place = poses.parent if (poses.parent / MANIFEST_FILE).is_file() else poses
+    print_next("report", place, *(how.words() if place == poses else []), "-o", "report.html")
 
 
 def summarise(found: xr.Dataset) -> dict[str, Any]:
@@ -173,7 +183,10 @@ def _load(
         raise InputError(f"{path}: --run is for a simulated path.nc of driftwalk assemble")
     if given.file is None:
         # Without a study nobody has said how large the tank is: the blocks need not fit into it.
-        own = given.overrides.get(STUDY_KEYS["side"], Block().side_m)
+        own = given.overrides.get(STUDY_KEYS["side"])
+        if own is None:
+            own = Block().side_m
+            print_note(f"the side of the blocks is the default, {100 * own:g} cm (--side)")
         return how.load(path, side=own), own
     resolved = given.study()
     with explained():

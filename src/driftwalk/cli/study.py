@@ -64,6 +64,7 @@ def check(
         print_json({**study.to_dict(), "resolved": resolved})
     else:
         typer.echo(study.to_toml(), nl=False)
+        print_next("fit", "RECORDING", "--study", path, "-o", "fit")
 
 
 study_app.command("recover", help=paragraphs(recover.__doc__ or ""))(recover)

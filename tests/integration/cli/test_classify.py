@@ -79,7 +79,10 @@ def test_complete(recording: Path) -> None:
 def test_table(recording: Path) -> None:
     done = here("classify", recording)
     assert done.code == 0
-    assert done.err == ""
+    assert done.err == (
+        "driftwalk: the side of the blocks is the default, 3 cm (--side)\n"
+        f"next: driftwalk report {recording} -o report.html\n"
+    )
     lines = [line.split() for line in done.out.splitlines()]
     assert ["2+1", "49.1525", "2.9"] in lines
     assert ["5", "split", "b:0", "c:2", "2+1"] in lines
@@ -93,7 +96,7 @@ def test_nothing_joined(recording: Path) -> None:
 
 def test_file(recording: Path, tmp_path: Path) -> None:
     out = tmp_path / "classes.nc"
-    assert here("classify", recording, "-o", out).err == f"driftwalk: wrote {out}\n"
+    assert f"\ndriftwalk: wrote {out}\n" in here("classify", recording, "-o", out).err
     with xr.open_dataset(out, engine="h5netcdf") as found:
         assert found.attrs["kind"] == "classification"
         assert int(found["event_count"]) == 2
