@@ -111,7 +111,7 @@ def classify(
 
     if out is not None:
         require_target(out, existing="replace" if overwrite else "error", endings=(".nc",))
-    recording, block_side = _load(poses, how, given, run)
+    recording, block_side, is_default = _load(poses, how, given, run)
     tolerances = {
         "join_distance": join_distance,
         "join_angle": join_angle,
@@ -136,6 +136,8 @@ def classify(
     _print(summary)
     for warning in summary["warnings"]:
         print_note(f"warning: {warning}")
+    if is_default:
+        print_note(f"the side of the blocks is the default, {100 * block_side:g} cm (--side)")
     # A file of a run is shown with its run.
     place = poses.parent if (poses.parent / MANIFEST_FILE).is_file() else poses
     print_next("report", place, *(how.words() if place == poses else []), "-o", "report.html")
@@ -169,8 +171,8 @@ def summarise(found: xr.Dataset) -> dict[str, Any]:
 
 def _load(
     path: Path, how: RecordingOptions, given: StudyOptions, run: int | None
-) -> tuple[xr.Dataset, float]:
-    """Return the recording, or the simulated run, and the side of its blocks [m]."""
+) -> tuple[xr.Dataset, float, bool]:
+    """Return the recording or simulated run, the side of its blocks [m], and if it is a default."""
     from driftwalk.assembly import path_recording
     from driftwalk.conditions import load_with_study
     from driftwalk.model import Block
@@ -178,19 +180,17 @@ def _load(
     simulated = _simulated_path(path)
     if simulated is not None:
         chosen = int(simulated["run"][0]) if run is None else run
-        return path_recording(simulated, run=chosen), float(simulated.attrs["block_side_m"])
+        return path_recording(simulated, run=chosen), float(simulated.attrs["block_side_m"]), False
     if run is not None:
         raise InputError(f"{path}: --run is for a simulated path.nc of driftwalk assemble")
     if given.file is None:
         # Without a study nobody has said how large the tank is: the blocks need not fit into it.
-        own = given.overrides.get(STUDY_KEYS["side"])
-        if own is None:
-            own = Block().side_m
-            print_note(f"the side of the blocks is the default, {100 * own:g} cm (--side)")
-        return how.load(path, side=own), own
+        stated = given.overrides.get(STUDY_KEYS["side"])
+        own = Block().side_m if stated is None else stated
+        return how.load(path, side=own), own, stated is None
     resolved = given.study()
     with explained():
-        return load_with_study(path, resolved, how.arguments()), resolved.block.side_m
+        return load_with_study(path, resolved, how.arguments()), resolved.block.side_m, False
 
 
 def _simulated_path(path: Path) -> xr.Dataset | None:
