@@ -96,7 +96,7 @@ def test_nothing_joined(recording: Path) -> None:
 
 def test_file(recording: Path, tmp_path: Path) -> None:
     out = tmp_path / "classes.nc"
-    assert f"\ndriftwalk: wrote {out}\n" in here("classify", recording, "-o", out).err
+    assert f"driftwalk: wrote {out}\n" in here("classify", recording, "-o", out).err
     with xr.open_dataset(out, engine="h5netcdf") as found:
         assert found.attrs["kind"] == "classification"
         assert int(found["event_count"]) == 2
