@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -111,11 +112,12 @@ def export(
         for note in notes:
             print_note(f"note: {note}")
         print_row("folder", f"{out}: {target.gives}")
+        print_row("begin with", out / "README.md")
         for line in () if outcome is None else outcome.lines:
             print_row(
                 "verified" if outcome is not None and outcome.passed else "NOT VERIFIED", line
             )
-        print_row("next", f"read {out / 'README.md'}")
+        print(f"next: read {out / 'README.md'}", file=sys.stderr)
     return 0 if outcome is None or outcome.passed else 1
 
 
