@@ -283,6 +283,15 @@ def _assembled(folder: Path) -> Names:
     return {}
 
 
+def _fitted(folder: Path) -> Names:
+    """Provide ``fit/``: a run directory of a fit of a minute, and ``four/`` of what it builds."""
+    words = ("--to", "60s", "--tank-diameter", "30cm", "--spline-spacing", "4cm", "--no-check")
+    assert here("fit", RECORDING, *words, "-o", folder / "fit").code == 0
+    few = ("--runs", "20", "--duration", "20s", "--film", "none")
+    assert here("assemble", folder / "fit", *few, "-o", folder / "four").code == 0
+    return {}
+
+
 def _pixels(folder: Path) -> Names:
     """Provide tables that need an option: pixels, a clock without a unit, an unnamed body."""
     rows = [f"{10 + k}\t{20 + k}\t1\t{30 + k}\t40\t1\t" for k in range(20)]
@@ -530,7 +539,7 @@ PAGES: dict[str, Page] = {
         provide=_files(_recording(60.0), _pixels, _poses), numbers=Numbers.SAME
     ),
     "docs/how-to/report.md": Page(
-        provide=_files(_recording(60.0), _calibrated, _simulated), slow=True
+        provide=_files(_recording(60.0), _calibrated, _simulated, _fitted), slow=True
     ),
     "docs/how-to/take-your-tracks-elsewhere.md": Page(
         provide=_files(_one_recording, _several_worlds, _calibrated),
@@ -555,7 +564,7 @@ PAGES: dict[str, Page] = {
         slow=True,
     ),
     "docs/how-to/simulate.md": Page(
-        provide=_files(_flow("flow.nc"), _diffusing),
+        provide=_files(_flow("flow.nc"), _diffusing, _fitted),
         holds=("run.sizes['replicate'] == 8", "like.attrs['model'] == 'active'"),
         makes=("block.nc", "beetle.nc", "own.nc", "like.nc", "found.nc"),
         draws=False,

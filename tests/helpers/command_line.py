@@ -112,6 +112,14 @@ def refusal(done: Done) -> str:
     return done.err
 
 
+def refusal_under_way(done: Done) -> str:
+    """Return the one line of a mistake, after the words with which the run had begun."""
+    begun = ("driftwalk: tank: ", "driftwalk: warning: nobody stated ")
+    lines = done.err.splitlines(keepends=True)
+    assert lines[0].startswith(begun[0])
+    return refusal(done._replace(err="".join(x for x in lines if not x.startswith(begun))))
+
+
 def contents(folder: Path) -> dict[str, bytes | None]:
     """Return everything in a folder: the bytes of the files, None for folders."""
     paths = folder.rglob("*")

@@ -325,10 +325,7 @@ def test_progress_through_a_pipe_is_plain_lines(study: Path, tmp_path: Path) -> 
     assert done.code == 0
     lines = [line for line in done.err.splitlines() if line.startswith("calibrate: ")]
     assert len(lines) > 5
-    assert all(
-        re.fullmatch(r"calibrate: \d+ of 100 \(\d+ %\)(, [\w ]+ left)?: [\w ]+", line)
-        for line in lines
-    )
+    assert all(re.fullmatch(r"calibrate: \d+ %(, [\w ]+ left)?: [\w ]+", line) for line in lines)
     shares = [int(line.split()[1]) for line in lines]
     assert shares == sorted(shares)
     assert shares[-1] == 100
@@ -365,5 +362,5 @@ def test_progress_on_a_terminal_is_a_bar_with_the_time_left(study: Path, tmp_pat
     seen = b"".join(parts).decode()
     assert "\x1b" in seen
     assert "━" in seen
-    assert "/100" in seen
-    assert re.search(r"\d:\d\d:\d\d|-:--:--", seen)
+    assert re.search(r"\d+ %", seen)
+    assert re.search(r"\d+ s left", seen), seen[-3000:]

@@ -28,6 +28,7 @@ from command_line import (
     end,
     here,
     refusal,
+    refusal_under_way,
     start,
 )
 from signals_at_units import after_units, go_on, halted
@@ -232,7 +233,7 @@ def test_a_disk_that_is_full(
     ballast = small_disk / "ballast"
     ballast.write_bytes(bytes(os.statvfs(small_disk).f_bavail * 4096 - free))
     folder = small_disk / "run"
-    line = refusal(apart(*words(study, folder)))
+    line = refusal_under_way(apart(*words(study, folder)))
     assert "the disk is full" in line
     assert str(folder) in line
     ballast.unlink()
@@ -248,7 +249,8 @@ def test_a_full_disk_keeps_the_file_that_was_there(command: str, small_disk: Pat
     out = small_disk / "out.nc"
     out.write_bytes(b"precious")
     (small_disk / "ballast").write_bytes(bytes(os.statvfs(small_disk).f_bavail * 4096))
-    line = refusal(
+    said = refusal_under_way if command == "simulate" else refusal
+    line = said(
         apart(
             *{
                 "convert": ["convert", RECORDING, out],
