@@ -32,7 +32,7 @@ def convert(
     arena and all other information; CSV has the columns t_s, x_m, y_m, theta_rad and body.
     """
     from driftwalk.cli.inputs.study_recording import words_to_fit
-    from driftwalk.record import describe, save_trajectory
+    from driftwalk.record import save_trajectory
 
     trajectory = how.load(recording, tank_diameter=tank_diameter, side=side)
     save_trajectory(trajectory, out, existing="replace" if overwrite else "error")
@@ -58,5 +58,5 @@ def convert(
         f"wrote {out}: {counts['samples']} samples of {bodies} bod{'y' if bodies == 1 else 'ies'}; "
         f"format {trajectory.attrs['format']}; y {trajectory.attrs['y_axis']}"
     )
-    words = words_to_fit(trajectory, describe(trajectory))
+    words = words_to_fit(trajectory)
     print_next("fit", out, *words, "-o", sibling(out.with_suffix(""), "fit"))

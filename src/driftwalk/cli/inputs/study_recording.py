@@ -109,15 +109,15 @@ def read_with_flow(
     )
 
 
-def words_to_fit(trajectory: xr.Dataset, described: Mapping[str, Any]) -> list[str]:
+def words_to_fit(trajectory: xr.Dataset, described: Mapping[str, Any] | None = None) -> list[str]:
     """Return the options that a fit needs besides those with which a recording was read.
 
     Parameters
     ----------
     trajectory : xarray.Dataset
         The recording.
-    described : mapping
-        What `driftwalk.describe` says of it.
+    described : mapping, optional
+        What `driftwalk.describe` says of it; found where it is needed, which takes its time.
 
     Returns
     -------
@@ -129,16 +129,19 @@ def words_to_fit(trajectory: xr.Dataset, described: Mapping[str, Any]) -> list[s
     from driftwalk.conditions import require_inside
     from driftwalk.core.errors import InputError
     from driftwalk.model import Study
+    from driftwalk.record import describe
+    from driftwalk.schema import body_names
 
-    name, found = next(iter(described["bodies"].items()))
-    words = ["--body", name] if len(described["bodies"]) > 1 else []
-    if described["arena"] is not None:
+    names = body_names(trajectory)
+    words = ["--body", names[0]] if len(names) > 1 else []
+    if "arena" in trajectory.attrs:
         return words
-    circle = found["circle_of_centers"]
+    found = described if described is not None else describe(trajectory)
+    circle = found["bodies"][names[0]]["circle_of_centers"]
     if circle and circle["sectors_visited_share"] >= FIT_TANK:
         return [*words, "--arena", "fit"]
     try:
-        require_inside(Study(), trajectory, name)
+        require_inside(Study(), trajectory, names[0])
     except InputError:
         return [*words, "--tank-diameter", "DIAMETER"]
     return words
