@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from driftwalk.conditions.refuse import require_motion, require_positions
 from driftwalk.conditions.study import is_stated, study_for
-from driftwalk.conditions.tank import OUTLINE, study_in_arena
+from driftwalk.conditions.tank import study_in_arena
 from driftwalk.core.json_text import parse_json
 from driftwalk.record import load
 
@@ -88,7 +88,7 @@ def read_recordings(
             trajectory = _with_others(trajectory, path, study, values)
         trajectories.append(trajectory)
         of_files.append(of_file)
-    stated = not study.tank.model_fields_set.isdisjoint(OUTLINE) or any(of_files)
+    stated = is_stated(study, "tank.diameter_m") or any(of_files)
     if "tank" in values or study.recording.arena != "tank":
         study, stated = study_in_arena(study, trajectories[0]), True
     named = body or study.recording.body

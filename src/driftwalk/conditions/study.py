@@ -84,7 +84,7 @@ def study_for(
 
     chosen = apply_overrides(study if study is not None else Study(), overrides or {})
     # A fact that is stated already, by the study or by an earlier recording, has to be the same.
-    tank = not chosen.tank.model_fields_set.isdisjoint(OUTLINE)
+    tank = is_stated(chosen, "tank.diameter_m")
     block = set(chosen.block.model_fields_set)
     fitted = False
     for recording in recordings:
@@ -256,8 +256,10 @@ def is_stated(study: Study, key: str) -> bool:
     (True, False)
     """
     section, _, name = key.partition(".")
-    same = {"tank": OUTLINE, "block.depth_m": ("depth", "depth_m")}
-    names = same["tank"] if section == "tank" else same.get(key, (name,))
+    if section == "tank":
+        names: Collection[str] = OUTLINE
+    else:
+        names = ("depth", "depth_m") if key == "block.depth_m" else (name,)
     return not getattr(study, section).model_fields_set.isdisjoint(names)
 
 
