@@ -117,7 +117,7 @@ def test_the_tank_is_said_where_it_is_lost_and_kept_where_it_is_not(tmp_path: Pa
         np.testing.assert_array_equal(back["x"].values, recording["x"].values)
         assert json.loads(back.attrs["arena"]) == json.loads(recording.attrs["arena"])
     done = here("export", tmp_path / "a.nc", "--to", "movement", "-o", tmp_path / "movement")
-    assert done.err == ""
+    assert done.err == f"next: read {tmp_path / 'movement' / 'README.md'}\n"
     back = load(tmp_path / "movement" / "a.movement.nc")
     assert json.loads(back.attrs["arena"]) == json.loads(recording.attrs["arena"])
 
