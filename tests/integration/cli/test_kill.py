@@ -205,7 +205,7 @@ def test_files_that_may_not_grow(
         "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         f"resource.setrlimit(resource.RLIMIT_FSIZE, ({bytes_allowed}, resource.RLIM_INFINITY))\n"
     )
-    line = refusal(apart(*words(study, folder), before=PLAIN + limit))
+    line = refusal_under_way(apart(*words(study, folder), before=PLAIN + limit))
     assert str(folder) in line
     assert "run the same command again to continue" in line
     assert not list(folder.rglob("*partial*"))

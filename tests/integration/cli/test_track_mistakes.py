@@ -165,8 +165,9 @@ def test_a_file_that_breaks_off_keeps_what_came_before(words: list[object], tmp_
     done = apart("track", cut, *words[1:], "-o", out)
     assert done.code == 0, done.err
     notes = done.err.splitlines()
-    assert len(notes) == 2
+    assert len(notes) == 3
     assert "frames, at 1.4 s of 2.4 s" in notes[1]
+    assert notes[2] == f"next: driftwalk classify {out}"
     recording = dw.load(out)
     assert 13 <= recording.sizes["time"] <= 15
     assert recording.attrs["complete"] == "no"

@@ -60,6 +60,7 @@ def simulated(flow: xr.Dataset, *, seconds: float = 600.0, seed: int = 1) -> xr.
         {
             "forces.drag_coefficient": DRAG,
             "forces.force_std_N": FORCE_N,
+            "flow.start": "first",
             "observation.position_noise_m": 3e-4,
             "observation.orientation_noise_rad": 0.009,
         },
