@@ -34,7 +34,7 @@ from driftwalk.datasets import tank30_flow, tank30_recording, tank30_truth
 from driftwalk.figures import write_figures
 from driftwalk.motion import BlockModel
 from driftwalk.schema import body_track
-from driftwalk.schema.calibration_facts import calibration_facts
+from driftwalk.schema.answers.calibration_facts import calibration_facts
 from driftwalk.simulation.backend import world_table
 from driftwalk.simulation.initial import world_orientations
 

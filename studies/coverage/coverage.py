@@ -20,16 +20,16 @@ from typing import Any
 import numpy as np
 
 import driftwalk as dw
-from driftwalk.calibration.maps import Mapper
-from driftwalk.calibration.problem import Problem, limits_of, prepare_problem
-from driftwalk.calibration.quality import quality_of_fit
-from driftwalk.calibration.refine import Refined, locate, refine
-from driftwalk.calibration.region import (
+from driftwalk.calibration.goodness_of_fit import quality_of_fit
+from driftwalk.calibration.grid.bootstrap_region import (
     build_surface,
     confidence_region,
     region_contains,
     run_bootstrap,
 )
+from driftwalk.calibration.grid.grid_refinement import Refined, locate, refine
+from driftwalk.calibration.grid.map_stores import Mapper
+from driftwalk.calibration.problem import Problem, limits_of, prepare_problem
 from driftwalk.conditions import recorded_camera
 from driftwalk.core.seeds import world_keys
 from driftwalk.schema import Track, body_track

@@ -28,7 +28,7 @@ import driftwalk as dw
 from driftwalk.core.errors import DriftwalkError
 from driftwalk.core.provenance import plain
 from driftwalk.likelihood.ready import AngleUse
-from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.answers.fit_facts import fit_facts
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 INFER: Final = "cpp/include/driftwalk/infer"

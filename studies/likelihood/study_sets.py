@@ -11,7 +11,7 @@ from ode import PROGRAM, ode_poses
 from tracks import INTERVAL_S, Camera, Poses, own_poses, samples, see, wall_share
 from worlds import FAMILIES, World, draw_flow, draw_parameters
 
-from driftwalk.core.atomic import write_atomic
+from driftwalk.core.files.atomic import write_atomic
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -20,7 +20,7 @@ from lines import read_lines
 from study_sets import FIRST_SEED
 
 import driftwalk as dw
-from driftwalk.core.atomic import write_atomic
+from driftwalk.core.files.atomic import write_atomic
 from driftwalk.core.provenance import manifest, write_manifest
 
 MOST_WALL_SHARE = 0.3

@@ -23,10 +23,10 @@ from recordings import Known, recordings
 from table import markdown
 
 import driftwalk as dw
-from driftwalk.core.atomic import write_atomic
+from driftwalk.core.files.atomic import write_atomic
 from driftwalk.core.provenance import manifest, plain, write_manifest
-from driftwalk.schema.calibration_facts import calibration_facts
-from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.answers.calibration_facts import calibration_facts
+from driftwalk.schema.answers.fit_facts import fit_facts
 
 if TYPE_CHECKING:
     import xarray as xr

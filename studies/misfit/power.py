@@ -21,10 +21,10 @@ from right import FIRST_SEED as FIRST_RIGHT_SEED
 from run import FIRST_SEED, SETS, current, file_of
 
 import driftwalk as dw
-from driftwalk.core.atomic import write_atomic
+from driftwalk.core.files.atomic import write_atomic
 from driftwalk.core.provenance import manifest, write_manifest
 from driftwalk.likelihood.check.verdict import LEVEL
-from driftwalk.likelihood.law.opening import (
+from driftwalk.likelihood.law.forward_selection import (
     MEMORY_SIGMAS,
     OPENED_SIGMAS,
     OPENED_STRENGTH,

@@ -20,7 +20,7 @@ from cases import CASES
 from run import FIRST_SEED, current, read_lines
 
 import driftwalk as dw
-from driftwalk.core.atomic import write_atomic
+from driftwalk.core.files.atomic import write_atomic
 from driftwalk.core.provenance import manifest, write_manifest
 
 PARAMETERS = {"drag_coefficient": "C_d", "force_std": "σ_F"}

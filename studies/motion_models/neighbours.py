@@ -24,11 +24,11 @@ from recordings import RECORDINGS, read_lines
 
 import driftwalk as dw
 from driftwalk.calibration.evolution import AspectObjective, Budget, search_minimum
-from driftwalk.calibration.models.checks import CHECKS
-from driftwalk.calibration.models.contestants import contestants
-from driftwalk.calibration.models.judge import JUDGED, even_blocks
-from driftwalk.calibration.models.recorded import RecordedMotion, body_motion
-from driftwalk.calibration.models.verdict import checks_off
+from driftwalk.calibration.held_out.candidates import contestants
+from driftwalk.calibration.held_out.checks import CHECKS
+from driftwalk.calibration.held_out.held_out_score import JUDGED, even_blocks
+from driftwalk.calibration.held_out.recorded import RecordedMotion, body_motion
+from driftwalk.calibration.ranking.verdict import checks_off
 from driftwalk.comparison.aspects.form import resampled
 from driftwalk.conditions import read_recordings
 from driftwalk.model import Study, load_study

@@ -28,7 +28,7 @@ COLUMNS = (
 def row(name: str, found: xr.Dataset) -> list[str]:
     """Return the cells of one calibration; what is interpreted, each with its 90 % interval."""
     from driftwalk.model import parse_study
-    from driftwalk.schema.calibration_facts import calibration_facts
+    from driftwalk.schema.answers.calibration_facts import calibration_facts
 
     facts = calibration_facts(found)
     study = parse_study(facts["study"])
@@ -54,7 +54,7 @@ def _with_interval(facts: dict[str, Any], key: str, factor: float) -> str:
 
 def main(runs: list[str]) -> None:
     """Print the table, and below it the warnings of each run."""
-    from driftwalk.schema.netcdf import open_netcdf
+    from driftwalk.schema.stores.netcdf import open_netcdf
 
     print("| " + " | ".join(COLUMNS) + " |")
     print("|" + "---|" * len(COLUMNS))

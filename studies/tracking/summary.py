@@ -22,7 +22,7 @@ from run import read_lines
 from scenes import SEEDS
 
 import driftwalk as dw
-from driftwalk.core.atomic import write_atomic
+from driftwalk.core.files.atomic import write_atomic
 from driftwalk.core.provenance import manifest, write_manifest
 
 Line = dict[str, Any]

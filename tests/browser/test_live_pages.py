@@ -29,7 +29,7 @@ from signals_at_units import after_units, go_on, halted, until_halted
 import driftwalk as dw
 from browser.conftest import PHONE, Visit
 from browser.pictures import drawn_share, pixels
-from driftwalk.core.rundir import RunDirectory
+from driftwalk.core.files.rundir import RunDirectory
 from driftwalk.schema import build_trajectory
 from driftwalk.sweep import grid
 

@@ -18,7 +18,7 @@ import driftwalk as dw
 from browser.all_kinds import page_of
 from browser.conftest import PHONE, Visit
 from browser.pictures import drawn_share, path_points, pixels
-from driftwalk.core.rundir import RunDirectory
+from driftwalk.core.files.rundir import RunDirectory
 from driftwalk.page import sensitivity_sections
 
 pytestmark = pytest.mark.browser

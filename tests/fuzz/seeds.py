@@ -23,7 +23,7 @@ from tracker_seeds import tracker_files
 
 import driftwalk as dw
 from driftwalk.cli.main import main
-from driftwalk.core.rundir import RunDirectory
+from driftwalk.core.files.rundir import RunDirectory
 
 DATA = Path(str(files("driftwalk.datasets") / "tank30_ode_a"))
 PIXELS = ("--metres-per-pixel", "0.001")

@@ -15,10 +15,10 @@ from command_line import FLOW, here, refusal
 
 import driftwalk as dw
 from driftwalk.core.errors import FormatError
-from driftwalk.core.json_text import parse_json
-from driftwalk.core.run_layout import RECORD_FILE
-from driftwalk.core.toml_text import parse_toml
-from driftwalk.schema.netcdf import ALLOWANCE_BYTES, open_netcdf
+from driftwalk.core.files.run_layout import RECORD_FILE
+from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.text.toml_text import parse_toml
+from driftwalk.schema.stores.netcdf import ALLOWANCE_BYTES, open_netcdf
 
 FRAMES = ("--frame-rate", "10", "--metres-per-pixel", "0.001")
 DEEP, DIGITS = "[" * 5000, "9" * 5000

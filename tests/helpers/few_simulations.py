@@ -8,9 +8,15 @@ from __future__ import annotations
 
 import pytest
 
-from driftwalk.calibration import compare
-from driftwalk.calibration.estimation import approach, descend, likeness, posterior, run
+from driftwalk.calibration.estimation import (
+    gauss_newton,
+    posterior,
+    regression_abc,
+    run,
+    synthetic_likelihood,
+)
 from driftwalk.calibration.evolution import Budget
+from driftwalk.calibration.ranking import compare
 
 FEW = Budget(design=16, starts=1, short=2, long=2)
 
@@ -34,15 +40,15 @@ def compare_after_little(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(compare, "Budget", lambda: FEW)
     _approach_little(patch)
     _descend_little(patch)
-    patch.setattr(likeness, "SIMULATIONS", 256)
+    patch.setattr(synthetic_likelihood, "SIMULATIONS", 256)
 
 
 def _approach_little(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(approach, "SIMULATIONS", 64)
-    patch.setattr(approach, "MOST_ROUNDS", 2)
+    patch.setattr(regression_abc, "SIMULATIONS", 64)
+    patch.setattr(regression_abc, "MOST_ROUNDS", 2)
 
 
 def _descend_little(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(descend, "FEWEST_SIMULATIONS", (128, 128))
-    patch.setattr(descend, "COEFFICIENTS", (4, 8))
-    patch.setattr(descend, "MOST_ROUNDS", 2)
+    patch.setattr(gauss_newton, "FEWEST_SIMULATIONS", (128, 128))
+    patch.setattr(gauss_newton, "COEFFICIENTS", (4, 8))
+    patch.setattr(gauss_newton, "MOST_ROUNDS", 2)

@@ -9,8 +9,8 @@ import xarray as xr
 from command_line import FLOW, RECORDING
 
 import driftwalk as dw
+from driftwalk.core.files.rundir import RunDirectory
 from driftwalk.core.provenance import manifest
-from driftwalk.core.rundir import RunDirectory
 from driftwalk.model import Study
 
 SEARCH = {

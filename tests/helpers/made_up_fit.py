@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from synthetic_calibration import ARENA, bundled_flow
 
-from driftwalk.schema.facts import fit_variables
+from driftwalk.schema.answers.fit_facts import fit_variables
 
 LAGS, CELLS, PARTS, BINS = 5, 4, 4, 6
 

@@ -18,7 +18,7 @@ def after_units(sent: signal.Signals, *counts: int) -> str:
     """Return lines of Python that send a process a signal when it has stored so many units."""
     return f"""
 import os, signal
-from driftwalk.core import shards
+from driftwalk.core.files import shards
 store_unit, stored = shards.ShardStore.write, []
 def store_and_signal(self, unit, arrays):
     store_unit(self, unit, arrays)

@@ -14,8 +14,8 @@ import numpy as np
 import xarray as xr
 
 from driftwalk.schema import FLAGS, build_flow_field, build_trajectory
+from driftwalk.schema.answers.calibration_facts import calibration_facts, calibration_parts
 from driftwalk.schema.calibration import stored_parameters
-from driftwalk.schema.calibration_facts import calibration_facts, calibration_parts
 
 BUNDLED = Path(__file__).parents[2] / "src" / "driftwalk" / "datasets" / "tank30_ode_a"
 ARENA = json.dumps({"shape": "circle", "diameter_m": 0.3, "center_m": [0.0, 0.0]})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import xarray as xr
 from synthetic_calibration import answered, synthetic_calibration
 
-from driftwalk.schema.calibration_facts import calibration_facts
+from driftwalk.schema.answers.calibration_facts import calibration_facts
 
 NAMES = {"drag_coefficient": "speed", "force_std": "tumble_rate"}
 UNITS = {"speed": "m/s", "tumble_rate": "1/s"}

@@ -11,7 +11,7 @@ import driftwalk as dw
 from driftwalk.figures import write_figures
 from driftwalk.model import apply_overrides
 from driftwalk.schema import build_trajectory
-from driftwalk.schema.calibration_facts import calibration_facts
+from driftwalk.schema.answers.calibration_facts import calibration_facts
 
 TRUTH = {"drag_coefficient": 0.45, "force_std_N": 0.6e-3}
 SMALL = {

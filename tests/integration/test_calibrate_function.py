@@ -21,7 +21,7 @@ from driftwalk.core.seeds import world_keys
 from driftwalk.model import apply_overrides
 from driftwalk.motion import Parameter, motion_model
 from driftwalk.schema import build_trajectory
-from driftwalk.schema.calibration_facts import calibration_facts
+from driftwalk.schema.answers.calibration_facts import calibration_facts
 from driftwalk.simulation import Start
 from driftwalk.simulation.backend import Camera
 

@@ -9,7 +9,7 @@ from every_kind import FORMS, every_kind
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import check_dataset, unknown_names
 from driftwalk.schema.kinds import KINDS
-from driftwalk.schema.netcdf import open_netcdf
+from driftwalk.schema.stores.netcdf import open_netcdf
 
 
 def test_every_kind_is_made() -> None:

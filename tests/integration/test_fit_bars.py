@@ -13,7 +13,7 @@ from fit_worlds import DRAG, FORCE_N, NOISE_M, TRUTH
 
 import driftwalk as dw
 from driftwalk.flow import bilinear
-from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.answers.fit_facts import fit_facts
 
 STUDIES = Path(__file__).resolve().parents[2] / "studies" / "real"
 

@@ -12,7 +12,7 @@ import pytest
 
 import driftwalk as dw
 from driftwalk.schema import build_flow_field, build_trajectory
-from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.answers.fit_facts import fit_facts
 
 FOLDER = Path(__file__).resolve().parents[1] / "data" / "ode_recordings"
 AXIS = np.linspace(-0.165, 0.165, 133)

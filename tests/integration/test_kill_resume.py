@@ -16,8 +16,8 @@ import pytest
 from signals_at_units import after_units, go_on, halted
 
 import driftwalk
+from driftwalk.core.files.run_layout import state_of
 from driftwalk.core.provenance import read_manifest
-from driftwalk.core.run_layout import state_of
 
 SOURCE = str(Path(driftwalk.__file__ or "").parents[1])
 UNITS = 24
@@ -29,7 +29,7 @@ sys.path.insert(0, {SOURCE!r})
 import numpy as np
 from concurrent.futures import ThreadPoolExecutor
 from driftwalk.core.errors import DriftwalkError
-from driftwalk.core.rundir import RunDirectory
+from driftwalk.core.files.rundir import RunDirectory
 from driftwalk.sweep import grid, run_sweep
 
 INTERRUPTED_AT = None

@@ -1,7 +1,7 @@
 """The paper's calibration of a motion model on a recording, and which of several explains it."""
 
 from driftwalk.calibration.check import check_recording
-from driftwalk.calibration.compare import (
+from driftwalk.calibration.ranking.compare import (
     ALL_MODELS,
     DEFAULT_MODELS,
     check_models,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from driftwalk.calibration.models.recorded import body_motion
+from driftwalk.calibration.held_out.recorded import body_motion
 from driftwalk.calibration.problem import prepare_problem
 from driftwalk.calibration.refuse import MOST_PARAMETERS, require_samples, require_searchable
 from driftwalk.conditions import neighbours_of, recorded_camera, require_travel

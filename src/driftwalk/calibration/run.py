@@ -9,13 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.calibration.aside import aside
-from driftwalk.calibration.ends import End, interval_warnings, optimum_warnings
 from driftwalk.calibration.estimation import Stores, Tell, calibrate_many
-from driftwalk.calibration.maps import InTurn, Mapper, window_id
-from driftwalk.calibration.own_flow import own_flow_warning
-from driftwalk.calibration.problem import Problem, limits_of, prepare_problem
-from driftwalk.calibration.quality import (
+from driftwalk.calibration.flow_warning import own_flow_warning
+from driftwalk.calibration.goodness_of_fit import (
     FAR_ABOVE_FLOOR,
     Halves,
     Quality,
@@ -23,15 +19,26 @@ from driftwalk.calibration.quality import (
     quality_of_fit,
     validate_on_halves,
 )
-from driftwalk.calibration.refine import Refined, beating_cell, first_window, locate, refine
-from driftwalk.calibration.refuse import MOST_PARAMETERS, require_samples, require_searchable
-from driftwalk.calibration.region import (
+from driftwalk.calibration.grid.bootstrap_region import (
     Bootstrap,
     Region,
     build_surface,
     confidence_region,
     run_bootstrap,
 )
+from driftwalk.calibration.grid.boundary_warnings import End, interval_warnings, optimum_warnings
+from driftwalk.calibration.grid.grid_map import Map, Progress
+from driftwalk.calibration.grid.grid_refinement import (
+    Refined,
+    beating_cell,
+    first_window,
+    locate,
+    refine,
+)
+from driftwalk.calibration.grid.map_stores import InTurn, Mapper, window_id
+from driftwalk.calibration.grid.surface import Optimum, at_settings
+from driftwalk.calibration.problem import Problem, limits_of, prepare_problem
+from driftwalk.calibration.refuse import MOST_PARAMETERS, require_samples, require_searchable
 from driftwalk.calibration.result import (
     Found,
     answer_facts,
@@ -39,9 +46,7 @@ from driftwalk.calibration.result import (
     estimate_facts,
     interval_facts,
 )
-from driftwalk.calibration.search import Map, Progress
-from driftwalk.calibration.steadiness import Steadiness, steadiness_of
-from driftwalk.calibration.surface import Optimum, at_settings
+from driftwalk.calibration.stationarity import Steadiness, steadiness_of
 from driftwalk.calibration.wall import wall_warning
 from driftwalk.comparison import Statistic, StepDistance
 from driftwalk.conditions import (
@@ -52,6 +57,7 @@ from driftwalk.conditions import (
     study_in_arena,
     unstated_warning,
 )
+from driftwalk.core.background_task import aside
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.run_stages import share_of_map, share_of_windows, tell_nobody
 from driftwalk.motion import BlockModel, Details, MotionModel, ParticleModel
@@ -115,7 +121,7 @@ def calibrate(
         Computes the work units of maps, bootstrap and summaries elsewhere, with one thread each;
         see `driftwalk.sweep.run_sweep`. The rest runs here. The result does not depend on it.
     stores : callable, optional
-        Where each stage keeps finished work (`driftwalk.core.rundir`); memory when left out.
+        Where each stage keeps finished work (`driftwalk.core.files.rundir`); memory when left out.
     tell : callable, optional
         Called with the stage and its progress: ``tell("map", 64, 1681)``.
     meanwhile : callable, optional

@@ -22,7 +22,7 @@ from driftwalk.cli.terminal.demo_answer import (
 from driftwalk.cli.terminal.output import print_json, print_note
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.run_stages import tell_nobody
-from driftwalk.schema.netcdf import open_netcdf
+from driftwalk.schema.stores.netcdf import open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -159,8 +159,8 @@ def _write_page(out: Path, *runs: str) -> None:
 def _require_own(out: Path) -> None:
     """Refuse a directory with anything in it that no demo made, before any work."""
     from driftwalk.core.errors import RunDirectoryError
-    from driftwalk.core.run_layout import refuse_leading_out, visible
-    from driftwalk.core.shards import make_folder
+    from driftwalk.core.files.run_layout import refuse_leading_out, visible
+    from driftwalk.core.files.shards import make_folder
 
     make_folder(out)
     foreign = [entry for entry in visible(out) if entry.name not in (FIT, CALIBRATION, PAGE)]
@@ -173,7 +173,7 @@ def _require_own(out: Path) -> None:
 
 
 def _finished(folder: Path, overwrite: bool) -> bool:
-    from driftwalk.core.run_layout import state_of
+    from driftwalk.core.files.run_layout import state_of
 
     if overwrite or not folder.is_dir() or state_of(folder) != "finished":
         return False

@@ -32,15 +32,17 @@ class Command(NamedTuple):
 
 COMMANDS: Final[dict[str, Command]] = {
     "study": Command("study", "study_app", "Write and check study files."),
-    "camera": Command("camera", "camera_app", "Calibrate the camera: lens and plane."),
-    "markers": Command("markers", "markers_app", "Learn what the markers look like."),
-    "track": Command("track", "track", "Track blocks in a video or before a camera."),
-    "watch": Command("watch", "watch", "Watch blocks assemble, live."),
-    "info": Command("info", "info", "Say what a recording holds and how driftwalk reads it."),
-    "convert": Command("convert", "convert", "Turn a recording into a trajectory file."),
+    "camera": Command("recordings.camera", "camera_app", "Calibrate the camera: lens and plane."),
+    "markers": Command("recordings.markers", "markers_app", "Learn what the markers look like."),
+    "track": Command("recordings.track", "track", "Track blocks in a video or before a camera."),
+    "watch": Command("recordings.watch", "watch", "Watch blocks assemble, live."),
+    "info": Command(
+        "recordings.info", "info", "Say what a recording holds and how driftwalk reads it."
+    ),
+    "convert": Command("recordings.convert", "convert", "Turn a recording into a trajectory file."),
     "flow": Command("flow", "flow", "Take the flow field from a recording."),
     "models": Command("models", "models", "List the models of bodies that move by themselves."),
-    "simulate": Command("simulate", "simulate", "Simulate the motion of the block."),
+    "simulate": Command("prediction.simulate", "simulate", "Simulate the motion of the block."),
     "compare": Command("compare", "compare", "Measure how far apart two motions are."),
     "compare-models": Command(
         "compare_models", "compare_models", "Say which motion models explain a recording."
@@ -49,18 +51,22 @@ COMMANDS: Final[dict[str, Command]] = {
         "calibrate", "calibrate", "Find the drag coefficient and the stochastic force."
     ),
     "fit": Command("fit", "fit", "Fit flow, drag, stochastic force and tracking noise together."),
-    "assemble": Command("assemble", "assemble", "Simulate self-assembly of many blocks."),
+    "assemble": Command(
+        "prediction.assemble", "assemble", "Simulate self-assembly of many blocks."
+    ),
     "sensitivity": Command(
-        "sensitivity", "sensitivity", "Measure how much self-assembly depends on the model."
+        "prediction.sensitivity",
+        "sensitivity",
+        "Measure how much self-assembly depends on the model.",
     ),
     "classify": Command(
-        "classify", "classify", "Say what the blocks of a recording assembled into."
+        "recordings.classify", "classify", "Say what the blocks of a recording assembled into."
     ),
     "export": Command("export", "export", "Take a calibrated model to another simulator."),
     "report": Command("sharing.report", "report", "Write a report of a run: one HTML file."),
     "cite": Command("sharing.cite", "cite", "Say what to cite for a run."),
     "view": Command("view", "view", "Explore a run in the browser, or watch a tracker."),
-    "play": Command("play", "play", "Turn the knobs of the model while the tank moves."),
+    "play": Command("prediction.play", "play", "Turn the knobs of the model while the tank moves."),
     "demo": Command("demo", "demo", "Fit a bundled recording, and calibrate on the fitted flow."),
 }
 

@@ -38,7 +38,7 @@ def new(
     ] = False,
 ) -> None:
     """Print a study file with what differs from tank to tank, or with --full every parameter."""
-    from driftwalk.core.atomic import write_atomic
+    from driftwalk.core.files.atomic import write_atomic
     from driftwalk.model import short_study_template, study_template
 
     text = study_template() if full else f"{short_study_template()}{ALL_PARAMETERS}"

@@ -13,7 +13,7 @@ from driftwalk.comparison.plan import usual_interval
 from driftwalk.comparison.significance import PermutationTest, block_permutation_test
 from driftwalk.comparison.walk import steps
 from driftwalk.core.errors import InputError
-from driftwalk.core.json_text import parse_json
+from driftwalk.core.text.json_text import parse_json
 from driftwalk.schema import body_track
 from driftwalk.schema.check import build_dataset
 

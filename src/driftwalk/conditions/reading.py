@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from driftwalk.conditions.refuse import require_motion, require_positions
 from driftwalk.conditions.study import is_stated, study_for
 from driftwalk.conditions.tank import study_in_arena
-from driftwalk.core.json_text import parse_json
+from driftwalk.core.text.json_text import parse_json
 from driftwalk.record import load
 
 if TYPE_CHECKING:

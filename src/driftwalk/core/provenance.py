@@ -12,10 +12,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from driftwalk.core.atomic import write_atomic
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.file_names import text_of_name
-from driftwalk.core.json_text import read_json
+from driftwalk.core.files.atomic import write_atomic
+from driftwalk.core.files.file_names import text_of_name
+from driftwalk.core.text.json_text import read_json
 
 MANIFEST_VERSION: Final = 1
 MANIFEST_KIND: Final = "driftwalk manifest"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.core.uncertain import Uncertain, split_uncertain
 
 STUDY_KEYS: Final[dict[str, str]] = {

@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, Final
 
-from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import InputError
+from driftwalk.core.text.did_you_mean import did_you_mean
 
 Colour = tuple[int, int, int]
 """Red, green, blue, each 0 to 255."""

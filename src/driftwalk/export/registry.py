@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import InputError
+from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.export.data.targets import DATA_TARGETS
 from driftwalk.export.figures.targets import FIGURE_TARGETS
 from driftwalk.export.target import Source, Target, Verification

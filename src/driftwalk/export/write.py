@@ -7,9 +7,9 @@ import secrets
 import shutil
 from pathlib import Path
 
-from driftwalk.core.atomic import PARTIAL, rename, storage_error
 from driftwalk.core.errors import InputError
-from driftwalk.core.run_layout import faults_of
+from driftwalk.core.files.atomic import PARTIAL, rename, storage_error
+from driftwalk.core.files.run_layout import faults_of
 from driftwalk.export.target import Source, Target
 
 

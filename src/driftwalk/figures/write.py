@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from driftwalk.core.atomic import atomic_path
 from driftwalk.core.errors import InputError
+from driftwalk.core.files.atomic import atomic_path
 from driftwalk.core.provenance import file_sha256
 from driftwalk.figures.drawn_data import write_drawn_data
 from driftwalk.plot.parts.style import add_footer, print_style

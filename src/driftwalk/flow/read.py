@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.file_names import text_of_name
+from driftwalk.core.files.file_names import text_of_name
 from driftwalk.flow.arena import Outline, outline_of, read_arena
 from driftwalk.flow.fill import fill_velocity
 from driftwalk.flow.grid import Grid
@@ -23,8 +23,8 @@ from driftwalk.flow.readers.raw import FieldOptions
 from driftwalk.flow.readers.units import raw_to_si
 from driftwalk.flow.rows import grid_rows
 from driftwalk.schema import FLAGS, build_flow_field, check_flow_field
-from driftwalk.schema.contents import check_contents
-from driftwalk.schema.netcdf import is_netcdf, open_netcdf
+from driftwalk.schema.stores.contents import check_contents
+from driftwalk.schema.stores.netcdf import is_netcdf, open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr

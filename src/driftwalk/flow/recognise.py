@@ -13,7 +13,7 @@ from driftwalk.flow.readers.netcdf import holds_velocities
 from driftwalk.flow.readers.pivlab import holds_velocities as holds_pivlab, is_pivlab
 from driftwalk.flow.readers.table import is_field_table
 from driftwalk.flow.rows import grid_rows
-from driftwalk.schema.netcdf import is_netcdf, kind_of, open_netcdf
+from driftwalk.schema.stores.netcdf import is_netcdf, kind_of, open_netcdf
 
 LARGEST_BYTES: Final = 64 << 20
 """Rows without a header in a larger file are taken for a recording."""

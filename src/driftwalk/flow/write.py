@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from driftwalk.core.atomic import atomic_path, require_target, write_atomic
 from driftwalk.core.errors import InputError
+from driftwalk.core.files.atomic import atomic_path, require_target, write_atomic
 from driftwalk.schema import check_flow_field
-from driftwalk.schema.netcdf import netcdf_bytes
+from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 if TYPE_CHECKING:
     import xarray as xr

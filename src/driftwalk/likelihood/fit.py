@@ -11,15 +11,15 @@ from driftwalk.conditions import jump_warnings, unstated_warning
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.run_stages import Course, share_of_search, tell_nobody
 from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.agreement import angle_given_facts
+from driftwalk.likelihood.angle_consistency import angle_given_facts
 from driftwalk.likelihood.excerpt import pieces
 from driftwalk.likelihood.filter_pass import Passes, Point
+from driftwalk.likelihood.interval_inflation import with_mended_frames
 from driftwalk.likelihood.law.assumptions import Assumptions, assumptions_of
 from driftwalk.likelihood.law.facts import law_facts, side_slopes, stated_drag
 from driftwalk.likelihood.law.found import LawFound
 from driftwalk.likelihood.law.modes import TRIAL_PASSES
 from driftwalk.likelihood.law.search import LawSearch
-from driftwalk.likelihood.mistakes.mirrored import spin_correlation
 from driftwalk.likelihood.newton import Passed, Prior, Tell, work_of_pass
 from driftwalk.likelihood.ready import (
     AngleUse,
@@ -43,11 +43,11 @@ from driftwalk.likelihood.result import (
 )
 from driftwalk.likelihood.solution import BREAKDOWN, require_noise_below_motion, solved
 from driftwalk.likelihood.start import first_point, first_weights
+from driftwalk.likelihood.tracker_errors.mirrored import spin_correlation
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
-from driftwalk.likelihood.widening import with_mended_frames
 from driftwalk.schema import Track
+from driftwalk.schema.answers.fit_facts import texts
 from driftwalk.schema.check import described
-from driftwalk.schema.facts import texts
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,21 +8,13 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from driftwalk.conditions import require_travel
-from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import InputError
-from driftwalk.core.json_text import parse_json
+from driftwalk.core.text.argument_text import argument_text
+from driftwalk.core.text.json_text import parse_json
 from driftwalk.flow.arena import Outline, outline_of, read_arena
 from driftwalk.likelihood.angle import no_angle, smooth_angle
 from driftwalk.likelihood.filter_pass import LONGEST_GAP_S, Body, Series
 from driftwalk.likelihood.intervals import Intervals, cut_track, intervals_of
-from driftwalk.likelihood.mistakes.dropped import (
-    DroppedFrames,
-    find_dropped_frames,
-    places_of,
-    with_gaps,
-)
-from driftwalk.likelihood.mistakes.outliers import without_mistakes
-from driftwalk.likelihood.mistakes.smoothed import require_raw
 from driftwalk.likelihood.refuse import (
     FEWEST_SAMPLES,
     require_length,
@@ -32,6 +24,14 @@ from driftwalk.likelihood.refuse import (
     require_usable,
 )
 from driftwalk.likelihood.spline import Spline, lay_spline
+from driftwalk.likelihood.tracker_errors.dropped import (
+    DroppedFrames,
+    find_dropped_frames,
+    places_of,
+    with_gaps,
+)
+from driftwalk.likelihood.tracker_errors.outliers import without_mistakes
+from driftwalk.likelihood.tracker_errors.smoothed import require_raw
 from driftwalk.likelihood.wall import wall_intervals
 from driftwalk.schema import Track, body_track
 

@@ -22,6 +22,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.flow.grid import Grid, make_grid
 from driftwalk.likelihood.filter_pass import Point, Series
+from driftwalk.likelihood.interval_inflation import widened
 from driftwalk.likelihood.intervals import Intervals, fitted_intervals, switched_frames
 from driftwalk.likelihood.law.facts import (
     inertia_facts,
@@ -33,10 +34,9 @@ from driftwalk.likelihood.law.found import LawFound
 from driftwalk.likelihood.newton import PRIOR_LOG_DRAG_STD, Mode, known_numbers_variance
 from driftwalk.likelihood.reml import Restricted
 from driftwalk.likelihood.spline import Floats, Spline
-from driftwalk.likelihood.widening import widened
 from driftwalk.schema import FLAGS, build_flow_field
+from driftwalk.schema.answers.fit_facts import fit_variables
 from driftwalk.schema.earlier import current_form
-from driftwalk.schema.facts import fit_variables
 from driftwalk.schema.kinds import KINDS
 
 if TYPE_CHECKING:

@@ -6,14 +6,14 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from driftwalk.likelihood.agreement import NOTABLE_DISAGREEMENT
+from driftwalk.likelihood.angle_consistency import NOTABLE_DISAGREEMENT
 from driftwalk.likelihood.intervals import Intervals
 from driftwalk.likelihood.length import USUAL_PRECISION, in_words, needed_duration
-from driftwalk.likelihood.mistakes.mirrored import MIRRORED
 from driftwalk.likelihood.newton import NOTABLE_LEVER
 from driftwalk.likelihood.refuse import MOST_WALL_SHARE
 from driftwalk.likelihood.result import Whiteness
-from driftwalk.schema.facts import is_open
+from driftwalk.likelihood.tracker_errors.mirrored import MIRRORED
+from driftwalk.schema.answers.fit_facts import is_open
 
 if TYPE_CHECKING:
     from driftwalk.model import Study

@@ -14,8 +14,12 @@ from driftwalk.model.sensitivity import Sensitivity
 from driftwalk.model.simulation import Pose, Simulation
 from driftwalk.model.steps import Steps
 from driftwalk.model.study import Study, apply_overrides, load_study, parse_study
+from driftwalk.model.study_file.template import (
+    parameter_table,
+    short_study_template,
+    study_template,
+)
 from driftwalk.model.tank import FieldOfView, Tank
-from driftwalk.model.template import parameter_table, short_study_template, study_template
 from driftwalk.model.water import Water
 
 __all__ = [

@@ -9,9 +9,9 @@ from typing import Any, Self
 
 from pydantic import Field, model_validator
 
-from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import ConfigurationError, FormatError
-from driftwalk.core.toml_text import parse_toml, read_toml
+from driftwalk.core.text.did_you_mean import did_you_mean
+from driftwalk.core.text.toml_text import parse_toml, read_toml
 from driftwalk.model.assembly import Assembly
 from driftwalk.model.block import Block
 from driftwalk.model.calibration import Calibration
@@ -25,8 +25,8 @@ from driftwalk.model.section import Section
 from driftwalk.model.sensitivity import Sensitivity
 from driftwalk.model.simulation import Pose, Simulation, resolve_time_step
 from driftwalk.model.steps import Steps
+from driftwalk.model.study_file.toml import write_toml
 from driftwalk.model.tank import Tank
-from driftwalk.model.toml import write_toml
 from driftwalk.model.water import Water
 
 

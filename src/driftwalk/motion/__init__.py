@@ -3,10 +3,10 @@
 from driftwalk.motion.block import BlockModel
 from driftwalk.motion.camera import observe_worlds
 from driftwalk.motion.choose import feels_others, is_family_name, motion_model
+from driftwalk.motion.external_program.program import ProgramModel
 from driftwalk.motion.family import MEMBERS, PARTS, Member, Part, ParticleModel, models
 from driftwalk.motion.function import FunctionModel, Scene
 from driftwalk.motion.known import models_knowing
-from driftwalk.motion.program import ProgramModel
 from driftwalk.motion.protocol import Details, MotionModel, Scores, ScoresItself, Worlds
 from driftwalk.motion.random import WorldRandom
 from driftwalk.motion.score import score_worlds

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any, Final
 
 from driftwalk.core.errors import ConfigurationError
+from driftwalk.motion.external_program.program import TIMEOUT_S, ProgramModel
 from driftwalk.motion.family import ParticleModel, family_model
 from driftwalk.motion.family.particle import NEIGHBOURS
 from driftwalk.motion.function import MotionFunction, Settings, function_model
 from driftwalk.motion.model_file import SUFFIX, model_of_file
-from driftwalk.motion.program import TIMEOUT_S, ProgramModel
 from driftwalk.motion.protocol import MotionModel
 from driftwalk.motion.ranges import given_by_name
 from driftwalk.schema import Parameter

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.motion.choose import is_family_name, motion_model
 from driftwalk.motion.protocol import MotionModel
 

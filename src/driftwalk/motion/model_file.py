@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.conditions.recorded import Conditions
-from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.motion.function import Settings, function_model
 from driftwalk.motion.protocol import (
     Details,

@@ -17,9 +17,9 @@ from driftwalk.core.processors import default_threads
 from driftwalk.core.seeds import world_keys
 from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.block import BlockModel
+from driftwalk.motion.external_program.program import ProgramModel
 from driftwalk.motion.family import ParticleModel
 from driftwalk.motion.family.particle import time_step_of
-from driftwalk.motion.program import ProgramModel
 from driftwalk.motion.protocol import Keys, MotionModel, Worlds
 from driftwalk.motion.values import known_values
 from driftwalk.schema import body_track

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
-from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import ConfigurationError, DriftwalkError
 from driftwalk.core.extras import show_dask
+from driftwalk.core.text.did_you_mean import did_you_mean
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.motion.protocol import MotionModel
 from driftwalk.motion.ranges import known_value
 from driftwalk.schema import Parameter

@@ -76,7 +76,7 @@ def assemble(
     from driftwalk.assembly import assemble as assemble_study
     from driftwalk.runs import AssemblyWork, run_assembly
     from driftwalk.runs.folder import silent
-    from driftwalk.schema.netcdf import open_netcdf
+    from driftwalk.schema.stores.netcdf import open_netcdf
 
     given: dict[str, Any] = dict(settings)
     found = model_of(model, flow, study_overrides(keys=ASSEMBLY_KEYS, **given))

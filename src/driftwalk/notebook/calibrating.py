@@ -88,7 +88,7 @@ def calibrate(
     from driftwalk.notebook.result import as_result
     from driftwalk.runs import CalibrationWork, result_file, run_calibration
     from driftwalk.runs.folder import silent
-    from driftwalk.schema.netcdf import open_netcdf
+    from driftwalk.schema.stores.netcdf import open_netcdf
 
     given: dict[str, Any] = dict(settings)
     if isinstance(model, Study):

@@ -99,7 +99,7 @@ def compare_models(
     from driftwalk.notebook.result import as_result
     from driftwalk.runs import ModelComparisonWork, run_model_comparison
     from driftwalk.runs.folder import silent
-    from driftwalk.schema.netcdf import open_netcdf
+    from driftwalk.schema.stores.netcdf import open_netcdf
 
     named = {"usual": DEFAULT_MODELS, "all": ALL_MODELS}
     asked = named.get(models, (models,)) if isinstance(models, str) else models

@@ -78,7 +78,7 @@ def fit(
     from driftwalk.notebook.result import as_result
     from driftwalk.runs import FitWork, run_fit
     from driftwalk.runs.folder import silent
-    from driftwalk.schema.netcdf import open_netcdf
+    from driftwalk.schema.stores.netcdf import open_netcdf
 
     many = [recordings] if isinstance(recordings, xr.Dataset) else list(recordings)
     given: dict[str, Any] = dict(settings)

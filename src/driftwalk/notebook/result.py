@@ -6,7 +6,7 @@ from html import escape
 
 import xarray as xr
 
-from driftwalk.schema.answer import answer_lines
+from driftwalk.schema.answers.answer import answer_lines
 
 
 class Result(xr.Dataset):  # type: ignore[no-untyped-call]

@@ -9,7 +9,8 @@ from driftwalk.page.run_page import (
     recording_page,
     report_page,
 )
-from driftwalk.page.sections.assembly import assembly_sections
+from driftwalk.page.sections.assemblies.assembly import assembly_sections
+from driftwalk.page.sections.assemblies.sensitivity import sensitivity_sections
 from driftwalk.page.sections.calibration import (
     bootstrap_section,
     calibration_sections,
@@ -23,7 +24,6 @@ from driftwalk.page.sections.model_recovery import model_recovery_sections
 from driftwalk.page.sections.models import model_sections
 from driftwalk.page.sections.recording import trajectory_section
 from driftwalk.page.sections.recovery import recovery_sections
-from driftwalk.page.sections.sensitivity import sensitivity_sections
 
 __all__ = [
     "assembly_sections",

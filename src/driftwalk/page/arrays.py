@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.json_text import json_value
+from driftwalk.core.text.json_text import json_value
 
 Floats = npt.NDArray[np.float64]
 DType = Literal["f4", "f8", "i2", "i4", "u1"]

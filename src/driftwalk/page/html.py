@@ -11,8 +11,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from driftwalk.core.atomic import require_target, write_atomic
 from driftwalk.core.errors import InputError
+from driftwalk.core.files.atomic import require_target, write_atomic
 
 BUNDLE: Final = ("driftwalk.css", "driftwalk.js")
 # What could end the element that holds the data, or break it as a program.

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.errors import DriftwalkError, InputError
-from driftwalk.core.json_text import json_value
+from driftwalk.core.text.json_text import json_value
 from driftwalk.page.arrays import number
 from driftwalk.plot.parts.arena import arena_of
 from driftwalk.plot.parts.labels import interval_of
-from driftwalk.schema.answer import NOT_DETERMINED
-from driftwalk.schema.calibration_facts import facts_of
-from driftwalk.schema.facts import is_open, sentences
+from driftwalk.schema.answers.answer import NOT_DETERMINED
+from driftwalk.schema.answers.calibration_facts import facts_of
+from driftwalk.schema.answers.fit_facts import is_open, sentences
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -18,16 +18,16 @@ from driftwalk.page.parts import (
     section,
     warnings_section,
 )
-from driftwalk.page.sections.assembly import assembly_sections
+from driftwalk.page.sections.assemblies.assembly import assembly_sections
+from driftwalk.page.sections.assemblies.sensitivity import sensitivity_sections
 from driftwalk.page.sections.calibration import calibration_sections
 from driftwalk.page.sections.fit import fit_sections
 from driftwalk.page.sections.manifest import manifest_section
-from driftwalk.page.sections.many import many_sections
+from driftwalk.page.sections.model_calibration import many_sections
 from driftwalk.page.sections.model_recovery import model_recovery_sections
 from driftwalk.page.sections.models import model_sections
 from driftwalk.page.sections.recording import noise_of, recording_sections
 from driftwalk.page.sections.recovery import recovery_sections
-from driftwalk.page.sections.sensitivity import sensitivity_sections
 from driftwalk.page.sections.tracking import tracking_sections, tracking_warnings
 from driftwalk.page.stored_run import MAIN_FILES, Run, open_run_folder
 from driftwalk.schema import body_names

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import DriftwalkError, FormatError, InputError
-from driftwalk.core.file_names import text_of_name
-from driftwalk.core.provenance import read_manifest, refuse_other_version
-from driftwalk.core.run_layout import (
+from driftwalk.core.files.file_names import text_of_name
+from driftwalk.core.files.run_layout import (
     MANIFEST_FILE,
     RECORD_FILE,
     State,
@@ -19,8 +18,9 @@ from driftwalk.core.run_layout import (
     state_of,
     visible,
 )
-from driftwalk.core.shards import read_specification
-from driftwalk.schema.netcdf import open_netcdf
+from driftwalk.core.files.shards import read_specification
+from driftwalk.core.provenance import read_manifest, refuse_other_version
+from driftwalk.schema.stores.netcdf import open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.atomic import atomic_path, require_target
 from driftwalk.core.errors import InputError
+from driftwalk.core.files.atomic import atomic_path, require_target
 from driftwalk.plot.parts.arena import CM_PER_M, arena_of, draw_arena
 from driftwalk.plot.parts.assembly_labels import PALETTE
 from driftwalk.plot.parts.film_file import FRAMES_PER_S, Frame, require_film_writer, write_frames

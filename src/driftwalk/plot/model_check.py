@@ -20,7 +20,7 @@ from driftwalk.plot.parts.style import (
     axes_or_new,
     speed_colormap,
 )
-from driftwalk.schema.verdict import residuals_of
+from driftwalk.schema.answers.verdict import residuals_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -6,14 +6,14 @@ says what a recording holds; `save_trajectory` keeps it.
 
 from driftwalk.record.arena import PlacedArena, place_arena
 from driftwalk.record.circle import CircleFit, fit_circle, tank_radius_bound
-from driftwalk.record.info import describe
-from driftwalk.record.io import load, readable_formats
-from driftwalk.record.jumps import (
+from driftwalk.record.cleaning.jumps import (
     Impossible,
     arena_diagonal,
     impossible_steps,
     impossible_warning,
 )
+from driftwalk.record.info import describe
+from driftwalk.record.io import load, readable_formats
 from driftwalk.record.noise import (
     NoiseBound,
     NoiseEstimate,

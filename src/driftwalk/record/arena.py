@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.text.argument_text import argument_text
 from driftwalk.record.circle import ENOUGH_VISITED, fit_circle, tank_radius_bound
 from driftwalk.record.raw import Array
 

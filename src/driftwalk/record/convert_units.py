@@ -6,10 +6,10 @@ from fractions import Fraction
 
 import numpy as np
 
-from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import InputError
+from driftwalk.core.text.argument_text import argument_text
 from driftwalk.record.circle import implied_scale
-from driftwalk.record.extent import refuse_far
+from driftwalk.record.cleaning.extent import refuse_far
 from driftwalk.record.quantum import common_quantum
 from driftwalk.record.raw import (
     ANGLE_UNITS,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.json_text import json_value, parse_json
+from driftwalk.core.text.json_text import json_value, parse_json
 from driftwalk.record.circle import fit_circle
 from driftwalk.record.noise import estimate_tracking_noise
 from driftwalk.record.raw import Array

@@ -13,14 +13,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.json_text import parse_json
+from driftwalk.core.text.json_text import parse_json
 from driftwalk.core.units import parse_quantity
 from driftwalk.record.arena import PlacedArena, arena_attributes, place_arena
-from driftwalk.record.clean import Counts, clean_body
-from driftwalk.record.clock import check_clock
+from driftwalk.record.cleaning.clean import Counts, clean_body
+from driftwalk.record.cleaning.clock import check_clock
+from driftwalk.record.cleaning.extent import refuse_many_bodies, refuse_sparse
+from driftwalk.record.cleaning.jumps import arena_diagonal, impossible_steps, impossible_warning
+from driftwalk.record.cleaning.warn import angle_warnings, plausibility_warnings
 from driftwalk.record.convert_units import convert_units
-from driftwalk.record.extent import refuse_many_bodies, refuse_sparse
-from driftwalk.record.jumps import arena_diagonal, impossible_steps, impossible_warning
 from driftwalk.record.noise import noise_reach
 from driftwalk.record.origin import origin_of
 from driftwalk.record.pose.listed import listed
@@ -29,7 +30,6 @@ from driftwalk.record.pose.options import two_names
 from driftwalk.record.raw import DELIMITERS, Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.registry import PLAIN
 from driftwalk.record.text import DAMAGED_GZIP
-from driftwalk.record.warn import angle_warnings, plausibility_warnings
 from driftwalk.schema import Track, build_trajectory
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from driftwalk.core.atomic import atomic_path, require_target, write_atomic
+from driftwalk.core.files.atomic import atomic_path, require_target, write_atomic
 from driftwalk.schema import body_names, check_trajectory
-from driftwalk.schema.netcdf import netcdf_bytes
+from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 if TYPE_CHECKING:
     import xarray as xr

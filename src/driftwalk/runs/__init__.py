@@ -14,7 +14,7 @@ from driftwalk.runs.sensitivity import (
     draw_sensitivity,
     run_sensitivity,
 )
-from driftwalk.schema.netcdf import netcdf_bytes
+from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 __all__ = [
     "LABELS",

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.core.run_stages import Course, tell_nobody
 from driftwalk.runs.folder import Progress, open_run, silent
 from driftwalk.runs.stored import dataset_hash
-from driftwalk.schema.netcdf import netcdf_bytes, open_netcdf
+from driftwalk.schema.stores.netcdf import netcdf_bytes, open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.core.rundir import RunDirectory
+    from driftwalk.core.files.rundir import RunDirectory
     from driftwalk.model import Study
 
 FIXED_TRIAL: Final = 0

@@ -12,13 +12,13 @@ from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.run_stages import CALIBRATION_STAGES, Course, tell_nobody
 from driftwalk.runs.folder import Progress, naming_recording, open_run, silent
 from driftwalk.runs.stored import dataset_hash
-from driftwalk.schema.netcdf import netcdf_bytes
 from driftwalk.schema.parameters import unit_suffix
+from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.core.rundir import RunDirectory
+    from driftwalk.core.files.rundir import RunDirectory
     from driftwalk.model import Study
     from driftwalk.motion import MotionModel
     from driftwalk.sweep import Store

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from driftwalk.core.run_stages import Course, tell_nobody
 from driftwalk.runs.folder import Progress, open_run, silent
 from driftwalk.runs.stored import dataset_hash
-from driftwalk.schema.netcdf import netcdf_bytes
+from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
-    from driftwalk.core.rundir import RunDirectory
+    from driftwalk.core.files.rundir import RunDirectory
     from driftwalk.model import Study
 
 
@@ -78,8 +78,8 @@ def open_run(
         When the directory is in use, holds another run, or cannot be written.
     """
     from driftwalk import _core
+    from driftwalk.core.files.rundir import RunDirectory
     from driftwalk.core.provenance import manifest
-    from driftwalk.core.rundir import RunDirectory
 
     with RunDirectory(
         folder, specification=specification, on_existing="overwrite" if overwrite else "resume"

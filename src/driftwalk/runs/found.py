@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.files.run_layout import MANIFEST_FILE, faults_of, run_file, state_of
 from driftwalk.core.provenance import read_manifest
-from driftwalk.core.run_layout import MANIFEST_FILE, faults_of, run_file, state_of
 from driftwalk.motion import MotionModel, estimated_values
+from driftwalk.schema.answers.fit_facts import sentences
 from driftwalk.schema.calibration import is_block
-from driftwalk.schema.contents import check_contents
 from driftwalk.schema.earlier import current_form
-from driftwalk.schema.facts import sentences
-from driftwalk.schema.netcdf import is_netcdf, open_netcdf
+from driftwalk.schema.stores.contents import check_contents
+from driftwalk.schema.stores.netcdf import is_netcdf, open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from driftwalk.core.run_stages import Course
 from driftwalk.runs.folder import Progress, open_run, silent
 from driftwalk.runs.stored import dataset_hash
-from driftwalk.schema.netcdf import netcdf_bytes
+from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from driftwalk.core.processors import default_threads
 from driftwalk.runs.folder import Progress, open_run, silent
 from driftwalk.runs.stored import dataset_hash
-from driftwalk.schema.netcdf import netcdf_bytes
+from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,12 +14,12 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import Course, tell_nobody
 from driftwalk.runs.folder import Progress, open_run, silent
 from driftwalk.runs.stored import dataset_hash
-from driftwalk.schema.netcdf import netcdf_bytes
+from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.core.rundir import RunDirectory
+    from driftwalk.core.files.rundir import RunDirectory
     from driftwalk.model import Study
 
 DRAWN_AXES: Final = 2

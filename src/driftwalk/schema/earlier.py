@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.schema.answers.calibration_facts import calibration_parts, is_explained
+from driftwalk.schema.answers.fit_facts import fit_variables, texts
 from driftwalk.schema.calibration import stored_parameters
-from driftwalk.schema.calibration_facts import calibration_parts, is_explained
 from driftwalk.schema.check import with_descriptions
-from driftwalk.schema.facts import fit_variables, texts
 from driftwalk.schema.kinds import KINDS
 
 if TYPE_CHECKING:

@@ -1,6 +1,6 @@
 """Any function over many settings: order, work units, resume, executors."""
 
-from driftwalk.core.shards import ShardStore
+from driftwalk.core.files.shards import ShardStore
 from driftwalk.sweep.cut import settings_per_unit
 from driftwalk.sweep.design import Design, WorkUnit, grid
 from driftwalk.sweep.handout import threads_of_unit

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import ClusterError, DriftwalkError, InputError
-from driftwalk.core.shards import Arrays
+from driftwalk.core.files.shards import Arrays
 from driftwalk.sweep.design import WorkUnit
 from driftwalk.sweep.handout import FOR_EACH_WORKER, Handout, UnitFuture, handout, is_lost
 from driftwalk.sweep.store import MemoryStore, Store, collect

@@ -1,4 +1,4 @@
-"""Where a sweep keeps its results. `driftwalk.core.shards` defines the files."""
+"""Where a sweep keeps its results. `driftwalk.core.files.shards` defines the files."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.shards import Arrays, Unit, UnitT
+from driftwalk.core.files.shards import Arrays, Unit, UnitT
 
 
 class Store(Protocol):

@@ -185,7 +185,7 @@ def save_picture(path: str | Path, picture: Image) -> Path:
     ...     save_picture(f"{folder}/a.png", np.zeros((4, 4, 3), np.uint8)).name
     'a.png'
     """
-    from driftwalk.core.atomic import write_atomic
+    from driftwalk.core.files.atomic import write_atomic
 
     done, data = require_opencv().imencode(".png", picture)
     if not done:

@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 from typing import Any, TypeVar
 
-from driftwalk.core.atomic import atomic_path
 from driftwalk.core.errors import ConfigurationError, FormatError
-from driftwalk.core.toml_text import read_toml
+from driftwalk.core.files.atomic import atomic_path
+from driftwalk.core.text.toml_text import read_toml
 from driftwalk.model.section import Section
 
 Kind = TypeVar("Kind", bound=Section)

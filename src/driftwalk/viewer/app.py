@@ -18,7 +18,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
 from driftwalk.core.errors import FormatError
-from driftwalk.core.json_text import parse_json
+from driftwalk.core.text.json_text import parse_json
 from driftwalk.viewer.hub import Content, Hub, Source
 from driftwalk.viewer.messages import Outbox, make_message
 from driftwalk.viewer.security import HEADERS, Gate

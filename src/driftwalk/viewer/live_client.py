@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.json_text import parse_json
+from driftwalk.core.text.json_text import parse_json
 from driftwalk.viewer.hub import Content, Publish, Source
 from driftwalk.viewer.shell import page_frame
 from driftwalk.viewer.sound_frame import SoundFrames

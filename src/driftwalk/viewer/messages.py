@@ -12,7 +12,7 @@ import json
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
-from driftwalk.core.json_text import json_value
+from driftwalk.core.text.json_text import json_value
 
 PACED: Final = frozenset({"tank", "frame"})
 """Kinds that wait until the browser has drawn the last one."""

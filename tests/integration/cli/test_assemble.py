@@ -30,8 +30,8 @@ from redrawn import assert_drawn_alike
 from signals_at_units import after_units
 
 from driftwalk.page import report_page
-from driftwalk.schema.calibration_facts import calibration_facts
-from driftwalk.schema.facts import fitted_value
+from driftwalk.schema.answers.calibration_facts import calibration_facts
+from driftwalk.schema.answers.fit_facts import fitted_value
 
 CLASSES = ["I", "O", "T", "S", "L", "I3+1", "L3+1", "2+2", "2+1+1", "1+1+1+1"]
 REQUIRED = {"proportions", "intervals", "complete", "runs"}

@@ -34,7 +34,7 @@ from command_line import (
 import driftwalk
 from driftwalk.figures.calibration import ks_map_figure
 from driftwalk.plot.parts.style import print_style
-from driftwalk.schema.calibration_facts import calibration_facts
+from driftwalk.schema.answers.calibration_facts import calibration_facts
 
 FIGURES = (
     *("flow", "trajectory", "steps", "ks_map"),

@@ -14,7 +14,7 @@ from self_propelled import moving
 import driftwalk as dw
 from driftwalk.cli.terminal.model_answer import print_answer
 from driftwalk.record import save_trajectory
-from driftwalk.schema.netcdf import open_netcdf
+from driftwalk.schema.stores.netcdf import open_netcdf
 
 TRUTH = {"speed": 0.03, "rotational_diffusion": 0.5, "turn_rate": 0.3}
 

@@ -15,7 +15,7 @@ import driftwalk as dw
 from driftwalk.calibration import DEFAULT_MODELS
 from driftwalk.cli.terminal.models_answer import print_answer
 from driftwalk.runs import read_found
-from driftwalk.schema.netcdf import open_netcdf
+from driftwalk.schema.stores.netcdf import open_netcdf
 
 SHORT = (
     *(RECORDING, "--to", "30s", "--tank-diameter", "30cm", "--models", "inertial,active"),

@@ -11,7 +11,7 @@ from self_propelled import moving
 
 import driftwalk as dw
 from driftwalk.cli.terminal.models_answer import print_answer
-from driftwalk.schema.netcdf import netcdf_bytes, open_netcdf
+from driftwalk.schema.stores.netcdf import netcdf_bytes, open_netcdf
 
 RESTING = {
     "speed": 0.04, "speed_cv": 0.2, "run_time": 1.0, "run_time_cv": 0.5, "rest_time": 1.0,

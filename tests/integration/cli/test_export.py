@@ -17,7 +17,7 @@ from finished_run import write_finished_run
 import driftwalk as dw
 from driftwalk.export import TARGETS
 from driftwalk.schema import build_flow_field
-from driftwalk.schema.netcdf import netcdf_bytes
+from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 SIMULATORS = ("mujoco", "webots", "gazebo")
 

@@ -20,7 +20,7 @@ import driftwalk as dw
 from driftwalk.export.data.ros import first_stamp, topics
 from driftwalk.record import load, save_trajectory
 from driftwalk.schema import body_names, body_track, build_trajectory
-from driftwalk.schema.netcdf import netcdf_bytes
+from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 EXACT = {"csv": "{}.csv", "trackpy": "{}.trackpy.csv", "movement": "{}.movement.nc"}
 

@@ -15,7 +15,7 @@ import xarray as xr
 from command_line import DATA, FIT, RECORDING, Done, here, refusal
 
 import driftwalk as dw
-from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.answers.fit_facts import fit_facts
 
 SECOND = DATA / "recording_second_seed.csv"
 REQUIRED = (

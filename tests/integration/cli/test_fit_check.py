@@ -12,7 +12,7 @@ import xarray as xr
 from command_line import RECORDING, Done, here
 from redrawn import assert_drawn_alike
 
-from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.answers.fit_facts import fit_facts
 
 SHORT = ("--to", "150", "--spline-spacing", "3cm", "--force-interval", "16ms")
 STUDIES = Path(__file__).resolve().parents[3] / "studies" / "real"

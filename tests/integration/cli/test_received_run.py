@@ -17,7 +17,7 @@ import pytest
 from command_line import FLOW, RECORDING, here, refusal
 from finished_run import write_finished_run
 
-from driftwalk.schema.netcdf import netcdf_bytes, open_netcdf
+from driftwalk.schema.stores.netcdf import netcdf_bytes, open_netcdf
 from driftwalk.viewer import RunSource
 
 pytestmark = [

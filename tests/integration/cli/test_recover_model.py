@@ -19,7 +19,7 @@ from signals_at_units import after_units
 
 import driftwalk as dw
 from driftwalk.record import save_trajectory
-from driftwalk.schema.netcdf import open_netcdf
+from driftwalk.schema.stores.netcdf import open_netcdf
 
 VALUES = {"speed": 0.03, "rotational_diffusion": 0.5, "turn_rate": 0.3}
 TRUTH = [word for name, one in VALUES.items() for word in ("--parameter", f"{name}={one}")]

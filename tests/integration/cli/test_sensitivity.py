@@ -31,7 +31,7 @@ from command_line import (
 from redrawn import assert_drawn_alike
 from signals_at_units import after_units
 
-from driftwalk.schema.calibration_facts import calibration_facts
+from driftwalk.schema.answers.calibration_facts import calibration_facts
 
 SIZE = ["--blocks", "3", "--runs", "15", "--realisations", "3", "--duration", "60s"]
 MAP = ["--vary", "drag-coefficient=0.2:1:0.4", "--vary", "force-std=0.2mN,1mN"]

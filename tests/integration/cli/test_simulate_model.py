@@ -15,7 +15,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 import driftwalk as dw
 from driftwalk.schema.check import check_dataset
-from driftwalk.schema.netcdf import open_netcdf
+from driftwalk.schema.stores.netcdf import open_netcdf
 
 ACTIVE = {"speed": 0.05, "rotational_diffusion": 0.5, "turn_rate": 0.0}
 PROGRAM = Path(__file__).parents[2] / "helpers" / "tumble_program.py"

@@ -21,7 +21,7 @@ from driftwalk.core.provenance import MANIFEST_KIND
 from driftwalk.model import Study
 from driftwalk.runs import read_found
 from driftwalk.schema import build_dataset
-from driftwalk.schema.facts import fit_facts, fitted_value
+from driftwalk.schema.answers.fit_facts import fit_facts, fitted_value
 
 TANK = ("--tank-diameter", "30cm")
 BODY = ("--side", "28mm", "--mass", "10g", "--depth", "9mm")

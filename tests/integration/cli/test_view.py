@@ -24,7 +24,7 @@ from websockets.exceptions import ConnectionClosedError, InvalidStatus
 from websockets.sync.client import connect
 
 import driftwalk as dw
-from driftwalk.core.rundir import RunDirectory
+from driftwalk.core.files.rundir import RunDirectory
 
 HOSTILE = "<script>alert(1)<|script>&\"'"
 

@@ -14,8 +14,8 @@ import pytest
 from command_line import FLOW, GRID, RECORDING, here, leave_out_figures
 from few_simulations import compare_after_little, simulate_little
 
-from driftwalk.core.rundir import RunDirectory
-from driftwalk.core.shards import ShardStore
+from driftwalk.core.files.rundir import RunDirectory
+from driftwalk.core.files.shards import ShardStore
 from driftwalk.page import report_page
 from driftwalk.page.run_page import TITLES
 from driftwalk.page.stored_run import MAIN_FILES

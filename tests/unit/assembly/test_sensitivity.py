@@ -18,7 +18,7 @@ import driftwalk as dw
 from driftwalk.assembly.runs.run import assemble
 from driftwalk.assembly.sensitivity import settings as engine
 from driftwalk.core.errors import InputError
-from driftwalk.core.shards import ShardStore
+from driftwalk.core.files.shards import ShardStore
 from driftwalk.sweep import MemoryStore
 
 AXES = {"drag_coefficient": [0.2, 1.0], "force_std": [0.0, 5e-4, 2e-3]}

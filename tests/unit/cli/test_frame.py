@@ -25,8 +25,8 @@ from driftwalk.cli.options.study import StudyOptions, option_name, with_study_op
 from driftwalk.cli.terminal.output import print_json, print_table, to_json
 from driftwalk.cli.terminal.progress import ProgressReporter, duration_text
 from driftwalk.core.errors import ConfigurationError, FormatError, InputError
-from driftwalk.core.json_text import json_value
 from driftwalk.core.study_keys import CALIBRATION_KEYS, STUDY_KEYS, study_overrides
+from driftwalk.core.text.json_text import json_value
 from driftwalk.model import Study, load_study
 
 AddCommand = Callable[[Callable[..., None]], None]

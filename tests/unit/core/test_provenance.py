@@ -148,7 +148,7 @@ def test_value_without_a_form_is_refused() -> None:
 
 def test_import_loads_numpy_at_most() -> None:
     code = (
-        "import sys; import driftwalk.core.rundir, driftwalk.sweep;"
+        "import sys; import driftwalk.core.files.rundir, driftwalk.sweep;"
         "print([m for m in ('xarray', 'scipy', 'pandas', 'filelock') if m in sys.modules])"
     )
     source = str(Path(driftwalk.__file__ or "").parents[1])

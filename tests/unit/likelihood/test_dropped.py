@@ -13,10 +13,15 @@ from fit_worlds import coarse_study, fitted, recording
 from hypothesis import given, settings, strategies as st
 
 import driftwalk as dw
-from driftwalk.likelihood.mistakes.dropped import ENOUGH, find_dropped_frames, places_of, with_gaps
-from driftwalk.likelihood.widening import with_mended_frames
+from driftwalk.likelihood.interval_inflation import with_mended_frames
+from driftwalk.likelihood.tracker_errors.dropped import (
+    ENOUGH,
+    find_dropped_frames,
+    places_of,
+    with_gaps,
+)
 from driftwalk.schema import Track, body_track, build_trajectory
-from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.answers.fit_facts import fit_facts
 
 
 class Filmed(NamedTuple):

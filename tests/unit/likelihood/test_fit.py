@@ -16,7 +16,7 @@ from driftwalk.likelihood.filter_pass import Series
 from driftwalk.likelihood.result import footprint_count, whiteness_of
 from driftwalk.model import apply_overrides
 from driftwalk.schema import FLAGS, build_trajectory
-from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.answers.fit_facts import fit_facts
 
 
 @pytest.fixture(scope="module")

@@ -12,10 +12,10 @@ from fit_worlds import coarse_study, fitted, recording
 from hypothesis import given, strategies as st
 
 import driftwalk as dw
-from driftwalk.likelihood.mistakes.outliers import FEWEST, mistakes_in, without_mistakes
 from driftwalk.likelihood.ready import prepare
+from driftwalk.likelihood.tracker_errors.outliers import FEWEST, mistakes_in, without_mistakes
 from driftwalk.schema import Track, body_track
-from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.answers.fit_facts import fit_facts
 
 SECONDS = 300.0
 NOISE_M = 3e-4

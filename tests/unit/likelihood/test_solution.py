@@ -17,7 +17,7 @@ from driftwalk.likelihood.result import parameter_facts
 from driftwalk.likelihood.solution import cholesky, require_noise_below_motion, solved
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema import Track, build_trajectory
-from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.answers.fit_facts import fit_facts
 
 BLOCK = 2048
 """The check keeps the derivatives of so many samples at a time."""

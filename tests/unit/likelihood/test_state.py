@@ -11,7 +11,7 @@ import driftwalk as dw
 from driftwalk.likelihood.ready import use_angle
 from driftwalk.model import apply_overrides
 from driftwalk.schema import body_track, build_trajectory
-from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.answers.fit_facts import fit_facts
 
 SECONDS = 600.0
 ANGLE_NOISE = np.radians(0.5)

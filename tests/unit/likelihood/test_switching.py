@@ -32,7 +32,7 @@ from driftwalk.likelihood.ready import body_of, prepare, spline_of
 from driftwalk.likelihood.result import Whiteness
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema import Track, body_track, build_trajectory
-from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.answers.fit_facts import fit_facts
 
 SWITCHED = {"switching_times_s": [START_S + SWITCH_S]}
 

@@ -17,14 +17,14 @@ import driftwalk as dw
 from driftwalk.cli.terminal.fit_answer import summary
 from driftwalk.conditions import estimated_study
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood import agreement, compare_laws, estimate_wall, judge_fit
+from driftwalk.likelihood import angle_consistency, compare_laws, estimate_wall, judge_fit
 from driftwalk.likelihood.check import judged
 from driftwalk.likelihood.contacts import estimate as wall
 from driftwalk.likelihood.newton import Mode
 from driftwalk.page.sections.fit import fit_summary
 from driftwalk.schema import build_trajectory
-from driftwalk.schema.answer import answer_lines
-from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.answers.answer import answer_lines
+from driftwalk.schema.answers.fit_facts import fit_facts
 
 UNKNOWN = "not determined by this recording"
 
@@ -77,7 +77,7 @@ def test_a_motion_without_random_force_has_no_numbers(
 
 def test_the_fit_with_the_angle_given_may_break_down_alone(monkeypatch: Any) -> None:
     study, track = coarse_study(), recording(60.0)
-    found = agreement.find_mode
+    found = angle_consistency.find_mode
 
     def diverged(*given: Any, **options: Any) -> Mode:
         mode = found(*given, **options)
@@ -86,8 +86,10 @@ def test_the_fit_with_the_angle_given_may_break_down_alone(monkeypatch: Any) -> 
 
     alone = dw.fit_motion(track, study)
     with monkeypatch.context() as patch:
-        patch.setattr(agreement, "find_mode", diverged)
-        patch.setattr(agreement, "restricted_drag", lambda _, mode, *rest, **more: _at(mode))
+        patch.setattr(angle_consistency, "find_mode", diverged)
+        patch.setattr(
+            angle_consistency, "restricted_drag", lambda _, mode, *rest, **more: _at(mode)
+        )
         left_out = dw.fit_motion(track, study)
     facts = fit_facts(left_out)
     assert math.isnan(facts["angle_disagreement_std"])

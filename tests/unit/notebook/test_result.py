@@ -12,8 +12,8 @@ import xarray as xr
 from hypothesis import given, strategies as st
 
 from driftwalk.notebook.result import Result, as_result
-from driftwalk.schema.answer import answer_lines
-from driftwalk.schema.netcdf import netcdf_bytes, open_netcdf
+from driftwalk.schema.answers.answer import answer_lines
+from driftwalk.schema.stores.netcdf import netcdf_bytes, open_netcdf
 
 
 def answer(**more: object) -> xr.Dataset:

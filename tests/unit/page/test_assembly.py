@@ -20,10 +20,10 @@ from synthetic_assembly import (
 )
 
 from driftwalk.page import assembly_sections, sensitivity_sections
-from driftwalk.page.sections.assembly import l1_and_chance
-from driftwalk.page.sections.assembly_sizes import sizes_section
-from driftwalk.page.sections.classes import cells_of
-from driftwalk.page.sections.replay import MOST_POSES
+from driftwalk.page.sections.assemblies.assembly import l1_and_chance
+from driftwalk.page.sections.assemblies.assembly_sizes import sizes_section
+from driftwalk.page.sections.assemblies.classes import cells_of
+from driftwalk.page.sections.assemblies.replay import MOST_POSES
 
 
 def made_up_assembly(path: xr.Dataset) -> xr.Dataset:

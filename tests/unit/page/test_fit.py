@@ -12,7 +12,7 @@ from recovery_worlds import TRUTH, synthetic_recovery
 from synthetic_calibration import bundled_recording
 
 from driftwalk.page import fit_sections, recovery_sections
-from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.answers.fit_facts import fit_facts
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from page_reading import numbers_of, part_of
 
 from driftwalk.cli.terminal.fit_answer import print_found, print_verdict
 from driftwalk.page import fit_sections
-from driftwalk.schema.facts import fit_facts, fit_variables
+from driftwalk.schema.answers.fit_facts import fit_facts, fit_variables
 
 NUMBERS = {
     "added_mass_share": 0.5,

@@ -10,7 +10,7 @@ import xarray as xr
 from every_kind import every_kind
 
 from driftwalk.page.run_page import dataset_page
-from driftwalk.page.sections.many import many_sections
+from driftwalk.page.sections.model_calibration import many_sections
 
 
 @pytest.fixture(scope="module")

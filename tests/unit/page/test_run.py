@@ -19,12 +19,12 @@ from synthetic_calibration import answered, bundled_flow, bundled_recording, syn
 
 from driftwalk import __version__
 from driftwalk.core.errors import InputError, RunDirectoryError
+from driftwalk.core.files.rundir import RunDirectory
 from driftwalk.core.provenance import manifest
-from driftwalk.core.rundir import RunDirectory
 from driftwalk.model import Study
 from driftwalk.page import joined_page, manifest_section, report_html, report_page, write_report
 from driftwalk.schema import build_trajectory
-from driftwalk.schema.citation import (
+from driftwalk.schema.answers.citation import (
     PAPER_AUTHORS,
     PAPER_TITLE,
     PAPER_VENUE,

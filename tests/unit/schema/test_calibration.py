@@ -16,7 +16,7 @@ from driftwalk.core.provenance import MANIFEST_KIND
 from driftwalk.model import Study
 from driftwalk.runs import read_found
 from driftwalk.schema.calibration import is_block, stored_parameters
-from driftwalk.schema.contents import check_contents
+from driftwalk.schema.stores.contents import check_contents
 
 PLACE = Path("run/calibration.nc")
 

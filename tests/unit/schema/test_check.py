@@ -12,9 +12,9 @@ import xarray as xr
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.schema import build_dataset, check_dataset, described
 from driftwalk.schema.check import unknown_names
-from driftwalk.schema.contents import check_contents
 from driftwalk.schema.description import Variable
 from driftwalk.schema.steps import build_steps
+from driftwalk.schema.stores.contents import check_contents
 
 
 def steps() -> xr.Dataset:

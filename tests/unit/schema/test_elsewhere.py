@@ -12,7 +12,7 @@ import pytest
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.stores.hdf5 import opened_hdf5
-from driftwalk.schema.netcdf import kind_of, open_netcdf
+from driftwalk.schema.stores.netcdf import kind_of, open_netcdf
 
 
 def linked(file: h5py.File, secret: Path) -> None:

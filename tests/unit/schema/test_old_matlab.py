@@ -13,7 +13,7 @@ from scipy.io import savemat
 
 import driftwalk as dw
 from driftwalk.flow import load_flow
-from driftwalk.schema.matlab import read_old
+from driftwalk.schema.stores.matlab import read_old
 
 
 def test_variables_come_by_their_names(tmp_path: Path) -> None:

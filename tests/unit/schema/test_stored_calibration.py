@@ -17,12 +17,16 @@ from driftwalk.core.errors import ConfigurationError, FormatError, InputError
 from driftwalk.motion import motion_model
 from driftwalk.page.run_page import dataset_page
 from driftwalk.schema import check_dataset
+from driftwalk.schema.answers.calibration_facts import (
+    calibration_facts,
+    calibration_parts,
+    facts_of,
+)
+from driftwalk.schema.answers.fit_facts import fitted_value
 from driftwalk.schema.calibration import is_block, stored_parameters
-from driftwalk.schema.calibration_facts import calibration_facts, calibration_parts, facts_of
 from driftwalk.schema.check import unknown_names
 from driftwalk.schema.earlier import current_form
-from driftwalk.schema.facts import fitted_value
-from driftwalk.schema.netcdf import open_netcdf
+from driftwalk.schema.stores.netcdf import open_netcdf
 
 OLD = Path(__file__).resolve().parents[2] / "data" / "old_datasets"
 FILES = ("calibration_version_1.nc", "calibration_of_a_function_version_1.nc")

@@ -13,10 +13,10 @@ from fit_worlds import coarse_study, recording
 import driftwalk as dw
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.schema import check_dataset
+from driftwalk.schema.answers.fit_facts import ESTIMATES, fit_facts, fit_variables, fitted_value
 from driftwalk.schema.check import unknown_names
 from driftwalk.schema.earlier import current_form
-from driftwalk.schema.facts import ESTIMATES, fit_facts, fit_variables, fitted_value
-from driftwalk.schema.netcdf import open_netcdf
+from driftwalk.schema.stores.netcdf import open_netcdf
 
 OLD = Path(__file__).resolve().parents[2] / "data" / "old_datasets"
 FITS = ("fit_version_1.nc", "fit_of_several_flows_version_1.nc")

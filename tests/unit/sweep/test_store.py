@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pytest
 
 from driftwalk.core.errors import InputError, RunDirectoryError
-from driftwalk.core.shards import pack_shard, unpack_shard
+from driftwalk.core.files.shards import pack_shard, unpack_shard
 from driftwalk.sweep import MemoryStore, ShardStore, Store, collect, grid
 
 UNITS = grid(a=range(6)).units(2)

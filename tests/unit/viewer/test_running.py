@@ -16,8 +16,8 @@ import pytest
 
 import driftwalk as dw
 from driftwalk.core.errors import InputError
-from driftwalk.core.rundir import RunDirectory
-from driftwalk.core.shards import ShardStore
+from driftwalk.core.files.rundir import RunDirectory
+from driftwalk.core.files.shards import ShardStore
 from driftwalk.model import Study
 from driftwalk.schema import Parameter
 from driftwalk.sweep import grid

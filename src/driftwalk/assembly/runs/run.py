@@ -89,7 +89,7 @@ def assemble(
         Index of the parameter set within a larger piece of work: with the seed and the run's index
         it is the address of a run's random numbers, so that two trials are independent.
     store : Store, optional
-        Where finished work units are kept (`driftwalk.core.rundir`); memory when left out.
+        Where finished work units are kept (`driftwalk.core.files.rundir`); memory when left out.
     progress : callable, optional
         Called with the number of finished runs and the total.
     threads : int, optional

@@ -16,7 +16,7 @@ from driftwalk.assembly.sensitivity.axes import Axes
 from driftwalk.assembly.sensitivity.settings import Outcomes, Settings
 from driftwalk.assembly.sensitivity.times import map_courses, reference_courses
 from driftwalk.core.errors import InputError
-from driftwalk.core.json_text import parse_json
+from driftwalk.core.text.json_text import parse_json
 from driftwalk.schema.check import build_dataset, described
 from driftwalk.schema.kinds.flow_series import FLOW_SERIES
 

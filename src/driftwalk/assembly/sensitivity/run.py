@@ -61,7 +61,7 @@ def sensitivity_map(
     reference : xarray.Dataset, optional
         An `outcome_distribution`; default: `sensitivity_reference` of the study, in memory.
     store : Store, optional
-        Where finished work units are kept (`driftwalk.core.rundir`); memory when left out.
+        Where finished work units are kept (`driftwalk.core.files.rundir`); memory when left out.
     progress : callable, optional
         Called with the number of finished settings and the total.
     threads : int, optional

@@ -24,7 +24,7 @@ from driftwalk.assembly.runs.plan import Arrays, Plan, make_plan, simulate_rows
 from driftwalk.assembly.runs.start import place_blocks
 from driftwalk.assembly.sensitivity.times import Courses, added, courses_of, courses_to_text
 from driftwalk.core.errors import DriftwalkError
-from driftwalk.core.shards import Unit, UnitT
+from driftwalk.core.files.shards import Unit, UnitT
 from driftwalk.simulation.backend import BROKEN
 from driftwalk.simulation.series import flow_starts
 from driftwalk.sweep import (

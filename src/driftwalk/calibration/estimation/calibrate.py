@@ -5,11 +5,11 @@ from __future__ import annotations
 from concurrent.futures import Executor
 from typing import TYPE_CHECKING
 
-from driftwalk.calibration.estimation.contact import at_the_wall
 from driftwalk.calibration.estimation.result import build_model_calibration
 from driftwalk.calibration.estimation.run import Stores, Tell, estimate
-from driftwalk.calibration.models.contestants import contestants
-from driftwalk.calibration.models.recorded import body_motion
+from driftwalk.calibration.estimation.wall_clearance import at_the_wall
+from driftwalk.calibration.held_out.candidates import contestants
+from driftwalk.calibration.held_out.recorded import body_motion
 from driftwalk.conditions import jump_warnings
 from driftwalk.motion import MotionModel
 

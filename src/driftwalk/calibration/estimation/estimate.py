@@ -8,9 +8,9 @@ from typing import Final, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.estimation import approach as approaching, descend as descending
-from driftwalk.calibration.estimation.approach import WIDE_ERRORS, Order, approach
-from driftwalk.calibration.estimation.descend import WIDEST, Descended, Simulate, descend
+from driftwalk.calibration.estimation import gauss_newton, regression_abc
+from driftwalk.calibration.estimation.bootstrap_correction import Repeated, repeat_estimates
+from driftwalk.calibration.estimation.gauss_newton import WIDEST, Descended, Simulate, descend
 from driftwalk.calibration.estimation.modes import Modes, find_modes
 from driftwalk.calibration.estimation.posterior import (
     MOST_ROUNDS as MOST_REGIONS,
@@ -18,7 +18,7 @@ from driftwalk.calibration.estimation.posterior import (
     sample_posterior,
 )
 from driftwalk.calibration.estimation.profile import Profiles, misfit_profiles
-from driftwalk.calibration.estimation.repeated import Repeated, repeat_estimates
+from driftwalk.calibration.estimation.regression_abc import WIDE_ERRORS, Order, approach
 
 Floats = npt.NDArray[np.float64]
 
@@ -91,9 +91,9 @@ class Matched(NamedTuple):
 
 def most_simulations(parameters: int, worlds: int) -> int:
     """Return how many settings `match_summaries` simulates at most."""
-    wide = approaching.SIMULATIONS * approaching.MOST_ROUNDS
-    each, last = descending.simulations_of(parameters)
-    narrow = each * descending.MOST_ROUNDS
+    wide = regression_abc.SIMULATIONS * regression_abc.MOST_ROUNDS
+    each, last = gauss_newton.simulations_of(parameters)
+    narrow = each * gauss_newton.MOST_ROUNDS
     regions = MOST_REGIONS * last // 2
     return wide + (1 + MOST_STARTS) * (narrow + regions) + worlds
 
@@ -229,7 +229,7 @@ def _profiles(
         recorded,
         posterior.solved,
         wider * posterior.draws.std(axis=0),
-        reach=descending.REACH,
+        reach=gauss_newton.REACH,
     )
     place = np.clip(found.place - bias[:, None], 0.0, 1.0)
     return Profiles(place, found.rise / wider[:, None] ** 2)

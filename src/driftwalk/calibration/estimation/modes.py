@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.estimation.descend import Descended
+from driftwalk.calibration.estimation.gauss_newton import Descended
 from driftwalk.calibration.estimation.posterior import DRAWS, Posterior
 
 Floats = npt.NDArray[np.float64]

@@ -14,8 +14,8 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.estimation.descend import Simulate, simulations_of
 from driftwalk.calibration.estimation.emulator import LocalEmulator, Solved, fit_emulator
+from driftwalk.calibration.estimation.gauss_newton import Simulate, simulations_of
 from driftwalk.calibration.estimation.region import WIDEST, Region, region_about
 
 Floats = npt.NDArray[np.float64]

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.estimation.descend import rounded
+from driftwalk.calibration.estimation.gauss_newton import rounded
 
 Floats = npt.NDArray[np.float64]
 

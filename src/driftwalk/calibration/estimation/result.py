@@ -11,15 +11,15 @@ import numpy.typing as npt
 
 from driftwalk.calibration.estimation.estimate import Matched
 from driftwalk.calibration.estimation.run import Estimation
-from driftwalk.calibration.models.checks import CHECKS, UNITS
-from driftwalk.calibration.models.contestants import Contestant
-from driftwalk.calibration.models.judge import JUDGED, without_error
-from driftwalk.calibration.models.recorded import RecordedMotion
-from driftwalk.calibration.models.result import motion_warnings
-from driftwalk.calibration.models.verdict import verdict_of
+from driftwalk.calibration.held_out.candidates import Contestant
+from driftwalk.calibration.held_out.checks import CHECKS, UNITS
+from driftwalk.calibration.held_out.held_out_score import JUDGED, without_error
+from driftwalk.calibration.held_out.recorded import RecordedMotion
+from driftwalk.calibration.ranking.result import motion_warnings
+from driftwalk.calibration.ranking.verdict import verdict_of
 from driftwalk.motion import ParticleModel
+from driftwalk.schema.answers.fit_facts import BOUNDS, texts
 from driftwalk.schema.check import build_dataset
-from driftwalk.schema.facts import BOUNDS, texts
 
 if TYPE_CHECKING:
     import xarray as xr

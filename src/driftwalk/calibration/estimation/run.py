@@ -12,18 +12,18 @@ import numpy.typing as npt
 
 from driftwalk.calibration.estimation.determined import Determination, determination
 from driftwalk.calibration.estimation.estimate import Matched, match_summaries, most_simulations
-from driftwalk.calibration.estimation.exchange import Order, order_of
-from driftwalk.calibration.estimation.objective import SummaryObjective
+from driftwalk.calibration.estimation.label_switching import Order, order_of
 from driftwalk.calibration.evolution import AspectObjective, Budget, Found, search_minimum
 from driftwalk.calibration.evolution.kept import KeptScores
-from driftwalk.calibration.models.contestants import Contestant
-from driftwalk.calibration.models.judge import (
+from driftwalk.calibration.held_out.candidates import Contestant
+from driftwalk.calibration.held_out.held_out_score import (
     Judged,
     even_blocks,
     judge_setting,
     require_numbers,
 )
-from driftwalk.calibration.models.recorded import RecordedMotion
+from driftwalk.calibration.held_out.recorded import RecordedMotion
+from driftwalk.calibration.summaries.simulated import SummaryObjective
 from driftwalk.core.processors import one_blas_thread
 
 if TYPE_CHECKING:

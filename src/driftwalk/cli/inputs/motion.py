@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.core.errors import InputError
-from driftwalk.core.file_names import text_of_name
-from driftwalk.schema.contents import check_contents
-from driftwalk.schema.netcdf import kind_of, open_netcdf
+from driftwalk.core.files.file_names import text_of_name
+from driftwalk.schema.stores.contents import check_contents
+from driftwalk.schema.stores.netcdf import kind_of, open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -54,7 +54,7 @@ def what_else(path: Path) -> str | None:
     >>> what_else(Path(str(files("driftwalk.datasets") / "tank30_ode_a" / "recording.csv")))
     """
     # NumPy comes with it, which the help of the commands does without.
-    from driftwalk.core.run_layout import state_of
+    from driftwalk.core.files.run_layout import state_of
 
     if path.is_dir() and state_of(path) in ("unfinished", "finished"):
         recording = path / "recording.nc"
@@ -81,7 +81,7 @@ def _is_field(path: Path) -> bool:
 
 def _maybe_a_field(path: Path) -> str | None:
     """Return how a `.nc` that is no known recording may be read as a flow field, None of others."""
-    from driftwalk.schema.netcdf import is_netcdf, kind_of, open_netcdf
+    from driftwalk.schema.stores.netcdf import is_netcdf, kind_of, open_netcdf
 
     named = path.is_file() and path.suffix.lower() == ".nc"
     if not named or not is_netcdf(path) or kind_of(path) is not None:
@@ -98,7 +98,7 @@ def _maybe_a_field(path: Path) -> str | None:
 
 def _netcdf_kind(path: Path) -> str | None:
     """Return which kind of driftwalk's own datasets a file holds, None for any other file."""
-    from driftwalk.schema.netcdf import kind_of
+    from driftwalk.schema.stores.netcdf import kind_of
 
     if path.suffix.lower() != ".nc":
         return None

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
 import typer
 
-from driftwalk.core.did_you_mean import did_you_mean
 from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.text.did_you_mean import did_you_mean
 
 if TYPE_CHECKING:
     from driftwalk.motion import MotionModel

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
+from driftwalk.cli.options.flatten_options import Command, Part, spread
 from driftwalk.cli.options.shared import quantity_parser
-from driftwalk.cli.options.spread import Command, Part, spread
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:

@@ -60,7 +60,7 @@ def flow_of_run(path: Path | None) -> Path | None:
     """Return the flow field in a run directory; any other path as it is."""
     if path is None or not path.is_dir():
         return path
-    from driftwalk.core.run_layout import run_file
+    from driftwalk.core.files.run_layout import run_file
 
     stored = run_file(path, "flow.nc")
     if stored is None:

@@ -12,10 +12,10 @@ from driftwalk.cli.options.shared import Json
 from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.output import print_json, printable
 from driftwalk.core.errors import InputError
+from driftwalk.core.files.run_layout import MANIFEST_FILE, faults_of, state_of
 from driftwalk.core.provenance import read_manifest, refuse_other_version
-from driftwalk.core.run_layout import MANIFEST_FILE, faults_of, state_of
-from driftwalk.schema.citation import bibtex, citation, methods_used
-from driftwalk.schema.netcdf import is_netcdf, open_netcdf
+from driftwalk.schema.answers.citation import bibtex, citation, methods_used
+from driftwalk.schema.stores.netcdf import is_netcdf, open_netcdf
 
 
 def cite(

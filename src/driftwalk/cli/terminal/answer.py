@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from driftwalk.cli.terminal.output import print_next, print_note, printable
-from driftwalk.schema.answer import NOT_DETERMINED, SYMBOLS, Estimate, estimate_of
+from driftwalk.schema.answers.answer import NOT_DETERMINED, SYMBOLS, Estimate, estimate_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,8 +14,8 @@ from driftwalk.cli.terminal.answer import (
     print_warnings,
 )
 from driftwalk.cli.terminal.output import command_text, print_next, sibling
+from driftwalk.schema.answers.calibration_facts import calibration_facts
 from driftwalk.schema.calibration import is_block, stored_parameters
-from driftwalk.schema.calibration_facts import calibration_facts
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,8 +10,8 @@ from driftwalk.cli.terminal.answer import ends_text, label_of, number_text
 from driftwalk.cli.terminal.calibration_answer import summary as calibration_summary
 from driftwalk.cli.terminal.fit_answer import answer
 from driftwalk.cli.terminal.output import print_note
-from driftwalk.schema.answer import estimate_of, reader_unit
-from driftwalk.schema.facts import ESTIMATES
+from driftwalk.schema.answers.answer import estimate_of, reader_unit
+from driftwalk.schema.answers.fit_facts import ESTIMATES
 
 if TYPE_CHECKING:
     import xarray as xr

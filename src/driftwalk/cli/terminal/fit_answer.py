@@ -20,10 +20,10 @@ from driftwalk.cli.terminal.answer import (
 )
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import command_text, print_next, sibling
-from driftwalk.schema.answer import undetermined
-from driftwalk.schema.compared_laws import compared_laws
-from driftwalk.schema.facts import ESTIMATES, fit_facts, is_open, sentences
-from driftwalk.schema.law_words import (
+from driftwalk.schema.answers.answer import undetermined
+from driftwalk.schema.answers.compared_laws import compared_laws
+from driftwalk.schema.answers.fit_facts import ESTIMATES, fit_facts, is_open, sentences
+from driftwalk.schema.answers.law_words import (
     LAW_KEYS,
     LINEAR_DRAG_ALONE,
     WALL_KEYS,

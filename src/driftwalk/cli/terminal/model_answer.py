@@ -18,8 +18,8 @@ from driftwalk.cli.terminal.answer import (
 )
 from driftwalk.cli.terminal.calibration_answer import model_words
 from driftwalk.cli.terminal.output import command_text, print_next, sibling
-from driftwalk.schema.answer import estimate_of
-from driftwalk.schema.compared_models import own_score
+from driftwalk.schema.answers.answer import estimate_of
+from driftwalk.schema.answers.compared_models import own_score
 from driftwalk.schema.parameters import unit_suffix
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 from driftwalk.cli.terminal.answer import print_report_next, print_row, print_warnings
 from driftwalk.cli.terminal.output import print_table
 from driftwalk.cli.terminal.progress import ProgressReporter
-from driftwalk.schema.model_words import ASPECT_WORDS
+from driftwalk.schema.answers.model_words import ASPECT_WORDS
 
 if TYPE_CHECKING:
     import xarray as xr

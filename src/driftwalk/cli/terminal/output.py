@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from driftwalk.cli.terminal.argument_names import in_options, to_options
-from driftwalk.core.atomic import require_free
 from driftwalk.core.errors import InputError
-from driftwalk.core.json_text import json_value
+from driftwalk.core.files.atomic import require_free
+from driftwalk.core.text.json_text import json_value
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,8 +51,8 @@ def to_json(values: Mapping[str, Any]) -> str:
 
 def save_dataset(dataset: xr.Dataset, path: Path) -> None:
     """Write a dataset as NetCDF, and say so."""
-    from driftwalk.core.atomic import write_atomic
-    from driftwalk.schema.netcdf import netcdf_bytes
+    from driftwalk.core.files.atomic import write_atomic
+    from driftwalk.schema.stores.netcdf import netcdf_bytes
 
     write_atomic(path, netcdf_bytes(dataset))
     print_note(f"wrote {path}")

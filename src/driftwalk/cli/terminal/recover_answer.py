@@ -10,7 +10,7 @@ import numpy as np
 from driftwalk.cli.terminal.answer import print_report_next, print_row, print_warnings
 from driftwalk.cli.terminal.output import print_table
 from driftwalk.cli.terminal.progress import duration_text
-from driftwalk.schema.answer import symbol_of
+from driftwalk.schema.answers.answer import symbol_of
 
 if TYPE_CHECKING:
     import xarray as xr

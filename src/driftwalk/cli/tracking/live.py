@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.terminal.output import print_note
 from driftwalk.cli.tracking.parts import TrackingParts
-from driftwalk.core.file_names import text_of_name
+from driftwalk.core.files.file_names import text_of_name
 
 if TYPE_CHECKING:
     from driftwalk.track import AssemblySeen, Camera, Frame, LiveServer, SeenEvent, TrackState

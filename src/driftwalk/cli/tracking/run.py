@@ -20,8 +20,8 @@ from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.cli.tracking.live import LiveOutputs
 from driftwalk.cli.tracking.parts import TrackingParts
 from driftwalk.core.errors import InputError
-from driftwalk.core.file_names import text_of_name
-from driftwalk.core.json_text import parse_json
+from driftwalk.core.files.file_names import text_of_name
+from driftwalk.core.text.json_text import parse_json
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from driftwalk.core.atomic import write_atomic
-from driftwalk.core.json_text import parse_json
+from driftwalk.core.files.atomic import write_atomic
+from driftwalk.core.text.json_text import parse_json
 from driftwalk.export.data.clock import frame_rate
 from driftwalk.export.data.motion import Motion
 from driftwalk.export.data.ros import first_stamp, topics

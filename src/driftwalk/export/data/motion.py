@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from driftwalk.core.errors import InputError
-from driftwalk.core.json_text import read_json
-from driftwalk.core.run_layout import MANIFEST_FILE, run_file, run_files, state_of
-from driftwalk.core.toml_text import parse_toml
-from driftwalk.schema.netcdf import kind_of, open_netcdf
+from driftwalk.core.files.run_layout import MANIFEST_FILE, run_file, run_files, state_of
+from driftwalk.core.text.json_text import read_json
+from driftwalk.core.text.toml_text import parse_toml
+from driftwalk.schema.stores.netcdf import kind_of, open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.core.atomic import require_free, write_atomic
-from driftwalk.core.json_text import json_value
+from driftwalk.core.files.atomic import require_free, write_atomic
+from driftwalk.core.text.json_text import json_value
 from driftwalk.export.data.clock import frame_rate
 from driftwalk.export.data.motion import Motion
 from driftwalk.schema import body_names
-from driftwalk.schema.netcdf import netcdf_bytes
+from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 if TYPE_CHECKING:
     import xarray as xr

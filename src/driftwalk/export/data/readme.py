@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from driftwalk.core.atomic import write_atomic
+from driftwalk.core.files.atomic import write_atomic
 
 README: Final = "README.md"
 MEANING: Final = {

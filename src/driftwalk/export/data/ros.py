@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.atomic import require_free
 from driftwalk.core.errors import InputError
+from driftwalk.core.files.atomic import require_free
 from driftwalk.export.data.motion import Motion
 from driftwalk.schema import body_names
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.atomic import atomic_path, require_free
+from driftwalk.core.files.atomic import atomic_path, require_free
 from driftwalk.export.data.clock import frame_numbers
 from driftwalk.export.data.motion import Motion
 from driftwalk.schema import body_names

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from driftwalk.core.file_names import text_of_name
+from driftwalk.core.files.file_names import text_of_name
 from driftwalk.export.data.film import write_film
 from driftwalk.export.data.losses import lost, read_again, write_tank
 from driftwalk.export.data.motion import Motion, find_motions

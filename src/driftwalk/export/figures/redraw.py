@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from driftwalk.core.errors import InputError
+from driftwalk.core.files.run_layout import MANIFEST_FILE, run_file, state_of
 from driftwalk.core.provenance import read_manifest
-from driftwalk.core.run_layout import MANIFEST_FILE, run_file, state_of
-from driftwalk.schema.contents import check_contents
-from driftwalk.schema.netcdf import open_netcdf
+from driftwalk.schema.stores.contents import check_contents
+from driftwalk.schema.stores.netcdf import open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr

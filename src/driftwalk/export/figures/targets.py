@@ -6,8 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from driftwalk.core.atomic import write_atomic
-from driftwalk.core.file_names import text_of_name
+from driftwalk.core.files.atomic import write_atomic
+from driftwalk.core.files.file_names import text_of_name
 from driftwalk.export.figures.redraw import draw_run
 from driftwalk.export.target import Source, Target
 

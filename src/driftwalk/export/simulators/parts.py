@@ -57,7 +57,7 @@ def stored_text(name: str) -> str:
 
 def write_common(folder: Folder, block: Block) -> None:
     """Write what the model is, study and flow, and the licence."""
-    from driftwalk.schema.netcdf import netcdf_bytes
+    from driftwalk.schema.stores.netcdf import netcdf_bytes
 
     folder.text("study.toml", block.study.to_toml())
     folder.data("flow.nc", netcdf_bytes(block.flow))

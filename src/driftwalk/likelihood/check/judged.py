@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from driftwalk.core.errors import InputError, reason_of
 from driftwalk.likelihood.check.run import check_model
 from driftwalk.likelihood.solution import BREAKDOWN
-from driftwalk.schema.verdict import with_verdict
+from driftwalk.schema.answers.verdict import with_verdict
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -27,8 +27,8 @@ from driftwalk.likelihood.check.worlds import (
 )
 from driftwalk.likelihood.ready import as_list
 from driftwalk.likelihood.result import require_fit
+from driftwalk.schema.answers.fit_facts import texts
 from driftwalk.schema.check import build_dataset
-from driftwalk.schema.facts import texts
 
 if TYPE_CHECKING:
     import xarray as xr

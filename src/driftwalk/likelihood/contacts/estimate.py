@@ -18,9 +18,9 @@ from driftwalk.likelihood.intervals import fitted_intervals
 from driftwalk.likelihood.newton import Tell
 from driftwalk.likelihood.result import fitted_flow
 from driftwalk.likelihood.solution import BREAKDOWN
-from driftwalk.schema.answer import undetermined
+from driftwalk.schema.answers.answer import undetermined
+from driftwalk.schema.answers.law_words import WALL_KEYS
 from driftwalk.schema.check import described
-from driftwalk.schema.law_words import WALL_KEYS
 
 if TYPE_CHECKING:
     import xarray as xr

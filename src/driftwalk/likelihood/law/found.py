@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from driftwalk.likelihood.law.trial import Trial
+from driftwalk.likelihood.law.score_tests import Trial
 from driftwalk.likelihood.newton import Mode
 
 

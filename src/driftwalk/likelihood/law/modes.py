@@ -11,7 +11,7 @@ import numpy as np
 
 from driftwalk.likelihood.excerpt import pieces
 from driftwalk.likelihood.filter_pass import Passes, Point, Series
-from driftwalk.likelihood.law.trial import Trial, try_numbers
+from driftwalk.likelihood.law.score_tests import Trial, try_numbers
 from driftwalk.likelihood.newton import (
     CLOSE,
     CLOSE_ENOUGH,

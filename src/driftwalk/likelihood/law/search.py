@@ -2,8 +2,8 @@
 
 The search of the likelihood is made for the paper's law, and for that of a floating body where
 score tests under the first cast doubt on it. At the better one, such tests say which further
-numbers the recording asks for (`driftwalk.likelihood.law.trial`). Those are opened and fitted, and
-closed again where nothing comes of them.
+numbers the recording asks for (`driftwalk.likelihood.law.score_tests`). Those are opened and
+fitted, and closed again where nothing comes of them.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from driftwalk.likelihood.excerpt import beginning
 from driftwalk.likelihood.filter_pass import Passes, Point
 from driftwalk.likelihood.law.assumptions import FLOATING, Assumptions
 from driftwalk.likelihood.law.departures import DRAG_SHAPES, DRAGS, NUMBERS
+from driftwalk.likelihood.law.forward_selection import Opening, is_kept
 from driftwalk.likelihood.law.found import LawFound
 from driftwalk.likelihood.law.modes import Modes, unless_broken
-from driftwalk.likelihood.law.opening import Opening, is_kept
-from driftwalk.likelihood.law.trial import Trial
+from driftwalk.likelihood.law.score_tests import Trial
 from driftwalk.likelihood.newton import (
     FROM_ANOTHER,
     FROM_NEAR,
@@ -33,7 +33,7 @@ from driftwalk.likelihood.newton import (
     Prior,
     Weights,
 )
-from driftwalk.schema.law_words import LEAST_EVIDENCE, OPENED_SIGMAS
+from driftwalk.schema.answers.law_words import LEAST_EVIDENCE, OPENED_SIGMAS
 
 DOUBTED_CHI_SQUARED: Final = 30.0
 """The paper's law is in doubt when the numbers of a floating body are so far from its own,"""

@@ -16,7 +16,7 @@ from driftwalk.likelihood.intervals import fitted_intervals
 from driftwalk.likelihood.result import fitted_flow, require_fit
 from driftwalk.likelihood.wall import MARGIN
 from driftwalk.schema import FLAGS, body_track
-from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.answers.fit_facts import fit_facts
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -29,7 +29,7 @@ from driftwalk.page.sections.map import map_section, region_part
 from driftwalk.page.sections.recording import Noise, recording_sections
 from driftwalk.page.words import count, quantity, with_interval
 from driftwalk.plot.parts.labels import interval_of
-from driftwalk.schema.facts import sentences
+from driftwalk.schema.answers.fit_facts import sentences
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -26,10 +26,10 @@ from driftwalk.page.sections.law import law_sections
 from driftwalk.page.sections.recording import Noise, recording_sections
 from driftwalk.page.words import count, percent, quantity, with_interval
 from driftwalk.plot.parts.labels import interval_of
-from driftwalk.schema.answer import NOT_DETERMINED
-from driftwalk.schema.calibration_facts import facts_of
-from driftwalk.schema.facts import is_open, sentences
-from driftwalk.schema.law_words import LINEAR_DRAG_ALONE
+from driftwalk.schema.answers.answer import NOT_DETERMINED
+from driftwalk.schema.answers.calibration_facts import facts_of
+from driftwalk.schema.answers.fit_facts import is_open, sentences
+from driftwalk.schema.answers.law_words import LINEAR_DRAG_ALONE
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,9 +9,9 @@ import numpy as np
 
 from driftwalk.page.parts import Section, figure, section, value_of
 from driftwalk.page.words import percent
-from driftwalk.schema.compared_laws import compared_laws
-from driftwalk.schema.facts import fit_facts
-from driftwalk.schema.law_words import (
+from driftwalk.schema.answers.compared_laws import compared_laws
+from driftwalk.schema.answers.fit_facts import fit_facts
+from driftwalk.schema.answers.law_words import (
     MEMORY_SIGMAS,
     OPENED_SIGMAS,
     LawNumber,

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Any
 
-from driftwalk.core.json_text import json_value
+from driftwalk.core.text.json_text import json_value
 from driftwalk.page.parts import Section, section
-from driftwalk.schema.citation import bibtex, citation
+from driftwalk.schema.answers.citation import bibtex, citation
 
 
 def manifest_section(manifest: Mapping[str, Any]) -> Section:

@@ -10,9 +10,9 @@ import numpy as np
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.raw import Extra, RawBody, RawRecording, ReadOptions
 from driftwalk.schema import body_names, check_trajectory
-from driftwalk.schema.contents import check_contents
 from driftwalk.schema.kinds import KINDS
-from driftwalk.schema.netcdf import MAGIC, kind_of, open_netcdf
+from driftwalk.schema.stores.contents import check_contents
+from driftwalk.schema.stores.netcdf import MAGIC, kind_of, open_netcdf
 from driftwalk.schema.trajectory import POSE
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from driftwalk.record.stores.npz import ZIP
 from driftwalk.record.tables.choose import the_one_that_fits
 from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.tables.sheet import SheetSource
-from driftwalk.schema.netcdf import refuse_huge
+from driftwalk.schema.stores.netcdf import refuse_huge
 
 if TYPE_CHECKING:
     from openpyxl import Workbook

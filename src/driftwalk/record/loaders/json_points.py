@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from driftwalk.core.bounded import MIB
 from driftwalk.core.errors import FormatError
-from driftwalk.core.json_text import MOST_BYTES, parse_json
+from driftwalk.core.files.bounded import MIB
+from driftwalk.core.text.json_text import MOST_BYTES, parse_json
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.text import open_binary
 

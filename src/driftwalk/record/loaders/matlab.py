@@ -11,7 +11,7 @@ from driftwalk.record.stores.matlab import matlab_variables_of
 from driftwalk.record.tables.choose import the_one_that_fits
 from driftwalk.record.tables.matlab import matlab_tables, only_matlab
 from driftwalk.record.tables.rows import recording_of
-from driftwalk.schema.matlab import HDF5_BASED, OLD
+from driftwalk.schema.stores.matlab import HDF5_BASED, OLD
 
 
 class MatlabLoader:

@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError
+from driftwalk.record.cleaning.stacked import order_in_frame, split_bodies
 from driftwalk.record.head import first_lines
 from driftwalk.record.raw import Array, RawRecording, ReadOptions
-from driftwalk.record.stacked import order_in_frame, split_bodies
 from driftwalk.record.text import lines_of, open_binary
 
 # Number of arguments of $PARTICLE to the places of image x, y, world x, y, orientation.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from driftwalk.record.cleaning.stacked import split_bodies
 from driftwalk.record.head import first_lines, read_header
 from driftwalk.record.layout import TableLayout
 from driftwalk.record.raw import RawBody, RawRecording, ReadOptions
-from driftwalk.record.stacked import split_bodies
 from driftwalk.record.text import read_table
 
 

@@ -12,7 +12,7 @@ from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.head import detect_delimiter, first_lines
 from driftwalk.record.stores.hdf5 import names_in
 from driftwalk.record.stores.npz import ZIP, members
-from driftwalk.schema.netcdf import HDF5
+from driftwalk.schema.stores.netcdf import HDF5
 
 HEADER_ROWS: Final = 4
 MOST_NAMES: Final = 6

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError, reason_of
 from driftwalk.record.stores.hdf5 import Hdf5Contents, opened_hdf5, text_of
-from driftwalk.schema.matlab import HDF5_BASED, OLD, read_old, refuse_many
+from driftwalk.schema.stores.matlab import HDF5_BASED, OLD, read_old, refuse_many
 
 _CLASS: Final = "MATLAB_class"
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.schema.netcdf import refuse_huge
+from driftwalk.schema.stores.netcdf import refuse_huge
 
 ZIP: Final = b"PK\x03\x04"
 _NPY: Final = ".npy"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from driftwalk.core.argument_text import argument_text
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.text.argument_text import argument_text
 from driftwalk.record.pose.listed import listed
 from driftwalk.record.raw import ReadOptions
 from driftwalk.record.tables.rows import columns_of

@@ -13,8 +13,8 @@ from driftwalk.motion import MotionModel, known_values
 from driftwalk.schema import Parameter
 from driftwalk.viewer.play.bodies import MovingBodies
 from driftwalk.viewer.play.motion import INTERVAL_S, MotionWindow, beside
-from driftwalk.viewer.play.moving import Playground
 from driftwalk.viewer.play.playground import ANGLE_DIGITS, POSITION_DIGITS, flow_arrows
+from driftwalk.viewer.play.playground_base import Playground
 from driftwalk.viewer.play.settings import SPEED, Knob
 from driftwalk.viewer.shell import page_frame
 

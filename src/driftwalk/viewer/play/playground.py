@@ -14,7 +14,7 @@ import numpy.typing as npt
 from driftwalk.assembly import LiveTank
 from driftwalk.page import encode_array
 from driftwalk.viewer.play.motion import MotionWindow, beside
-from driftwalk.viewer.play.moving import Playground
+from driftwalk.viewer.play.playground_base import Playground
 from driftwalk.viewer.play.settings import controls_section, knobs_for, most_blocks_in, values_of
 from driftwalk.viewer.play.stream import frame_line
 from driftwalk.viewer.shell import page_frame

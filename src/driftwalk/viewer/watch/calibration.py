@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import DriftwalkError
-from driftwalk.core.run_layout import run_file
+from driftwalk.core.files.run_layout import run_file
 from driftwalk.core.run_stages import CALIBRATION_STAGES, MORE, share_of_map, share_of_windows
 from driftwalk.page import bootstrap_section, encode_array, map_section, profile_sections
 from driftwalk.schema import Parameter

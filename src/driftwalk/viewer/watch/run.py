@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import DriftwalkError, InputError, RunDirectoryError
-from driftwalk.core.file_names import path_inside, text_of_name
+from driftwalk.core.files.file_names import path_inside, text_of_name
+from driftwalk.core.files.run_layout import MANIFEST_FILE, RECORD_FILE, state_of
+from driftwalk.core.files.shards import read_specification
 from driftwalk.core.provenance import read_manifest, refuse_other_version
-from driftwalk.core.run_layout import MANIFEST_FILE, RECORD_FILE, state_of
 from driftwalk.core.run_stages import tell_nobody
-from driftwalk.core.shards import read_specification
 from driftwalk.viewer.hub import Content, Publish, Source
 from driftwalk.viewer.shell import page_frame
 from driftwalk.viewer.watch.running import NO_CELL, RunningOther

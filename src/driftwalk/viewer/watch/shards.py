@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from driftwalk.core.errors import DriftwalkError
-from driftwalk.core.file_names import path_inside
-from driftwalk.core.run_layout import RECORD_FILE, SHARD_FOLDER, run_file
-from driftwalk.core.shards import (
+from driftwalk.core.files.file_names import path_inside
+from driftwalk.core.files.run_layout import RECORD_FILE, SHARD_FOLDER, run_file
+from driftwalk.core.files.shards import (
     SHARD_SUFFIX,
     SPECIFICATION_FILE,
     Arrays,

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from driftwalk.calibration.estimation.descend import Descended, drawn_settings
 from driftwalk.calibration.estimation.emulator import fit_emulator
+from driftwalk.calibration.estimation.gauss_newton import Descended, drawn_settings
 from driftwalk.calibration.estimation.modes import Modes, find_modes
 from driftwalk.calibration.estimation.posterior import DRAWS, Posterior, sample_posterior
 

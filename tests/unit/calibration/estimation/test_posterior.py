@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from scipy.stats import truncnorm
 
-from driftwalk.calibration.estimation.descend import drawn_settings, rounded
 from driftwalk.calibration.estimation.emulator import fit_emulator
+from driftwalk.calibration.estimation.gauss_newton import drawn_settings, rounded
 from driftwalk.calibration.estimation.posterior import DRAWS, Posterior, sample_posterior
 
 SLOPES = np.array([[1.0, 0.3], [0.2, 1.0], [0.5, 0.5], [0.4, -0.3]])

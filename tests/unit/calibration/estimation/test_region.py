@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import gammainc
 
-from driftwalk.calibration.estimation.descend import rounded
+from driftwalk.calibration.estimation.gauss_newton import rounded
 from driftwalk.calibration.estimation.region import (
     NARROWEST,
     SPREAD,

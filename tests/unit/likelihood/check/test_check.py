@@ -13,7 +13,7 @@ import driftwalk as dw
 from driftwalk.core.errors import InputError
 from driftwalk.model import apply_overrides
 from driftwalk.schema import build_trajectory
-from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.answers.fit_facts import fit_facts
 
 CRITERIA = {
     *("autocorrelation", "tails", "outliers", "place", "time and place", "flow strength"),

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from driftwalk.likelihood.law.trial import find_pulses
+from driftwalk.likelihood.law.score_tests import find_pulses
 
 
 def spectrum_of(time: np.ndarray, products: np.ndarray) -> Any:

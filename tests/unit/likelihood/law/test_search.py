@@ -21,8 +21,8 @@ from driftwalk.likelihood.law.assumptions import assumptions_of
 from driftwalk.likelihood.law.held_out import LAWS
 from driftwalk.likelihood.result import _log_drag_std
 from driftwalk.model import Study, apply_overrides
+from driftwalk.schema.answers.fit_facts import fit_facts, fitted_value
 from driftwalk.schema.check import check_dataset
-from driftwalk.schema.facts import fit_facts, fitted_value
 
 SECONDS = 300.0
 FALSE_ALARM = "an interval of 99.9 % misses once in a thousand; seeds are fixed"

@@ -13,7 +13,7 @@ from driftwalk.likelihood.recover import one as recover_one
 from driftwalk.likelihood.recover.one import Truth, simulated_recordings
 from driftwalk.model import apply_overrides
 from driftwalk.model.recover import true_time_step_s
-from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.answers.fit_facts import fit_facts
 
 
 @pytest.fixture(scope="module")

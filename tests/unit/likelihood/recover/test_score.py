@@ -12,7 +12,7 @@ from fit_worlds import DRAG, FORCE_N, NOISE_M, coarse_study, recording
 import driftwalk as dw
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.recover.score import block_flow
-from driftwalk.schema.facts import fit_facts
+from driftwalk.schema.answers.fit_facts import fit_facts
 
 R, SIDE = 0.15, 0.03
 

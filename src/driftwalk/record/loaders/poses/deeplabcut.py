@@ -28,7 +28,7 @@ from driftwalk.record.recognise.marks import Marks
 from driftwalk.record.stores.hdf5 import names_in, opened_hdf5
 from driftwalk.record.stores.pandas_frame import frame_in
 from driftwalk.record.text import header_rows, read_table
-from driftwalk.schema.netcdf import HDF5, file_start
+from driftwalk.schema.stores.netcdf import HDF5, file_start
 
 KEYS: Final = ("df_with_missing", "tracks")
 """Names under which DeepLabCut stores its table."""

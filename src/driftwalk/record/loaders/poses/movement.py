@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError
-from driftwalk.core.json_text import parse_json
+from driftwalk.core.text.json_text import parse_json
 from driftwalk.record.pose.keypoints import Confidence, Point, Poses, bodies_of, choose_keypoints
 from driftwalk.record.raw import LENGTH_UNITS, Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.recognise.marks import Marks
-from driftwalk.schema.netcdf import MAGIC, open_netcdf, text_attribute
+from driftwalk.schema.stores.netcdf import MAGIC, open_netcdf, text_attribute
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError
-from driftwalk.core.json_text import parse_json
+from driftwalk.core.text.json_text import parse_json
 from driftwalk.record.pose.keypoints import Confidence, Point, Poses, bodies_of, choose_keypoints
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.recognise.marks import Marks

@@ -15,18 +15,18 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.bounded import MIB, read_bounded
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.json_text import parse_json
+from driftwalk.core.files.bounded import MIB, read_bounded
+from driftwalk.core.text.json_text import parse_json
+from driftwalk.record.cleaning.stacked import number_codes, split_bodies
 from driftwalk.record.head import first_row
 from driftwalk.record.layout import TableLayout
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.recognise.marks import Marks
-from driftwalk.record.stacked import number_codes, split_bodies
 from driftwalk.record.stores.hdf5 import names_in, opened_hdf5
 from driftwalk.record.stores.plain_pickle import PickledArray, unpickle
 from driftwalk.record.text import read_table
-from driftwalk.schema.netcdf import HDF5, file_start
+from driftwalk.schema.stores.netcdf import HDF5, file_start
 
 NPY: Final = b"\x93NUMPY"
 TABLE: Final = "trajectories.csv"

@@ -25,7 +25,7 @@ from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.recognise.marks import Marks
 from driftwalk.record.stores.npz import ZIP, members, opened_npz
 from driftwalk.record.text import read_table
-from driftwalk.schema.netcdf import file_start
+from driftwalk.schema.stores.netcdf import file_start
 
 CENTRES: Final = ("wcentroid", "centroid", "pcentroid", "head")
 """Points that TRex knows of an individual, the first that a file has is the body."""

@@ -1,0 +1,64 @@
+"""How far estimates are from the truth: recordings are simulated at the draws and estimated alike.
+
+The draws take the emulator for exact, its covariance for the same everywhere, and the summaries for
+normal. Estimates of simulated recordings show what these leave out: a bias, and a scatter that is
+larger than the draws say (a parametric bootstrap; Efron and Tibshirani, An Introduction to the
+Bootstrap (1993), chapter 10).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.calibration.estimation.gauss_newton import rounded
+from driftwalk.calibration.estimation.posterior import REACH, Posterior
+
+Floats = npt.NDArray[np.float64]
+
+FEWEST: Final = 40
+"""Recordings from which a bias and a scatter are taken."""
+
+
+class Repeated(NamedTuple):
+    """Estimates of simulated recordings of the model."""
+
+    misfits: Floats
+    """Of each at the setting that fits it best, shape (recordings,)."""
+    bias: Floats
+    """Mean of estimate less truth, shape (parameters,)."""
+    spread: Floats
+    """Factor by which the draws are too narrow, from 1 on, shape (parameters,)."""
+
+
+def repeat_estimates(
+    simulate: Callable[[Floats], Floats], posterior: Posterior, count: int
+) -> Repeated:
+    """Simulate recordings at draws and estimate each as the recording was.
+
+    Parameters
+    ----------
+    simulate : callable
+        Settings in the unit cube (n, parameters) to summaries (n, summaries).
+    posterior : Posterior
+        The draws, and the emulator by which recordings are estimated.
+    count : int
+        Recordings.
+    """
+    draws, emulator = posterior.draws, posterior.emulator
+    every = np.linspace(0, len(draws) - 1, min(count, len(draws))).round().astype(np.int64)
+    chosen = rounded(draws[every])
+    found = [
+        emulator.solve(one, reach=REACH, start=setting)
+        for one, setting in zip(simulate(chosen), chosen, strict=True)
+    ]
+    misfits = np.array([one.misfit for one in found])
+    if len(found) < FEWEST:
+        none = np.zeros(draws.shape[1])
+        return Repeated(misfits, none, none + emulator.widening)
+    errors = np.array([one.setting for one in found]) - chosen
+    spread = errors.std(axis=0) / draws.std(axis=0)
+    return Repeated(misfits, errors.mean(axis=0), np.maximum(spread, 1.0))

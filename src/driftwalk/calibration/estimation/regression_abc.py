@@ -1,0 +1,146 @@
+"""The part of the ranges in which a recording's parameters lie: from the widest box inwards.
+
+Settings are drawn from a box and simulated, and their parameters are regressed on their summaries,
+the simulations near the recording counting most. The parameters that the regression gives the
+recording, and its errors on simulations that it has not used, make the next box. Nothing is
+minimised, so there is no local minimum to end in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.calibration.estimation.emulator import CONSTANT
+from driftwalk.calibration.estimation.gauss_newton import rounded
+from driftwalk.core.errors import InputError
+
+Floats = npt.NDArray[np.float64]
+Order = Callable[[Floats], Floats]
+Simulate = Callable[[Floats], Floats]
+"""Settings in the unit cube (n, parameters) to summaries (n, summaries)."""
+
+SIMULATIONS: Final = 256
+MOST_ROUNDS: Final = 6
+WIDE_ERRORS: Final = 2.5
+"""The next box ends so many errors from its centre."""
+NARROW: Final = 0.05
+"""Errors at which a box is small enough for `descend`, in parts of the ranges."""
+LOST: Final = 0.2
+"""A regression with larger errors than this has learnt next to nothing: a uniform one has 0.29."""
+RIDGES: Final = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
+BOUNDED: Final = 2.0
+"""Summaries farther from the usual than some of these standard deviations count as that far."""
+
+
+class Box(NamedTuple):
+    """Where the parameters lie."""
+
+    centre: Floats
+    """In the unit cube, shape (parameters,)."""
+    error: Floats
+    """Standard error of the centre, in parts of the ranges."""
+
+    @property
+    def found(self) -> bool:
+        """Whether the summaries say where, for most parameters."""
+        return bool(np.median(self.error) < LOST)
+
+
+def approach(
+    simulate: Simulate, recorded: Floats, parameters: int, *, order: Order, seed: int
+) -> Box:
+    """Return the box in which the parameters of a recording lie.
+
+    Parameters
+    ----------
+    simulate : callable
+        Summaries of simulations.
+    recorded : ndarray, shape (summaries,)
+        Summaries of the recording.
+    parameters : int
+        Dimensions of the cube.
+    order : callable
+        Puts states of the model that could change places in order: a regression on both would end
+        between them.
+    seed : int
+        Of the settings that are drawn.
+
+    Raises
+    ------
+    InputError
+        When no summary varies over the whole cube.
+
+    Examples
+    --------
+    >>> def simulate(settings):
+    ...     return np.column_stack([settings[:, 0] ** 2, settings[:, 0] + settings[:, 1]])
+    >>> box = approach(simulate, np.array([0.25, 1.2]), 2, order=np.asarray, seed=1)
+    >>> box.centre.round(2).tolist()
+    [0.5, 0.7]
+    """
+    from scipy.stats import qmc
+
+    low, high = np.zeros(parameters), np.ones(parameters)
+    box = Box(0.5 * (low + high), np.full(parameters, np.sqrt(1.0 / 12.0)))
+    for number in range(MOST_ROUNDS):
+        drawn = qmc.Sobol(parameters, seed=seed + number).random(SIMULATIONS)
+        settings = order(rounded(low + (high - low) * drawn))
+        summaries = simulate(settings)
+        _require_change(summaries)
+        before, box = box, _regressed(settings, summaries, recorded)
+        if box.error.max() < NARROW or (number and not box.found):
+            break
+        if number and (box.error > 0.9 * before.error).all():
+            break
+        reach = WIDE_ERRORS * box.error
+        low = np.clip(box.centre - reach, 0.0, 1.0 - NARROW)
+        high = np.clip(box.centre + reach, low + 0.2 * NARROW, 1.0)
+    return box
+
+
+def _require_change(summaries: Floats) -> None:
+    """Refuse a model that moves in the same way whatever its parameters and random numbers are."""
+    varies = np.ptp(summaries, axis=0) > CONSTANT * (np.abs(summaries).max(axis=0) + CONSTANT)
+    if not varies.any():
+        raise InputError(
+            "the model moves in the same way at all settings of its parameters: check that it uses "
+            "them, and its ranges"
+        )
+
+
+def _regressed(settings: Floats, summaries: Floats, recorded: Floats) -> Box:
+    """Return the parameters that a regression on summaries gives a recording, and its errors.
+
+    Of several ridges each parameter has that of the smallest error; errors are those of leaving
+    one simulation out.
+    """
+    spread = summaries.std(axis=0)
+    used = spread > 0.0
+    middle, scale = np.median(summaries, axis=0)[used], spread[used]
+    known, asked = (
+        BOUNDED * np.tanh((one[..., used] - middle) / (BOUNDED * scale))
+        for one in (summaries, recorded)
+    )
+    apart = ((known - asked) ** 2).mean(axis=1)
+    weight = np.exp(-apart / max(float(np.median(apart)), 1e-300))
+    table = np.column_stack([np.ones(len(known)), known])
+    row = np.concatenate([[1.0], asked])
+    gram, target = (table.T * weight) @ table, (table.T * weight) @ settings
+    errors, answers = [], []
+    for ridge in RIDGES:
+        penalty = np.full(row.size, ridge)
+        penalty[0] = 1e-9
+        inverse = np.linalg.inv(gram + np.diag(penalty))
+        coefficients = inverse @ target
+        own = np.einsum("ij,jk,ik->i", table, inverse, table) * weight
+        left = (settings - table @ coefficients) / (1.0 - np.minimum(own, 0.95))[:, None]
+        errors.append((weight[:, None] * left**2).sum(axis=0) / weight.sum())
+        answers.append(row @ coefficients)
+    best = np.argmin(errors, axis=0)
+    each = np.arange(settings.shape[1])
+    centre = np.clip(np.array(answers)[best, each], 0.0, 1.0)
+    return Box(centre, np.sqrt(np.array(errors)[best, each]))

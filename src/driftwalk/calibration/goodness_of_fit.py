@@ -1,0 +1,138 @@
+"""How good the fit is, apart from how well the parameters are known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.calibration.grid.bootstrap_region import Bootstrap, recordings_at, simulated_steps
+from driftwalk.calibration.grid.grid_map import Map, Progress, run_map
+from driftwalk.calibration.grid.grid_refinement import first_window, locate
+from driftwalk.calibration.grid.map_stores import Mapper
+from driftwalk.calibration.problem import Problem, limits_of
+from driftwalk.comparison.statistic import distances_among
+from driftwalk.schema.answers.calibration_facts import is_explained
+
+FAR_ABOVE_FLOOR = 2.0
+"""A distance more than this many noise floors is called far above it."""
+FLOOR_REPLICATES = 8
+VALIDATION_REPLICATES = 16
+
+
+def noise_floor_at(problem: Problem, point: Sequence[float]) -> float:
+    """Return the median distance between two simulated recordings of the same parameters."""
+    steps = simulated_steps(problem, point, stage="floor", replicates=FLOOR_REPLICATES)
+    among = distances_among(problem.statistic, steps, threads=problem.like.threads)
+    return float(np.median(among))
+
+
+class Quality(NamedTuple):
+    """Distance at the optimum against what chance alone gives."""
+
+    distance: float
+    """Mean KS distance of simulated recordings at the optimum to the real one."""
+    standard_error: float
+    floor: float
+    """Median KS distance between two simulated recordings of these parameters."""
+    floor_upper: float
+    """Its 95 % quantile."""
+
+    @property
+    def stretch(self) -> float:
+        """Factor by which errors are widened for what the model leaves unexplained, >= 1."""
+        return max(self.distance / self.floor, 1.0)
+
+    @property
+    def explained(self) -> bool:
+        """Whether the distance is within reach of the floor."""
+        return is_explained(self.distance, self.floor, self.floor_upper, FAR_ABOVE_FLOOR)
+
+
+def quality_of_fit(bootstrap: Bootstrap) -> Quality:
+    """Return the quality of fit from the recordings that the bootstrap simulated."""
+    to_recording = bootstrap.to_recording
+    return Quality(
+        float(to_recording.mean()),
+        float(to_recording.std(ddof=1) / np.sqrt(to_recording.size)),
+        float(np.median(bootstrap.to_each_other)),
+        float(np.quantile(bootstrap.to_each_other, 0.95)),
+    )
+
+
+class Halves(NamedTuple):
+    """A calibration on the first half of a recording, judged on the second."""
+
+    point: tuple[float, ...]
+    """Coordinates of the optimum on the first half."""
+    distance: float
+    """Mean KS distance on the second half."""
+    floor: float
+    """Noise floor of recordings as long as the second half."""
+
+
+def validate_on_halves(
+    whole: Problem,
+    coarse: Map,
+    first: Problem,
+    second: Problem,
+    *,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> Halves:
+    """Calibrate on the first half of a recording and measure the distance on the second.
+
+    The search is the usual one with a single replicate per setting on the coarse map, and ends
+    with the window that locates the valley: enough for an optimum, and a small part of the main
+    calibration's time. Settings of the coarse map that the triangle inequality excludes are not
+    simulated again: see `could_be_best`.
+
+    Parameters
+    ----------
+    whole : Problem
+        The recording.
+    coarse : Map
+        Its coarse map.
+    first, second : Problem
+        The halves; `second` has the flow of `first`.
+    executor : concurrent.futures.Executor, optional
+        Computes the maps' work units elsewhere, with one thread each.
+    progress : callable, optional
+        Called after every work unit with the settings of its map that are done, and all of them.
+    """
+    map_of_half = run_map(
+        first,
+        coarse.axes,
+        stage="first_half",
+        replicates=1,
+        only=could_be_best(whole, coarse, first),
+        executor=executor,
+        progress=progress,
+    )
+    lowest = map_of_half.point(map_of_half.cell_of_minimum())
+    window = first_window(map_of_half, noise_floor_at(first, lowest))
+    maps = Mapper(first, "first_half_refined", executor=executor, progress=progress)
+    optimum = locate(maps, window, limits_of(first)).landscape.optimum
+    recordings, distances = recordings_at(
+        second, optimum, stage="second_half", count=VALIDATION_REPLICATES
+    )
+    among = distances_among(second.statistic, recordings, threads=second.like.threads)
+    return Halves(optimum.point, float(distances.mean()), float(np.median(among)))
+
+
+def could_be_best(whole: Problem, coarse: Map, part: Problem) -> npt.NDArray[np.bool_]:
+    """Return which settings of a coarse map could be nearest to a part of the recording.
+
+    With d for the distance of the part from the whole, D of the part to a setting is within d of
+    that of the whole. So a setting that is more than 2 d farther from the whole than the best one
+    is farther from the part, too. Chance adds to that: a floor of the part for each of the two.
+    """
+    between = whole.statistic.matrix(
+        part.reference.table, whole.reference.table, threads=whole.like.threads
+    )
+    lowest = coarse.point(coarse.cell_of_minimum())
+    margin = 2.0 * float(between[0, 0]) + 2.0 * noise_floor_at(part, lowest)
+    return np.asarray(coarse.mean <= coarse.mean.min() + margin)

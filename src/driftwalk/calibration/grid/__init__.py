@@ -1,0 +1,1 @@
+"""Calibration on a grid: KS distances, refinement, energy score, bootstrap region."""

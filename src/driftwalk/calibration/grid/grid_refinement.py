@@ -1,0 +1,304 @@
+"""The refined map: windows that close in on the valley until they resolve it.
+
+A window is a grid of the same few nodes, whatever its extent. The settings that the recording does
+not exclude, those less than `PLAUSIBLE` floors above the minimum, say where the next window lies:
+smaller where they fill a small part of this one, wider or moved where they reach its end. So the
+last one has steps that suit the valley along each axis, and a bandwidth narrow against it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.calibration.grid.energy_score import Landscape, landscape_of
+from driftwalk.calibration.grid.grid_map import Map
+from driftwalk.calibration.grid.surface import at_settings
+from driftwalk.calibration.problem import Axes, Floats
+
+Box = tuple[tuple[float, float], ...]
+"""Both ends along each parameter, in its coordinate."""
+
+LOCATING: Final[dict[int, int]] = {1: 24, 2: 12}
+"""Intervals along an axis of a window that locates the valley, by the number of parameters."""
+MOST: Final[dict[int, int]] = {1: 96, 2: 18}
+"""Intervals along an axis of the refined map, at most."""
+ABOUT: Final = 1.3
+"""A step may be larger than it should be by this factor."""
+MOST_WINDOWS: Final = 6
+"""Windows that locate the valley, at most."""
+LOCATING_REPLICATES: Final = 2
+BANDWIDTH_STEPS: Final = 2.0
+"""Bandwidth of the surface in steps, at least."""
+BANDWIDTH_SHARE: Final = 0.125
+"""Bandwidth of the surface as a share of the window."""
+PLAUSIBLE: Final = 1.25
+"""Settings less than this many floors above the minimum are plausible."""
+PADDING: Final = 0.2
+"""A window goes beyond the plausible settings by this share of their extent on each side."""
+SMALLER: Final = 0.6
+"""A window is replaced by one that is smaller by this factor along an axis, or more."""
+BEATEN: Final = 1e-3
+"""Share of maps in which chance alone makes a setting nearer than the optimum."""
+RACED: Final = 0.8
+"""Settings less than this many floors above the minimum get all replicates."""
+NICE: Final = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+
+
+class Maps(Protocol):
+    """The simulation of the windows of a refinement."""
+
+    def full(self, axes: Axes, replicates: int) -> Map:
+        """Simulate every setting of a grid."""
+
+    def more(self, found: Map, chosen: npt.NDArray[np.bool_], replicates: int) -> Map:
+        """Give some settings of a map more replicates."""
+
+
+class Refined(NamedTuple):
+    """A refined map with its surface."""
+
+    map: Map
+    landscape: Landscape
+    bandwidth: tuple[float, ...]
+    window: Box
+    plausible: Box
+    """Extent of the plausible settings."""
+
+
+def first_window(coarse: Map, margin: float) -> Box:
+    """Return the extent of the coarse cells that could hold the optimum, and one around.
+
+    Parameters
+    ----------
+    coarse : Map
+        The first pass.
+    margin : float
+        Cells connected with the minimum whose distance is within `margin` of it are covered: the
+        noise floor of the distance.
+    """
+    from scipy.ndimage import label
+
+    cell = coarse.cell_of_minimum()
+    labels, _ = label(coarse.mean <= coarse.mean[cell] + margin)
+    inside = np.argwhere(labels == labels[cell])
+    return tuple(
+        (float(axis[max(low - 1, 0)]), float(axis[min(high + 1, axis.size - 1)]))
+        for axis, low, high in zip(coarse.axes, inside.min(axis=0), inside.max(axis=0), strict=True)
+    )
+
+
+def locate(maps: Maps, window: Box, limits: Box) -> Refined:
+    """Close in on the valley, from a window that holds part of it.
+
+    Parameters
+    ----------
+    maps : Maps
+        Simulates.
+    window : Box
+        Where to begin.
+    limits : Box
+        Ends of the search.
+
+    Returns
+    -------
+    Refined
+        The last window: its plausible settings fill most of it and end within it, or it cannot
+        become better.
+    """
+    seen = set()
+    for _ in range(MOST_WINDOWS):
+        axes = window_axes(window, limits, [LOCATING[len(window)]] * len(window))
+        found = refined(maps.full(axes, LOCATING_REPLICATES), window, limits)
+        seen.add(window)
+        following = next_window(found, limits)
+        if following in seen:
+            break
+        window = following
+    return found
+
+
+def refined(found: Map, window: Box, limits: Box) -> Refined:
+    """Return a map with its surface and the extent of its plausible settings."""
+    widths = tuple(
+        max(BANDWIDTH_STEPS * _step(axis), BANDWIDTH_SHARE * float(np.ptp(axis)))
+        for axis in found.axes
+    )
+    landscape = landscape_of(found, widths)
+    return Refined(found, landscape, widths, window, _plausible(landscape, limits))
+
+
+def _plausible(landscape: Landscape, limits: Box) -> Box:
+    """Return the extent of the plausible settings; infinite where they reach the end of a window.
+
+    An end of the search is none of a window.
+    """
+    from scipy.ndimage import label
+
+    labels, _ = label(landscape.height <= PLAUSIBLE)
+    lowest = np.unravel_index(int(np.argmin(landscape.height)), landscape.height.shape)
+    inside = np.argwhere(labels == labels[lowest])
+    box = []
+    for axis, low, high, ends in zip(
+        landscape.smoother.axes, inside.min(axis=0), inside.max(axis=0), limits, strict=True
+    ):
+        slack = 1e-6 * float(np.ptp(axis))
+        cut = (
+            low == 0 and axis[0] - ends[0] > slack,
+            (high == axis.size - 1 and ends[1] - axis[-1] > slack),
+        )
+        box.append((-math.inf if cut[0] else axis[low], math.inf if cut[1] else axis[high]))
+    return tuple((float(low), float(high)) for low, high in box)
+
+
+def beating_cell(found: Map, landscape: Landscape) -> tuple[int, ...] | None:
+    """Return the setting that is nearer than the optimum by more than chance; None without one.
+
+    Half of the smooth floor is taken off the distance of each. Chance is the scatter of the
+    replicates of the plausible settings; among all settings of a map without such a setting, one
+    is found in a share `BEATEN` of maps.
+    """
+    # Not scipy.stats, whose import takes half a second.
+    from scipy.special import ndtri
+
+    plausible = (at_settings(landscape.height) <= PLAUSIBLE) & (found.replicates > 1)
+    if not plausible.any():
+        return None
+    error = found.standard_error[plausible] * np.sqrt(found.replicates[plausible])
+    spread = float(np.sqrt(np.nanmean(error**2)))
+    score = found.mean - 0.5 * at_settings(landscape.floor)
+    lowest = landscape.optimum.distance - 0.5 * landscape.floor_at_optimum
+    better = (lowest - score) * np.sqrt(found.replicates)
+    best = np.unravel_index(int(np.argmax(better)), better.shape)
+    if better[best] <= -spread * ndtri(BEATEN / better.size):
+        return None
+    return tuple(int(index) for index in best)
+
+
+def next_window(found: Refined, limits: Box) -> Box:
+    """Return the window that follows one: itself where it resolves the valley."""
+    cell = beating_cell(found.map, found.landscape)
+    if cell is not None:
+        return _half_around(found.map.point(cell), found.map.axes)
+    following = []
+    for axis, (low, high), ends, window in zip(
+        found.map.axes, found.plausible, limits, found.window, strict=True
+    ):
+        step, extent = _step(axis), float(np.ptp(axis))
+        cut = math.isinf(low), math.isinf(high)
+        first, last = (axis[0] if cut[0] else low), (axis[-1] if cut[1] else high)
+        pad = max(PADDING * (last - first), step)
+        first = max(first - (max(pad, 0.5 * extent) if cut[0] else pad), ends[0])
+        last = min(last + (max(pad, 0.5 * extent) if cut[1] else pad), ends[1])
+        if not any(cut) and last - first > SMALLER * extent:
+            following.append(window)
+        else:
+            following.append((float(first), float(last)))
+    return tuple(following)
+
+
+def _half_around(point: Sequence[float], axes: Axes) -> Box:
+    """Return a window of half the extent around a point, within a grid."""
+    box = []
+    for value, axis in zip(point, axes, strict=True):
+        quarter = 0.25 * float(np.ptp(axis))
+        box.append((max(value - quarter, float(axis[0])), min(value + quarter, float(axis[-1]))))
+    return tuple(box)
+
+
+def window_axes(window: Box, limits: Box, intervals: Sequence[float]) -> Axes:
+    """Return a grid over a window, of round numbers.
+
+    Examples
+    --------
+    >>> window_axes(((0.31, 0.52),), ((0.0, 2.0),), [4])[0].tolist()
+    [0.3, 0.35, 0.4, 0.45, 0.5, 0.55]
+    """
+    return tuple(
+        _axis(low, high, ends, count)
+        for (low, high), ends, count in zip(window, limits, intervals, strict=True)
+    )
+
+
+def _axis(low: float, high: float, limits: tuple[float, float], intervals: float) -> Floats:
+    if limits[1] <= limits[0]:
+        return np.array([limits[0]])
+    step = round_step((high - low) / intervals)
+    slack = 1e-6 * step
+    first, last = math.floor(low / step + 1e-6), math.ceil(high / step - 1e-6)
+    digits = max(12, 3 - math.floor(math.log10(step)))
+    values = np.round(step * np.arange(first, last + 1), digits)
+    inside = (values >= limits[0] - slack) & (values <= limits[1] + slack)
+    return np.asarray(values[inside])
+
+
+def round_step(step: float) -> float:
+    """Return the largest round number up to a step.
+
+    Examples
+    --------
+    >>> round_step(0.0173)
+    0.015
+    """
+    power = 10.0 ** math.floor(math.log10(step) + 1e-9)
+    return max(nice for nice in NICE if nice * power <= step * (1.0 + 1e-9)) * power
+
+
+def refine(
+    maps: Maps, located: Refined, limits: Box, steps: Sequence[float], wanted: int
+) -> Refined:
+    """Give the located window the replicates that are wanted, where the optimum could be.
+
+    Parameters
+    ----------
+    maps : Maps
+        Simulates.
+    located : Refined
+        The window; it is mapped again where its steps are too large.
+    limits : Box
+        Ends of the search.
+    steps : sequence of float
+        Steps along each axis, about, at most.
+    wanted : int
+        Replicates of the settings that could be the optimum; the others have two.
+    """
+    found = located
+    finer = _intervals(located, steps)
+    if finer is not None:
+        window = padded(located, limits)
+        axes = window_axes(window, limits, finer)
+        found = refined(maps.full(axes, LOCATING_REPLICATES), window, limits)
+    low = at_settings(found.landscape.height) <= RACED
+    return refined(maps.more(found.map, low, wanted), found.window, limits)
+
+
+def _intervals(located: Refined, steps: Sequence[float]) -> list[float] | None:
+    """Return how many intervals each axis should have; None where it has them."""
+    most = MOST[len(steps)]
+    wanted = []
+    for axis, step in zip(located.map.axes, steps, strict=True):
+        intervals = min(float(np.ptp(axis)) / step, most)
+        wanted.append(max(intervals, axis.size - 1))
+    enough = all(
+        ABOUT * (axis.size - 1) >= intervals
+        for axis, intervals in zip(located.map.axes, wanted, strict=True)
+    )
+    return None if enough else wanted
+
+
+def padded(found: Refined, limits: Box) -> Box:
+    """Return the extent of the plausible settings with some around."""
+    box = []
+    for axis, (low, high), ends in zip(found.map.axes, found.plausible, limits, strict=True):
+        first, last = (axis[at] if math.isinf(end) else end for at, end in ((0, low), (-1, high)))
+        pad = max(PADDING * (last - first), _step(axis))
+        box.append((float(max(first - pad, ends[0])), float(min(last + pad, ends[1]))))
+    return tuple(box)
+
+
+def _step(axis: Floats) -> float:
+    return float(axis[1] - axis[0]) if axis.size > 1 else 0.0

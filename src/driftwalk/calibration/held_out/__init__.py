@@ -1,0 +1,1 @@
+"""Motion models judged on held-out blocks of a recording."""

@@ -1,0 +1,144 @@
+"""The models that take part in a comparison: what each is given, and what of it is searched."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from driftwalk.calibration.evolution import recorded_ranges
+from driftwalk.calibration.held_out.baselines import HiddenMarkovWalk, ResampledSteps, runs_of
+from driftwalk.calibration.held_out.hidden_markov import fit_hidden_walk
+from driftwalk.calibration.held_out.recorded import RecordedMotion
+from driftwalk.comparison.aspects import block_of, interleaved
+from driftwalk.conditions import Conditions, unstated_warning
+from driftwalk.conditions.own_flow import flow_from_track
+from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.motion import (
+    BlockModel,
+    MotionModel,
+    ParticleModel,
+    motion_model,
+)
+from driftwalk.schema import Parameter, Track
+
+if TYPE_CHECKING:
+    from driftwalk.model import Study
+
+BLOCK: Final = "block"
+
+Chosen = str | MotionModel
+
+
+class Contestant(NamedTuple):
+    """A model that takes part in a comparison."""
+
+    model: MotionModel
+    like: Conditions
+    ranges: tuple[Parameter, ...]
+    """Of the search; none for a walk that was fitted by other means."""
+    numbers: int
+    """That are fitted."""
+    baseline: bool
+
+
+def made_models(
+    models: Sequence[Chosen], motion: RecordedMotion, study: Study
+) -> list[MotionModel]:
+    """Return the models, made of their names.
+
+    Raises
+    ------
+    ConfigurationError
+        When there is none, a name is unknown, or two models have the same name.
+    """
+    found = [_made(one, motion, study) for one in models]
+    names = [model.name for model in found]
+    if not names:
+        raise ConfigurationError("no motion model is given to compare")
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise ConfigurationError(f"a motion model is given twice: {twice[0]}")
+    return found
+
+
+def contestants(
+    models: Sequence[MotionModel], motion: RecordedMotion, study: Study
+) -> tuple[list[Contestant], list[str]]:
+    """Return the models with their conditions and ranges, and warnings.
+
+    Where the flow is not known, models that need one get that of the even blocks of time. Where
+    none can be extracted they are left out, with a warning, and so is a model that feels other
+    bodies where there are none.
+
+    Raises
+    ------
+    InputError
+        When no model is left.
+    """
+    found: list[Contestant] = []
+    warnings: list[str] = []
+    for model in models:
+        try:
+            found.append(_contestant(model, motion, study))
+        except InputError as error:
+            if len(models) == 1:
+                raise
+            what = "the block" if model.name == BLOCK else model.name
+            warnings.append(f"{what} is left out: {error}")
+    if not found:
+        raise InputError("; ".join(warnings))
+    unstated = unstated_warning(
+        study, about="block" if any(one.name == BLOCK for one in models) else "tank"
+    )
+    return found, warnings if unstated is None else [unstated, *warnings]
+
+
+def walks(motion: RecordedMotion) -> list[Contestant]:
+    """Return walks of the steps in the even blocks."""
+    (steps,), _ = interleaved([motion.steps], duration=motion.duration)
+    interval = motion.plan.short.step_interval
+    hidden = fit_hidden_walk(runs_of(steps, interval))
+    return [
+        Contestant(ResampledSteps(steps.points, interval), motion.like, (), 0, baseline=True),
+        Contestant(
+            HiddenMarkovWalk(hidden, interval), motion.like, (), hidden.parameters, baseline=True
+        ),
+    ]
+
+
+def _made(one: Chosen, motion: RecordedMotion, study: Study) -> MotionModel:
+    if one == BLOCK:
+        return BlockModel(study)
+    model = motion_model(one) if isinstance(one, str) else one
+    # Only the family leaves its distance from the wall to the recording.
+    if isinstance(model, ParticleModel) and not model.states_clearance:
+        return model.with_clearance(motion.clearance)
+    return model
+
+
+def _within_reach(parameter: Parameter, motion: RecordedMotion) -> Parameter:
+    """Return the range of a neighbour's push without what is too short to be felt.
+
+    Below a quarter of the usual distance e^-4 is left of a push, 2 %, so all settings are alike
+    there, and a search gets lost.
+    """
+    low = motion.usual_distance / 4.0
+    if parameter.name != "neighbour_range" or not parameter.low < low < parameter.high:
+        return parameter
+    return replace(parameter, low=low, step=0.0)
+
+
+def _contestant(model: MotionModel, motion: RecordedMotion, study: Study) -> Contestant:
+    ranges = model.parameters
+    if isinstance(model, ParticleModel):
+        model.require_others(motion.like)
+        ranges = recorded_ranges(ranges, motion.scales)
+        if model.feels_others:
+            ranges = tuple(_within_reach(one, motion) for one in ranges)
+    like = motion.like
+    if model.needs_flow and like.flow is None:
+        even = block_of(motion.track.time, motion.duration) % 2 == 0
+        track = Track(*(part[even] for part in motion.track))
+        like = replace(like, flow=flow_from_track(track, study))
+    return Contestant(model, like, ranges, len(ranges), baseline=False)

@@ -1,0 +1,109 @@
+"""One motion model on a recording: searched on the even blocks of time, judged on the odd ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.calibration.evolution import (
+    AspectObjective,
+    Budget,
+    search_minimum,
+)
+from driftwalk.calibration.held_out.candidates import Contestant
+from driftwalk.calibration.held_out.recorded import RecordedMotion
+from driftwalk.comparison.aspects import AspectReference
+from driftwalk.core.errors import InputError
+from driftwalk.motion.batches import no_numbers
+from driftwalk.motion.score import broken_worlds
+
+Floats = npt.NDArray[np.float64]
+Tell = Callable[[int, int], None]
+
+JUDGED: Final = 20
+"""Worlds by which the answer of a search is judged."""
+TRIED: Final = 8
+"""Settings at which a model is tried before it is searched."""
+
+
+class Judged(NamedTuple):
+    """A model's answer and how far it is from the recording."""
+
+    point: Floats
+    """In the unit cube of the ranges."""
+    trained: Floats
+    """Median distance from the even blocks in each aspect, shape (aspects,)."""
+    held: Floats
+    """The same from the odd blocks."""
+    score: float
+    """Mean of distance over floor in the odd blocks."""
+    without: Floats
+    """The same without each of the odd blocks, shape (blocks / 2,)."""
+    checks: Floats
+    """Facts that are not fitted, of each world, shape (worlds, checks)."""
+    ends: Floats
+    """Scores at the ends of the searches."""
+    evaluations: int
+
+
+def judge(
+    entry: Contestant, motion: RecordedMotion, *, budget: Budget, seed: int, tell: Tell | None
+) -> Judged:
+    """Search a model on the even blocks of a recording, and judge it on the odd ones."""
+    objective = even_blocks(entry, motion, seed)
+    if not entry.ranges:
+        return judge_setting(objective, motion, np.empty(0))
+    require_numbers(objective)
+    found = search_minimum(objective, len(entry.ranges), budget=budget, seed=seed, tell=tell)
+    judged = judge_setting(objective, motion, found.best)
+    return judged._replace(ends=found.ends, evaluations=found.evaluations)
+
+
+def even_blocks(entry: Contestant, motion: RecordedMotion, seed: int) -> AspectObjective:
+    """Return how far a model's settings are from the even blocks of a recording."""
+    return AspectObjective(entry.model, entry.ranges, entry.like, motion.plan, motion.fitted, seed)
+
+
+def judge_setting(objective: AspectObjective, motion: RecordedMotion, point: Floats) -> Judged:
+    """Judge a setting, in the unit cube, on the odd blocks of a recording."""
+    seen = objective.simulated(point[None], JUDGED, stage="judged")
+    aspects, broken = objective.aspects(seen), broken_worlds(seen.status)
+
+    def distances(reference: AspectReference) -> Floats:
+        apart = reference.distances(aspects, threads=objective.like.threads)
+        apart[broken] = 1.0
+        return apart
+
+    held = distances(motion.held)
+    return Judged(
+        point=point,
+        trained=np.median(distances(motion.fitted), axis=0),
+        held=np.median(held, axis=0),
+        score=float(motion.held.overall(held).mean()),
+        without=np.array(
+            [float(part.overall(distances(part)).mean()) for part in motion.without_each_block]
+        ),
+        checks=np.array([motion.checks(x, y) for x, y in zip(seen.x, seen.y, strict=True)]),
+        ends=np.empty(0),
+        evaluations=0,
+    )
+
+
+def require_numbers(objective: AspectObjective) -> None:
+    """Refuse a model that loses its numbers wherever it is tried: no search could mend that."""
+    from scipy.stats import qmc
+
+    tried = qmc.Sobol(len(objective.ranges), seed=objective.seed).random(TRIED)
+    seen = objective.simulated(tried, 1, stage="tried")
+    if broken_worlds(seen.status).all():
+        values = {name: float(column[0]) for name, column in objective.values(tried).items()}
+        raise InputError(no_numbers(objective.model.name, values))
+
+
+def without_error(without: Floats) -> float:
+    """Return the standard error of a mean from what is left without each block (jackknife)."""
+    count = without.size
+    return float(np.sqrt((count - 1) / count * ((without - without.mean()) ** 2).sum()))

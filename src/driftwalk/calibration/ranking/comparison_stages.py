@@ -1,0 +1,254 @@
+"""The two stages of a comparison of models: distances of all, then summaries of the closest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar, Final
+
+import numpy as np
+
+from driftwalk.calibration.estimation import Stores
+from driftwalk.calibration.estimation.model_evidence import most_settings, summarised
+from driftwalk.calibration.evolution import Budget
+from driftwalk.calibration.held_out.candidates import Contestant
+from driftwalk.calibration.held_out.held_out_score import Judged, judge, without_error
+from driftwalk.calibration.held_out.recorded import RecordedMotion
+from driftwalk.calibration.parallel_search import Together, is_ours, longest_first, sharing
+from driftwalk.calibration.ranking.evidence_ranking import Asked, Summarised, asked_models
+from driftwalk.core.files.shards import Arrays
+from driftwalk.core.processors import one_blas_thread
+from driftwalk.core.run_stages import Course, tell_nobody
+from driftwalk.sweep import MemoryStore, Store, WorkUnit, collect, grid, run_sweep
+
+Tell = Callable[[int, int, str], None]
+Finished = Callable[[str, float, float, int], None]
+"""Hears of a model that was judged: its name, its score, the standard error of that, and how many
+models there are."""
+
+USUAL_PART: Final = 4
+"""Searches by summaries simulate a quarter of what they may: most are given up after a few rounds,
+or find their end soon."""
+USUALLY_ASKED: Final = 3
+"""Models whose summaries are usually asked,"""
+SUMMARY_WORK: Final = 3.0
+"""each setting of which takes as long as so many of the first stage (5 minutes of the bundled
+recording): all blocks of time are simulated."""
+
+
+@dataclass(frozen=True, eq=False)
+class Searches:
+    """The function of the sweep: one model, searched and judged wherever it is sent."""
+
+    entries: Sequence[Contestant]
+    motion: RecordedMotion
+    seed: int
+    budget: Budget
+    within: Callable[[int, int], None] | None = None
+    """Called with the model and the settings done; with all of them when it is finished."""
+    linear_algebra: ClassVar[bool] = True
+    """Its results depend on numpy and scipy."""
+
+    def __call__(self, unit: WorkUnit) -> dict[str, np.ndarray]:
+        """Search and judge the model of a unit."""
+        index = unit.start
+
+        def say(done: int, _: int) -> None:
+            if self.within is not None:
+                self.within(index, done)
+
+        say(0, 0)
+        with one_blas_thread():
+            found = judge(
+                self.entries[index], self.motion, budget=self.budget, seed=self.seed, tell=say
+            )
+        say(self.costs()[index], 0)
+        most = max(len(entry.ranges) for entry in self.entries)
+        return _packed(found, most, self.budget.starts + 1)
+
+    def costs(self) -> list[int]:
+        """Return the settings that each model's search simulates at most."""
+        numbers = [len(entry.ranges) for entry in self.entries]
+        return [self.budget.evaluations(one) if one else 0 for one in numbers]
+
+    def fingerprint(self) -> dict[str, Any]:
+        """Return what determines the numbers of all models, for the store of a run."""
+        return {
+            "models": [entry.model.describe() for entry in self.entries],
+            "ranges": [[one.describe() for one in entry.ranges] for entry in self.entries],
+            "seed": self.seed,
+            "budget": vars(self.budget),
+            "aspects": list(self.motion.held.names),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Stages:
+    """The two stages, and how far they are together."""
+
+    work: Searches
+    worlds: int
+    """Recordings by which a misfit is judged; below 2 nobody is asked."""
+    stores: Stores | None
+    executor: Executor | None
+    """Elsewhere."""
+    tell: Tell
+    beside: Executor | None = None
+    """Threads of this process, where there is no executor."""
+    finished: Finished = tell_nobody
+    """Hears of each model that was searched and judged."""
+
+    def judged(self) -> list[Judged]:
+        """Judge every model, one work unit each."""
+        entries = self.work.entries
+        units = grid(model=np.arange(len(entries))).units(1)
+        kept = self._store("models", self.work.fingerprint())
+        kept = MemoryStore() if kept is None else kept
+        searched = self._searched_here if self.executor is None else self._searched_elsewhere
+        arrays = searched(units, kept, self._each_once(units, kept))
+        return [
+            _unpacked({name: values[index] for name, values in arrays.items()}, entry)
+            for index, entry in enumerate(entries)
+        ]
+
+    def summarised(self, judged: Sequence[Judged]) -> dict[int, Summarised]:
+        """Ask the summaries of those that tie, and of others while none of them gives them."""
+        asked = asked_models(self.work.entries, judged) if self.worlds > 1 else Asked((), 0)
+        found: dict[int, Summarised] = {}
+        for number, index in enumerate(asked.models):
+            if number >= asked.tied and any(one.usual for one in found.values()):
+                break
+            found[index] = self._matched(number, index, judged[index].point, max(asked.tied, 1))
+        return found
+
+    def finish(self) -> None:
+        """Say that all is done but the figures."""
+        self.course.begin("figures")
+
+    @cached_property
+    def course(self) -> Course:
+        """How far all stages are together."""
+        able = [one for one in self.work.entries if one.ranges and not one.baseline]
+        asks = self.worlds > 1 and len(able) > 1
+        usual = sorted(map(self._usual, able))[-USUALLY_ASKED:] if asks else []
+        parts = {"models": sum(self.work.costs()), "summaries": SUMMARY_WORK * sum(usual)}
+        return Course(self.tell, {**parts, "figures": 0.0})
+
+    def _each_once(self, units: Sequence[WorkUnit], kept: Store) -> Callable[[int, int], None]:
+        """Return what a sweep tells its progress, which hears of each finished model once."""
+        told: set[int] = set()
+
+        def look(_done: int, _total: int) -> None:
+            missing = {unit.start for unit in kept.missing(units)}
+            for unit in units:
+                index = unit.start
+                if index in missing or index in told:
+                    continue
+                told.add(index)
+                entry = self.work.entries[index]
+                arrays = {name: values[0] for name, values in kept.read(unit).items()}
+                one = _unpacked(arrays, entry)
+                std = without_error(one.without)
+                self.finished(entry.model.name, one.score, std, len(units))
+
+        return look
+
+    def _searched_here(
+        self, units: Sequence[WorkUnit], kept: Store, look: Callable[[int, int], None]
+    ) -> Arrays:
+        """Search a user's own models, one by one, then those of driftwalk at the same time.
+
+        A user's model may fail: that is said before the others take minutes.
+        """
+        entries = self.work.entries
+        together = Together(
+            [one.model.name for one in entries],
+            self.work.costs(),
+            lambda done, names: self.course.stage("models")(done, sum(self.work.costs()), names),
+        )
+        missing = [unit.start for unit in kept.missing(units)]
+        together.finished([unit.start for unit in units if unit.start not in missing])
+        ours = [k for k in missing if is_ours(entries[k])] if self.beside is not None else []
+        others = [k for k in missing if k not in ours]
+        alone = replace(self.work, within=together)
+        shared = replace(alone, entries=[sharing(one, len(ours)) for one in entries])
+        with together.waiting:
+            if others:
+                run_sweep(alone, [units[k] for k in others], store=kept, progress=look)
+            if ours:
+                first = [units[k] for k in longest_first(ours, entries)]
+                run_sweep(shared, first, store=kept, executor=self.beside, progress=look)
+        return collect(kept, units)
+
+    def _searched_elsewhere(
+        self, units: Sequence[WorkUnit], kept: Store, look: Callable[[int, int], None]
+    ) -> Arrays:
+        """Search models where an executor puts them: only whole ones are heard of."""
+
+        def finished(done: int, total: int) -> None:
+            self.course.stage("models")(done, total)
+            look(done, total)
+
+        return run_sweep(self.work, units, store=kept, executor=self.executor, progress=finished)
+
+    def _matched(self, number: int, index: int, answer: np.ndarray, planned: int) -> Summarised:
+        """Match the summaries with one model: units of 16 settings, the rest in this process.
+
+        So many models as `planned` are asked, or some more.
+        """
+        entry = self.work.entries[index]
+
+        def say(done: int, most: int) -> None:
+            # Most end at a quarter of the most, some there: the root gives half to either.
+            inside = math.sqrt(done / most)
+            self.course.stage("summaries")(
+                number + inside, planned, f"summaries of {entry.model.name}"
+            )
+
+        fingerprint = {
+            **self.work.fingerprint(), "asked": index, "answer": answer.tolist(),
+            "worlds": self.worlds,
+        }  # fmt: skip
+        return summarised(
+            entry,
+            self.work.motion,
+            answer,
+            seed=self.work.seed,
+            worlds=self.worlds,
+            executor=self.executor or (self.beside if is_ours(entry) else None),
+            store=self._store(f"summaries-{number}", fingerprint),
+            tell=say,
+        )
+
+    def _store(self, name: str, fingerprint: dict[str, Any]) -> Store | None:
+        return None if self.stores is None else self.stores(name, fingerprint)
+
+    def _usual(self, entry: Contestant) -> int:
+        """Return how many settings the summaries of a model usually need."""
+        return most_settings(len(entry.ranges), self.worlds) // USUAL_PART
+
+
+def _packed(judged: Judged, most: int, searches: int) -> dict[str, np.ndarray]:
+    """Return arrays of the same shapes for every model, with one entry each."""
+    point = np.full(most, np.nan)
+    point[: judged.point.size] = judged.point
+    ends = np.full(searches, np.nan)
+    ends[: judged.ends.size] = judged.ends
+    arrays = {**judged._asdict(), "point": point, "ends": ends}
+    return {name: np.asarray(values)[None] for name, values in arrays.items()}
+
+
+def _unpacked(arrays: Mapping[str, np.ndarray], entry: Contestant) -> Judged:
+    return Judged(
+        point=arrays["point"][: len(entry.ranges)],
+        trained=arrays["trained"],
+        held=arrays["held"],
+        score=float(arrays["score"]),
+        without=arrays["without"],
+        checks=arrays["checks"],
+        ends=arrays["ends"][np.isfinite(arrays["ends"])],
+        evaluations=int(arrays["evaluations"]),
+    )

@@ -1,0 +1,270 @@
+"""The `model_comparison` dataset: motion models, from the closest to the farthest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.calibration.held_out.candidates import Contestant
+from driftwalk.calibration.held_out.checks import CHECKS, UNITS
+from driftwalk.calibration.held_out.held_out_score import JUDGED, Judged, without_error
+from driftwalk.calibration.held_out.recorded import RecordedMotion
+from driftwalk.calibration.ranking.evidence_ranking import (
+    Naming,
+    Summarised,
+    naming,
+    said_of,
+    tie_sentence,
+)
+from driftwalk.calibration.ranking.verdict import Verdict, verdict_of
+from driftwalk.calibration.stationarity import Steadiness, steadiness_of_steps
+from driftwalk.comparison import KsReference
+from driftwalk.comparison.aspects import points_distance
+from driftwalk.schema.answers.fit_facts import texts
+from driftwalk.schema.check import build_dataset
+from driftwalk.simulation.series import series_warnings
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+Floats = npt.NDArray[np.float64]
+
+TIED_SIGMAS: Final = 2.0
+"""Models tie where the difference of their scores is below so many standard errors."""
+AT_THE_END: Final = 0.01
+"""A value is at the end of its range within this part of it."""
+
+
+def build_comparison(
+    entries: Sequence[Contestant],
+    judged: Sequence[Judged],
+    motion: RecordedMotion,
+    study: Study,
+    recording: xr.Dataset,
+    warnings: Sequence[str],
+    summarised: Mapping[int, Summarised],
+) -> xr.Dataset:
+    """Return the dataset of a comparison; `entries` and `judged` have one item for each model.
+
+    `summarised` has those whose summaries were matched, by their places among them.
+    """
+    order = np.argsort([one.score for one in judged], kind="stable")
+    entries, judged = [entries[k] for k in order], [judged[k] for k in order]
+    asked = {at: summarised[k] for at, k in enumerate(order) if k in summarised}
+    answer = naming(entries, asked)
+    behind = np.array([one.score - judged[0].score for one in judged])
+    behind_std = np.array([without_error(one.without - judged[0].without) for one in judged])
+    names = [entry.model.name for entry in entries]
+    verdicts = [
+        verdict_of(
+            one,
+            motion,
+            baseline=entry.baseline,
+            clearly_behind=names[0]
+            if behind[k] > TIED_SIGMAS * behind_std[k] and k != answer.named
+            else None,
+            unlike=None if answer.named is None or k not in asked else said_of(asked[k]),
+        )
+        for k, (entry, one) in enumerate(zip(entries, judged, strict=True))
+    ]
+    closest = next((k for k, entry in enumerate(entries) if not entry.baseline), 0)
+    tied = [
+        k
+        for k, one in enumerate(judged)
+        if k > closest
+        and one.score - judged[closest].score
+        < TIED_SIGMAS * without_error(one.without - judged[closest].without)
+    ]
+    units, values = _estimates(entries, judged)
+    steady = _steadiness(motion)
+    said = [*warnings, *_edge_warnings(entries, judged), *motion_warnings(motion)]
+    why = _findings(names, entries, verdicts, closest, tied)
+    if asked:
+        why.insert(0 if answer.named is not None else 1, tie_sentence(names, asked, answer))
+    best = answer_sentence(names, verdicts, closest, answer)
+    findings = [best, *(one for one in why if one != best)]
+    data: dict[str, Any] = {
+        "score": ("model", [one.score for one in judged]),
+        "score_std": ("model", [without_error(one.without) for one in judged]),
+        "behind": ("model", behind),
+        "behind_std": ("model", behind_std),
+        "free_numbers": ("model", [entry.numbers for entry in entries]),
+        "baseline": ("model", [entry.baseline for entry in entries]),
+        "explained": ("model", [one.explained for one in verdicts]),
+        "verdict": ("model", texts([one.text for one in verdicts])),
+        "held_out_distance": (("model", "aspect"), [one.held for one in judged]),
+        "trained_distance": (("model", "aspect"), [one.trained for one in judged]),
+        "own_distance": ("aspect", motion.own),
+        "floor": ("aspect", motion.held.floor),
+        "check_recorded": ("check", motion.recorded_checks),
+        "check_median": (("model", "check"), [np.median(one.checks, axis=0) for one in judged]),
+        "check_low": (("model", "check"), [one.checks.min(axis=0) for one in judged]),
+        "check_high": (("model", "check"), [one.checks.max(axis=0) for one in judged]),
+        "check_unit": ("check", texts(UNITS)),
+        "estimate": (("model", "parameter"), values),
+        "parameter_unit": ("parameter", texts(list(units.values()))),
+        "end_score": (("model", "end"), _padded([one.ends for one in judged])),
+        "evaluations": ("model", [one.evaluations for one in judged]),
+        **_summaries(len(entries), asked, answer.named),
+    }
+    coords = {
+        "model": ("model", texts(names)),
+        "aspect": ("aspect", texts(motion.held.names)),
+        "check": ("check", texts(CHECKS)),
+        "parameter": ("parameter", texts(list(units))),
+        "finding": ("finding", texts(findings)),
+        "warning": ("warning", texts(said)),
+    }
+    attrs: dict[str, Any] = {
+        "step_interval_s": float(motion.plan.short.step_interval),
+        "duration_s": motion.duration,
+        "worlds": JUDGED,
+        "seed": study.calibration.seed,
+        "arena": study.tank.to_arena_json(),
+        "source": str(recording.attrs.get("source", "")),
+        "simulated_recording": str(recording.attrs.get("simulated", "no")),
+    }
+    if steady is not None:
+        attrs |= {"halves_ks_distance": steady.distance, "halves_p_value": steady.p_value}
+    return build_dataset("model_comparison", data, coords, attrs)
+
+
+def _summaries(models: int, asked: Mapping[int, Summarised], named: int | None) -> dict[str, Any]:
+    """Return what the summaries of the motion say; nothing where no model was asked."""
+    if not asked:
+        return {}
+    data: dict[str, Any] = {
+        "asked": ("model", [k in asked for k in range(models)]),
+        "named": ("model", [k == named for k in range(models)]),
+    }
+    for name in Summarised._fields:
+        values = [getattr(asked[k], name) if k in asked else np.nan for k in range(models)]
+        data[name] = ("model", values)
+    return data
+
+
+def _padded(rows: Sequence[Floats]) -> Floats:
+    found = np.full((len(rows), max(1, *(row.size for row in rows))), np.nan)
+    for place, row in zip(found, rows, strict=True):
+        place[: row.size] = row
+    return found
+
+
+def _estimates(
+    entries: Sequence[Contestant], judged: Sequence[Judged]
+) -> tuple[dict[str, str], Floats]:
+    """Return all parameters with their units, and the models' values, (models, parameters)."""
+    units: dict[str, str] = {}
+    answers: list[dict[str, float]] = []
+    for entry, one in zip(entries, judged, strict=True):
+        answer = {}
+        for parameter, share in zip(entry.ranges, one.point, strict=True):
+            # Two models may give one name to numbers of different units.
+            known = units.get(parameter.name, parameter.unit)
+            name = parameter.name if known == parameter.unit else parameter.key
+            units[name] = parameter.unit
+            low, high = (
+                float(parameter.to_coordinate(end)) for end in (parameter.low, parameter.high)
+            )
+            answer[name] = float(parameter.to_value(low + (high - low) * share))
+        answers.append(answer)
+    values = np.array([[answer.get(name, np.nan) for name in units] for answer in answers])
+    return units, values.reshape(len(entries), len(units))
+
+
+def _edge_warnings(entries: Sequence[Contestant], judged: Sequence[Judged]) -> list[str]:
+    """Return a sentence for each model of which a parameter is at the end of its range."""
+    found = []
+    for entry, one in zip(entries, judged, strict=True):
+        at_end = [
+            parameter.name
+            for parameter, share in zip(entry.ranges, one.point, strict=True)
+            if min(share, 1.0 - share) < AT_THE_END
+        ]
+        if at_end:
+            found.append(
+                f"{entry.model.name}: at the end of its range: {', '.join(at_end)}; extend the "
+                "range, or doubt the model"
+            )
+    return found
+
+
+def _steadiness(motion: RecordedMotion) -> Steadiness | None:
+    steps = next(one for one in motion.aspects if one.name == "steps").points
+    return steadiness_of_steps(steps, lambda one, other: points_distance(KsReference(one), other))
+
+
+def motion_warnings(motion: RecordedMotion) -> list[str]:
+    """Return sentences on a recording and its flow.
+
+    Where its halves differ, with the moment at which its speed changed, and where the flow is a
+    series that goes on beyond its frames.
+    """
+    said = series_warnings(motion.like.flow, duration=motion.duration)
+    steady = _steadiness(motion)
+    if steady is None or steady.warning is None:
+        return said
+    return [steady.warning + _change(motion), *said]
+
+
+def _change(motion: RecordedMotion) -> str:
+    """Return when the mean speed changed most, and from what to what."""
+    steps = motion.steps
+    speed = steps.points[:, 0] / motion.plan.short.step_interval
+    share = steps.time / motion.duration
+    splits = np.arange(0.05, 0.96, 0.05)
+    early = np.array([speed[share < split].mean() for split in splits])
+    late = np.array([speed[share >= split].mean() for split in splits])
+    # Of two means with equal variances: their difference in standard errors goes with this weight.
+    weight = np.sqrt(splits * (1.0 - splits))
+    best = int(np.nanargmax(np.abs(late - early) * weight))
+    return (
+        f"; the mean speed changed most at {splits[best] * motion.duration:.0f} s, from "
+        f"{1e3 * early[best]:.3g} to {1e3 * late[best]:.3g} mm/s"
+    )
+
+
+def answer_sentence(
+    names: Sequence[str], verdicts: Sequence[Verdict], closest: int, answer: Naming
+) -> str:
+    """Return the answer in one sentence: the best model, and whether it explains the recording.
+
+    The summaries of the motion decide where they name a model, the distance otherwise; a model that
+    explains the recording is better than one that does not.
+    """
+    first = closest if answer.named is None else answer.named
+    explained = [k for k, one in enumerate(verdicts) if one.explained]
+    if not explained:
+        return f"No model explains the recording; the best one is {names[first]}"
+    best = first if first in explained else explained[0]
+    others = [names[k] for k in explained if k != best]
+    also = f"; so do others, but no better: {', '.join(others)}" if others else ""
+    return f"{names[best]} explains the recording{also}"
+
+
+def _findings(
+    names: Sequence[str],
+    entries: Sequence[Contestant],
+    verdicts: Sequence[Verdict],
+    closest: int,
+    tied: Sequence[int],
+) -> list[str]:
+    """Return what the answer follows from, in sentences."""
+    found = [f"{names[closest]} is the closest in distance"]
+    rivals = [names[k] for k in tied if not entries[k].baseline]
+    if rivals:
+        found[0] += f"; no clear difference from {', '.join(rivals)}"
+    if not any(one.explained for one in verdicts):
+        found.append(f"{names[closest]} does not explain it: {verdicts[closest].text}")
+    walks = [names[k] for k in tied if entries[k].baseline]
+    nearer = [names[k] for k in range(closest)]
+    if nearer:
+        found.append(f"A walk of recorded steps is closer than all models: {', '.join(nearer)}")
+    elif walks:
+        found.append(f"No clear difference from a walk of recorded steps: {', '.join(walks)}")
+    return found

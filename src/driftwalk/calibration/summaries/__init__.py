@@ -1,0 +1,1 @@
+"""A motion in some hundred summary statistics, recorded or simulated."""

@@ -1,0 +1,220 @@
+"""A motion in some hundred numbers: the summaries that the second stage of an estimation matches.
+
+Two-dimensional distances find the neighbourhood of a model's parameters and leave most of them
+open. The summaries tell more: quantiles of step lengths, turns over several times, memory of the
+speed and of the velocity, displacement, place, and how bouts above and below a speed follow each
+other. Each is a smooth function of the parameters, whatever the model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.calibration.summaries.displacements import (
+    SMALLEST,
+    Bools,
+    Floats,
+    Series,
+    SummaryPlan,
+    series_of,
+    turns_of,
+)
+
+Numbers = Iterator[float]
+
+STEP_QUANTILES: Final = (0.02, 0.1, 0.25, 0.5, 0.75, 0.9, 0.98)
+LONGER_QUANTILES: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
+MEMORY_LAGS: Final = (1, 2, 3, 5, 10, 20, 50)
+DISPLACEMENT_LAGS: Final = (1, 3, 10, 30, 100)
+WALL_QUANTILES: Final = (0.05, 0.25, 0.5, 0.75)
+WALL_EDGES: Final = (0.05, 0.15, 0.4)
+"""Zones from the wall inwards, in parts of the largest distance; the rest is the middle."""
+SPEED_LEVELS: Final = (0.3, 0.7, 1.2)
+"""Speeds that part fast bouts from slow ones, in usual steps."""
+FASTER: Final = 0.4
+"""A step is faster than the one before by more than this in the logarithm; slower likewise."""
+STEADY: Final = 0.1
+STRAIGHT: Final = 0.3
+"""Turns [rad] above which they count as one kind."""
+FEWEST: Final = 4
+"""A mean of fewer is taken as 0: it would be chance."""
+
+
+def summarise(plan: SummaryPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> Floats:
+    """Return the summaries of a motion, shape (summaries,).
+
+    Parameters
+    ----------
+    plan : SummaryPlan
+        From `plan_summaries`.
+    x, y : array_like, shape (samples,)
+        Positions [m] at the plan's time stamps; NaN where a sample is missing.
+
+    Returns
+    -------
+    ndarray
+        Numbers without units: logarithms of lengths over the usual step, shares, cosines and
+        correlations. All 0 where the motion has fewer than 4 steps that count.
+
+    Examples
+    --------
+    >>> from driftwalk.comparison.aspects import plan_aspects
+    >>> from driftwalk.calibration.summaries.displacements import plan_summaries
+    >>> aspects = plan_aspects(np.arange(400) / 10.0)
+    >>> plan = plan_summaries(
+    ...     aspects, wall=lambda x, y: 100 - np.hypot(x, y), unit=1.0, depth=100.0,
+    ...     counts=lambda time: np.ones(time.shape, dtype=bool),
+    ... )
+    >>> x, y = np.cumsum(np.random.default_rng(1).normal(size=(2, 400)), axis=1)
+    >>> bool(np.isfinite(summarise(plan, x, y)).all())
+    True
+    """
+    one = series_of(plan, x, y)
+    if np.count_nonzero(one.there) < FEWEST:
+        return np.zeros(count_summaries(plan))
+    numbers = [
+        *_step_lengths(one),
+        *_turns(plan, x, y),
+        *_changes(one),
+        *_memory(one),
+        *_displacement(one),
+        *_place(one),
+        *_peaks(one),
+        *(number for level in SPEED_LEVELS for number in _bouts(one, level)),
+    ]
+    return np.array(numbers, dtype=np.float64)
+
+
+def count_summaries(plan: SummaryPlan) -> int:
+    """Return how many summaries a motion has."""
+    return (
+        len(STEP_QUANTILES)
+        + 6 * len(plan.intervals)
+        + len(LONGER_QUANTILES) * (len(plan.intervals) - 1)
+        + 6 + len(LONGER_QUANTILES)
+        + 2 * len(MEMORY_LAGS) + len(DISPLACEMENT_LAGS)
+        + len(WALL_QUANTILES) + len(WALL_EDGES)
+        + 3
+        + 9 * len(SPEED_LEVELS)
+    )  # fmt: skip
+
+
+def _mean(values: Floats, chosen: Bools) -> float:
+    """Return the mean over those that are chosen, 0 where they are too few."""
+    return float(values[chosen].mean()) if np.count_nonzero(chosen) >= FEWEST else 0.0
+
+
+def _step_lengths(one: Series) -> Numbers:
+    """Yield quantiles of the logarithm of the step lengths."""
+    yield from np.quantile(one.log_length[one.there], STEP_QUANTILES)
+
+
+def _turns(plan: SummaryPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> Numbers:
+    """Yield how bodies turn over each interval, and how far they get over the longer ones."""
+    for index, (length, angle) in enumerate(turns_of(plan, x, y)):
+        cos = np.cos(angle)
+        all_of = np.ones(angle.size, dtype=bool)
+        fast = length > np.median(length) if length.size else all_of
+        yield _mean(cos, all_of)
+        yield _mean(np.sin(angle), all_of)
+        yield _mean(np.cos(2.0 * angle), all_of)
+        yield _mean((cos < 0.0).astype(np.float64), all_of)
+        yield _mean(cos, fast)
+        yield float(np.log(_mean(np.minimum(np.abs(angle), STRAIGHT), fast) + 1e-3))
+        if index:
+            enough = length.size >= FEWEST
+            far = np.quantile(length, LONGER_QUANTILES) if enough else np.zeros(5)
+            yield from np.log(far / plan.unit + SMALLEST)
+
+
+def _changes(one: Series) -> Numbers:
+    """Yield how often the speed rises and falls, how the body turns then, and how much it does."""
+    pair = one.there[1:] & one.there[:-1]
+    change = np.where(pair, one.log_length[1:] - one.log_length[:-1], 0.0)
+    product = np.maximum(one.length[1:] * one.length[:-1], 1e-300)
+    cos = (one.dx[1:] * one.dx[:-1] + one.dy[1:] * one.dy[:-1]) / product
+    kinds = (change > FASTER, change < -FASTER, np.abs(change) < STEADY)
+    for kind in kinds:
+        yield float((kind & pair).sum()) / max(float(pair.sum()), 1.0)
+        yield _mean(cos, kind & pair)
+    enough = np.count_nonzero(pair) >= FEWEST
+    yield from np.quantile(change[pair], LONGER_QUANTILES) if enough else np.zeros(5)
+
+
+def _memory(one: Series) -> Numbers:
+    """Yield autocorrelations of the logarithm of the speed, and of the velocity."""
+    there = one.there
+    speed = np.where(there, one.log_length - one.log_length[there].mean(), 0.0)
+    dx, dy = (np.where(there, part, 0.0) for part in (one.dx, one.dy))
+    variance = float((speed**2).sum()) / np.count_nonzero(there)
+    square = float((dx**2 + dy**2).sum()) / np.count_nonzero(there)
+    for lag in MEMORY_LAGS:
+        pairs = np.count_nonzero(there[lag:] & there[:-lag])
+        if pairs < FEWEST or not variance > 0.0 or not square > 0.0:
+            yield from (0.0, 0.0)
+            continue
+        yield float((speed[lag:] * speed[:-lag]).sum()) / pairs / variance
+        yield float((dx[lag:] * dx[:-lag] + dy[lag:] * dy[:-lag]).sum()) / pairs / square
+
+
+def _displacement(one: Series) -> Numbers:
+    """Yield logarithms of mean squared displacements over unbroken stretches."""
+    broken = np.concatenate([[0], np.cumsum(~one.there)])
+    for lag in DISPLACEMENT_LAGS:
+        whole = broken[lag:] == broken[:-lag]
+        if np.count_nonzero(whole) < FEWEST:
+            yield 0.0
+            continue
+        square = (one.x[lag:] - one.x[:-lag]) ** 2 + (one.y[lag:] - one.y[:-lag]) ** 2
+        yield float(np.log(square[whole].mean() / one.unit**2 + 1e-12))
+
+
+def _place(one: Series) -> Numbers:
+    """Yield quantiles of the distance from the wall, and how much slower the body is near it."""
+    yield from np.quantile(one.from_wall[one.there], WALL_QUANTILES)
+    middle = one.there & (one.from_wall > WALL_EDGES[-1])
+    usual = _mean(one.log_length, middle)
+    inner = -np.inf
+    for edge in WALL_EDGES:
+        zone = one.there & (one.from_wall > inner) & (one.from_wall <= edge)
+        few = min(np.count_nonzero(zone), np.count_nonzero(middle)) < FEWEST
+        yield 0.0 if few else _mean(one.log_length, zone) - usual
+        inner = edge
+
+
+def _peaks(one: Series) -> Numbers:
+    """Yield how often the speed peaks, and mean and spread of the peaks."""
+    length, there = one.length, one.there
+    peak = there[1:-1] & there[:-2] & there[2:]
+    peak &= (length[1:-1] > length[:-2]) & (length[1:-1] >= length[2:])
+    height = one.log_length[1:-1][peak]
+    yield float(np.log1p(height.size))
+    yield float(height.mean()) if height.size else 0.0
+    yield float(np.log(height.std() + 1e-3)) if height.size else 0.0
+
+
+def _bouts(one: Series, level: float) -> Numbers:
+    """Yield how bouts above and below a speed last, and how the body turns over slow ones."""
+    fast = one.there & (one.log_length > np.log(level + SMALLEST))
+    changes = np.flatnonzero(np.diff(fast.astype(np.int8))) + 1
+    begins = np.concatenate([[0], changes])
+    lasts = np.diff(np.concatenate([begins, [fast.size]])).astype(np.float64)
+    is_fast = fast[begins]
+    yield float(fast[one.there].mean())
+    for kind in (is_fast, ~is_fast):
+        time = lasts[kind] if kind.any() else np.ones(1)
+        yield float(np.log(time).mean())
+        yield float(np.log(time).std())
+        yield float(np.log((time**2).sum() / time.sum()))
+    slow = np.flatnonzero(~is_fast)
+    inside = slow[(slow > 0) & (slow < is_fast.size - 1)]
+    before, after = begins[inside] - 1, begins[inside + 1]
+    product = np.maximum(one.length[before] * one.length[after], 1e-300)
+    cos = (one.dx[after] * one.dx[before] + one.dy[after] * one.dy[before]) / product
+    short = after - before <= 2
+    for kind in (short, ~short):
+        yield _mean(cos, kind)

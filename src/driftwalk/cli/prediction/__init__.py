@@ -1,0 +1,1 @@
+"""Commands that predict: motion, self-assembly, sensitivity, the live tank."""

@@ -1,0 +1,263 @@
+"""`driftwalk simulate`: trajectories of a block in a stirred tank, or of a motion model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import numpy as np
+import typer
+
+from driftwalk.cli.inputs.assembly_source import RUN_HELP, load_flow_for
+from driftwalk.cli.inputs.found_source import FoundSource, open_run
+from driftwalk.cli.inputs.study_recording import opening_note
+from driftwalk.cli.options.model import (
+    KnownModel,
+    ModelName,
+    ParametersFrom,
+    ParameterValues,
+    known_model,
+)
+from driftwalk.cli.options.recording import RecordingOptions
+from driftwalk.cli.options.shared import Json, flow_of_run
+from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
+from driftwalk.cli.terminal.answer import print_report_next, print_warnings
+from driftwalk.cli.terminal.output import print_json, print_next, print_note, require_place
+from driftwalk.core.errors import InputError
+from driftwalk.core.study_keys import STUDY_KEYS
+from driftwalk.core.text.json_text import parse_json
+from driftwalk.schema.kinds.flow_series import flow_series_words
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.conditions import About
+    from driftwalk.model import Study
+
+OF_THE_BLOCK: Final = (
+    *("drag_coefficient", "force_std_N", "force_interval_s", "force_noise_intensity_N2_s"),
+    "time_step_s",
+)
+"""Attributes that a simulation of the block has."""
+
+
+@with_study_options(
+    STUDY_KEYS,
+    *("tank_diameter", "side", "mass", "depth", "drag_coefficient", "force_std", "force_interval"),
+    *("wall_friction", "wall_restitution", "time_step", "duration", "sample_rate"),
+    *("position_noise", "orientation_noise", "replicates", "seed", "flow_repeat", "flow_start"),
+)
+def simulate(
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.nc", help="File to write.")],
+    given: StudyOptions,
+    run: Annotated[
+        Path | None, typer.Argument(metavar="RUN", help=RUN_HELP, show_default=False)
+    ] = None,
+    flow: Annotated[
+        Path | None,
+        typer.Option(
+            "--flow",
+            metavar="FILE",
+            help="Flow field: NetCDF, or CSV with x, y, u, v; or the run directory that holds it. "
+            "For the block, and for a --model that has a use for it.",
+            callback=flow_of_run,
+            show_default=False,
+        ),
+    ] = None,
+    model: ModelName = None,
+    parameters: ParameterValues = None,
+    parameters_from: ParametersFrom = None,
+    like: Annotated[
+        Path | None,
+        typer.Option(
+            "--like",
+            metavar="RECORDING",
+            help="Recording that gives start, time stamps and gaps (driftwalk's "
+            "NetCDF or plain CSV).",
+            show_default=False,
+        ),
+    ] = None,
+    body: Annotated[
+        str | None,
+        typer.Option("--body", metavar="NAME", help="Body of --like.", show_default=False),
+    ] = None,
+    backend: Annotated[
+        str,
+        typer.Option(
+            "--backend",
+            metavar="cpu|reference",
+            help="Backend: cpu for single, reference for double precision.",
+        ),
+    ] = "cpu",
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace a file that exists.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Simulate the motion of the block, or of another motion model.
+
+    With a RUN: its model, with the values, the study and the flow field of the run. With --model: a
+    body that moves by itself, or a model of one's own; every parameter gets a value. It starts
+    where the recording of --like does, otherwise anywhere in the tank, at rest.
+    """
+    from driftwalk.core.files.atomic import write_atomic
+    from driftwalk.motion import feels_others
+    from driftwalk.schema.stores.netcdf import netcdf_bytes
+
+    if backend not in ("cpu", "reference"):
+        raise InputError(f"--backend takes cpu or reference, got '{backend}'")
+    if like is not None and backend == "reference":
+        raise InputError("--like runs on the cpu backend only: leave out --backend")
+    require_place(out, existing="replace" if overwrite else "error")
+    others = feels_others(model)
+    kept = None if others else body
+    recording = None if like is None else RecordingOptions(body=kept).load(like)
+    source = None if run is None else open_run(run, given, model, parameters_from)
+    if model is not None or (source is not None and not source.is_block):
+        if backend != "cpu":
+            raise InputError("--backend is for the block: leave it out with another model")
+        known = known_model(model, parameters, run or parameters_from)
+        result = _of_model(known, given, source, flow, recording, body)
+    elif parameters or parameters_from is not None:
+        raise InputError("--parameter and --parameters-from belong to a --model")
+    else:
+        result = _of_block(given, source, flow, recording, body, backend=backend)
+    write_atomic(out, netcdf_bytes(result))
+    facts = summary(result)
+    if json:
+        print_json({"file": str(out), **facts})
+        return
+    print_note(
+        f"wrote {out}: {facts['replicates']} x {facts['samples']} samples over "
+        f"{facts['duration_s']:g} s; {_in_words(facts)}"
+    )
+    for name, count in facts["status"].items():
+        if count:
+            print_note(f"warning: {count} of {facts['replicates']} replicates: {name}")
+    print_warnings(facts["warnings"])
+    if like is None:
+        print_report_next(out)
+    else:
+        print_next("compare", like, out)
+
+
+def _of_block(
+    given: StudyOptions,
+    source: FoundSource | None,
+    flow: Path | None,
+    recording: xr.Dataset | None,
+    body: str | None,
+    *,
+    backend: str,
+) -> xr.Dataset:
+    from driftwalk.conditions import simulate_like, study_for
+    from driftwalk.flow import load_flow
+    from driftwalk.simulation import simulate as run
+
+    if source is not None:
+        chosen, field = source.block(flow)
+    elif flow is None:
+        raise InputError(
+            "the flow of the water is missing: give a flow field (--flow), or the run directory of "
+            "a fit or a calibration"
+        )
+    else:
+        chosen, field = given.study(), load_flow(flow)
+    if recording is not None:
+        chosen = study_for([recording], chosen, body=body)
+    if recording is None:
+        result = run(chosen, field, backend="reference" if backend == "reference" else "cpu")
+    else:
+        result = simulate_like(chosen, field, recording)
+    # What was refused needs no such words.
+    print_warnings([] if source is None else source.found.warnings)
+    _say_what(chosen, given, source, about="simulation")
+    return result
+
+
+def _say_what(
+    study: Study, given: StudyOptions, source: FoundSource | None, *, about: About
+) -> None:
+    """Say which body and tank are simulated, and warn of those that nobody stated."""
+    from driftwalk.conditions import unstated_warning
+
+    otherwise = "recording" if source is None else str(source.folder)
+    opening_note(study, given, about=about, otherwise=otherwise)()
+    warning = unstated_warning(study, about=about)
+    if warning is not None:
+        print_note(f"warning: {warning}")
+
+
+def _of_model(
+    known: KnownModel,
+    given: StudyOptions,
+    source: FoundSource | None,
+    flow: Path | None,
+    recording: xr.Dataset | None,
+    body: str | None,
+) -> xr.Dataset:
+    from driftwalk.conditions import study_for
+    from driftwalk.motion import simulate_motion
+
+    _refuse_block(given)
+    chosen = given.study() if source is None else source.study()
+    if recording is not None:
+        chosen = study_for([recording], chosen, body=body)
+    if source is not None:
+        field = source.flow_for(known.model, chosen, flow)
+    else:
+        field = None if flow is None else load_flow_for(flow, chosen)
+    result = simulate_motion(
+        known.model, known.values, chosen, flow=field, like=recording, body=body
+    )
+    _say_what(chosen, given, source, about="tank")
+    for warning in known.warnings:
+        print_note(f"warning: {warning}")
+    return result
+
+
+def _refuse_block(given: StudyOptions) -> None:
+    """Refuse options about the block and its force, which another model does not have."""
+    of_block = [key for key in given.overrides if key.startswith(("block.", "forces."))]
+    of_block += [key for key in given.overrides if key == "simulation.time_step_s"]
+    if of_block:
+        names = ", ".join(option_name(key, keys=given.keys) for key in of_block)
+        raise InputError(f"{names}: about the block, which --model replaces; leave it out")
+
+
+def _in_words(facts: dict[str, Any]) -> str:
+    if "model" in facts:
+        values = ", ".join(f"{name} {value:g}" for name, value in facts["parameters"].items())
+        return f"{facts['model']} with {values}"
+    return (
+        f"σ_F = {1e3 * facts['force_std_N']:g} mN redrawn every "
+        f"{1e3 * facts['force_interval_s']:g} ms"
+    )
+
+
+def summary(result: xr.Dataset) -> dict[str, Any]:
+    """Return what a simulation is in a few numbers, units in the keys."""
+    status = result["status"]
+    masks = status.attrs["flag_masks"]
+    names = status.attrs["flag_meanings"].split()
+    path = np.hypot(*(np.diff(result[name].values, axis=1) for name in ("x", "y")))
+    elapsed = float(result["time"].values[-1] - result["time"].values[0])
+    of_model: dict[str, Any]
+    if "model" in result.attrs:
+        values = parse_json(result.attrs["model_parameters"])
+        of_model = {"model": result.attrs["model"], "parameters": values}
+    else:
+        of_model = {name: result.attrs[name] for name in OF_THE_BLOCK}
+    return {
+        "replicates": int(result.sizes["replicate"]),
+        "samples": int(result.sizes["time"]),
+        "duration_s": elapsed,
+        **of_model,
+        "seed": result.attrs["seed"],
+        "mean_speed_m_s": float(np.nansum(path) / (elapsed * path.shape[0])) if elapsed else 0.0,
+        "status": {
+            name: int(((status.values & mask) != 0).sum())
+            for name, mask in zip(names, masks, strict=True)
+        },
+        "warnings": flow_series_words(result.attrs, holds="what the paths have in common holds"),
+    }

@@ -1,0 +1,278 @@
+"""`driftwalk classify`: what the blocks of a recording assembled into."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from driftwalk.cli.inputs.other_files import explained
+from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
+from driftwalk.cli.options.shared import Json, quantity_option
+from driftwalk.cli.options.study import StudyOptions, with_study_options
+from driftwalk.cli.terminal.output import (
+    print_json,
+    print_next,
+    print_note,
+    print_table,
+    save_dataset,
+)
+from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.files.run_layout import MANIFEST_FILE
+from driftwalk.core.study_keys import STUDY_KEYS
+from driftwalk.schema.shapes import short_class
+from driftwalk.schema.stores.contents import check_contents
+from driftwalk.schema.stores.netcdf import kind_of, open_netcdf
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_PANEL = "Criteria of a join"
+# Centres of blocks that touch are a side apart, and noise takes off a little.
+_TOO_CLOSE = 0.8
+
+
+def _tolerance(name: str, unit: str, help: str) -> Any:
+    return quantity_option(name, unit, help, panel=_PANEL)
+
+
+@with_recording_options
+@with_study_options(STUDY_KEYS, "side")
+def classify(
+    poses: Annotated[
+        Path,
+        typer.Argument(metavar="POSES", help="Recording of all blocks with their orientations."),
+    ],
+    given: StudyOptions,
+    how: RecordingOptions,
+    chirality: Annotated[
+        Literal["merged", "distinct"],
+        typer.Option("--chirality", help="Mirror images as one shape or two."),
+    ] = "merged",
+    join_distance: Annotated[
+        float | None,
+        _tolerance(
+            "--join-distance", "m", "Distance of face centres that join (default: side / 10)."
+        ),
+    ] = None,
+    join_angle: Annotated[
+        float | None,
+        _tolerance("--join-angle", "rad", "Angle between faces that join (default: 10deg)."),
+    ] = None,
+    release_distance: Annotated[
+        float | None,
+        _tolerance(
+            "--release-distance", "m", "Distance that parts them (default: twice that to join)."
+        ),
+    ] = None,
+    release_angle: Annotated[
+        float | None,
+        _tolerance(
+            "--release-angle", "rad", "Angle that parts them (default: twice that to join)."
+        ),
+    ] = None,
+    min_duration: Annotated[
+        float | None,
+        _tolerance("--min-duration", "s", "Shortest join or parting that counts (default: 0.5s)."),
+    ] = None,
+    hold: Annotated[
+        float | None,
+        _tolerance("--hold", "s", "Time for which an unseen block keeps its joins (default: 1s)."),
+    ] = None,
+    run: Annotated[
+        int | None,
+        typer.Option(
+            "--run",
+            min=0,
+            help="Run of a simulated path.nc (default: its first).",
+            show_default=False,
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="FILE.nc", help="File for the result.", show_default=False
+        ),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace a file that exists.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Say what the blocks of a recording assembled into, and when.
+
+    Blocks are joined if two faces stay close to each other and face each other. The outcome class
+    is the multiset of the shapes that they form. The side of the blocks is that of the study, by
+    default 3 cm.
+    """
+    from driftwalk.assembly import classify as classify_recording
+    from driftwalk.core.files.atomic import require_target
+
+    if out is not None:
+        require_target(out, existing="replace" if overwrite else "error", endings=(".nc",))
+    recording, block_side, is_default = _load(poses, how, given, run)
+    tolerances = {
+        "join_distance": join_distance,
+        "join_angle": join_angle,
+        "release_distance": release_distance,
+        "release_angle": release_angle,
+        "min_duration": min_duration,
+        "hold": hold,
+    }
+    stated: dict[str, Any] = {key: value for key, value in tolerances.items() if value is not None}
+    try:
+        found = classify_recording(recording, side=block_side, chirality=chirality, **stated)
+    except ConfigurationError:
+        raise
+    except InputError as error:
+        raise InputError(f"{poses}: {error}") from error
+    if out is not None:
+        save_dataset(found, out)
+    summary = summarise(found)
+    if json:
+        print_json({"poses": poses, **summary})
+        return
+    _print(summary)
+    for warning in summary["warnings"]:
+        print_note(f"warning: {warning}")
+    if is_default:
+        print_note(f"the side of the blocks is the default, {100 * block_side:g} cm (--side)")
+    # A file of a run is shown with its run.
+    place = poses.parent if (poses.parent / MANIFEST_FILE).is_file() else poses
+    print_next("report", place, *(how.words() if place == poses else []), "-o", "report.html")
+
+
+def summarise(found: xr.Dataset) -> dict[str, Any]:
+    """Return what a classification found with units in the keys, ready for JSON."""
+    names = [str(name) for name in found["class"].values]
+    facts = {
+        key: value
+        for key, value in found.attrs.items()
+        if key not in ("kind", "schema_version", "source", "arena")
+    }
+    classes = _changes(found, names)
+    final = _name(names, found["outcome"].values[-1])
+    return {
+        **facts,
+        "bodies": found["body"].values,
+        "classes": classes,
+        "proportions": {
+            name: share
+            for name, share in zip(names, found["proportion"].values.tolist(), strict=True)
+            if share > 0
+        },
+        "final": final,
+        "complete": "+" not in final if final else None,
+        "events": _events(found, names),
+        "warnings": _warnings(found),
+    }
+
+
+def _load(
+    path: Path, how: RecordingOptions, given: StudyOptions, run: int | None
+) -> tuple[xr.Dataset, float, bool]:
+    """Return the recording or simulated run, the side of its blocks [m], and if it is a default."""
+    from driftwalk.assembly import path_recording
+    from driftwalk.conditions import load_with_study
+    from driftwalk.model import Block
+
+    simulated = _simulated_path(path)
+    if simulated is not None:
+        chosen = int(simulated["run"][0]) if run is None else run
+        return path_recording(simulated, run=chosen), float(simulated.attrs["block_side_m"]), False
+    if run is not None:
+        raise InputError(f"{path}: --run is for a simulated path.nc of driftwalk assemble")
+    if given.file is None:
+        # Without a study nobody has said how large the tank is: the blocks need not fit into it.
+        stated = given.overrides.get(STUDY_KEYS["side"])
+        own = Block().side_m if stated is None else stated
+        return how.load(path, side=own), own, stated is None
+    resolved = given.study()
+    with explained():
+        return load_with_study(path, resolved, how.arguments()), resolved.block.side_m, False
+
+
+def _simulated_path(path: Path) -> xr.Dataset | None:
+    """Return the dataset of a file that `driftwalk assemble` wrote; None for a recording."""
+    if path.suffix != ".nc" or not path.is_file():
+        return None
+    # Whatever else it is, the loaders say what is wrong with it.
+    return check_contents(open_netcdf(path), path) if kind_of(path) == "assembly_path" else None
+
+
+def _name(names: list[str], index: int) -> str:
+    return names[index] if index >= 0 else ""
+
+
+def _changes(found: xr.Dataset, names: list[str]) -> list[dict[str, Any]]:
+    """Return the class at the first sample and at each sample where it is another one."""
+    outcome, time = found["outcome"].values.tolist(), found["time"].values.tolist()
+    return [
+        {"time_s": time[at], "outcome": _name(names, outcome[at])}
+        for at in range(len(outcome))
+        if at == 0 or outcome[at] != outcome[at - 1]
+    ]
+
+
+def _events(found: xr.Dataset, names: list[str]) -> list[dict[str, Any]]:
+    """Return joins and partings in order of time, at the same sample partings first."""
+    bodies = [str(name) for name in found["body"].values]
+    events = [
+        {
+            "time_s": found[f"{kind}_time"].values[at],
+            "kind": word,
+            "bodies": [bodies[block] for block in found[f"{kind}_block"].values[at]],
+            "faces": found[f"{kind}_face"].values[at],
+            "outcome": _name(names, found[f"{kind}_class"].values[at]),
+        }
+        for kind, word in (("split", "split"), ("event", "join"))
+        for at in range(int(found[f"{kind}_count"]))
+    ]
+    return sorted(events, key=lambda event: float(event["time_s"]))
+
+
+def _warnings(found: xr.Dataset) -> list[str]:
+    facts = found.attrs
+    said = []
+    if facts["closest_m"] < _TOO_CLOSE * facts["block_side_m"]:
+        said.append(
+            f"two blocks come as close as {100 * facts['closest_m']:.3g} cm, which a side of "
+            f"{100 * facts['block_side_m']:.3g} cm does not allow: is it right (--side)?"
+        )
+    if facts["dropped_joins"]:
+        said.append(
+            f"{facts['dropped_joins']} joins contradict others on the lattice and were dropped"
+        )
+    if facts["unknown_samples"]:
+        said.append(
+            f"at {facts['unknown_samples']} of {found.sizes['time']} samples the class is unknown: "
+            f"a block was not seen for more than {facts['hold_s']:g} s (--hold)"
+        )
+    return said
+
+
+def _print(summary: dict[str, Any]) -> None:
+    known = summary["known_s"]
+    rows = [
+        [short_class(name), 100.0 * share, share * known]
+        for name, share in summary["proportions"].items()
+    ]
+    print_table(rows, columns=["class", "share of time [%]", "time [s]"])
+    print()
+    listed = [
+        [
+            event["time_s"],
+            event["kind"],
+            *(f"{body}:{face}" for body, face in zip(event["bodies"], event["faces"], strict=True)),
+            short_class(event["outcome"]),
+        ]
+        for event in summary["events"]
+    ]
+    if listed:
+        columns = ["time [s]", "event", "block:face", "block:face", "class afterwards"]
+        print_table(listed, columns=columns)
+    else:
+        print("no blocks joined")
+    print()
+    print_table([["at the end", short_class(summary["final"]) or "unknown"]])

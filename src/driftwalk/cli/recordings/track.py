@@ -1,0 +1,160 @@
+"""`driftwalk track`: a recording from a video or a camera."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from driftwalk.cli.options import tracking as given
+from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.tracking import TrackingOptions
+from driftwalk.cli.terminal.output import print_json, print_next, print_note, print_table, sibling
+from driftwalk.core.errors import InputError
+
+_SHOWN = {"duplicates": "doubled"}
+
+
+def track(
+    source: given.SourceName,
+    markers: given.Markers,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="FILE.nc",
+            help="Recording to write; needed without --explain.",
+            show_default=False,
+        ),
+    ] = None,
+    camera: given.CameraFile = None,
+    tank_diameter: given.Diameter = None,
+    px_per_m: given.PxPerM = None,
+    polarity: given.Polarity = None,
+    least_area_px: given.LeastArea = None,
+    most_area_px: given.MostArea = None,
+    image_rate: given.ImageRate = None,
+    bodies: given.Bodies = None,
+    max_speed: given.MaxSpeed = None,
+    lost_after: given.LostAfter = None,
+    side: given.BlockSide = None,
+    live: given.Live = None,
+    live_nmea: given.LiveNmea = None,
+    live_host: given.LiveHost = "127.0.0.1",
+    overlay: given.Overlay = None,
+    explain: Annotated[
+        int | None,
+        typer.Option(
+            "--explain",
+            metavar="FRAME",
+            min=0,
+            help="Write a PNG of this frame that shows each candidate and why it was "
+            "rejected, then exit.",
+            show_default=False,
+        ),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace files that exist.")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Track blocks in a video or before a camera.
+
+    The recording holds the measured poses, each with its covariance, and marks where identities
+    could have been exchanged. Ctrl-C ends tracking and keeps everything tracked up to then.
+    """
+    from driftwalk.cli.tracking.parts import build_parts
+    from driftwalk.cli.tracking.run import TrackingRun, summary
+    from driftwalk.core.files.atomic import require_free, require_target
+
+    existing = "replace" if overwrite else "error"
+    options = TrackingOptions(
+        source=source,
+        markers=markers,
+        camera=camera,
+        tank_diameter=tank_diameter,
+        px_per_m=px_per_m,
+        polarity=polarity,
+        least_area_px=least_area_px,
+        most_area_px=most_area_px,
+        image_rate=image_rate,
+        bodies=bodies,
+        max_speed=max_speed,
+        lost_after=lost_after,
+        side=side,
+        live=live,
+        live_nmea=live_nmea,
+        live_host=live_host,
+        overlay=overlay,
+    )
+    if explain is not None:
+        _explain(options, explain, out, existing)
+        return
+    if out is None:
+        raise InputError("name the recording to write: -o recording.nc")
+    require_target(out, existing=existing, endings=(".nc",))
+    if overlay is not None:
+        require_free(overlay, existing=existing)
+    run = TrackingRun(options, build_parts(options), out)
+    run.run()
+    found = summary(run)
+    if json:
+        print_json({"out": out, **found})
+        return
+    print_note(f"wrote {out}")
+    _print(found)
+    if bodies == 1:
+        print_next("fit", out, "-o", sibling(out.with_suffix(""), "fit"))
+    else:
+        print_next("classify", out)
+
+
+def _print(found: dict[str, Any]) -> None:
+    rows = [
+        [name, 100.0 * body["seen_share"], 100.0 * body["ambiguous_share"]]
+        for name, body in found["bodies"].items()
+    ]
+    print_table(rows, columns=["body", "seen [%]", "ambiguous [%]"])
+    print()
+    counts = {**found["counts"], **found["counts"]["rejected"]}
+    counts.pop("rejected")
+    print_table([[_SHOWN.get(name, name.replace("_", " ")), n] for name, n in counts.items()])
+    if found["frames_per_s"] is not None:
+        print()
+        print_table([["frames tracked per second", found["frames_per_s"]]])
+    if found["interrupted"] is not None:
+        print_note(f"warning: {found['interrupted']}")
+
+
+def _explain(options: TrackingOptions, number: int, out: Path | None, existing: str) -> None:
+    """Draw one frame with everything that was found in it."""
+    from driftwalk.cli.tracking.parts import build_parts
+    from driftwalk.core.files.atomic import require_target
+    from driftwalk.track import explain_frame, open_source, save_picture
+
+    if out is not None and out.suffix == ".png":
+        picture = out
+    else:
+        stem = Path(options.source.replace(":", "-")).stem if out is None else out.stem
+        picture = (Path() if out is None else out.parent) / f"{stem}-frame-{number}.png"
+    require_target(picture, existing=existing, endings=(".png",))
+    parts = build_parts(options)
+    opened = open_source(options.source, rate=options.image_rate, keep_stale=True)
+    last = -1
+    try:
+        for frame in opened:
+            last = frame.index
+            if last >= number:
+                break
+    finally:
+        opened.close()
+    if last != number:
+        raise InputError(f"{options.source}: there is no frame {number}; the last is {last}")
+    found, rejected = parts.detector.detect(frame.image)
+    save_picture(picture, explain_frame(frame.image, found, rejected, camera=parts.camera))
+    rows = [[one.column, one.row, "found" + (f" {one.key}" if one.key else "")] for one in found]
+    rows += [[one.column, one.row, one.reason] for one in rejected]
+    print_table(rows, columns=["column [px]", "row [px]", "result"])
+    print_note(f"wrote {picture}")

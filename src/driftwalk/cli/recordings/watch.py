@@ -1,0 +1,144 @@
+"""`driftwalk watch`: who is joined to whom, live."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from driftwalk.cli.options import tracking as given
+from driftwalk.cli.options.tracking import TrackingOptions
+from driftwalk.cli.terminal.output import print_note
+from driftwalk.core.errors import InputError
+
+if TYPE_CHECKING:
+    from driftwalk.track import AssemblySeen, Frame, TrackState
+
+_MOST_CLASSES = 6
+
+
+def watch(
+    source: given.SourceName,
+    markers: given.Markers,
+    bodies: given.Bodies = None,
+    side: given.BlockSide = None,
+    camera: given.CameraFile = None,
+    tank_diameter: given.Diameter = None,
+    px_per_m: given.PxPerM = None,
+    image_rate: given.ImageRate = None,
+    max_speed: given.MaxSpeed = None,
+    lost_after: given.LostAfter = None,
+    live: given.Live = None,
+    live_nmea: given.LiveNmea = None,
+    live_host: given.LiveHost = "127.0.0.1",
+    overlay: given.Overlay = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="FILE.nc", help="Recording to write as well.", show_default=False
+        ),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace files that exist.")
+    ] = False,
+) -> None:
+    """Watch blocks assemble: poses, joins and the outcome class, as they happen.
+
+    Prints a line for each join, parting or change of the class, and one line per second with the
+    poses. While a block is hidden, it names the classes that are possible.
+    """
+    from driftwalk.cli.tracking.parts import build_parts
+    from driftwalk.cli.tracking.run import TrackingRun
+    from driftwalk.core.files.atomic import require_free, require_target
+
+    existing = "replace" if overwrite else "error"
+    if out is not None:
+        require_target(out, existing=existing, endings=(".nc",))
+    if overlay is not None:
+        require_free(overlay, existing=existing)
+    options = TrackingOptions(
+        source=source,
+        markers=markers,
+        camera=camera,
+        tank_diameter=tank_diameter,
+        px_per_m=px_per_m,
+        image_rate=image_rate,
+        bodies=bodies,
+        max_speed=max_speed,
+        lost_after=lost_after,
+        side=side,
+        live=live,
+        live_nmea=live_nmea,
+        live_host=live_host,
+        overlay=overlay,
+    )
+    parts = build_parts(options)
+    if parts.observer is None:
+        raise InputError(
+            "to report which blocks are joined, watch needs markers with an "
+            "orientation, the number of blocks (--bodies) and their side (--side, or "
+            "block_side_m in the markers file)"
+        )
+    run = TrackingRun(options, parts, out, _Printer())
+    run.run()
+    if out is not None and not run.saved:
+        run.recording()  # Says that nothing was tracked, and what was there instead.
+    if run.saved:
+        print_note(f"wrote {out}")
+    if run.interrupted is not None:
+        print_note(f"warning: {run.interrupted}")
+
+
+class _Printer:
+    """Prints what changes, and the poses and the frames dropped once a second."""
+
+    def __init__(self) -> None:
+        self._class: frozenset[str] | None = None
+        self._next = self._next_dropped = 0.0
+        self._dropped = 0
+
+    def __call__(
+        self,
+        frame: Frame,
+        states: Sequence[TrackState],
+        observed: AssemblySeen | None,
+        dropped: int,
+    ) -> None:
+        if dropped > self._dropped and frame.time >= self._next_dropped:
+            # A camera that is too fast drops some at every frame.
+            self._next_dropped = frame.time + 1.0
+            print(f"{frame.time:9.2f} s  dropped  {dropped - self._dropped} ({dropped} up to now)")
+            self._dropped = dropped
+        if observed is None:
+            return
+        for event in observed.events:
+            faces = zip(event.bodies, event.faces, strict=True)
+            between = " - ".join(f"{body}:{face}" for body, face in faces)
+            print(f"{event.time:9.2f} s  {event.kind}  {between}  {event.outcome}")
+        if observed.possible != self._class:
+            self._class = observed.possible
+            hidden = f"  (hidden: {', '.join(observed.hidden)})" if observed.hidden else ""
+            print(f"{frame.time:9.2f} s  class  {_classes(observed)}{hidden}")
+        if frame.time >= self._next:
+            self._next = frame.time + 1.0
+            poses = "  ".join(_pose(state) for state in states) or "no block is followed yet"
+            print(f"{frame.time:9.2f} s  {poses}", flush=True)
+
+
+def _classes(observed: AssemblySeen) -> str:
+    if observed.outcome:
+        return observed.outcome
+    names = sorted(observed.possible)
+    if not names:
+        return f"unknown: {len(observed.hidden)} blocks are hidden, any class is possible"
+    if len(names) == 1:
+        return names[0]
+    more = f" and {len(names) - _MOST_CLASSES} more" if len(names) > _MOST_CLASSES else ""
+    return "one of " + ", ".join(names[:_MOST_CLASSES]) + more
+
+
+def _pose(state: TrackState) -> str:
+    mark = "?" if state.measured is None else ("!" if state.ambiguous > 0 else "")
+    return f"{state.id}{mark} ({100 * state.x:.2f}, {100 * state.y:.2f}) cm {state.theta:+.2f} rad"

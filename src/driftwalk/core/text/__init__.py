@@ -1,0 +1,1 @@
+"""Text of arguments, JSON, TOML and messages."""

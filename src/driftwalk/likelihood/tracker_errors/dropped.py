@@ -1,0 +1,276 @@
+"""Frames that a recording lacks although its stamps say a constant rate, found from its track.
+
+Where a block moves, its step across a missing frame is twice as long as its neighbours', in x, y
+and orientation together. Every interval is compared with what its neighbours predict, once for each
+number of missing frames (see `interval_windows`). How often frames are missing is estimated along
+with it, by expectation and maximisation over the whole recording. Intervals of half, one and a
+half and two and a half times the length are a control: no dropped frame makes those.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.remember import remembered
+from driftwalk.likelihood.spline import Floats
+from driftwalk.likelihood.tracker_errors.interval_windows import (
+    AT_MIDDLE,
+    CLASSES,
+    CLEAN,
+    DECOY,
+    DECOYS,
+    DROPS,
+    HERE,
+    KIND,
+    MIDDLE,
+    MOST_MISSING,
+    WIDTH,
+    Axis,
+    log_likelihoods,
+)
+from driftwalk.record import estimate_tracking_noise
+from driftwalk.schema import Track
+
+Integers = npt.NDArray[np.int64]
+
+FEWEST: Final = 100
+"""Windows without which no rate can be estimated."""
+REGULAR: Final = 0.1
+"""Share of the interval by which the stamps of a constant rate may be off: they may be rounded."""
+ENOUGH: Final = 30.0
+"""Evidence from which on frames are missing. It is 0.0 on recordings of the model at 10 Hz and at
+most 27 on recordings of animals and robots, but for one whose control says that it means nothing;
+with one frame in twenty missing it is 128 and more after ten minutes."""
+MOST_DECOYS: Final = 0.5
+"""Share of the dropped frames' rate up to which the control may go."""
+BEFORE: Final = 2.0
+"""The same before any is found, when two in one window pass for something else."""
+MOST_ROUNDS: Final = 6
+"""Frames that are found change what is expected of their neighbours."""
+MOST_STEPS: Final = 60
+FIRST_RATE: Final = 3e-3
+MOST_RATE: Final = 0.9
+LEAST_RATE: Final = 1e-6
+LONGEST_SPAN: Final = 3 * (WIDTH - 1)
+"""Of a window, in intervals of the clock; in longer ones nothing is predicted."""
+LEAST_ORIENTED: Final = 0.5
+"""Share of the samples with an orientation from which on it is used."""
+MOST_NAMED: Final = 5
+FAST: Final = 0.99
+"""Quantile of the steps beyond which they do not tell how fast a body is: jumps are among them."""
+
+
+class DroppedFrames(NamedTuple):
+    """Where frames are missing although the stamps do not say so."""
+
+    after: Integers
+    """Numbers of the track's samples before the missing frames, from 0; shape (d,)."""
+    time: Floats
+    """Their stamps [s], shape (d,)."""
+    missing: Integers
+    """Number of frames that are missing there, shape (d,)."""
+    posterior: Floats
+    """Probability that any are, shape (d,)."""
+    expected: Floats
+    """Expected number of missing frames in every interval of the track, (n - 1,)."""
+    rate: float
+    """Estimated share of the intervals that lack frames."""
+    evidence: float
+    """Logarithm of the likelihood ratio of that rate over none."""
+    interval: float
+    """Between frames [s]; NaN where the stamps are not those of a constant rate."""
+
+    @property
+    def frames(self) -> int:
+        """Number of missing frames."""
+        return int(self.missing.sum())
+
+
+@remembered
+def find_dropped_frames(track: Track, clock: Floats) -> DroppedFrames:
+    """Find frames that are missing although the stamps say a constant rate.
+
+    None are found where the evidence is below `ENOUGH`, where the control has more than half of
+    their rate, or where more of the intervals lack two or three frames than one: then the steps are
+    those of a body that moves in leaps. Frames that are missing while a body hardly moves are not
+    seen, nor those among the first and the last four samples.
+
+    Parameters
+    ----------
+    track : Track
+        One body, without samples that are mistakes.
+    clock : ndarray, shape (m,)
+        Time stamps of the recording [s], those of samples without a position too.
+
+    Examples
+    --------
+    >>> frame = np.delete(np.arange(2000), np.arange(50, 2000, 50))
+    >>> noise = np.random.default_rng(1).normal(0.0, 3e-4, (2, frame.size))
+    >>> x, y = 0.1 * np.cos(0.05 * frame) + noise[0], 0.1 * np.sin(0.05 * frame) + noise[1]
+    >>> clock = 0.1 * np.arange(frame.size)
+    >>> found = find_dropped_frames(Track(clock, x, y, np.full(frame.size, np.nan)), clock)
+    >>> found.frames, found.after[:4].tolist()
+    (38, [49, 98, 147, 196])
+    """
+    interval = _regular_interval(clock)
+    none = np.zeros(0, dtype=np.int64)
+    still = np.zeros(max(track.time.size - 1, 0))
+    nothing = DroppedFrames(none, np.zeros(0), none, np.zeros(0), still, 0.0, 0.0, interval)
+    if math.isnan(interval) or track.time.size < FEWEST + WIDTH:
+        return nothing
+    stamped = np.rint(np.diff(track.time) / interval)
+    lengths = stamped
+    for number in range(MOST_ROUNDS):
+        starts = _windows(lengths)
+        if starts.size < FEWEST:
+            return nothing
+        axes = _axes(track, _time_of(lengths, interval))
+        likelihood = log_likelihoods(axes, starts, lengths, stamped, dt=interval)
+        rates, value = _rates(likelihood)
+        if number == 0:
+            evidence = value - _rates(likelihood, without=DROPS)[1]
+            if evidence < ENOUGH or not _are_dropped_frames(rates, BEFORE):
+                return nothing._replace(evidence=evidence)
+        share = _posterior(likelihood, rates)
+        some = share.sum(axis=1)
+        found = some > 0.5
+        before = lengths
+        lengths = stamped.copy()
+        lengths[starts[found] + MIDDLE] += 1.0 + share[found].argmax(axis=1)
+        if np.array_equal(lengths, before):
+            break
+    if not _are_dropped_frames(rates, MOST_DECOYS):
+        return nothing._replace(evidence=evidence)
+    after = np.flatnonzero(lengths > stamped)
+    still[starts + MIDDLE] = share @ np.arange(1, MOST_MISSING + 1)
+    return DroppedFrames(
+        after,
+        track.time[after],
+        (lengths - stamped)[after].astype(np.int64),
+        some[np.searchsorted(starts, after - MIDDLE)],
+        still,
+        float(rates[list(DROPS)].sum()),
+        evidence,
+        interval,
+    )
+
+
+def with_gaps(track: Track, found: DroppedFrames) -> Track:
+    """Return a track with the time of the missing frames put in: they become gaps.
+
+    Where it is not sure whether a frame is missing, the expected time is put in: the position is
+    then wrong by the least mean square.
+    """
+    if not found.frames:
+        return track
+    later = np.concatenate([[0.0], np.cumsum(found.expected)])
+    return track._replace(time=track.time + found.interval * later)
+
+
+def places_of(found: DroppedFrames) -> str:
+    """Return in words after which stamps frames are missing: the first few."""
+    named = ", ".join(f"{time:.6g} s" for time in found.time[:MOST_NAMED])
+    more = found.time.size - MOST_NAMED
+    return f"after {named}" + (f" and {more} more" if more > 0 else "")
+
+
+def _regular_interval(clock: Floats) -> float:
+    """Return the interval of stamps at a constant rate; NaN where they are others."""
+    if clock.size <= 1:
+        return math.nan
+    interval = float(clock[-1] - clock[0]) / (clock.size - 1)
+    off = clock - (clock[0] + interval * np.arange(clock.size))
+    return interval if np.abs(off).max() <= REGULAR * interval else math.nan
+
+
+def _windows(lengths: Floats) -> npt.NDArray[np.intp]:
+    """Return the first samples of the windows that no long gap splits."""
+    total = np.concatenate([[0.0], np.cumsum(lengths)])
+    return np.flatnonzero(total[WIDTH - 1 :] - total[: 1 - WIDTH] <= LONGEST_SPAN)
+
+
+def _time_of(lengths: Floats, interval: float) -> Floats:
+    time: Floats = interval * np.concatenate([[0.0], np.cumsum(lengths)])
+    return time
+
+
+def _axes(track: Track, time: Floats) -> list[Axis]:
+    """Return x and y, and the orientation where most samples have one."""
+    unknown = np.full(time.size, np.nan)
+    axes = _alike(Track(time, track.x, track.y, unknown))
+    seen = np.isfinite(track.theta)
+    if seen.mean() < LEAST_ORIENTED or np.ptp(track.theta[seen]) == 0.0:
+        return axes
+    turned = np.unwrap(track.theta[seen])
+    # Estimated as if it were both coordinates of a position: those have noise and intensity.
+    found = _alike(Track(time[seen], turned, turned, unknown[seen]))[0]
+    theta = unknown.copy()
+    theta[seen] = turned
+    return [*axes, found._replace(values=theta)]
+
+
+def _alike(track: Track) -> list[Axis]:
+    """Return two coordinates that share their noise and intensity."""
+    noise = estimate_tracking_noise(track)
+    interval = float(np.median(np.diff(track.time)))
+    axes = []
+    for values in (track.x, track.y):
+        steps = np.abs(np.diff(values))
+        usual = math.sqrt(float((np.minimum(steps, np.quantile(steps, FAST)) ** 2).mean()))
+        # Neither is exactly zero: a covariance has to be one.
+        least = max(1e-2 * usual, 1e-12)
+        std = max(np.nan_to_num(noise.position_noise_m), least)
+        intensity = max(noise.acceleration_intensity_m2_s3, 1e-6 * std**2 / interval**3)
+        axes.append(Axis(values, std, intensity, usual))
+    return axes
+
+
+def _rates(likelihood: Floats, *, without: tuple[int, ...] = ()) -> tuple[Floats, float]:
+    """Return how often everything happens in an interval, shape (CLASSES,), and how likely that is.
+
+    A window is one of seven that see the same interval: their likelihood is that to the power of
+    seven.
+    """
+    top = likelihood.max(axis=1)
+    scaled = np.exp(likelihood - top[:, None])
+    kinds = [kind == KIND for kind in range(CLASSES)]
+    anywhere = np.stack([scaled[:, one].sum(axis=1) for one in kinds], axis=1)
+    here = np.stack([scaled[:, one & AT_MIDDLE].sum(axis=1) for one in kinds], axis=1)
+    rates = np.full(CLASSES, FIRST_RATE)
+    for _ in range(MOST_STEPS):
+        rates[list(without)] = 0.0
+        weight = _weights(rates)
+        total = anywhere @ weight
+        value = float((top + np.log(total)).sum()) / (WIDTH - 1)
+        before = rates
+        rates = np.maximum(weight * (here / total[:, None]).mean(axis=0) / HERE, LEAST_RATE)
+        if np.abs(rates - before)[CLEAN + 1 :].max() < LEAST_RATE:
+            break
+    return before, value
+
+
+def _weights(rates: Floats) -> Floats:
+    """Return the probability of a window in which one thing happens at one place, or nothing."""
+    some = min(float(rates[CLEAN + 1 :].sum()), MOST_RATE)
+    weight = rates * (1.0 - some) ** (WIDTH - 2)
+    weight[CLEAN] = (1.0 - some) ** (WIDTH - 1)
+    return weight
+
+
+def _are_dropped_frames(rates: Floats, most: float) -> bool:
+    """Whether the intervals are whole ones rather than any, and mostly lack one frame."""
+    single, more = rates[DROPS[0]], rates[list(DROPS[1:])].sum()
+    return bool(len(DECOYS) * rates[DECOY] <= most * (single + more) and more <= single)
+
+
+def _posterior(likelihood: Floats, rates: Floats) -> Floats:
+    """Return the probability that a window's middle interval lacks 1, 2, 3 frames, (w, 3)."""
+    whole = likelihood + np.log(_weights(rates)[KIND])
+    share = np.exp(whole - whole.max(axis=1, keepdims=True))
+    share /= share.sum(axis=1, keepdims=True)
+    kinds = [(kind == KIND) & AT_MIDDLE for kind in DROPS]
+    return np.stack([share[:, one].sum(axis=1) for one in kinds], axis=1)

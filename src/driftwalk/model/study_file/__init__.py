@@ -1,0 +1,1 @@
+"""Study files: a study as TOML, and the template with comments."""

@@ -1,0 +1,1 @@
+"""A motion model that is a program: it answers lines of JSON with positions."""

@@ -1,0 +1,217 @@
+"""One running program: a line is written to it, a line is read from it, within a time."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from threading import Event
+from typing import Final
+
+from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.files.bounded import MIB
+from driftwalk.motion.external_program.pipes import pipes_of
+
+TICK_S: Final = 0.1
+"""How often a request looks whether it is still wanted."""
+GRACE_S: Final = 1.0
+"""Time that a program has to end by itself."""
+SHOWN_LINES: Final = 5
+# The same on Windows, where there are no sessions.
+_OWN_GROUP: Final[int] = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
+
+
+@dataclass(frozen=True)
+class Request:
+    """A line for a program."""
+
+    line: bytes
+    where: str
+    """The end of a message about it: "at speed=0.1"."""
+    most: int
+    """Bytes that the answer may have."""
+
+
+class ProgramFault(Exception):
+    """A program did not do what was asked of it."""
+
+    def __init__(self, where: str, reason: str) -> None:
+        super().__init__(where, reason)
+        self.where = where
+        self.reason = reason
+
+
+class ProgramEnded(ProgramFault):
+    """It ended before it had answered."""
+
+
+class Program:
+    """A running program, in a process group of its own.
+
+    Parameters
+    ----------
+    words : sequence of str
+        The command.
+    folder : str
+        The folder that it runs in.
+
+    Raises
+    ------
+    ConfigurationError
+        When it cannot be started.
+    """
+
+    def __init__(self, words: Sequence[str], folder: str) -> None:
+        self.greeting = b""
+        """Its answer to the first request."""
+        self.repeats = False
+        """Whether it was seen to make the same world again."""
+        self._owner = os.getpid()
+        self._process = _start(words, folder)
+        self._pipes = pipes_of(self._process)
+        self._unread = b""
+
+    @property
+    def is_own(self) -> bool:
+        """Whether this process started it, and not one of which this process is a copy."""
+        return os.getpid() == self._owner
+
+    def ask(self, request: Request, *, timeout: float, stop: Event) -> bytes:
+        """Return the line that the program answers with.
+
+        Raises
+        ------
+        ProgramEnded
+            When it ends before.
+        ProgramFault
+            When it takes longer than `timeout` [s], writes more than it may, or `stop` is set. It
+            is of no use after that.
+        """
+        end = time.monotonic() + timeout
+        answer = bytearray(self._unread)
+        complete = b"\n" in answer
+        self._pipes.send(request.line)
+        while self._pipes.sending or not complete:
+            if stop.is_set():
+                raise ProgramFault(request.where, "it was stopped")
+            if (left := end - time.monotonic()) <= 0.0:
+                raise ProgramFault(request.where, self._late(timeout, started=bool(answer)))
+            if len(answer) > request.most:
+                most = f"{request.most / MIB:.3g} MiB"
+                raise ProgramFault(request.where, f"its answer is longer than {most}")
+            try:
+                chunk = self._pipes.receive(min(left, TICK_S))
+            except BrokenPipeError:
+                raise self._ended(request) from None
+            if chunk == b"":
+                raise self._ended(request)
+            if chunk is not None:
+                complete = complete or b"\n" in chunk
+                answer += chunk
+        line, _, self._unread = bytes(answer).partition(b"\n")
+        return line
+
+    def last_errors(self) -> str:
+        """Return the last lines that it wrote to standard error, for the end of a message."""
+        text = self._pipes.errors.decode("utf-8", "replace")
+        lines = [line.strip() for line in text.splitlines() if line.strip()][-SHOWN_LINES:]
+        if not lines:
+            return ""
+        shown = " | ".join(lines)
+        return "; its last messages: " + "".join(c if c.isprintable() else " " for c in shown)
+
+    def close_input(self) -> None:
+        """Close its standard input: a program that reads to the end then ends by itself."""
+        self._pipes.close_input()
+
+    def close(self, *, patience: float = 0.0) -> None:
+        """End it and all that it started, after `patience` [s] to do so by itself."""
+        self.close_input()
+        if self.is_own:
+            with suppress(subprocess.TimeoutExpired):
+                if patience > 0.0:
+                    self._process.wait(patience)
+            self._kill()
+            self._process.wait()
+        self._pipes.close()
+
+    def _late(self, timeout: float, *, started: bool) -> str:
+        hint = "a line break ends an answer" if started else "an answer has to be flushed"
+        return (
+            f"it gave no answer within {timeout:g} s ({hint}; `timeout` gives it longer)"
+            f"{self.last_errors()}"
+        )
+
+    def _ended(self, request: Request) -> ProgramEnded:
+        """Return how it ended; one that only closed its output is ended here."""
+        end = time.monotonic() + GRACE_S
+        while self._process.poll() is None and time.monotonic() < end:
+            # It may be writing its last words, and wait until somebody reads them.
+            self._pipes.hear_errors(0.01)
+        code = self._process.poll()
+        self._kill()
+        # More than a pipe holds; somebody else may go on writing to it.
+        for _ in range(32):
+            if not self._pipes.hear_errors(0.0):
+                break
+        return ProgramEnded(request.where, f"it {_exit_words(code)}{self.last_errors()}")
+
+    def _kill(self) -> None:
+        if sys.platform == "win32":
+            # With all that it started: Windows has no groups of processes to end.
+            words = ["taskkill", "/F", "/T", "/PID", str(self._process.pid)]
+            subprocess.run(words, capture_output=True, check=False)
+            self._process.kill()
+        else:
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(self._process.pid, signal.SIGKILL)
+
+
+def close_programs(programs: Iterable[Program]) -> None:
+    """End programs that wait for a request, all in the time of one."""
+    ending = list(programs)
+    for program in ending:
+        program.close_input()
+    end = time.monotonic() + GRACE_S
+    for program in ending:
+        program.close(patience=max(end - time.monotonic(), 0.0))
+
+
+def _start(words: Sequence[str], folder: str) -> subprocess.Popen[bytes]:
+    try:
+        return subprocess.Popen(
+            words,
+            cwd=folder,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            bufsize=0,
+            # Ctrl-C is for this process, which then ends the program and what that has started.
+            start_new_session=True,
+            creationflags=_OWN_GROUP,
+        )
+    except OSError as error:
+        hint = (
+            "; a script needs its interpreter ('command:python3 simulator.py'), or a first line "
+            "that names it and the right to be run"
+        )
+        raise ConfigurationError(
+            f"cannot start the program {words[0]}: {error.strerror or error}"
+            f"{'' if isinstance(error, FileNotFoundError) else hint}"
+        ) from error
+    except ValueError as error:
+        raise ConfigurationError(f"cannot start the program {words[0]!r}: {error}") from error
+
+
+def _exit_words(code: int | None) -> str:
+    if code is None:
+        return "closed its standard output"
+    if code >= 0:
+        return f"ended with exit code {code}"
+    names = {one.value: one.name for one in signal.Signals}
+    return f"was ended by {names.get(-code, f'signal {-code}')}"

@@ -1,0 +1,116 @@
+"""Whether the times of a file can be true: above all those whose unit it does not say."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from driftwalk.core.errors import InputError
+from driftwalk.core.text.argument_text import argument_text
+from driftwalk.record.raw import CLOCK_UNITS, Array, RawRecording
+
+LONGEST_INTERVAL_S = 1e4
+"""Beyond this, an interval between samples is another unit's, unless it is whole hours."""
+SHORTEST_INTERVAL_S = 1e-6
+"""No camera takes a million frames a second for long."""
+USUAL_INTERVAL_S = 10.0
+"""Beyond this, milliseconds of a video are likelier than a camera with such a long interval."""
+LAST_DAY_S = 1e10
+"""Seconds since 1970 until the year 2286."""
+LONGEST_RECORDING_S = 1e12
+"""30 000 years; powers of much longer times are beyond float64."""
+_FIRST_DAY_S = 1e8
+_FASTEST_S, _SLOWEST_S = 1e-4, 2.0
+_HOUR_S = 3600.0
+_ENOUGH = 100_000
+
+
+def check_clock(raw: RawRecording) -> list[str]:
+    """Refuse times that cannot be, and return what to say about those that may not be seconds.
+
+    Parameters
+    ----------
+    raw : RawRecording
+        As a loader returned it.
+
+    Returns
+    -------
+    list of str
+        Sentences for the person who loads the file.
+
+    Raises
+    ------
+    InputError
+        When the clock names no unit and in seconds would begin after the year 2286, or have
+        intervals beyond `LONGEST_INTERVAL_S` or below `SHORTEST_INTERVAL_S`; when a clock of any
+        unit lasts longer than `LONGEST_RECORDING_S`.
+    """
+    if raw.clock_unit == "frame" or not raw.bodies:
+        return []
+    clocks = list({id(body.clock): body.clock for body in raw.bodies}.values())
+    # One mask at a time, and no copies: a clock may have millions of times.
+    first = min(float(clock.min(where=np.isfinite(clock), initial=np.inf)) for clock in clocks)
+    last = max(float(clock.max(where=np.isfinite(clock), initial=-np.inf)) for clock in clocks)
+    if last < first:
+        return []
+    first, last = first + raw.clock_origin, last + raw.clock_origin
+    notes = []
+    if raw.bare_clock is not None and raw.clock_unit == "s":
+        notes = _check_bare(raw.bare_clock, _steps(clocks), first, last)
+    lasts = (last - first) / CLOCK_UNITS[raw.clock_unit]
+    if lasts > LONGEST_RECORDING_S:
+        raise InputError(f"the times are {lasts:.3g} s apart: one of them, or their unit, is wrong")
+    return notes
+
+
+def _check_bare(column: str, steps: Array, first: float, last: float) -> list[str]:
+    """Refuse what cannot be seconds, and say what may be milliseconds."""
+    interval = float(np.median(steps)) if steps.size else 0.0
+    long = interval > LONGEST_INTERVAL_S and not _whole_hours(steps)
+    short = 0.0 < interval < SHORTEST_INTERVAL_S
+    what = f"the clock{f' in column {column!r}' if column else ''} names no unit"
+    if first >= LAST_DAY_S or long or short:
+        raise InputError(
+            f"{what}, and as seconds it would begin at {first:.3g} s, last {last - first:.3g} s "
+            f"and have an interval of {interval:.3g} s: {_remedy(column, first, interval)}"
+        )
+    if interval >= USUAL_INTERVAL_S and column and not _whole_hours(steps):
+        option = _option(column, "ms")
+        return [f"{what}; read as seconds, its interval is {interval:.4g} s: if it is ms, {option}"]
+    return []
+
+
+def _steps(clocks: list[Array]) -> Array:
+    """Return the sizes of the first steps of all clocks; rows at one time make none."""
+    known = [start[np.isfinite(start)] for start in (clock[:_ENOUGH] for clock in clocks)]
+    with np.errstate(over="ignore"):  # beyond float64 is as long as a step can be
+        steps = np.concatenate([np.abs(np.diff(start)) for start in known])
+    bounded: Array = np.minimum(steps[steps > 0], np.finfo(np.float64).max)
+    return bounded
+
+
+def _whole_hours(steps: Array) -> bool:
+    """Whether the steps are those of a calendar: one sample every six hours, or a day."""
+    return bool((steps % _HOUR_S == 0.0).mean() > 0.9)
+
+
+def _remedy(column: str, first: float, interval: float) -> str:
+    """Return what to do, with the units that would make sense."""
+    if not column:
+        return "the format has its times in seconds; write them so"
+    likely = [unit for unit in ("ms", "us", "ns") if _likely(CLOCK_UNITS[unit], first, interval)]
+    named = [
+        f"{_option(column, unit)} makes it {interval / CLOCK_UNITS[unit]:.3g} s" for unit in likely
+    ]
+    named = named or [f"{_option(column, 'UNIT')}, of {', '.join(CLOCK_UNITS)}"]
+    return f"name the unit ({'; '.join(named)}); if it is seconds, {_option(column, 's')}"
+
+
+def _likely(ticks: float, first: float, interval: float) -> bool:
+    """Whether a clock of so many ticks a second begins and ticks as clocks of cameras do."""
+    if first >= LAST_DAY_S and not _FIRST_DAY_S <= first / ticks < LAST_DAY_S:
+        return False
+    return interval == 0.0 or _FASTEST_S <= interval / ticks <= _SLOWEST_S
+
+
+def _option(column: str, unit: str) -> str:
+    return argument_text("columns", {"t": f"{column}:{unit}"})

@@ -1,0 +1,107 @@
+"""Rows of one body at one time in different places: several bodies were read as one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from driftwalk.core.errors import InputError
+from driftwalk.core.text.argument_text import argument_text
+from driftwalk.record.raw import Array, RawBody
+
+LARGEST_SHARE = 0.01
+"""Share of the times at which a tracker's slip may have left two places."""
+
+BodyColumns = Callable[[bool], list[str]]
+"""Returns the columns that could name the body; the argument: whether times must be in order."""
+
+
+def times_in_two_places(clock: Array, x: Array, y: Array, *, quantum: float = 0.0) -> Array:
+    """Return the times that have rows in different places.
+
+    Parameters
+    ----------
+    clock : array, shape (n,)
+        Times in order; those that are equal stand together.
+    x, y : array, shape (n,)
+        Positions; a row without one is in no place.
+    quantum : float
+        Rows no further apart than the resolution of the positions are in the same place.
+
+    Examples
+    --------
+    >>> times = np.array([0.0, 1.0, 1.0, 2.0, 2.0])
+    >>> times_in_two_places(times, np.array([0.0, 1.0, 1.0, 2.0, 5.0]), np.zeros(5)).tolist()
+    [2.0]
+    """
+    repeated = clock[1:] == clock[:-1]
+    known = np.isfinite(x) & np.isfinite(y)
+    rows = np.flatnonzero((np.append(repeated, False) | np.append(False, repeated)) & known)
+    if not rows.size:
+        return clock[:0]
+    times = clock[rows]
+    starts = np.flatnonzero(np.append(True, times[1:] != times[:-1]))
+    apart = np.zeros(starts.size, dtype=bool)
+    for values in (x[rows], y[rows]):
+        spread = np.maximum.reduceat(values, starts) - np.minimum.reduceat(values, starts)
+        # The scale to metres leaves a resolution rounded.
+        apart |= spread > quantum * (1.0 + 1e-6)
+    return times[starts][apart]
+
+
+def refuse_several_bodies(body: RawBody, apart: Array, columns: BodyColumns | None) -> None:
+    """Raise an error when the times in two places are more than a tracker's slips.
+
+    Parameters
+    ----------
+    body : RawBody
+        Its times in order.
+    apart : array
+        Result of `times_in_two_places`.
+    columns : callable, optional
+        Finds the columns that could name the body; None: the format has no columns to choose from.
+
+    Raises
+    ------
+    InputError
+        Naming these columns.
+    """
+    times = 1 + int((body.clock[1:] != body.clock[:-1]).sum())
+    if apart.size <= LARGEST_SHARE * times:
+        return
+    raise InputError(
+        f"body '{body.name}' is in several places at {apart.size} of {times} times, first at "
+        f"{apart[0]:.6g} s; {_advice(columns)}"
+    )
+
+
+def _advice(columns: BodyColumns | None) -> str:
+    if columns is None:
+        return (
+            "the format has no column that distinguishes bodies: split the file, or "
+            "correct these rows"
+        )
+    found = columns(False)
+    if found:
+        return name_the_body(found)
+    return (
+        'if these are several bodies, add a column that names them (`columns={"body": "NAME"}`); '
+        "if the clock is coarser than the frames, count frames "
+        '(`columns={"frame": "NAME"}` and `frame_rate`)'
+    )
+
+
+def name_the_body(columns: list[str]) -> str:
+    """Return what to do when one of these columns could name the body.
+
+    Examples
+    --------
+    >>> print(name_the_body(["particle"]))
+    the column 'particle' could name the body: add `columns={"body": "particle"}`
+    """
+    argument = argument_text("columns", {"body": columns[0]})
+    if len(columns) == 1:
+        return f"the column '{columns[0]}' could name the body: add {argument}"
+    shown = " or ".join(f"'{name}'" for name in columns)
+    return f"the column {shown} could name the body: add {argument} or the like"

@@ -1,0 +1,1 @@
+"""The answers of datasets: their numbers under flat names, and their words."""

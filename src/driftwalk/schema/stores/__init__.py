@@ -1,0 +1,1 @@
+"""NetCDF, HDF5 and MATLAB files, read within bounds."""

@@ -1,0 +1,127 @@
+"""MATLAB files: which they are, the names of their variables, and what scipy reads of old ones."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from driftwalk.core.errors import FormatError
+from driftwalk.schema.stores.matlab_elements import refuse_unknown_elements
+from driftwalk.schema.stores.netcdf import refuse_huge
+
+MOST_ELEMENTS: Final = 200_000
+"""Elements of an array of structs or cells that are read."""
+_SIZES: Final = {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "single": 4, "logical": 1}
+OLD: Final = b"MATLAB 5.0 MAT-file"
+"""Start of the format that MATLAB writes unless a user chooses another."""
+HDF5_BASED: Final = b"MATLAB 7.3 MAT-file"
+"""Start of the format for large variables, an HDF5 file behind half a kilobyte of text."""
+
+
+def matlab_variables(path: Path) -> list[str]:
+    """Return the names of a file's variables, [] when it is no file of MATLAB's or damaged.
+
+    Parameters
+    ----------
+    path : Path
+        Any file.
+    """
+    try:
+        with path.open("rb") as file:
+            old = file.read(len(OLD)) == OLD
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return _old_variables(path) if old else _hdf5_variables(path)
+    except Exception:  # whatever the damage of a file leads the libraries to
+        return []
+
+
+def read_old(path: Path) -> dict[str, Any]:
+    """Return what scipy reads from a file of the old format, by the variables' names.
+
+    Parameters
+    ----------
+    path : Path
+        A file that begins with `OLD`.
+
+    Raises
+    ------
+    FormatError
+        When the file declares more than it can hold, more than 200,000 structs or cells, or an
+        element of no known type. Of other damage scipy raises what it likes.
+    """
+    from scipy.io import loadmat
+
+    with warnings.catch_warnings():
+        # Of two variables of one name the later counts, as in MATLAB.
+        warnings.simplefilter("ignore")
+        _refuse_declared(path)
+        refuse_unknown_elements(path)
+        content: dict[str, Any] = loadmat(path, appendmat=False)
+    return {name: value for name, value in content.items() if not name.startswith("__")}
+
+
+def refuse_many(count: float, path: Path | None = None) -> None:
+    """Refuse an array of more structs or cells than are read.
+
+    Parameters
+    ----------
+    count : float
+        How many there are.
+    path : Path, optional
+        The file.
+
+    Raises
+    ------
+    FormatError
+        When there are more.
+    """
+    if count > MOST_ELEMENTS:
+        raise FormatError(
+            f"has an array of {count:.0f} structs or cells, and {MOST_ELEMENTS} are read: save a "
+            "struct of arrays (table2struct(T, 'ToScalar', true))",
+            path=path,
+        )
+
+
+def _refuse_declared(path: Path) -> None:
+    """Refuse what a file declares and cannot hold.
+
+    Of objects scipy knows no shape, and gives up.
+    """
+    from scipy.io import whosmat
+
+    try:
+        declared = whosmat(path, appendmat=False)
+        size = sum(_size(*entry) for entry in declared)
+    except TypeError:
+        return
+    refuse_huge(size, path)
+    for _, shape, kind in declared:
+        if kind in ("struct", "cell"):
+            refuse_many(_count(shape), path)
+
+
+def _size(_name: str, shape: tuple[int, ...], kind: str) -> int:
+    """Return how many bytes a variable has in memory by its header."""
+    return int(_count(shape)) * _SIZES.get(kind, 8)
+
+
+def _count(shape: tuple[int, ...]) -> float:
+    return float(np.prod([float(length) for length in shape]))
+
+
+def _old_variables(path: Path) -> list[str]:
+    from scipy.io import whosmat
+
+    return [str(name) for name, _, _ in whosmat(path, appendmat=False)]
+
+
+def _hdf5_variables(path: Path) -> list[str]:
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        return [str(name) for name in file if not str(name).startswith("#")]

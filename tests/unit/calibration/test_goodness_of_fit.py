@@ -1,0 +1,50 @@
+"""Which settings the halves of a recording leave out."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+import driftwalk as dw
+from driftwalk.calibration.goodness_of_fit import could_be_best
+from driftwalk.calibration.grid.grid_map import full_map, run_map
+from driftwalk.calibration.problem import prepare_problem
+from driftwalk.schema import Track, body_track
+from driftwalk.simulation.backend import Camera
+
+
+def test_the_best_setting_of_a_half_is_among_those_that_could_be():
+    """Every setting is simulated for the half, too: the nearest ones may not be left out."""
+    track = body_track(dw.tank30_recording().isel(time=slice(0, 2400)))
+    camera = Camera(3e-4, 0.0, 0.0)
+    half = Track(*(values[:1200] for values in track))
+    whole, first = (
+        prepare_problem(one, dw.Study(), dw.tank30_flow(), camera=camera, threads=1)
+        for one in (track, half)
+    )
+    axes = np.arange(1, 9) * 0.1, np.arange(0, 9) * 2e-4
+    coarse = run_map(whole, axes, stage="coarse", replicates=1)
+    of_half = run_map(first, axes, stage="first_half", replicates=1)
+    possible = could_be_best(whole, coarse, first)
+    assert possible[of_half.mean <= of_half.mean.min() + 0.02].all()
+    assert 0.02 < possible.mean() < 0.7
+
+
+def test_the_margin_is_that_of_the_triangle_inequality():
+    """A half that is the whole leaves no margin but chance: two floors."""
+    track = body_track(dw.tank30_recording().isel(time=slice(0, 600)))
+    camera = Camera(3e-4, 0.0, 0.0)
+    whole = prepare_problem(track, dw.Study(), dw.tank30_flow(), camera=camera, threads=1)
+    axes = np.array([0.4]), np.array([0.0, 3e-4, 6e-4, 9e-4])
+    from driftwalk.calibration.goodness_of_fit import noise_floor_at
+
+    floor = noise_floor_at(whole, (0.4, 6e-4))
+    distance = floor * np.array([[3.5, 2.9, 1.0, 3.1]])[..., None]
+    coarse = full_map(axes, distance, {})
+    assert could_be_best(whole, coarse, whole).tolist() == [[False, True, True, False]]
+    moved = dataclasses.replace(
+        whole.reference, steps=np.ascontiguousarray(whole.reference.steps * [1.1, 1.0])
+    )
+    other = dataclasses.replace(whole, reference=moved)
+    assert could_be_best(whole, coarse, other).tolist() == [[True, True, True, True]]

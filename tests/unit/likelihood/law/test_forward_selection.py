@@ -1,0 +1,109 @@
+"""What is opened first, and that a law found amid departures is compared once more."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fit_worlds import coarse_study, driven
+
+from driftwalk.core.run_stages import tell_nobody
+from driftwalk.flow.arena import outline_of
+from driftwalk.likelihood.filter_pass import Passes
+from driftwalk.likelihood.fit import _start
+from driftwalk.likelihood.law.assumptions import FLOATING, assumptions_of
+from driftwalk.likelihood.law.departures import STRENGTHS
+from driftwalk.likelihood.law.forward_selection import Opening, _parts
+from driftwalk.likelihood.law.found import LawFound
+from driftwalk.likelihood.law.score_tests import Trial
+from driftwalk.likelihood.law.search import LawSearch
+from driftwalk.likelihood.newton import Mode, Prior
+from driftwalk.likelihood.ready import body_of, prepare, spline_of
+from driftwalk.likelihood.start import first_weights
+
+PULSE = {"pulse_cosine": 0.1, "pulse_sine": 0.0, "pulse_frequency": 0.2}
+
+
+def trial_of(sigmas: Mapping[str, float]) -> Trial:
+    """Return independent score tests with standard deviations of 1."""
+    values = np.array(list(sigmas.values()))
+    return Trial(tuple(sigmas), values, np.ones(values.size), np.eye(values.size), values)
+
+
+def test_what_the_recording_asks_for_most_comes_first() -> None:
+    """By chi squared less its degrees of freedom: of the strengths 6 times 3 squared, less 6."""
+    trial = trial_of({"force_memory": 6.0, "marker_x": 7.5, **dict.fromkeys(STRENGTHS, 3.0)})
+    asked = dict.fromkeys(trial.names, 0.1) | PULSE
+    assert _parts(asked, trial) == [("marker_x",), STRENGTHS, ("force_memory",), tuple(PULSE)]
+
+
+class Stubborn(Opening):
+    """Opens numbers one group at a time only, and some of them never."""
+
+    def __init__(self, never: set[str]) -> None:
+        self.never, self.seen = never, []  # type: ignore[var-annotated]
+
+    def _opened(self, mode: Mode, asked: Mapping[str, float]) -> tuple[Mode, set[str]]:
+        self.seen.append(set(asked))
+        alone = len(asked) == 1 or set(asked) == set(STRENGTHS)
+        if alone and not self.never & set(asked):
+            return replace(mode, iterations=99), set()
+        return mode, set(asked)
+
+
+def bare_mode() -> Mode:
+    return Mode(None, None, np.eye(1), 0, 1, True, 0.0)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("never", "tries"), [(set(), 2), ({STRENGTHS[0]}, 3)])
+def test_where_all_together_fail_each_group_is_opened_alone(never: set[str], tries: int) -> None:
+    trial = trial_of({"force_memory": 4.2, **dict.fromkeys(STRENGTHS, 15.0)})
+    opening = Stubborn(never)
+    mode, dropped = opening._opened_or_strongest(
+        bare_mode(), dict.fromkeys(trial.names, 0.1), trial
+    )
+    assert mode.iterations == 99
+    assert dropped == set()
+    assert len(opening.seen) == tries
+    assert opening.seen[1] == set(STRENGTHS)
+
+
+def test_where_no_group_can_be_opened_all_are_closed() -> None:
+    trial = trial_of({"force_memory": 4.2, **dict.fromkeys(STRENGTHS, 15.0)})
+    before, asked = bare_mode(), dict.fromkeys(trial.names, 0.1)
+    opening = Stubborn({"force_memory", *STRENGTHS})
+    assert opening._opened_or_strongest(before, asked, trial) == (before, set(asked))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("settled_by", [10.0, math.inf])
+def test_a_law_that_was_found_amid_departures_is_compared_again(settled_by: float) -> None:
+    """A block under the paper's law, taken for a floating one with a linear part of the drag.
+
+    Evidence of 10 is not decisive; where it is, the score tests have to object. C_d is within 4 of
+    its standard deviations, which right code misses once in 16,000 recordings.
+    """
+    study = coarse_study("auto")
+    ready = prepare([driven(5, 200.0, {})], study, None, None)
+    passes = Passes(
+        ready.series,
+        body_of(study, ready.angle),
+        spline_of(study, outline_of(study.tank.to_arena())),
+    )
+    assumptions = assumptions_of(study, ready.angle, recordings=1, flows=1)
+    search = LawSearch(passes, Prior(passes), assumptions, study.fit.iterations, tell_nobody)
+    start = _start(passes, ready, study)
+    weights = first_weights(ready.tracks, passes.spline)
+    wrong = search.modes.find_from_afar(
+        replace(start, opened={"linear_share": 0.1}, fixed=dict(FLOATING)), weights
+    )
+    found = search._reconsidered(LawFound(wrong, wrong, True, {}, settled_by, None), start)
+    assert not found.floating
+    assert not found.mode.point.opened
+    assert found.settled_by == found.evidence["paper"] - found.evidence["floating"] > 10.0
+    drag = found.mode.point.coefficients.size
+    std = math.sqrt(found.mode.covariance[drag, drag])
+    assert abs(found.mode.point.log_drag - math.log(0.45)) < 4.0 * std
