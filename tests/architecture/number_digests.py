@@ -20,7 +20,7 @@ import numpy as np
 
 sys.path[:0] = [str(Path(__file__).parents[1] / name) for name in ("helpers", "reference")]
 
-from every_kind import FORMS, every_kind
+from every_kind import FORMS, every_kind  # noqa: E402
 
 
 def digest(values: np.ndarray) -> str:

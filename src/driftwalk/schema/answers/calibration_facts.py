@@ -1,9 +1,10 @@
 """The answer of a calibration under flat names, with the unit in the name, and as variables.
 
-As of a fit, see `driftwalk.schema.answers.fit_facts`: ``force_std_N`` is the value at
-``force_std`` of the variable ``estimate``, ``position_noise_m`` the variable ``position_noise`` in m. The names follow
-from the schema and from the model's parameters. ``ks_distance`` is the one exception: the map has
-that name, so the distance at the optimum is the variable ``optimum_ks_distance``.
+The names follow from the schema and from the model's parameters, as those of a fit do
+(`driftwalk.schema.answers.fit_facts`): ``force_std_N`` is the value at ``force_std`` of the
+variable ``estimate``, ``position_noise_m`` the variable ``position_noise`` in m. ``ks_distance`` is
+the one exception: the map has that name, so the distance at the optimum is the variable
+``optimum_ks_distance``.
 """
 
 from __future__ import annotations
