@@ -194,13 +194,17 @@ def refuse_huge(declared: int, path: Path) -> None:
     FormatError
         Says both sizes.
     """
-    size = path.stat().st_size
-    if declared > ALLOWANCE_BYTES + LARGEST_RATIO * size:
+    if declared > most_bytes(path):
         raise FormatError(
             f"is damaged: its header declares {declared / 1e9:.3g} GB, which a file of "
-            f"{size / 1e6:.2g} MB does not hold",
+            f"{path.stat().st_size / 1e6:.2g} MB does not hold",
             path=path,
         )
+
+
+def most_bytes(path: Path) -> int:
+    """Return how many bytes a file may hold in memory by its size on the disk."""
+    return ALLOWANCE_BYTES + LARGEST_RATIO * path.stat().st_size
 
 
 def _declared_hdf5(path: Path) -> int:
