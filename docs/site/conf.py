@@ -13,8 +13,9 @@ from importlib.metadata import version as version_of
 from pathlib import Path
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE))
+sys.path[:0] = [str(HERE), str(HERE.parents[1] / "tests" / "architecture")]
 
+from api_pages import write_pages  # noqa: E402
 from contents import add_contents  # noqa: E402
 
 project = "driftwalk"
@@ -70,5 +71,6 @@ sphinx_gallery_conf = {
 
 
 def setup(app: object) -> None:
-    """Let the front page's own links be the table of contents."""
+    """Make the pages of the Python names, and the table of contents of the front page's links."""
+    write_pages()
     app.connect("source-read", add_contents)  # type: ignore[attr-defined]

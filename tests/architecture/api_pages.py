@@ -1,6 +1,7 @@
 """The reference pages of the Python names, made from the docstrings.
 
-``python tests/architecture/api_pages.py`` writes them again.
+`make site` writes them before it builds the site, as does
+``python tests/architecture/api_pages.py``. They are not committed.
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ from signatures import bases_of, signature_of
 
 import driftwalk
 
-FOLDER: Final = Path(__file__).resolve().parents[2] / "docs" / "reference"
+FOLDER: Final = Path(__file__).resolve().parents[2] / "docs" / "reference" / "python"
 MADE: Final = "Made from the docstrings by `python tests/architecture/api_pages.py`."
+ALL: Final = "names.md"
 # The calls of a notebook first, then the rooms in the order of the data.
 ROOMS: Final = (
     "notebook",
@@ -49,13 +51,13 @@ TABLE: Final = "| name | what |\n|---|---|\n"
 
 def all_pages() -> dict[Path, str]:
     """Return the pages by their paths: one of all names, and one per room."""
-    rooms = {FOLDER / "python" / f"{_file(name)}.md": _room_page(name) for name in (*ROOMS, ERRORS)}
-    return {FOLDER / "python.md": _page_of_all(), **rooms}
+    rooms = {FOLDER / f"{_file(name)}.md": _room_page(name) for name in (*ROOMS, ERRORS)}
+    return {FOLDER / ALL: _page_of_all(), **rooms}
 
 
 def _page_of_all() -> str:
     parts = [
-        "# The Python names\n\n",
+        "# All names\n\n",
         f"{MADE}\n"
         "Each name leads to its arguments with units, results, errors and an example, as\n"
         "`help(driftwalk.fit)` shows them. Names in **bold** are also at the top, such as\n"
@@ -73,7 +75,7 @@ def _row(name: str, room: ModuleType, public: str) -> str:
     found = getattr(room, public)
     call = f"{public}{_short_arguments(found)}"
     top = getattr(driftwalk, public, None) is found and public in driftwalk._MODULE_OF
-    shown = f"[`{call}`](python/{_file(name)}.md#{_anchor(public)})"
+    shown = f"[`{call}`]({_file(name)}.md#{_anchor(public)})"
     return f"| {f'**{shown}**' if top else shown} | {_first_line(found)} |\n"
 
 
@@ -92,7 +94,7 @@ def _room_page(name: str) -> str:
     names = _names(name)
     parts = [
         f"# {_title(name)}",
-        f"{MADE} [All names](../python.md).",
+        f"{MADE} [All names]({ALL}).",
         as_markdown(inspect.getdoc(room) or ""),
         "\n".join(f"- [`{public}`](#{_anchor(public)})" for public in names),
         *(_entry(room, public) for public in names),
@@ -186,13 +188,15 @@ def _anchor(heading: str) -> str:
 
 
 def write_pages() -> None:
-    """Write every page, and remove those of rooms that are gone."""
+    """Write every page that has changed, and remove those of rooms that are gone."""
     found = all_pages()
-    (FOLDER / "python").mkdir(exist_ok=True)
-    for path in set((FOLDER / "python").glob("*.md")) - found.keys():
+    FOLDER.mkdir(exist_ok=True)
+    for path in set(FOLDER.glob("*.md")) - found.keys():
         path.unlink()
     for path, text in found.items():
-        path.write_text(text, encoding="utf-8")
+        # Sphinx reads a page again when its file is newer.
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -201,7 +201,7 @@ def _study(axes: dict[str, np.ndarray], blocks: int, chirality: str) -> xr.Datas
         p[loose] *= 1.0 + 300.0 * (1.0 - mobility[index]) ** 4
         share[index] = rng.multinomial(1000, p / p.sum()) / 1000
     dims = tuple(axes)
-    return xr.Dataset(
+    study = xr.Dataset(
         {
             "proportion": ((*dims, "class"), share),
             "runs": (dims, np.full(shape, 1000)),
@@ -221,6 +221,7 @@ def _study(axes: dict[str, np.ndarray], blocks: int, chirality: str) -> xr.Datas
             "noise_floor_mean": 0.11, "noise_floor_95": 0.18, "force_interval_s": 0.016,
         },
     )  # fmt: skip
+    return with_courses(study)
 
 
 def with_courses(study: xr.Dataset, *, samples: int = 11) -> xr.Dataset:

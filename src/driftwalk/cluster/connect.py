@@ -7,16 +7,17 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Final
 
 from driftwalk.cluster.address import ClusterAddress
 from driftwalk.cluster.jobs import begin_jobs
-from driftwalk.cluster.probe import SameBits
-from driftwalk.cluster.versions import refuse_other_workers
+from driftwalk.cluster.probe import SameBits, probe_digest, refuse_other_bits
 from driftwalk.core.errors import ClusterError, InputError, reason_of
 from driftwalk.core.extras import show_dask
+from driftwalk.core.provenance import package_versions
 from driftwalk.core.run_stages import tell_nobody
-from driftwalk.sweep import WorkerExecutor
+from driftwalk.sweep import WorkerExecutor, refuse_others
 
 ANSWER_S: Final = 10.0
 """How long a scheduler may take to answer [s]."""
@@ -200,3 +201,41 @@ def _number(count: int, what: str) -> str:
 
 def _was(count: int) -> str:
     return "was" if count == 1 else "were"
+
+
+def refuse_other_workers(client: Any) -> SameBits:
+    """Raise where a worker has another version of driftwalk, or none, or gives other bits.
+
+    Parameters
+    ----------
+    client : distributed.Client
+        Of the workers.
+
+    Returns
+    -------
+    SameBits
+        The same check for workers that come later.
+
+    Raises
+    ------
+    ClusterError
+        Names the worker, and both versions or both hashes.
+    """
+    wanted = package_versions(["driftwalk"])
+    # A function of the standard library: one of driftwalk's own would not run where it is missing.
+    for worker, found in _asked(client, version, "driftwalk"):
+        there = None if isinstance(found, PackageNotFoundError) else str(found)
+        refuse_others(wanted, {"driftwalk": there}, worker)
+    expected = probe_digest()
+    for worker, found in _asked(client, probe_digest):
+        refuse_other_bits(expected, found, worker)
+    return SameBits(expected)
+
+
+def _asked(client: Any, function: Callable[..., Any], *arguments: Any) -> Iterator[tuple[str, Any]]:
+    """Call a function on every worker, and give its name and what it said."""
+    for address, found in client.run(function, *arguments, on_error="return").items():
+        worker = f"the worker {address}"
+        if isinstance(found, BaseException) and not isinstance(found, PackageNotFoundError):
+            raise ClusterError(f"{worker} does not answer: {type(found).__name__}: {found}")
+        yield worker, found

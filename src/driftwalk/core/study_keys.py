@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.text.did_you_mean import did_you_mean
-from driftwalk.core.uncertain import Uncertain, split_uncertain
+from driftwalk.core.units import Uncertain, split_uncertain
 
 STUDY_KEYS: Final[dict[str, str]] = {
     "tank_diameter": "tank.diameter_m",

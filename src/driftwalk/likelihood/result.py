@@ -36,7 +36,7 @@ from driftwalk.likelihood.reml import Restricted
 from driftwalk.likelihood.spline import Floats, Spline
 from driftwalk.schema import FLAGS, build_flow_field
 from driftwalk.schema.answers.fit_facts import fit_variables
-from driftwalk.schema.earlier import current_form
+from driftwalk.schema.check import refuse_other_version
 from driftwalk.schema.kinds import KINDS
 
 if TYPE_CHECKING:
@@ -337,17 +337,17 @@ def visited_shares(fit: xr.Dataset) -> list[float]:
 
 
 def require_fit(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a fit, one of an earlier schema version in its current form.
+    """Return a fit.
 
     Raises
     ------
     InputError
-        When it is no fit.
+        When it is no fit, or one of another schema version.
     """
     kind = dataset.attrs.get("kind")
     if kind != "fit":
         raise InputError(f"not a fit: its kind is {kind!r}; fit_motion makes one")
-    return current_form(dataset)
+    return refuse_other_version(dataset)
 
 
 def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:

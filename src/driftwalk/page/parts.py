@@ -55,9 +55,8 @@ def empty_section(id: str, title: str, reason: str) -> Section:
 def attempt(id: str, title: str, make: Callable[[], Section | list[Section]]) -> list[Section]:
     """Make sections; what the data do not allow becomes an empty section with the reason.
 
-    Another version of driftwalk, or another program, may have written the data in another form:
-    that costs the section, and not the page. Errors that no data explain are faults of driftwalk,
-    and pass.
+    Another program may have written the data in another form: that costs the section, and not the
+    page. Errors that no data explain are faults of driftwalk, and pass.
     """
     try:
         made = make()

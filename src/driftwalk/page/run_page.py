@@ -31,7 +31,7 @@ from driftwalk.page.sections.recovery import recovery_sections
 from driftwalk.page.sections.tracking import tracking_sections, tracking_warnings
 from driftwalk.page.stored_run import MAIN_FILES, Run, open_run_folder
 from driftwalk.schema import body_names
-from driftwalk.schema.earlier import current_form
+from driftwalk.schema.check import refuse_other_version
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -133,7 +133,7 @@ def dataset_page(dataset: xr.Dataset) -> dict[str, Any]:
     --------
     ``dataset_page(fit)["title"]``
     """
-    dataset = current_form(dataset)
+    dataset = refuse_other_version(dataset)
     kind = str(dataset.attrs.get("kind", ""))
     if kind not in _SECTIONS_OF_ONE:
         raise InputError(

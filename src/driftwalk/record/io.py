@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.core.errors import InputError
+from driftwalk.core.text.did_you_mean import listed
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.core.units import parse_quantity
 from driftwalk.record.arena import PlacedArena, arena_attributes, place_arena
@@ -24,9 +25,7 @@ from driftwalk.record.cleaning.warn import angle_warnings, plausibility_warnings
 from driftwalk.record.convert_units import convert_units
 from driftwalk.record.noise import noise_reach
 from driftwalk.record.origin import origin_of
-from driftwalk.record.pose.listed import listed
-from driftwalk.record.pose.markers import join_markers
-from driftwalk.record.pose.options import two_names
+from driftwalk.record.pose.markers import join_markers, two_names
 from driftwalk.record.raw import DELIMITERS, Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.registry import PLAIN
 from driftwalk.record.text import DAMAGED_GZIP

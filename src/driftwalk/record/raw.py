@@ -155,3 +155,13 @@ class ReadOptions:
     """Keypoints seen with less confidence are missing; None: as usual for the format."""
     replicate: int = 0
     """Replicate of a simulation, counted from 0."""
+
+
+@dataclass(frozen=True)
+class Marks:
+    """Names that a file of a format has: a loader may have several, for several forms of it."""
+
+    container: str
+    """``"HDF5"``, ``"npz"``, ``"npy"``, ``"XML"``, ``"table"`` or ``"folder"``."""
+    names: tuple[str, ...]
+    """Arrays, attributes, keys, elements, columns or files."""

@@ -17,7 +17,7 @@ from driftwalk.core.provenance import read_manifest
 from driftwalk.motion import MotionModel, estimated_values
 from driftwalk.schema.answers.fit_facts import sentences
 from driftwalk.schema.calibration import is_block
-from driftwalk.schema.earlier import current_form
+from driftwalk.schema.check import refuse_other_version
 from driftwalk.schema.stores.contents import check_contents
 from driftwalk.schema.stores.netcdf import is_netcdf, open_netcdf
 
@@ -337,7 +337,7 @@ def read_found(source: Path | xr.Dataset, *, give: str = GIVE) -> FoundRun:
     if not isinstance(source, Path):
         origin = source.encoding.get("source")
         file = None if origin is None else Path(origin)
-        return FoundRun(current_form(source), file, run_folder(source))
+        return FoundRun(refuse_other_version(source), file, run_folder(source))
     if source.is_file():
         if give == GIVE and not is_netcdf(source):
             raise InputError(f"{source} is not a run directory: {give}")

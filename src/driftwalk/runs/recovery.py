@@ -57,7 +57,7 @@ def run_recovery(
 
     Parameters
     ----------
-    work : RecoverWork
+    work : RecoveryWork
         The work to do.
     folder : Path
         The run directory.

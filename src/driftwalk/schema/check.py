@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import FormatError, InputError
 from driftwalk.schema.description import Kind, Variable
 from driftwalk.schema.kinds import KINDS, find_kind
 
@@ -65,7 +66,9 @@ def check_dataset(dataset: xr.Dataset, kind: str | None = None) -> xr.Dataset:
     found = kind_of_dataset(dataset)
     if kind is not None and found.name != kind:
         raise InputError(f"not of the kind {kind}, but {found.name}")
-    require_version(dataset, found)
+    if "schema_version" not in dataset.attrs:
+        raise InputError(f"not of the kind {found.name}: the attribute 'schema_version' is missing")
+    refuse_other_version(dataset)
     for variable in found.variables:
         if variable.name in dataset.variables:
             _check_variable(dataset, variable, found)
@@ -81,14 +84,22 @@ def check_dataset(dataset: xr.Dataset, kind: str | None = None) -> xr.Dataset:
     return dataset
 
 
-def require_version(dataset: xr.Dataset, kind: Kind) -> None:
-    """Refuse a dataset of a version that is not the current one."""
+def refuse_other_version(dataset: xr.Dataset, path: Path | None = None) -> xr.Dataset:
+    """Return a dataset, unless it states another schema version than its kind's.
+
+    A dataset without a version passes: a file of another program need not state one.
+    """
+    kind = KINDS.get(str(dataset.attrs.get("kind")))
     version = dataset.attrs.get("schema_version")
+    if kind is None or version is None:
+        return dataset
     if not isinstance(version, int | np.integer) or version != kind.version:
-        raise InputError(
-            f"no {kind.name} of this version of driftwalk: its schema_version is {version}, "
-            f"expected {kind.version}"
+        raise FormatError(
+            f"is of another schema version: its {kind.name} has version {version}, and this "
+            f"driftwalk reads {kind.version}; make it again with this driftwalk",
+            path=path,
         )
+    return dataset
 
 
 def described(dataset: xr.Dataset) -> xr.Dataset:
@@ -104,18 +115,13 @@ def described(dataset: xr.Dataset) -> xr.Dataset:
     InputError
         As `check_dataset`.
     """
-    return check_dataset(with_descriptions(dataset))
-
-
-def with_descriptions(dataset: xr.Dataset) -> xr.Dataset:
-    """Return the same without the check, for what an earlier version left out."""
     kind = kind_of_dataset(dataset)
     dataset = dataset.copy(deep=False)
     for variable in kind.variables:
         if variable.name in dataset.variables:
             held = dataset.variables[variable.name]
             dataset[variable.name].attrs.update(variable.described(held.dtype))
-    return dataset
+    return check_dataset(dataset)
 
 
 def build_dataset(

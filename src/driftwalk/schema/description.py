@@ -129,8 +129,8 @@ class Kind:
         What it may say of itself, next to ``kind`` and ``schema_version``.
     read, read_attributes : str
         Names of the variables and of the attributes without which a stored one cannot be read,
-        separated by spaces. Files of other programs and of earlier versions
-        have less than driftwalk writes.
+        separated by spaces. Files of other programs have less than
+        driftwalk writes.
     """
 
     name: str

@@ -92,10 +92,6 @@ def test_settings_on_no_map_are_chosen_by_their_names(
     count = values(part["over_time"]["count"])
     exact = study["count_over_time"].transpose(axis, "class_over_time", "time")
     np.testing.assert_array_equal(count[0], exact)
-    older = study.drop_dims(["time", "class_over_time"])
-    none = part_of(sensitivity_sections(sensitivity=older), "times")
-    assert none["kind"] == "empty"
-    assert "kept no outcome classes over time" in none["reason"]
 
 
 def test_words_of_two_axes_are_one_list() -> None:
@@ -129,11 +125,6 @@ def test_of_more_than_twelve_parts_the_first_are_shown_and_the_rest_named() -> N
     times = [part for part in made if part["kind"] == "setting_times"]
     assert len(times) == 12
     assert times[2]["title"] == "Outcome classes over time, blocks 5"
-
-
-def test_a_study_of_before_has_none(study: xr.Dataset) -> None:
-    older = study.drop_dims(["time", "class_over_time"])
-    assert part_of(sensitivity_sections(sensitivity=older), "l1")["over_time"] is None
 
 
 def test_maps_without_end_have_fewer_times(

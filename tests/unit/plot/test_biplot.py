@@ -44,7 +44,7 @@ def test_dots_are_the_first_two_scores(parts) -> None:
 
 @pytest.mark.parametrize("color", ["complete", "l1_distance"])
 def test_colour_of_a_dot_belongs_to_its_setting(parts, study, color) -> None:
-    turned = study.transpose("force_std", "drag_coefficient", "class")
+    turned = study.transpose("force_std", "drag_coefficient", "class", ...)
     ax = plot_biplot(parts, sensitivity=turned, color=color)
     np.testing.assert_allclose(dots(ax).get_array(), study[color].values.ravel())
     np.testing.assert_allclose(

@@ -48,7 +48,7 @@ def test_map_is_the_distance_with_force_upwards_in_millinewtons(study) -> None:
 
 
 def test_order_of_the_dimensions_does_not_matter(study) -> None:
-    turned = study.transpose("class", "force_std", "drag_coefficient")
+    turned = study.transpose("class", "force_std", "drag_coefficient", ...)
     np.testing.assert_array_equal(
         mesh_values(plot_l1_map(study), (16, 15)), mesh_values(plot_l1_map(turned), (16, 15))
     )

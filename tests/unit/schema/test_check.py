@@ -15,6 +15,7 @@ from driftwalk.schema.check import unknown_names
 from driftwalk.schema.description import Variable
 from driftwalk.schema.steps import build_steps
 from driftwalk.schema.stores.contents import check_contents
+from driftwalk.schema.stores.netcdf import netcdf_bytes, open_netcdf
 
 
 def steps() -> xr.Dataset:
@@ -52,7 +53,10 @@ def test_a_sound_dataset_comes_back() -> None:
     [
         (lambda one: one.drop_attrs(deep=False), "not a dataset of driftwalk: it has no attribute"),
         (lambda one: one.assign_attrs(kind="paces"), "no kind of dataset is called 'paces': there"),
-        (lambda one: one.assign_attrs(schema_version=9), "its schema_version is 9, expected 1"),
+        (
+            lambda one: one.assign_attrs(schema_version=9),
+            "has version 9, and this driftwalk reads 1",
+        ),
         (lambda one: one.drop_vars("turning_angle"), "the variable 'turning_angle' is missing"),
         (lambda one: one.rename_dims(step="pace"), "lies on (pace), expected (step)"),
         (
@@ -112,6 +116,23 @@ def test_names_that_no_schema_has_are_found() -> None:
     assert unknown_names(map_of("tank")) == []
 
 
-def test_a_file_of_a_later_version_is_refused_in_words() -> None:
-    with pytest.raises(FormatError, match="later version of driftwalk: its steps has schema"):
-        check_contents(steps().assign_attrs(schema_version=2), Path("a.nc"))
+@pytest.mark.parametrize("version", [0, 2, "one"])
+def test_a_file_of_another_version_is_refused_in_words(version: int | str, tmp_path: Path) -> None:
+    other = steps().assign_attrs(schema_version=version)
+    said = f"is of another schema version: its steps has version {version}, and this driftwalk"
+    with pytest.raises(FormatError, match=said):
+        check_contents(other, Path("a.nc"))
+    path = tmp_path / "a.nc"
+    path.write_bytes(netcdf_bytes(other))
+    with pytest.raises(FormatError, match=said) as caught:
+        open_netcdf(path)
+    assert caught.value.path == path
+
+
+def test_a_file_of_another_program_need_not_state_a_version(tmp_path: Path) -> None:
+    other = steps()
+    del other.attrs["schema_version"]
+    (tmp_path / "a.nc").write_bytes(netcdf_bytes(other))
+    assert open_netcdf(tmp_path / "a.nc").equals(other)
+    with pytest.raises(InputError, match="the attribute 'schema_version' is missing"):
+        check_dataset(other)

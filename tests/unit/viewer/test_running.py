@@ -306,6 +306,15 @@ def test_assembly_counts_the_classes_of_finished_runs(tmp_path: Path) -> None:
         assert first["cells"] == [[[0, 0], [1, 0], [2, 0]]]
 
 
+def kept(counts: list[dict[str, int]]) -> dict[str, np.ndarray]:
+    """Return what a unit of a sensitivity keeps, with outcomes that stand from the first time."""
+    courses = [{name: [[0], [runs]] for name, runs in one.items()} for one in counts]
+    return {
+        name: np.array([json.dumps(one).encode() for one in texts])
+        for name, texts in (("count", counts), ("courses", courses))
+    }
+
+
 def test_sensitivity_fills_its_map(tmp_path: Path) -> None:
     chosen = {
         "sensitivity.drag_coefficient": [0.2, 0.3],
@@ -318,11 +327,9 @@ def test_sensitivity_fills_its_map(tmp_path: Path) -> None:
         source = RunSource(opened.path)
         reference, settings = opened.store("reference"), opened.store("map")
         for unit in grid(setting=np.arange(2)).units(2):
-            counts = [{"2": 6, "1+1": 4}, {"2": 4, "1+1": 6}]
-            reference.write(unit, {"count": np.array([json.dumps(c).encode() for c in counts])})
+            reference.write(unit, kept([{"2": 6, "1+1": 4}, {"2": 4, "1+1": 6}]))
         unit = grid(setting=np.arange(6)).units(4)[0]
-        counts = [{"2": 5, "1+1": 5}, {"2": 10}, {"1+1": 10}, {"2": 8, "1+1": 2}]
-        settings.write(unit, {"count": np.array([json.dumps(c).encode() for c in counts])})
+        settings.write(unit, kept([{"2": 5, "1+1": 5}, {"2": 10}, {"1+1": 10}, {"2": 8, "1+1": 2}]))
         source.look()
         section = page(source)["sections"][0]
         # Eq. 5 by hand: the pooled reference is one half each.

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from driftwalk.assembly.runs.address import stream_keys
 from driftwalk.assembly.runs.posterior import draw_posterior, has_covariance
 from driftwalk.core.errors import InputError
-from driftwalk.schema.earlier import current_form
+from driftwalk.schema.check import refuse_other_version
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -126,7 +126,7 @@ def has_region(calibration: xr.Dataset) -> bool:
 
 
 def _region_of(calibration: xr.Dataset) -> _Region:
-    calibration = current_form(calibration)
+    calibration = refuse_other_version(calibration)
     if not has_region(calibration):
         raise InputError(
             "the calibration has no joint region to draw parameters from: it was made without a "

@@ -19,7 +19,7 @@ from driftwalk.assembly.runs.drawn_flow import RUNS_PER_FLOW
 from driftwalk.core.errors import InputError
 from driftwalk.model import declared
 from driftwalk.schema.answers.fit_facts import fitted_value
-from driftwalk.schema.earlier import current_form
+from driftwalk.schema.check import refuse_other_version
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -87,7 +87,7 @@ def draw_posterior(fit: xr.Dataset, *, runs: int, seed: int, trial: int) -> dict
     >>> draw_posterior(fit, runs=2, seed=1, trial=1)["drag_coefficient"]  # doctest: +SKIP
     array([0.3874, 0.3921])
     """
-    fit = current_form(fit)
+    fit = refuse_other_version(fit)
     if not has_covariance(fit):
         raise InputError("the fit has no covariance to draw parameters from: fit again")
     names = [str(name) for name in fit["log_parameter"].values]

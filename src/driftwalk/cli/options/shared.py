@@ -9,8 +9,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.core.uncertain import Uncertain, split_uncertain
-from driftwalk.core.units import parse_quantity
+from driftwalk.core.units import Uncertain, parse_quantity, split_uncertain
 
 PANEL: Final = "Parameters"
 

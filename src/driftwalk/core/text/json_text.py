@@ -15,7 +15,6 @@ from typing import Any, Final
 
 from driftwalk.core.errors import FormatError
 from driftwalk.core.files.bounded import MIB, read_bounded
-from driftwalk.core.text.nesting import refuse_deep
 
 MOST_BYTES: Final = 64 * MIB
 """Largest JSON file: some 3 million points, or any manifest."""
@@ -116,3 +115,32 @@ def _integer(digits: str) -> int | float:
         return float(digits)
     value = int(digits)
     return value if -(2**63) <= value < 2**63 else float(value)
+
+
+MOST_LEVELS: Final = 64
+
+
+def refuse_deep(values: Any, *, path: str | Path | None = None) -> None:
+    """Refuse lists and mappings that lie more than 64 levels inside each other.
+
+    Raises
+    ------
+    FormatError
+        When they do.
+
+    Examples
+    --------
+    >>> refuse_deep({"x": [[1, 2], [3, 4]]})
+    """
+    level = [values]
+    for _ in range(MOST_LEVELS):
+        level = [
+            item
+            for value in level
+            if isinstance(value, (dict, list))
+            for item in (value.values() if isinstance(value, dict) else value)
+            if isinstance(item, (dict, list))
+        ]
+        if not level:
+            return
+    raise FormatError(f"holds values nested more than {MOST_LEVELS} levels deep", path=path)

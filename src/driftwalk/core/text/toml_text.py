@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from driftwalk.core.errors import FormatError
 from driftwalk.core.files.bounded import MIB, read_bounded
-from driftwalk.core.text.nesting import refuse_deep
+from driftwalk.core.text.json_text import refuse_deep
 
 MOST_BYTES: Final = MIB
 """Largest such file, including comments: its reader takes time that grows with the square of

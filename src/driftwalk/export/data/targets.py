@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Final
 
 from driftwalk.core.files.file_names import text_of_name
-from driftwalk.export.data.film import write_film
 from driftwalk.export.data.losses import lost, read_again, write_tank
 from driftwalk.export.data.motion import Motion, find_motions
 from driftwalk.export.data.movement import write_movement
@@ -45,15 +44,16 @@ def _write_motions(format: str, source: Source, folder: Path) -> list[Path]:
 
 
 def _write_films(ending: str, source: Source, folder: Path) -> list[Path]:
+    from driftwalk.plot import write_animation
+
     motions = find_motions(source.path, world=source.world)
     if len(motions) > 1:
         source.tell(
             f"the film shows {motions[0].name}, the first of {len(motions)}: name a world to see it"
         )
-    file = write_film(
-        motions[0],
-        folder,
-        ending=ending,
+    file = write_animation(
+        motions[0].recording,
+        folder / f"{motions[0].name}.{ending}",
         speed=1.0 if source.speed is None else source.speed,
         progress=source.progress,
     )

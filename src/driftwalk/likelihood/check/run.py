@@ -150,7 +150,7 @@ def check_model(
         motion,
         scan,
         angle=fit.attrs["angle"],
-        mistakes=int(fit["mistakes"]) if "mistakes" in fit else 0,
+        mistakes=int(fit["mistakes"]),
     )
     parts.append(criterion_variables(criteria))
     for more, at in parts:

@@ -43,7 +43,7 @@ CHANCE_SIGMAS: Final = 2.0
 
 
 def law_sections(fit: xr.Dataset) -> list[Section]:
-    """Return the sections on the force law, its rivals, and the wall; nothing for an old fit."""
+    """Return the sections on the force law, its rivals, and the wall."""
     facts = fit_facts(fit)
     confidence = value_of(fit, "confidence")
     made = []

@@ -9,8 +9,8 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from driftwalk.core.errors import InputError
-from driftwalk.record.pose.heading import angle_between
-from driftwalk.record.pose.listed import listed
+from driftwalk.core.text.did_you_mean import listed
+from driftwalk.record.pose.markers import angle_between
 from driftwalk.record.raw import Array, RawBody, ReadOptions
 
 Place = TypeVar("Place")

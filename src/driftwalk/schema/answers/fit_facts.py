@@ -1,7 +1,7 @@
 """The numbers of a fit under flat names, with the unit in the name.
 
-The command line prints them under these names, and earlier versions stored them so, as attributes:
-``force_std_N`` is the value at ``force_std`` of the variable ``estimate``.
+The command line prints them under these names: ``force_std_N`` is the value at
+``force_std`` of the variable ``estimate``.
 """
 
 from __future__ import annotations

@@ -16,12 +16,11 @@ from driftwalk.schema.description import (
 from driftwalk.schema.kinds.flow import ORIGIN
 
 _ON: Final = "[flow] y x"
+_TESTED: Final = "numbers of departures were tested"
 _SWITCHED: Final = "with switching times"
 _TURNING: Final = "the angle is in the state"
 _ASKED: Final = "a precision of C_d is asked for"
 _CHECKED: Final = "the model was checked"
-_LAWS: Final = "the fit was made by a version that looks for the force law"
-_SAYS: Final = "the fit was made by a version that keeps it"
 _WALL: Final = "contacts with the wall were looked for"
 _WALL_FOUND: Final = "the wall was estimated, from eight passages or more"
 _COMPARED_LAWS: Final = "two laws were fitted"
@@ -111,18 +110,15 @@ FIT: Final = Kind(
             "samples_used", "", "1", "samples that were near enough to their prediction", "int"
         ),
         Variable(
-            "mistakes", "", "1", "samples left out as mistakes of the tracker", "int",
-            when="the fit was made by a version that looks for them",
+            "mistakes", "", "1", "samples left out as mistakes of the tracker", "int"
         ),
         Variable(
             "jumps_removed", "", "1", "samples left out when the recordings were read, as too far "
             "away for the greatest speed", "int",
-            when="the fit was made by a version that counts them",
         ),
         Variable(
             "dropped_frames", "", "1", "frames that the recording lacks although its stamps do not "
-            "say so", "int", when="the fit was made by a version that looks for them",
-            note="their time is put in",
+            "say so", "int", note="their time is put in",
         ),
         Variable("intervals_usable", "", "1", "intervals that might have been used", "int"),
         Variable("duration", "", "s", "length of the recordings together"),
@@ -158,27 +154,25 @@ FIT: Final = Kind(
         ),
         Variable(
             "law_log_evidence", "law", "1", "logarithm of the evidence for each law",
-            when=_LAWS, note="without its constant, in the beginning of the recordings",
+            note="without its constant, in the beginning of the recordings",
         ),
         Variable(
-            "filter_drag_coefficient", "", "1", "C_d of the filter, without added mass",
-            when=_LAWS,
+            "filter_drag_coefficient", "", "1", "C_d of the filter, without added mass"
         ),
         Variable(
             "number_value", "number", None, "numbers of departures from the model",
-            when=_LAWS, note="as the filter takes them, in SI units",
+            note="as the filter takes them, in SI units",
         ),
         Variable(
-            "number_opened", "number", None, "whether the number was estimated", "bool",
-            when=_LAWS,
+            "number_opened", "number", None, "whether the number was estimated", "bool"
         ),
         Variable(
             "departure_estimate", "departure", None,
             "estimates of closed numbers by score tests at the end of the search",
-            when=_LAWS, note="in SI units; the model is 0",
+            when=_TESTED, note="in SI units; the model is 0",
         ),
         Variable(
-            "departure_std", "departure", None, "their standard deviations", when=_LAWS
+            "departure_std", "departure", None, "their standard deviations", when=_TESTED
         ),
         Variable(
             "drag_coefficient_any_added_mass_interval", "bound", "1",
@@ -218,9 +212,9 @@ FIT: Final = Kind(
             "wall_friction_interval", "bound", "1", "its interval", when=_WALL_FOUND,
             note="infinite where every contact may stick",
         ),
-        Variable("number", "number", None, "number", "text", when=_LAWS),
-        Variable("law", "law", None, "force law", "text", when=_LAWS),
-        Variable("departure", "departure", None, "number that was tested", "text", when=_LAWS),
+        Variable("number", "number", None, "number", "text"),
+        Variable("law", "law", None, "force law", "text"),
+        Variable("departure", "departure", None, "number that was tested", "text", when=_TESTED),
         Variable("parameter", "parameter", None, "parameter", "text"),
         Variable("unit", "parameter", None, "unit of the parameter", "text"),
         Variable("bound", "bound", None, "end of an interval", "text"),
@@ -299,17 +293,16 @@ FIT: Final = Kind(
         Attribute("angle", "text", 'how the orientation was used: "state", "given" or "none"'),
         Attribute(
             "force_law", "text", 'force law, found or stated: "paper" or "floating body"',
-            _LAWS,
         ),
         Attribute(
-            "force_law_stated", "text", '"yes" where the fit tried no other, else "no"', _SAYS
+            "force_law_stated", "text", '"yes" where the fit tried no other, else "no"'
         ),
         Attribute(
             "drag_law", "text", 'how the drag goes with the speed: "quadratic", "linear", "mixed" '
-            'of both, or "power"', _SAYS,
+            'of both, or "power"',
         ),
         Attribute(
-            "drag_law_stated", "text", '"yes" where the fit tried no other, else "no"', _SAYS
+            "drag_law_stated", "text", '"yes" where the fit tried no other, else "no"'
         ),
         Attribute("check_left_out", "text", "reason why the model was not checked", "it was not"),
         Attribute(

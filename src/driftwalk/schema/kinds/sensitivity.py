@@ -81,7 +81,7 @@ SENSITIVITY: Final = Kind(
         Variable("reference", "class", "1", "share in the reference"),
         Variable(
             "count_over_time", "... time class_over_time", "1", "runs of this class at this time",
-            "int", when="made since there are courses",
+            "int",
         ),
         Variable(
             "reference_over_time", "time class_over_time", "1",
@@ -89,11 +89,8 @@ SENSITIVITY: Final = Kind(
         ),
         *AXES,
         _CLASS,
-        Variable("time", "time", "s", "time from the start of the run", when="with courses"),
-        Variable(
-            "class_over_time", "class_over_time", None, "outcome class", "text",
-            when="with courses",
-        ),
+        Variable("time", "time", "s", "time from the start of the run"),
+        Variable("class_over_time", "class_over_time", None, "outcome class", "text"),
     ),
     attributes=(
         *_REFERENCE,

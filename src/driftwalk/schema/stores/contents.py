@@ -1,9 +1,9 @@
 """Required contents of driftwalk's own stored datasets, for the readers that need all of it.
 
 A page makes do with what there is, section by section; a recording, a flow field or a calibration
-that work goes on with has no such way out. Files of earlier versions, and those that other programs
-write in this form, hold less than `driftwalk.schema.check_dataset` asks for: here only what a
-reader relies on is needed, and the rest has to be what its name says where it is there.
+that work goes on with has no such way out. Files that other programs write in this form hold less
+than `driftwalk.schema.check_dataset` asks for: here only what a reader relies on is needed, and the
+rest has to be what its name says where it is there.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.core.text.json_text import parse_json
-from driftwalk.schema.description import Attribute, Kind, Variable
+from driftwalk.schema.check import refuse_other_version
+from driftwalk.schema.description import Attribute, Variable
 from driftwalk.schema.kinds import find_kind
 
 if TYPE_CHECKING:
@@ -30,13 +31,13 @@ def check_contents(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     Raises
     ------
     FormatError
-        When it is of a later version, a variable or attribute is missing, lies on other dimensions,
-        or is text for numbers or numbers for text.
+        When it is of another schema version, a variable or attribute is missing, lies on other
+        dimensions, or is text for numbers or numbers for text.
     """
     kind = find_kind(dataset)
     if kind is None:
         return dataset
-    refuse_later(dataset, kind, path)
+    refuse_other_version(dataset, path)
     attributes = {one.name: one for one in kind.attributes}
     for needed in kind.read.split():
         if needed not in dataset.variables:
@@ -55,17 +56,6 @@ def check_contents(dataset: xr.Dataset, path: Path) -> xr.Dataset:
         if key in attributes:
             _check_attribute(attributes[str(key)], value, path)
     return dataset
-
-
-def refuse_later(dataset: xr.Dataset, kind: Kind, path: Path) -> None:
-    """Refuse a dataset of a schema that is later than the one that is known."""
-    version = dataset.attrs.get("schema_version")
-    if isinstance(version, int | np.integer) and version > kind.version:
-        raise FormatError(
-            f"was written by a later version of driftwalk: its {kind.name} has schema version "
-            f"{version}, and this version reads up to {kind.version}",
-            path=path,
-        )
 
 
 def _check_variable(dataset: xr.Dataset, variable: Variable, path: Path) -> None:

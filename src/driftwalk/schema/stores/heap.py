@@ -1,9 +1,9 @@
 """Texts of variable length in an HDF5 file, looked at before the library reads them.
 
 HDF5 keeps them in collections, and refers to each by length, address of the collection and number.
-Where these are damaged the library comes to no end: it steps over a free space of no size again
-and again. Or it clears as much memory as the length says, four gigabytes at most, and only then
-finds that the text is shorter.
+Where these are damaged, HDF5 2.0 steps over a free space of no size forever, inside the library
+where no signal ends it. Or it clears as much memory as the length says, four gigabytes at most, and
+only then finds that the text is shorter.
 """
 
 from __future__ import annotations

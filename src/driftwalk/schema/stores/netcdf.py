@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import FormatError
 from driftwalk.core.files.bounded import MIB
-from driftwalk.schema.earlier import current_file
+from driftwalk.schema.check import refuse_other_version
 from driftwalk.schema.stores.heap import refuse_endless_texts
 
 if TYPE_CHECKING:
@@ -41,19 +41,20 @@ _WIDTH: Final = 8
 def open_netcdf(path: Path) -> xr.Dataset:
     """Read a NetCDF file into memory and close it.
 
-    Numbers stay as they are stored: a time in "s" does not become a date. A dataset of an earlier
-    schema version comes in the form of the current one. Each reader checks the required contents,
-    by `driftwalk.schema.stores.contents.check_contents` where work goes on with it.
+    Numbers stay as they are stored: a time in "s" does not become a date. Each reader checks the
+    required contents, by `driftwalk.schema.stores.contents.check_contents` where work goes on with
+    it.
 
     Raises
     ------
     FormatError
-        When it is no NetCDF file, declares more than it can hold, or is damaged.
+        When it is no NetCDF file, is of another schema version, declares more than it can hold, or
+        is damaged.
     """
     if not is_netcdf(path):
         raise FormatError("is not a NetCDF file", path=path)
     with _opened(path) as dataset:
-        return current_file(dataset.load(), path)
+        return refuse_other_version(dataset.load(), path)
 
 
 def netcdf_bytes(dataset: xr.Dataset) -> bytes:
@@ -193,13 +194,17 @@ def refuse_huge(declared: int, path: Path) -> None:
     FormatError
         Says both sizes.
     """
-    size = path.stat().st_size
-    if declared > ALLOWANCE_BYTES + LARGEST_RATIO * size:
+    if declared > most_bytes(path):
         raise FormatError(
             f"is damaged: its header declares {declared / 1e9:.3g} GB, which a file of "
-            f"{size / 1e6:.2g} MB does not hold",
+            f"{path.stat().st_size / 1e6:.2g} MB does not hold",
             path=path,
         )
+
+
+def most_bytes(path: Path) -> int:
+    """Return how many bytes a file may hold in memory by its size on the disk."""
+    return ALLOWANCE_BYTES + LARGEST_RATIO * path.stat().st_size
 
 
 def _declared_hdf5(path: Path) -> int:

@@ -72,8 +72,7 @@ class RunningSensitivity:
             changed = True
             for row, text in enumerate(unit.arrays["count"]):
                 self._count[name][unit.start + row] = Counter(json.loads(text))
-            # A run that an earlier version began keeps none.
-            for row, text in enumerate(unit.arrays.get("courses", ())):
+            for row, text in enumerate(unit.arrays["courses"]):
                 self._courses[name][unit.start + row] = text
         return self.sections() if changed else []
 

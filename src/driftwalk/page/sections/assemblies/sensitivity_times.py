@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from driftwalk.page.arrays import encode_array, numbers
 from driftwalk.page.axes import axis_words, value_words
-from driftwalk.page.parts import Section, empty_section, section, settings_of
+from driftwalk.page.parts import Section, section, settings_of
 from driftwalk.page.sections.assemblies.classes import cells_of
 from driftwalk.plot.parts.assembly_labels import OTHER, classes_to_show
 
@@ -18,12 +18,11 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-NEEDED: Final = ("count_over_time", "time", "class_over_time", "runs")
 MOST_COUNTS: Final = 6_000_000
 """Numbers of runs that the maps of a page hold together: some 2.2 MB of it."""
 
 
-def over_time_part(part: xr.Dataset, x: str, y: str) -> dict[str, Any] | None:
+def over_time_part(part: xr.Dataset, x: str, y: str) -> dict[str, Any]:
     """Return the classes of every setting of a map over time, next to those of the reference.
 
     Parameters
@@ -35,12 +34,9 @@ def over_time_part(part: xr.Dataset, x: str, y: str) -> dict[str, Any] | None:
 
     Returns
     -------
-    dict or None
-        ``over_time`` of an "l1_map", see ``docs/reference/page-data.md``; None where the study
-        does not hold it.
+    dict
+        ``over_time`` of an "l1_map", see ``docs/reference/page-data.md``.
     """
-    if any(name not in part for name in NEEDED):
-        return None
     names = [str(name) for name in part["class_over_time"].values]
     count = part["count_over_time"].transpose(y, x, "class_over_time", "time").values
     runs = part["runs"].transpose(y, x).values
@@ -76,12 +72,8 @@ def setting_times_section(part: xr.Dataset, id: str, where: str) -> Section:
     title = f"Outcome classes over time{where}"
     dims = [str(dim) for dim in part["l1_distance"].dims]
     row = part.drop_vars(dims).stack(x=dims, create_index=False)
-    of_each = [name for name in ("count_over_time", "runs") if name in row]
-    row = row.assign({name: row[name].expand_dims("y") for name in of_each})
+    row = row.assign({name: row[name].expand_dims("y") for name in ("count_over_time", "runs")})
     found = over_time_part(row, "x", "y")
-    if found is None:
-        reason = "This run kept no outcome classes over time; a new run keeps them."
-        return empty_section(id, title, reason)
     settings = [
         ", ".join(f"{axis_words(n)} {value_words(n, v)}" for n, v in zip(dims, place, strict=True))
         for place in settings_of(*(part[name].values.tolist() for name in dims))
@@ -94,8 +86,6 @@ def with_fewer_times(sensitivity: xr.Dataset) -> xr.Dataset:
 
     The first and the last time stay.
     """
-    if "count_over_time" not in sensitivity:
-        return sensitivity
     size, last = sensitivity["count_over_time"].size, sensitivity.sizes["time"] - 1
     steps = [step for step in range(1, last + 1) if last % step == 0]
     every = next((step for step in steps if size <= step * MOST_COUNTS), max(last, 1))

@@ -14,7 +14,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError, reason_of
 from driftwalk.core.files.bounded import MIB, read_bounded
-from driftwalk.core.text.nesting import MOST_LEVELS
+from driftwalk.core.text.json_text import MOST_LEVELS
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.space.flat import SpaceTrack, lay_flat
 from driftwalk.record.space.plane import plane_of

@@ -17,8 +17,7 @@ from driftwalk.record.head import first_lines, first_row
 from driftwalk.record.layout import TableLayout
 from driftwalk.record.loaders.poses.sleap import USUAL
 from driftwalk.record.pose.keypoints import Point, Poses, bodies_of, choose_keypoints
-from driftwalk.record.raw import Array, RawRecording, ReadOptions
-from driftwalk.record.recognise.marks import Marks
+from driftwalk.record.raw import Array, Marks, RawRecording, ReadOptions
 from driftwalk.record.text import read_table
 
 
