@@ -5,17 +5,12 @@ from __future__ import annotations
 import contextlib
 from itertools import islice
 from pathlib import Path
-from typing import Final
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
 from driftwalk.track.source.frames import images_in, open_capture
 from driftwalk.track.source.open import open_source
 from driftwalk.track.types import Image
-
-_CAMERA_STRIDE: Final = 5
-# Frames between two samples from which on seeking is quicker than reading what lies between.
-_SEEK_BEYOND: Final = 50
 
 
 def sample_images(
@@ -50,10 +45,11 @@ def sample_images(
     """
     total = frame_count(source)
     if str(source).startswith("camera:"):
-        stride = _CAMERA_STRIDE
+        stride = 5
     elif total is None or total <= number:
         stride = 1
-    elif Path(source).is_file() and total > _SEEK_BEYOND * number:
+    # Seeking is quicker than reading 50 frames between two samples.
+    elif Path(source).is_file() and total > 50 * number:
         found = _by_seeking(source, total, number)
         if found:
             return found
