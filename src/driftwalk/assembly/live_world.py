@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from functools import cached_property
 from threading import Lock
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.assembly.lattice.joined_faces import ROUNDING
 from driftwalk.assembly.lattice.live import Lattice
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import MOST_STEPS, make_plan, start_poses
@@ -25,9 +26,6 @@ if TYPE_CHECKING:
     from driftwalk.model.assembly import HiddenFaceDrag, Latching
 
 Floats = npt.NDArray[np.float64]
-
-ROUNDING: Final = 1e-9
-"""Share of a time step by which durations may miss its end."""
 
 
 class LiveEvent(NamedTuple):

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 METHOD: Final = "Student's t over runs, each interval on its own"
-SMALLEST_SHAPED: Final = 4
-"""Up to three blocks, all shapes are equally compact."""
 
 
 def assembly_sizes(
@@ -206,7 +204,8 @@ def _courses(
 
 def _compactness_of_runs(event_shape: Integers, shapes: list[str], size: Integers) -> Floats:
     """Return the compactness of each run that has one."""
-    shaped = np.where(size >= SMALLEST_SHAPED, size, 0)
+    # Up to three blocks, all shapes are equally compact.
+    shaped = np.where(size >= 4, size, 0)
     weighted = shaped * np.array([compactness(name) for name in shapes])
     real = event_shape[..., 2] >= 0
     total, blocks = (

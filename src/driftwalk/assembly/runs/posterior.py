@@ -31,8 +31,6 @@ LINEAR_SHARE: Final = "linear_share"
 PLAIN: Final = {"drag_power": "drag_power", "force_memory": "force_memory_s"}
 """Numbers of a law that [forces] holds as they are, by the fit's name for them."""
 LAW_NUMBERS: Final = (LINEAR_SHARE, *PLAIN)
-LEAST_QUADRATIC: Final = 1e-6
-"""Share of the quadratic drag below which nothing is known of its C_d."""
 
 
 def has_covariance(fit: xr.Dataset) -> bool:
@@ -110,7 +108,8 @@ def draw_posterior(fit: xr.Dataset, *, runs: int, seed: int, trial: int) -> dict
     quadratic, linear = np.ones(keys.size), np.ones(keys.size)
     if LINEAR_SHARE in change:
         share = _number(fit, LINEAR_SHARE)
-        quadratic -= change[LINEAR_SHARE] / max(1.0 - share, LEAST_QUADRATIC)
+        # With a smaller share of quadratic drag, nothing is known of its C_d.
+        quadratic -= change[LINEAR_SHARE] / max(1.0 - share, 1e-6)
         linear += change[LINEAR_SHARE] / share
     drawn = {
         "drag_coefficient": fitted_value(fit, "drag_coefficient") * by_drag * quadratic,

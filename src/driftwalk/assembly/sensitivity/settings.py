@@ -48,6 +48,20 @@ Progress = Callable[[int, int], None]
 
 NUMBERS: Final = ("left_out", "first_contact_median", "completion_median")
 """Variables with one number per setting."""
+
+
+class TrialPolicy(NamedTuple):
+    """First trials, so far apart that these runs and those of `assemble` share no random number."""
+
+    map: int = 1 << 32
+    """Of the map; chosen by hand."""
+    reference: int = 2 << 32
+    """Of the reference; chosen by hand."""
+    sobol: int = 3 << 32
+    """Of the Sobol indices; chosen by hand."""
+
+
+FIRST_TRIALS: Final = TrialPolicy()
 BLOCKS_AT_ONCE: Final = 1_000_000
 """Blocks of one call of the native core: about 100 MB."""
 

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-RESAMPLES = 200
 MEASURES = (
     "first_order",
     "first_order_half_width",
@@ -167,7 +166,7 @@ def sobol_indices(
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(varies, noise[independent].mean(axis=0) / variance, np.nan)
     # The seed itself is usually that of the design; the two draws stay apart.
-    drawn = np.random.default_rng(seed + 1).integers(samples, size=(samples, RESAMPLES)).T
+    drawn = np.random.default_rng(seed + 1).integers(samples, size=(samples, 200)).T
     sigmas = _normal_quantile(confidence)
     indices = np.full((len(MEASURES), table.shape[1], inputs), np.nan)
     for i in np.flatnonzero(varies):

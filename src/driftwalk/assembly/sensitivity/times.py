@@ -26,8 +26,6 @@ Courses = dict[str, Integers]
 
 TIMES: Final = 101
 """Times of the grid, from the start of the runs to their end."""
-MOST_CLASSES: Final = 24
-"""Classes that a map keeps over time: all of up to five blocks."""
 OTHER: Final = "other"
 DIMS: Final = ("time", "class_over_time")
 
@@ -142,7 +140,8 @@ def map_courses(
             largest[name] = max(largest.get(name, 0.0), float(row.max()) / runs)
     # Classes with the same share are taken in their order, so that the choice is always the same.
     ranked = sorted(sort_classes(largest), key=lambda name: -largest[name])
-    names = sort_classes(ranked[:MOST_CLASSES])
+    # All classes of up to five blocks are kept over time.
+    names = sort_classes(ranked[:24])
     listed = (*names, OTHER) if len(ranked) > len(names) else names
     count = np.stack([course_table(courses_from_text(text), listed) for text in texts])
     shape = (*dims.values(), TIMES, len(listed))
