@@ -9,8 +9,6 @@ import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
 
-NEWTON_STEPS = 30
-
 
 class DwellLaw(NamedTuple):
     """The law ``scale * (-ln U)**power`` of a bout's time, U uniform."""
@@ -46,7 +44,7 @@ def dwell_law(mean: npt.ArrayLike, cv: npt.ArrayLike) -> DwellLaw:
     wanted = np.log1p(cv**2)
     # The logarithm of the left side is convex in the power, and pi^2 / 6 power^2 at its beginning.
     power = np.sqrt(6.0 * wanted) / np.pi
-    for _ in range(NEWTON_STEPS):
+    for _ in range(30):
         excess = gammaln(1.0 + 2.0 * power) - 2.0 * gammaln(1.0 + power) - wanted
         slope = 2.0 * (psi(1.0 + 2.0 * power) - psi(1.0 + power))
         power = np.where(slope > 0.0, power - excess / np.where(slope > 0.0, slope, 1.0), power)
