@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -18,10 +18,6 @@ if TYPE_CHECKING:
     from driftwalk.schema import Track
 
 Floats = npt.NDArray[np.float64]
-
-LONGEST_GAP: Final = 5.0
-"""Longest time between two samples over which a body is taken to have moved straight on, in
-median intervals: trackers drop a frame or two, and after more nobody knows where it was."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +100,9 @@ def _mostly_inside(track: Track, tank: Tank) -> bool:
 
 def _within_samples(time: Floats, wanted: Floats) -> npt.NDArray[np.bool_]:
     """Return which times lie between two samples that are no more than a gap apart."""
-    longest = LONGEST_GAP * float(np.median(np.diff(time)))
+    # Over five median intervals a body has moved straight on: trackers drop a frame or two, and
+    # after more its place is unknown.
+    longest = 5.0 * float(np.median(np.diff(time)))
     after = np.clip(np.searchsorted(time, wanted), 1, time.size - 1)
     close = time[after] - time[after - 1] <= longest
     return np.asarray((wanted >= time[0]) & (wanted <= time[-1]) & close)

@@ -27,10 +27,6 @@ LAW_KEYS: Final = {
     "force_memory_s": "force_memory",
 }
 """Keys of [forces], and the parameters of a fit that they hold."""
-STICKING: Final = 10.0
-"""Friction of a wall at which every contact sticks."""
-_SAME: Final = 1e-9
-"""Relative difference of two numbers up to which they are the same statement."""
 _BLOCK_ATTRIBUTES: Final = {
     "side_m": ("block_side_m", "m", "side", "`block` when the recording is loaded"),
     "mass_kg": ("block_mass_kg", "kg", "mass", "`block.mass_kg`"),
@@ -183,7 +179,8 @@ def _fitted_wall(found: xr.Dataset) -> dict[str, Any]:
         return {}
     return {
         "tank.wall_restitution": float(found["wall_restitution"]),
-        "tank.wall_friction": min(float(found["wall_friction"]), STICKING),
+        # With a friction of 10, every contact with the wall sticks.
+        "tank.wall_friction": min(float(found["wall_friction"]), 10.0),
     }
 
 
@@ -287,7 +284,8 @@ def _with_block(study: Study, recording: xr.Dataset, *, stated: Collection[str])
         if name not in recording.attrs:
             continue
         own, ours = float(recording.attrs[name]), getattr(study.block, key)
-        is_same = abs(own - ours) <= _SAME * ours
+        # Up to rounding, two numbers are the same statement.
+        is_same = abs(own - ours) <= 1e-9 * ours
         if key in stated and not is_same:
             raise InputError(
                 f"{_name_of(recording)}the recording is of a block of {own:g} {unit}, and the "
