@@ -6,19 +6,27 @@ can only go on at home if both cut alike. So the cut follows from the work alone
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
-BLOCK_STEPS_PER_SECOND: Final = 25e6
-"""Steps of single blocks, or bodies, that one core makes: 12 to 40 million, by its instruction set
-(docs/explanation/performance.md)."""
-LARGEST_S: Final = 40.0
-"""A unit takes at most so many seconds of one core: as much is lost where its worker dies."""
-MANY: Final = 256
-"""Units are smaller where there would be fewer than so many, so that many workers are busy,"""
-SMALLEST_S: Final = 1.0
-"""though no smaller than this: handing one out and keeping it takes some hundredths of a second,"""
-FEWEST: Final = 16
-"""unless there would then be fewer than so many."""
+
+class CutPolicy(NamedTuple):
+    """How long a work unit takes."""
+
+    block_steps_per_second: float = 25e6
+    """Steps of single blocks, or bodies, that one core makes: 12 to 40 million, by its
+    instruction set (docs/explanation/performance.md); chosen by hand."""
+    largest_s: float = 40.0
+    """Longest unit [s of one core]: as much is lost where its worker dies; chosen by hand."""
+    many: int = 256
+    """Units of a sweep at least, so that many workers are busy; chosen by hand."""
+    smallest_s: float = 1.0
+    """Shortest unit [s], even if there are then fewer: to hand one out takes some hundredths of
+    a second; chosen by hand."""
+    fewest: int = 16
+    """Units of a sweep at least, however short they are; chosen by hand."""
+
+
+CUT: Final = CutPolicy()
 
 
 def settings_per_unit(settings: int, block_steps: float, *, multiple: int = 1) -> int:
@@ -41,7 +49,7 @@ def settings_per_unit(settings: int, block_steps: float, *, multiple: int = 1) -
     >>> settings_per_unit(1000, 4 * 30_000, multiple=25)  # four blocks for 5 minutes
     50
     """
-    each = max(block_steps, 1.0) / BLOCK_STEPS_PER_SECOND
+    each = max(block_steps, 1.0) / CUT.block_steps_per_second
     total = settings * each
-    unit = min(LARGEST_S, max(total / MANY, SMALLEST_S), total / FEWEST)
+    unit = min(CUT.largest_s, max(total / CUT.many, CUT.smallest_s), total / CUT.fewest)
     return max(int(unit / each) // multiple, 1) * multiple
