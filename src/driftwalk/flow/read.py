@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -30,9 +30,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Array = npt.NDArray[np.float64]
-
-FASTEST_M_S: Final = 1e4
-"""A few times the speed of sound in water: a wrong unit, or a number that means none."""
 
 
 def load_flow(
@@ -172,7 +169,8 @@ def _new_field(
     grid = Grid(x, y, float(x[1] - x[0]))
     frames = velocity.reshape(-1, y.size, x.size, 2)
     fastest = float(np.abs(frames[np.isfinite(frames)]).max(initial=0.0))
-    if fastest > FASTEST_M_S:
+    # Beyond a few times the speed of sound in water, the unit is wrong.
+    if fastest > 1e4:
         raise InputError(
             f"the flow reaches {fastest:.3g} m/s, as no water does: is its unit right?"
         )

@@ -9,7 +9,6 @@ from driftwalk.core.errors import FormatError
 from driftwalk.flow.readers import davis, insight, openpiv, pivlab, table
 from driftwalk.flow.readers.raw import RawField
 
-_HEAD_BYTES: Final = 1 << 14
 _TEXTS: Final = {"davis": davis, "insight": insight, "openpiv": openpiv}
 
 
@@ -26,7 +25,7 @@ def piv_format(path: Path) -> str | None:
         if pivlab.is_pivlab(path):
             return "pivlab"
         with path.open("rb") as file:
-            head = file.read(_HEAD_BYTES)
+            head = file.read(1 << 14)
     except OSError as error:
         raise FormatError(f"cannot be opened: {error.strerror or error}", path=path) from error
     text = head.removeprefix(b"\xef\xbb\xbf").decode("utf-8", "replace")

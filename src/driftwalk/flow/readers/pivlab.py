@@ -24,8 +24,6 @@ _ENDINGS: Final = ("_filtered", "_original", "")
 """Of what PIVlab saves of the velocities, the first that is there is read."""
 _NUMBERED: Final = re.compile(r"u_(\d+)")
 _MOST_FRAMES: Final = 10_000
-_REGULAR: Final = 1
-"""Type of a vector that was measured; 0 is masked, 2 was replaced by its neighbours."""
 
 
 class _Names(NamedTuple):
@@ -192,7 +190,8 @@ def _frame(file: _File, names: _Names, path: Path) -> Iterator[Array]:
             )
         frame = np.column_stack([array.ravel().astype(np.float64) for array in arrays])
         if kinds and kinds[number].shape == arrays[0].shape:
-            frame[kinds[number].ravel() != _REGULAR, 2:] = np.nan
+            # Type 1 was measured; 0 is masked, 2 was replaced by its neighbours.
+            frame[kinds[number].ravel() != 1, 2:] = np.nan
         yield frame
 
 
