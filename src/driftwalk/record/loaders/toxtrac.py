@@ -19,8 +19,6 @@ from driftwalk.record.text import read_table
 NAMES: Final = ["frame", "arena", "track", "x", "y", "label"]
 REAL_SPACE: Final = ("Time", "Arena", "Track", "Pos. X", "Pos. Y", "Label")
 """Names of the columns in real space; units follow in brackets."""
-PREDICTED: Final = 0.0
-"""Label of a position that was not seen."""
 
 
 class ToxTracLoader:
@@ -58,7 +56,8 @@ class ToxTracLoader:
             for place, number in pairs.T.tolist()
         ]
         bodies = split_bodies(codes.ravel().astype(np.int32), labels, clock=clock, x=x, y=y)
-        predicted = int((label == PREDICTED).sum())
+        # Label 0 is a position that was predicted, not seen.
+        predicted = int((label == 0.0).sum())
         return RawRecording(
             bodies,
             clock_unit=unit_of_name(header[0]) if real else "frame",

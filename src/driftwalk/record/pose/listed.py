@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
-
-MOST: Final = 20
 
 
 def listed(names: Sequence[str]) -> str:
@@ -16,4 +13,4 @@ def listed(names: Sequence[str]) -> str:
     >>> listed(["nose", "tail"])
     'nose, tail'
     """
-    return ", ".join(names[:MOST]) + (", …" if len(names) > MOST else "")
+    return ", ".join(names[:20]) + (", …" if len(names) > 20 else "")

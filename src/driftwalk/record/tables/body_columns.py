@@ -18,8 +18,6 @@ from driftwalk.record.raw import Array
 from driftwalk.record.tables.clock import TableClock
 from driftwalk.record.tables.source import TableSource
 
-MOST_SHOWN = 3
-
 
 def body_columns(
     source: TableSource,
@@ -69,7 +67,7 @@ def body_columns(
         if _are_names(table.labels[index], rows=table.rows)
         and _tells_apart(table.codes[index], times, x, y, in_order=in_order)
     }
-    return [names[index] for index in sorted(found, key=lambda index: found[index])[:MOST_SHOWN]]
+    return [names[index] for index in sorted(found, key=lambda index: found[index])[:3]]
 
 
 def _may_be_a_name(column: str) -> bool:

@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-_GROWTH = 1.25
-
 
 class GrowingColumn:
     """An array that values are appended to."""
@@ -22,7 +20,7 @@ class GrowingColumn:
         """Append values, which are copied."""
         stop = self._count + values.size
         if stop > self._values.size:
-            self._values.resize(max(stop, int(_GROWTH * self._values.size)), refcheck=False)
+            self._values.resize(max(stop, int(1.25 * self._values.size)), refcheck=False)
         self._values[self._count : stop] = values
         self._count = stop
 

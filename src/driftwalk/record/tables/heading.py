@@ -12,8 +12,19 @@ from driftwalk.record.head import is_numeric_row
 from driftwalk.record.layout import MISSING
 from driftwalk.record.raw import ReadOptions
 
-ROWS_LOOKED_AT: Final = 12
-"""Rows among which the names of the columns and the first row of data are."""
+
+class TablePolicy(NamedTuple):
+    """How much of a table is looked at before it is read."""
+
+    heading_rows: int = 12
+    """Rows among which are the names of the columns and the first row of data; chosen by hand."""
+    sample_rows: int = 50
+    """Rows by which a table is recognised; chosen by hand."""
+    first_rows: int = 100_000
+    """Rows that are read where only the first ones are needed; chosen by hand."""
+
+
+TABLE: Final = TablePolicy()
 
 
 class Heading(NamedTuple):
