@@ -1,4 +1,4 @@
-"""Whether a body jumps in its recording as no body moves: a warning for all that uses it."""
+"""Warn of impossible steps in a recording."""
 
 from __future__ import annotations
 

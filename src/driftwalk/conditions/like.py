@@ -1,4 +1,4 @@
-"""Simulation under the conditions of a recording."""
+"""Simulate under the conditions of a recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The other bodies of a recording, at the places where they were."""
+"""Neighbours: the other bodies of a recording, at their recorded positions."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def neighbours_of(recording: xr.Dataset, body: str | None, tank: Tank) -> Neighb
     """Return the other bodies of a recording that are in the tank; None where there are none.
 
     A body that is mostly beyond the wall is in another tank: one recording may show several. Where
-    each body has a tank of its own, with positions in that tank, none is another's neighbour.
+    each body has its own tank, none is another's neighbour.
 
     Parameters
     ----------

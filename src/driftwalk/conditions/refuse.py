@@ -1,4 +1,4 @@
-"""Recordings in which there is nothing to see: without a position, too short, or at rest.
+"""Refuse recordings without a motion: no position, too short, or at rest.
 
 A recording that is unfit for one estimator is unfit for all: each of them asks here.
 """

@@ -1,4 +1,4 @@
-"""The study of a piece of work: what the user states, with tank and block of the recording."""
+"""Merge the study: the user's statements, with tank and block of the recording."""
 
 from __future__ import annotations
 
@@ -185,7 +185,7 @@ def _fitted_wall(found: xr.Dataset) -> dict[str, Any]:
 
 
 def unstated_warning(study: Study, *, about: About) -> str | None:
-    """Return the warning that nobody stated what decides the numbers of some work.
+    """Return the warning about unstated values that decide the results.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def unstated_warning(study: Study, *, about: About) -> str | None:
     --------
     >>> import driftwalk as dw
     >>> unstated_warning(dw.Study(), about="tank")[:60]
-    'nobody stated the tank: the default, a circle of diameter 0.'
+    'the tank was not stated: the default, a circle of diameter 0'
     >>> study = dw.conditions.study_for([dw.tank30_recording()])
     >>> unstated_warning(study, about="block") is None
     True
@@ -227,16 +227,17 @@ def unstated_warning(study: Study, *, about: About) -> str | None:
     if not assumed:
         return None
     names, values = zip(*assumed.values(), strict=True)
-    are = "the default, {}, is" if len(values) == 1 else "the defaults, {}, are"
+    one = len(values) == 1
+    were, are = ("was", "the default, {}, is") if one else ("were", "the defaults, {}, are")
     return (
-        f"nobody stated the {_listed(names)}: {are.format(_listed(values))} assumed, and the "
-        f"result holds for {'it' if len(values) == 1 else 'them'} alone; state "
+        f"the {_listed(names)} {were} not stated: {are.format(_listed(values))} assumed, and the "
+        f"result holds for {'it' if one else 'them'} alone; state "
         + _listed([f"`{key}`" for key in assumed])
     )
 
 
 def is_stated(study: Study, key: str) -> bool:
-    """Return whether somebody stated a key of a study; of a tank, its outline.
+    """Return whether a key of a study was stated; of a tank, its outline.
 
     Parameters
     ----------
