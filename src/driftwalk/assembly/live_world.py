@@ -1,4 +1,4 @@
-"""A tank of blocks that keeps its state, to be looked at and changed while it runs."""
+"""Interactive simulation of a tank of blocks, advanced and changed step by step."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class LiveTank:
     """One tank of blocks that advances by a duration and whose parameters change while it runs.
 
     The world is that of `assemble` with ``backend="reference"``: while nothing is changed, it is
-    run 0 of `assembly_path` with the same seed, bit for bit, in whatever pieces it is advanced. It
+    run 0 of `assembly_path` with the same seed, bit for bit, however it is advanced. It
     goes on when all blocks have become one assembly, and has no end.
 
     Everything may be called from several threads at once. `advance`, `part`, `events` and `restart`

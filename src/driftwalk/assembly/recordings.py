@@ -1,4 +1,4 @@
-"""Outcome classes of a recording of many blocks: what they had assembled into, at every time."""
+"""Outcome classes of a recording of many blocks over time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How long a series remembers: the integrated autocorrelation time."""
+"""Integrated autocorrelation time of a series."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which samples of a recording form steps: decided once from the time stamps.
+"""Samples that form steps, decided once from the time stamps.
 
 The plan knows no positions. Built from a recording, it is applied to the recording and to every
 trajectory simulated at the same time stamps, so that both pass through the same function.

@@ -1,4 +1,4 @@
-"""Is the difference more than chance? A permutation test that respects serial correlation.
+"""Permutation test in blocks, which respects serial correlation.
 
 The steps of a trajectory remember their past, so single steps must not be exchanged between two
 samples: at an autocorrelation time of 19 steps such a test rejects a true null 92 % of the time at

@@ -1,4 +1,4 @@
-"""The quantity that a calibration minimises: the distance of simulated steps from the recording's.
+"""Objective of a calibration: the distance of simulated steps from the recorded ones.
 
 A statistic is prepared once with the recording and is then given tables of steps, one row per
 simulated world. `StepDistance` is the paper's: the two-dimensional Kolmogorov-Smirnov distance of

@@ -1,4 +1,4 @@
-"""Which steps join two different particles? The normalised median test, and the own track."""
+"""False links of particle tracks: normalised median test, and continuity of the track."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cells without data: a smooth continuation of the measured ones that respects the wall."""
+"""Fill empty cells by a smooth interpolation of the measured ones that respects the wall."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a file holds a flow field, and who wrote it: recordings are files of the same endings."""
+"""Recognise flow-field files and their program: recordings have the same file endings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From rows x, y, u, v in any order to a regular grid."""
+"""Sort rows x, y, u, v onto a regular grid."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def _axis(name: str, values: Array, line: Indices, path: Path) -> tuple[Array, I
     even = np.linspace(nodes[0], nodes[-1], nodes.size)
     # Positions are printed with few digits.
     if abs(nodes - even).max() > 0.02 * (even[1] - even[0]):
-        # Most likely one row has a wrong position, which makes a line of nodes of its own.
+        # Most likely one row has a wrong position, which makes a separate line of nodes.
         rarest = int(count.argmin())
         at = int(np.flatnonzero(number == rarest)[0])
         raise FormatError(

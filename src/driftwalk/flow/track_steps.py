@@ -94,7 +94,7 @@ def track_steps(trajectory: xr.Dataset) -> FoundSteps:
     first = np.flatnonzero(body[1:] == body[:-1])
     if first.size == 0:
         raise InputError(
-            "no body has two positions, and a velocity needs two: is each row a body of its own? "
+            "no body has two positions, and a velocity needs two: is each row a separate body? "
             "Name the column of the identities with `columns`"
         )
     interval = np.diff(time)[first]

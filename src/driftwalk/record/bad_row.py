@@ -1,4 +1,4 @@
-"""Find the row of a text table that cannot be read, and say what is wrong with it.
+"""Find the unreadable row of a text table and its error.
 
 Slow and plain: it runs only on a block that has already failed.
 """

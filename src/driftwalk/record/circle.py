@@ -1,4 +1,4 @@
-"""The circle that a body's centre stays in, found robustly, and what it says about the tank."""
+"""Robust circle fit to the positions of a body, and the tank that it implies."""
 
 from __future__ import annotations
 

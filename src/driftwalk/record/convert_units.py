@@ -1,4 +1,4 @@
-"""From the numbers of a file to SI: clock, scale, the direction of y. The only place for units."""
+"""Convert a recording to SI: clock, scale, direction of y. The only place for units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the numbers stand in a text table, and how a missing one is written."""
+"""Layout of a text table: columns, skipped lines and missing values."""
 
 from __future__ import annotations
 

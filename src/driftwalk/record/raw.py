@@ -1,4 +1,4 @@
-"""Result of a loader: the numbers of a file in the file's own units, and what they mean.
+"""Result of a loader: the numbers of a file in its own units, and their meaning.
 
 Units, scale, clock and the direction of y are turned into SI in one place, `record.convert_units`;
 a loader only says what the file holds.

@@ -109,7 +109,7 @@ def _encoding(file: io.BufferedReader) -> str | None:
     try:
         return other_encoding(file.peek(TEXT.head_bytes)[: TEXT.head_bytes])
     except (OSError, *DAMAGED_GZIP):
-        return None  # whoever reads it finds the damage, and says where
+        return None  # reading it reports the damage and its place
 
 
 class _BoundedGzip(io.RawIOBase):
@@ -234,7 +234,7 @@ def read_table(path: Path, layout: TableLayout, *, blocks: int | None = None) ->
     layout : TableLayout
         Columns to read.
     blocks : int, optional
-        Read no more than so many blocks of 4 MiB; None: the whole file.
+        Blocks of 4 MiB to read at most; None: the whole file.
 
     Returns
     -------

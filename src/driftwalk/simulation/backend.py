@@ -1,4 +1,4 @@
-"""The door to the native core: plain numbers and datasets in, a prepared model out."""
+"""Interface to the native core: prepare a model from plain numbers and datasets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A flow in frames: how it goes on beyond them, and at which moment each world begins in it."""
+"""Unsteady flow: continuation beyond its frames, and the start time of each world."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Series(NamedTuple):
     repeat: str
     """How it goes on beyond them: "none", "loop", "mirror" or "hold"."""
     begin: float
-    """Time at which a world begins that has no moment of its own [s]."""
+    """Time at which a world without a drawn start begins [s]."""
     closing: float
     """In a loop, time from the last frame to the first one again [s]; 0 where both are the same."""
 

@@ -1,4 +1,4 @@
-"""Into how many work units a sweep is cut: by what it costs, whoever computes it.
+"""Size of work units, by their cost alone.
 
 Results do not depend on the cut, but the names of the shards do: a run that was begun on a cluster
 can only go on at home if both cut alike. So the cut follows from the work alone.

@@ -1,4 +1,4 @@
-"""Which settings a sweep visits, in which order, and how they are cut into work units."""
+"""Design of a sweep: settings, their order and work units."""
 
 from __future__ import annotations
 

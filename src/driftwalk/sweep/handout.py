@@ -1,4 +1,4 @@
-"""How the units of a sweep are handed to an executor: a window of them, and the slow ones again."""
+"""Scheduling of work units: a window of submitted units, and slow ones submitted again."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Handout(Protocol):
         """Return what a unit gave, or raise what it failed by."""
 
     def lost(self, future: UnitFuture, /) -> bool:
-        """Return whether a unit was with several workers that ended, so that nobody takes it."""
+        """Whether a unit was with several workers that ended, so that none takes it."""
 
     @property
     def width(self) -> int:

@@ -109,7 +109,7 @@ def run_sweep(
 
 
 class _Tally:
-    """Counts what is done and tells it to whoever listens."""
+    """Counts finished units and reports progress."""
 
     def __init__(
         self, units: Sequence[WorkUnit], missing: Sequence[WorkUnit], progress: Progress | None

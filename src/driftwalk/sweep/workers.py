@@ -1,4 +1,4 @@
-"""Workers of a Dask cluster as a sweep sees them: each gets a function once, units as they come."""
+"""Executor on a Dask cluster: each worker gets a function once, then units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Live output: a TCP server that sends each frame's result to whoever is connected.
+"""Live output: a TCP server that sends each frame's result to its clients.
 
 Two forms: JSON, one object a line, and SwisTrack's NMEA sentences. A client that reads slowly loses
 frames, and the stream says how many; the tracker never waits for one.
@@ -116,7 +116,7 @@ class LiveServer:
             return len(self._clients)
 
     def wait_for_clients(self, number: int, *, timeout: float = 5.0) -> bool:
-        """Wait until so many clients are connected; False when they are not after `timeout` [s]."""
+        """Wait for this many clients; False when there are fewer after `timeout` [s]."""
         with self._changed:
             return self._changed.wait_for(lambda: len(self._clients) >= number, timeout)
 
@@ -197,7 +197,7 @@ class _Client:
             if len(self._waiting) >= LIVE.waiting_frames:
                 self._waiting.popleft()
                 self._lost += 1
-            # An image that nobody asked for is not kept.
+            # An image is kept only if a client asked for images.
             wanted = self._width is not None
             self._waiting.append(message if wanted else message._replace(image=None))
             self._changed.notify()

@@ -1,4 +1,4 @@
-"""Polyominoes: shapes of unit squares joined edge to edge; their names, and all there are.
+"""Polyominoes: shapes of unit squares joined edge to edge; names and enumeration.
 
 A shape is called by its canonical code: its rows from the top, ``x`` for a cell and ``.`` for none,
 joined by ``/``. Of all the ways to turn it (and, with chirality "merged", to mirror it) the code is

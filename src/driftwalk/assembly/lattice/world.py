@@ -1,4 +1,4 @@
-"""One world on the lattice: joins are put in one by one, as far as they agree with each other."""
+"""Lattice of one world: joins are added one by one if they are consistent."""
 
 from __future__ import annotations
 

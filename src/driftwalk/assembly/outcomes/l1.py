@@ -1,4 +1,4 @@
-"""The l1 distance of two distributions of outcomes (Eq. 5), and how much of it is chance."""
+"""The l1 distance of two distributions of outcomes (Eq. 5), and its noise floor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When does it happen? Times to first contact and completion, and the classes over time.
+"""Survival analysis: times to first contact and completion, and the classes over time.
 
 A run ends before its blocks have met or joined: then the time is not known, only that it is longer
 than the run (right censoring), and a mean over the runs that got there would be too short.

@@ -1,4 +1,4 @@
-"""Parameters drawn from what a calibration or a fit leaves open.
+"""Draw parameters from the uncertainty of a calibration or a fit.
 
 A draw from a calibration is a point of its joint region. Where D is the smooth surface of
 distances, m its minimum, L its level at the border and c the confidence of the region, a point is

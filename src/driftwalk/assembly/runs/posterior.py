@@ -1,4 +1,4 @@
-"""Parameters drawn from the posterior of a fit.
+"""Draw parameters from the posterior of a fit.
 
 It is Gaussian in ln C_d, in the logarithm of the force's noise intensity and in the numbers of the
 force law, with the covariance that the fit stores; numbers of the camera are left out. It holds for
@@ -125,7 +125,7 @@ def draw_posterior(fit: xr.Dataset, *, runs: int, seed: int, trial: int) -> dict
 
 
 def _within(key: str, values: Floats) -> Floats:
-    """Return values within what [forces] takes: a fit that leaves an end open draws beyond it."""
+    """Return values within what [forces] takes: draws of a fit may lie beyond it."""
     quantity = declared(f"forces.{key}").quantity
     return values if quantity is None else np.clip(values, quantity.ge, quantity.le)
 

@@ -1,4 +1,4 @@
-"""Which input matters most for what blocks build: Sobol' indices, and the share of noise."""
+"""Sobol' sensitivity indices of assembly outcomes, and the share of noise."""
 
 from __future__ import annotations
 

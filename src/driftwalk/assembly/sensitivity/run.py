@@ -1,4 +1,4 @@
-"""How much does what blocks build depend on the model? Outcomes over settings, and a reference."""
+"""Sensitivity map: outcomes over settings, compared with a reference."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Outcomes of many settings, each of many runs: the engine under a sensitivity analysis.
 
-Every setting has random numbers of its own, by its trial: what comes out depends neither on the
+Every setting has its own random numbers, by its trial: what comes out depends neither on the
 order of the settings nor on how they are cut into work units.
 """
 
@@ -232,7 +232,7 @@ class _Piece(NamedTuple):
 
 
 def _calls(settings: list[int], runs: int, most: int) -> Iterator[list[_Piece]]:
-    """Give the runs of settings in groups of at most so many, each one call of the core."""
+    """Yield groups of runs of settings, each for one call of the core."""
     group: list[_Piece] = []
     room = most
     for setting in settings:

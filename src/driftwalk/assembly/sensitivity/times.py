@@ -1,4 +1,4 @@
-"""How many runs of a setting are in each outcome class over time, on one grid for all settings."""
+"""Outcome classes over time: runs of each setting in each class, on one time grid."""
 
 from __future__ import annotations
 
@@ -160,10 +160,10 @@ def _all_single(plan: Plan) -> str:
 
 def course_table(courses: Courses, listed: Sequence[str]) -> Integers:
     """Return courses as numbers of runs, shape (time, class); "other" at the end is the rest."""
-    nobody = np.zeros(TIMES, dtype=np.int64)
-    table = np.stack([courses.get(name, nobody) for name in listed], axis=1)
+    none = np.zeros(TIMES, dtype=np.int64)
+    table = np.stack([courses.get(name, none) for name in listed], axis=1)
     if listed[-1] == OTHER:
-        table[:, -1] = sum((row for name, row in courses.items() if name not in listed), nobody)
+        table[:, -1] = sum((row for name, row in courses.items() if name not in listed), none)
     return table
 
 

@@ -1,4 +1,4 @@
-"""How far motions are apart in each aspect, and how far a recording is from itself."""
+"""Distance of two motions in each aspect, and its noise floor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which samples of a recording show which aspect of its motion: decided once from time stamps."""
+"""Samples that form each aspect of a motion, decided once from the time stamps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which reader takes a file: by its content, in the order of how sure that is."""
+"""Choose the reader of a file by its content, the most certain first."""
 
 from __future__ import annotations
 

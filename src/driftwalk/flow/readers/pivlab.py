@@ -199,7 +199,7 @@ def _units(file: _File) -> tuple[str, str, Array]:
     """Return the units of positions and velocities, and the factors to them.
 
     An export says its units and is calibrated. A session has pixels, and factors to m and m/s that
-    are 1 where nobody has calibrated it.
+    are 1 without a calibration.
     """
     if "units" in file.names:
         text = _text(file.read("units"))

@@ -61,7 +61,7 @@ class Pipes(Protocol):
         """Read standard error if something comes in time; return whether something did."""
 
     def close_input(self) -> None:
-        """Tell the program that there is nothing more to read."""
+        """Close the program's input."""
 
     def close(self) -> None:
         """Give all pipes back; the program has ended, or belongs to another process."""
@@ -125,7 +125,7 @@ class SelectedPipes:
         return True
 
     def close_input(self) -> None:
-        """Tell the program that there is nothing more to read."""
+        """Close the program's input."""
         with suppress(KeyError, ValueError):
             self._selector.unregister(self._input)
         self._streams[0].close()
@@ -213,7 +213,7 @@ class ThreadedPipes:
         return False
 
     def close_input(self) -> None:
-        """Tell the program that there is nothing more to read."""
+        """Close the program's input."""
         # A thread in the middle of a line holds the pipe until the program has ended.
         if not self.sending:
             self._streams[0].close()

@@ -48,7 +48,7 @@ class ProgramEnded(ProgramFault):
 
 
 class Program:
-    """A running program, in a process group of its own.
+    """A running program, in its own process group.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Duplicate and unsorted times, jumps and gaps: found, handled and counted."""
+"""Clean a track: duplicate and unsorted times, outliers and gaps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether the times of a file can be true: above all those whose unit it does not say."""
+"""Plausibility of a clock, above all of one without a unit."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def _remedy(column: str, first: float, interval: float) -> str:
 
 
 def _likely(ticks: float, first: float, interval: float) -> bool:
-    """Whether a clock of so many ticks a second begins and ticks as clocks of cameras do."""
+    """Whether a clock with these ticks per second starts and ticks like a camera's."""
     if first >= CLOCK.last_day_s and not CLOCK.first_day_s <= first / ticks < CLOCK.last_day_s:
         return False
     return interval == 0.0 or CLOCK.fastest_s <= interval / ticks <= CLOCK.slowest_s

@@ -1,4 +1,4 @@
-"""How many bodies and times a recording may have, and how far they may be.
+"""Limits of a recording's size: bodies, times and positions.
 
 A `trajectory` has a place for each body at each time.
 
@@ -82,7 +82,7 @@ def refuse_sparse(time: Array, bodies: list[RawBody]) -> None:
 def refuse_far(bodies: Sequence[RawBody], scale: float) -> None:
     """Refuse numbers that are no position and no angle: a damaged file, or a mark of what is lost.
 
-    Neither are positions that all are as good as zero.
+    Positions that all are practically zero are refused too.
 
     Parameters
     ----------

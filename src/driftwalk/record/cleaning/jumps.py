@@ -1,7 +1,7 @@
-"""Samples that a body cannot have been at: it would have been faster than it can be.
+"""Outliers of a track: samples that imply an impossible speed.
 
-`find_jumps` knows how fast it can be; `impossible_steps` does not: long steps, alone among short
-ones.
+`find_jumps` takes the greatest speed; `impossible_steps` needs none: it finds single long steps
+among short ones.
 """
 
 from __future__ import annotations

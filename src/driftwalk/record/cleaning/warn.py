@@ -1,4 +1,4 @@
-"""Sentences about numbers that no tank and no robot would give."""
+"""Plausibility warnings about extent, speed, clock and angles."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def _clock_warnings(bodies: list[RawBody]) -> list[str]:
 
 
 def encoding_notes(path: Path) -> list[str]:
-    """Return what to say about text whose encoding nobody named.
+    """Return the warning about text of an unknown encoding.
 
     Parameters
     ----------

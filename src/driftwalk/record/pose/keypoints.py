@@ -1,4 +1,4 @@
-"""Keypoints of a pose file to bodies: which point is the body, which two say where it points."""
+"""Convert keypoints of a pose file into bodies with positions and orientations."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Poses(Generic[Place]):
     individuals: Mapping[str, Mapping[str, Place]]
     """Individual to keypoint to its place in the file."""
     read: Callable[[Place], Point]
-    """Returns a keypoint; arrays that nobody else holds."""
+    """Returns a keypoint as new arrays."""
     dropped: int = field(default=0, init=False)
     seen: int = field(default=0, init=False)
     confident: bool = field(default=False, init=False)

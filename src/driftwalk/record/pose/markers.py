@@ -1,4 +1,4 @@
-"""Markers of one robot, which a tracker follows as bodies of their own, to one body."""
+"""Merge the markers of one robot, tracked as separate bodies, into one body."""
 
 from __future__ import annotations
 

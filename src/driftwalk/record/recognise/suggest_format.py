@@ -1,4 +1,4 @@
-"""Which formats a file that is none of them is nearest to, and what it lacks of each."""
+"""Suggest formats for an unrecognised file: the nearest ones, and what it lacks of each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Orientations in space, in the form that a file has them, and the angle in the plane."""
+"""3-D orientations (quaternions, Euler angles), and their angle in the plane."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which columns of a plain table could name the body, where rows of several were read as one.
+"""Candidate columns for the body's name, where rows of several bodies were read as one.
 
 Slow and plain: it runs only on a table that has already been refused.
 """

@@ -40,7 +40,7 @@ class CellError(ValueError):
 
 
 def as_numbers(values: Values, name: str) -> Array:
-    """Return the values of a column as float64, which nobody else holds; NaN where one is missing.
+    """Return the values of a column as a new float64 array, NaN where one is missing.
 
     Parameters
     ----------

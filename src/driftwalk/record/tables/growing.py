@@ -1,4 +1,4 @@
-"""Columns that grow block by block and are held once: no list of parts is joined at the end."""
+"""Growing arrays: columns that are appended block by block and held once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The first rows of a table: which one names its columns, below titles and above units."""
+"""Header detection: which row of a table names its columns, below titles and above units."""
 
 from __future__ import annotations
 

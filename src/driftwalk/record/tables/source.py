@@ -1,4 +1,4 @@
-"""A table that is read column by column, wherever it lies."""
+"""Table of text, of a sheet or of arrays, read column by column."""
 
 from __future__ import annotations
 

@@ -204,7 +204,7 @@ def _nanoseconds(texts: Texts, match: re.Match[str], rows: npt.NDArray[np.int64]
         ticks -= SECOND_NS * offset * (-1 if zone.startswith("-") else 1)
     if wrong.any():
         at = int(np.argmax(wrong))
-        raise StampError(int(rows[at]), f"'{texts[at].decode()}' is no date and time that there is")
+        raise StampError(int(rows[at]), f"'{texts[at].decode()}' is not a valid date and time")
     return ticks
 
 

@@ -1,4 +1,4 @@
-"""Which columns of a plain table count up like a clock, where none was recognised as one."""
+"""Columns of a plain table that increase like a clock, for a table without a recognised clock."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much of a marker's colour a pixel shows, whatever its brightness.
+"""Colour weight of a pixel by hue and chroma, independent of its brightness.
 
 Brightness scales a* and b* together, so a colour is a direction in their plane. A pixel's weight
 for a colour is its chroma along that direction, 1 on the disc itself, and 0 where the hue is

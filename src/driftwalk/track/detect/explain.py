@@ -1,4 +1,4 @@
-"""A frame with the detections drawn in, and the rejected candidates with their reasons."""
+"""Draw detections into a frame, and rejected candidates with their reasons."""
 
 from __future__ import annotations
 

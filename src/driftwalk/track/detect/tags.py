@@ -1,4 +1,4 @@
-"""Coded tags, which say who they are: ArUco and AprilTag, through OpenCV."""
+"""Fiducial tags with identities: ArUco and AprilTag, through OpenCV."""
 
 from __future__ import annotations
 

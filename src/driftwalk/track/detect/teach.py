@@ -1,4 +1,4 @@
-"""What do the markers look like? Two colours, a size and a spacing, proposed from a few frames."""
+"""Propose a marker description from sample frames: two colours, size and spacing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which track a detection belongs to: solved inside connected groups of the gating graph only.
+"""Assignment of detections to tracks, within connected components of the gating graph.
 
 An edge says that a detection may belong to a track, at a cost: the negative logarithm of its
 likelihood over that of "the track was missed and the detection is something else". So an edge that
@@ -142,7 +142,7 @@ def _excess(cost: Floats, taken: Integers) -> Floats:
     Another assignment differs by cycles, in which each track takes the detection of the next one.
     The cheapest cycle through an edge is that edge and the shortest way back. One more node
     represents detections without a track: a track that goes there takes a detection that was left,
-    or none; from there it costs nothing to leave a track's detection to nobody.
+    or none; from there it costs nothing to leave a track's detection unassigned.
     """
     tracks = np.arange(len(cost))
     has = taken >= 0

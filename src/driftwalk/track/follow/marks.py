@@ -1,4 +1,4 @@
-"""Where identities could have been exchanged: intervals that are marked, each with a score."""
+"""Ambiguous identities: marked intervals of possible exchanges, each with a score."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which body a new track is: one that was lost, or one more."""
+"""Re-identification: whether a new track is a lost body or a new one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From detections to tracks: which detection is which body, and where that is not certain.
+"""Multi-object tracker: detections to tracks, with marks where an identity is uncertain.
 
 Each frame, the tracks are predicted over the time that has passed, detections are gated, and each
 connected group of the gating graph is assigned on its own. The output is the measurement, not the

@@ -1,4 +1,4 @@
-"""State that the tracker keeps for each body."""
+"""Track state of each body."""
 
 from __future__ import annotations
 

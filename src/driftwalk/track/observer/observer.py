@@ -1,4 +1,4 @@
-"""Self-assembly as it is seen: who is joined to whom, and the outcome class, frame by frame.
+"""Online observer of self-assembly: joins and the outcome class, frame by frame.
 
 The rules, the lattice and the events are those of `driftwalk.classify`: an observer that has taken
 every frame of a recording holds the joins and events that `classify` finds in it. Live, a join or a

@@ -1,4 +1,4 @@
-"""Which outcome classes are possible while some blocks are hidden.
+"""Possible outcome classes while some blocks are hidden.
 
 Visible blocks constrain the classes: blocks that are joined are one shape, and two shapes of seen
 blocks that do not fit on a common lattice are not one. Hidden blocks may be anywhere: alone, joined

@@ -1,4 +1,4 @@
-"""How many frames are missing, from the times between those there are, while they come."""
+"""Count missing frames from the intervals between frames, online."""
 
 from __future__ import annotations
 

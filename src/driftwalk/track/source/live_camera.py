@@ -1,4 +1,4 @@
-"""A camera: a thread reads it, and whoever asks gets the newest frame."""
+"""Live camera: a thread reads it and keeps the newest frame."""
 
 from __future__ import annotations
 

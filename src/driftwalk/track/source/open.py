@@ -1,4 +1,4 @@
-"""Open whatever gives frames: a video, a folder of images, a camera."""
+"""Open a source of frames: a video, a folder of images, a camera."""
 
 from __future__ import annotations
 

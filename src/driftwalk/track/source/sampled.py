@@ -1,4 +1,4 @@
-"""A few images of a source, spread over it: to find the rim, the background, the colours."""
+"""Sample images spread over a source, to find the rim, the background, the colours."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ class _Individual:
     path: Path
     names: set[str]
     column: Callable[[str], Array]
-    """Returns a column by its name, an array that nobody else holds."""
+    """Returns a column by its name as a new array."""
     length_unit: str
     cm_per_pixel: float | None = None
     frame_rate_hz: float | None = None

@@ -1,4 +1,4 @@
-"""Two-colour markers: two discs of different hue on each block give position and orientation."""
+"""Detector of two-colour markers: two discs of different hue give position and orientation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the two discs of a marker are when parts of them are hidden: from their outlines.
+"""Fit partly hidden discs by their outlines.
 
 The outline of what is seen of a disc is partly the disc's own, a circle of known size, and partly
 the edge of what hides it, which can only lie inside the circle. Both circles, at the marker's

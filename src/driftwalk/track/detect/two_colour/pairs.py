@@ -1,4 +1,4 @@
-"""Which disc belongs to which: the best pairing of the two colours by the marker's spacing."""
+"""Pair discs of the two colours by the marker's spacing (assignment problem)."""
 
 from __future__ import annotations
 

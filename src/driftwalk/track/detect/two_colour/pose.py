@@ -1,4 +1,4 @@
-"""Where the two discs of a marker are, to a small part of a pixel.
+"""Subpixel centres of the two discs of a marker, with their covariance.
 
 Each pixel's place counts by how much of the colour it shows; discs that are partly hidden are
 measured by their outlines (`driftwalk.track.detect.two_colour.outline`).
