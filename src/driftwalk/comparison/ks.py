@@ -22,8 +22,12 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.comparison.warn import ComparisonWarning
 from driftwalk.core.errors import InputError
+
+
+class ComparisonWarning(UserWarning):
+    """A comparison was made, but the data limit its meaning."""
+
 
 Points = npt.NDArray[np.float64]
 Ties = Literal["strict", "limits"]

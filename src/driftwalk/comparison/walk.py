@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.comparison.ks import ComparisonWarning
 from driftwalk.comparison.plan import AppliedSteps, StepPlan, apply_steps, plan_steps
-from driftwalk.comparison.warn import ComparisonWarning
 from driftwalk.core.errors import InputError
 from driftwalk.schema import body_track
 from driftwalk.schema.steps import build_steps

@@ -6,8 +6,8 @@ from os import PathLike
 from pathlib import Path
 
 from driftwalk.core.errors import InputError
+from driftwalk.flow.read import piv_format
 from driftwalk.flow.readers import openpiv
-from driftwalk.flow.readers.formats import piv_format
 from driftwalk.flow.readers.netcdf import holds_velocities
 from driftwalk.flow.readers.pivlab import holds_velocities as holds_pivlab, is_pivlab
 from driftwalk.flow.readers.table import is_field_table

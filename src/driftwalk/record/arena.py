@@ -232,7 +232,7 @@ def _outside(beyond: Array, size: float, reach: Reach) -> list[str]:
 
 def _polygon(path: Path) -> PlacedArena:
     from driftwalk.record.head import read_header
-    from driftwalk.record.layout import TableLayout
+    from driftwalk.record.raw import TableLayout
     from driftwalk.record.text import read_table
 
     names, delimiter, skip, has_header = read_header(path)

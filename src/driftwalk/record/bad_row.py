@@ -9,7 +9,7 @@ import csv
 from pathlib import Path
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.layout import MISSING, TableLayout
+from driftwalk.record.raw import MISSING, TableLayout
 
 DELIMITER_NAMES = {",": "a comma", "\t": "a tab", ";": "a semicolon", " ": "blanks"}
 

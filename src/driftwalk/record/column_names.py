@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -336,3 +337,14 @@ def _agreed(units: list[str], what: str) -> str:
         shown = ", ".join(unit or "none" for unit in distinct)
         raise InputError(f"the columns of {what} name different units ({shown}): name them alike")
     return distinct[0] if distinct else ""
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return the first names, with commas between them.
+
+    Examples
+    --------
+    >>> listed(["nose", "tail"])
+    'nose, tail'
+    """
+    return ", ".join(names[:20]) + (", …" if len(names) > 20 else "")

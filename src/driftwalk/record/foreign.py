@@ -25,7 +25,7 @@ from driftwalk.record.raw import (
 )
 
 if TYPE_CHECKING:
-    from driftwalk.record.recognise.marks import Marks
+    from driftwalk.record.raw import Marks
 
 GROUP: Final = "driftwalk.loaders"
 _MEMBERS: Final = ("name", "description", "sniff", "read")

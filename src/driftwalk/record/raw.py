@@ -14,6 +14,33 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+MISSING = frozenset(
+    {"", "#N/A", "NaN", "nan", "NAN", "NA", "N/A", "null", "NULL", "None", "none", "-nan"}
+)
+"""Words that trackers write for a missing number."""
+
+
+@dataclass(frozen=True)
+class TableLayout:
+    """Where the numbers stand in a text file."""
+
+    delimiter: str
+    """One character, or ``" "`` for any run of blanks."""
+    names: list[str]
+    """Names of all columns, in order (for error messages)."""
+    skip_lines: int = 0
+    """Lines before the first row of data."""
+    numbers: tuple[int, ...] = ()
+    """Columns (from 0) to read as numbers."""
+    texts: tuple[int, ...] = ()
+    """Columns (from 0) to read as text."""
+    clock: int | None = None
+    """The one of the numbers whose whole values may be beyond those that float64 holds exactly."""
+    stamps: tuple[int, ...] = ()
+    """Columns (from 0) of time stamps; of several the sum counts, as of a date and a time of day.
+    It becomes the numbers of the first of them."""
+
+
 Array = npt.NDArray[np.float64]
 
 LENGTH_UNITS: dict[str, float] = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "km": 1e3}
@@ -155,3 +182,13 @@ class ReadOptions:
     """Keypoints seen with less confidence are missing; None: as usual for the format."""
     replicate: int = 0
     """Replicate of a simulation, counted from 0."""
+
+
+@dataclass(frozen=True)
+class Marks:
+    """Names that a file of a format has: a loader may have several, for several forms of it."""
+
+    container: str
+    """``"HDF5"``, ``"npz"``, ``"npy"``, ``"XML"``, ``"table"`` or ``"folder"``."""
+    names: tuple[str, ...]
+    """Arrays, attributes, keys, elements, columns or files."""

@@ -25,7 +25,7 @@ PLAIN: Final = "csv"
 class Loader(Protocol):
     """Reads one file format.
 
-    It may have `marks`, a tuple of `record.recognise.marks.Marks`: the error about a
+    It may have `marks`, a tuple of `record.raw.Marks`: the error about a
     file that is nearly of the format then names what it lacks.
     """
 

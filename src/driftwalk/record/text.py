@@ -22,8 +22,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import check_lines
-from driftwalk.record.layout import MISSING, TableLayout
-from driftwalk.record.raw import Array
+from driftwalk.record.raw import MISSING, Array, TableLayout
 from driftwalk.record.tables.encoding import WINDOWS, TranscodedText, other_encoding
 from driftwalk.record.tables.growing import GrowingColumn
 from driftwalk.record.tables.stamps import StampError, StampReader, calendar_of, clock_of_stamps

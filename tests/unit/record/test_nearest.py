@@ -12,7 +12,7 @@ from tracker_files import movement_file
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record import load, readable_formats
-from driftwalk.record.recognise.marks import Marks
+from driftwalk.record.raw import Marks
 from driftwalk.record.registry import loaders
 
 

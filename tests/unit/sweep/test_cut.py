@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hypothesis import given, strategies as st
 
-from driftwalk.sweep.cut import CUT, settings_per_unit
+from driftwalk.sweep.design import CUT, settings_per_unit
 
 SETTINGS = st.integers(1, 200_000)
 STEPS = st.floats(1.0, 1e12)

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.runs.address import stream_keys
+from driftwalk.assembly.runs.plan import stream_keys
 from driftwalk.assembly.runs.posterior import draw_posterior, has_covariance
 from driftwalk.core.errors import InputError
 from driftwalk.schema.earlier import current_form

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.runs.address import stream_keys
 from driftwalk.assembly.runs.drawn_flow import RUNS_PER_FLOW
+from driftwalk.assembly.runs.plan import stream_keys
 from driftwalk.core.errors import InputError
 from driftwalk.model import declared
 from driftwalk.schema.answers.fit_facts import fitted_value

@@ -18,9 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.events import replay_events
-from driftwalk.assembly.runs.address import stream_keys
 from driftwalk.assembly.runs.dataset import completion_step, times_of
-from driftwalk.assembly.runs.plan import Arrays, Plan, make_plan, simulate_rows
+from driftwalk.assembly.runs.plan import Arrays, Plan, make_plan, simulate_rows, stream_keys
 from driftwalk.assembly.runs.start import place_blocks
 from driftwalk.assembly.sensitivity.times import Courses, added, courses_of, courses_to_text
 from driftwalk.core.errors import DriftwalkError

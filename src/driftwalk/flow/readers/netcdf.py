@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.flow.grid import round_nodes
-from driftwalk.flow.readers.raw import FieldOptions
-from driftwalk.flow.readers.units import FieldScale
+from driftwalk.flow.readers.units import FieldOptions, FieldScale
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.pose.listed import listed
+from driftwalk.record.column_names import listed
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.stores.matlab import matlab_variables_of
 from driftwalk.record.tables.choose import the_one_that_fits

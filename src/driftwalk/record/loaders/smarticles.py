@@ -7,8 +7,7 @@ from pathlib import Path
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.head import first_lines, is_numeric_row, read_header
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import RawBody, RawRecording, ReadOptions
+from driftwalk.record.raw import RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
 
 NAMES = ["sync", "t", *(f"{name}{robot}" for robot in range(1, 4) for name in ("x", "y", "theta"))]

@@ -11,9 +11,7 @@ from driftwalk.core.errors import FormatError
 from driftwalk.record.cleaning.stacked import split_bodies
 from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.head import first_lines, first_row, is_numeric_row
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import RawRecording, ReadOptions
-from driftwalk.record.recognise.marks import Marks
+from driftwalk.record.raw import Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
 
 NAMES: Final = ["frame", "arena", "track", "x", "y", "label"]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from driftwalk.core.errors import InputError
-from driftwalk.record.pose.heading import angle_between
-from driftwalk.record.pose.listed import listed
+from driftwalk.record.column_names import listed
+from driftwalk.record.pose.keypoints import angle_between
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
 
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
+from driftwalk.record.raw import Marks
 from driftwalk.record.recognise.contents import Contents, contents_of
-from driftwalk.record.recognise.marks import Marks
 
 KNOWN: Final = (
     (

@@ -13,8 +13,7 @@ import numpy.typing as npt
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.cleaning.several_bodies import LARGEST_SHARE
 from driftwalk.record.column_names import ColumnMap, column_meaning
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import Array
+from driftwalk.record.raw import Array, TableLayout
 from driftwalk.record.tables.clock import TableClock
 from driftwalk.record.tables.source import TableSource
 

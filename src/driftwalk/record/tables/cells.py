@@ -12,8 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.record.bad_row import is_number
-from driftwalk.record.layout import MISSING
-from driftwalk.record.raw import Array
+from driftwalk.record.raw import MISSING, Array
 from driftwalk.record.tables.stamps import (
     MOMENT,
     OF_DAY,

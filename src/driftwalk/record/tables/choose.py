@@ -7,7 +7,7 @@ from pathlib import Path
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.text.argument_text import argument_text
-from driftwalk.record.pose.listed import listed
+from driftwalk.record.column_names import listed
 from driftwalk.record.raw import ReadOptions
 from driftwalk.record.tables.rows import columns_of
 from driftwalk.record.tables.source import TableSource

@@ -9,8 +9,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.column_names import map_columns, unit_of_name
 from driftwalk.record.head import is_numeric_row
-from driftwalk.record.layout import MISSING
-from driftwalk.record.raw import ReadOptions
+from driftwalk.record.raw import MISSING, ReadOptions
 
 
 class TablePolicy(NamedTuple):

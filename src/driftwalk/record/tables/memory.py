@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.record.layout import TableLayout
+from driftwalk.record.raw import TableLayout
 from driftwalk.record.tables.cells import (
     CellError,
     Values,

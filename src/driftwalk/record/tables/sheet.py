@@ -11,8 +11,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.head import is_numeric_row
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import ReadOptions
+from driftwalk.record.raw import ReadOptions, TableLayout
 from driftwalk.record.tables.cells import (
     CellError,
     Values,

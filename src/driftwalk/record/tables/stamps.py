@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.record.layout import MISSING
+from driftwalk.record.raw import MISSING
 
 Ticks = npt.NDArray[np.int64]
 Texts = npt.NDArray[np.bytes_]

@@ -8,7 +8,7 @@ import numpy as np
 
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.column_names import ColumnMap
-from driftwalk.record.layout import MISSING, TableLayout
+from driftwalk.record.raw import MISSING, TableLayout
 from driftwalk.record.tables.source import TableSource
 
 

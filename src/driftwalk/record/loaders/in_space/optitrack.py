@@ -10,8 +10,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import split_fields
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import Array, RawRecording, ReadOptions
+from driftwalk.record.raw import Array, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.space.flat import SpaceTrack, lay_flat
 from driftwalk.record.space.plane import plane_of
 from driftwalk.record.space.turns import QUATERNION, Turns

@@ -11,8 +11,7 @@ from typing import Final
 import numpy as np
 
 from driftwalk.record.head import first_lines, is_numeric_row
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import RawRecording, ReadOptions
+from driftwalk.record.raw import RawRecording, ReadOptions, TableLayout
 from driftwalk.record.space.flat import SpaceTrack, lay_flat
 from driftwalk.record.space.plane import plane_of
 from driftwalk.record.space.turns import QUATERNION, Turns

@@ -11,8 +11,7 @@ import numpy.typing as npt
 from driftwalk.core.errors import FormatError
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.record.pose.keypoints import Confidence, Point, Poses, bodies_of, choose_keypoints
-from driftwalk.record.raw import RawRecording, ReadOptions
-from driftwalk.record.recognise.marks import Marks
+from driftwalk.record.raw import Marks, RawRecording, ReadOptions
 from driftwalk.record.stores.hdf5 import Hdf5Contents, names_in, opened_hdf5, text_of
 
 ORDER: Final = ("track", "xy", "node", "frame")

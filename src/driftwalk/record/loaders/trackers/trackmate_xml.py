@@ -12,8 +12,7 @@ import numpy as np
 from driftwalk.core.errors import FormatError
 from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.loaders.trackers.trackmate import OUTSIDE, stated_unit
-from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
-from driftwalk.record.recognise.marks import Marks
+from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions
 from driftwalk.record.text import DAMAGED_GZIP, open_binary
 
 _SPOT: Final = ("ID", "POSITION_X", "POSITION_Y", "POSITION_T", "FRAME")
